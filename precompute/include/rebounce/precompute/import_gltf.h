@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+
+#include "rebounce/precompute/scene.h"
+
+namespace rebounce {
+
+/// Imports the default scene of a .glb or .gltf file (the first scene where none is named, every
+/// root node where there is no scene).
+///
+/// Takes triangles, strips and fans, indexed or not, of every component type that glTF allows,
+/// sparse and interleaved accessors, any node transform; base colour, emission, double-sidedness;
+/// KHR_lights_punctual and cameras. Throws Error, one line, for anything that cannot be trusted or
+/// is required and not supported; what can be left out safely is counted or becomes a warning.
+Scene import_gltf(const std::filesystem::path& path);
+
+}  // namespace rebounce

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "rebounce/transfer/scene_description.h"
+#include "rebounce/transfer/types.h"
+
+namespace rebounce {
+
+/// A decoded image: 8-bit sRGB, alpha last, rows from the top.
+struct Image {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgba;  ///< [height][width][4]
+};
+
+/// A static triangle scene in world space: metres, right-handed, +Y up.
+struct Scene {
+  std::vector<Float3> position;             ///< [v]
+  std::vector<Float3> normal;               ///< [v] unit, on the front side
+  std::vector<Float2> base_color_texcoord;  ///< [v] set and KHR_texture_transform applied
+  std::vector<Float2> emissive_texcoord;    ///< [v] likewise
+  std::vector<Float3> vertex_color;         ///< [v] linear, 1 where the asset has none
+
+  std::vector<Uint3> triangle;  ///< [t] counter-clockwise seen from the front (mirrors undone)
+  std::vector<std::uint32_t> triangle_material;  ///< [t]
+
+  std::vector<Material> materials;  ///< at least one
+  std::vector<Texture> textures;
+  std::vector<Image> images;  ///< decoded, one for each texture
+  std::vector<Light> lights;
+  std::vector<Camera> cameras;
+
+  std::string name;  ///< file name without its folder
+  std::string hash;  ///< "xxh3:" + 32 hexadecimal digits over the file, its buffers and images
+  std::size_t degenerate_triangle_count = 0;  ///< dropped: no area
+  std::vector<std::string> warnings;          ///< one line each
+};
+
+}  // namespace rebounce

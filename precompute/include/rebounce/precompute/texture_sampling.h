@@ -1,0 +1,24 @@
+#pragma once
+
+#include "rebounce/precompute/scene.h"
+
+namespace rebounce {
+
+/// One sRGB byte as linear light in [0, 1].
+float srgb_to_linear(std::uint8_t value);
+
+/// The image's colour in linear light at `texcoord`, bilinearly filtered, wrapped as `texture`
+/// says.
+Float3 sample_texture(const Texture& texture, const Image& image, Float2 texcoord);
+
+/// Base colour (linear: factor x texture x vertex colour) averaged over the triangle with these
+/// texture coordinates and vertex colours: stratified samples, more where more texels are covered.
+Float3 mean_base_color(const Scene& scene, const Material& material,
+                       const std::array<Float2, 3>& texcoord,
+                       const std::array<Float3, 3>& vertex_color);
+
+/// Emitted luminance in cd/m² averaged over the triangle, likewise.
+Float3 mean_emitted_luminance(const Scene& scene, const Material& material,
+                              const std::array<Float2, 3>& texcoord);
+
+}  // namespace rebounce

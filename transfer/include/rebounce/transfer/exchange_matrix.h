@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/transfer/shared_array.h"
+#include "rebounce/transfer/types.h"
+
+namespace rebounce {
+
+/// The form factors as exchange areas S(i,j) = area(i) F(i,j) in m².
+///
+/// S is symmetric (reciprocity), so only the strict upper triangle is kept, by rows: one stored
+/// number serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. The
+/// diagonal is zero: a flat patch does not see itself. Pairs that do not see each other are absent.
+struct ExchangeMatrix {
+  SharedArray<std::uint64_t> row_begin;  ///< [n + 1], row_begin[n] = number of entries
+  SharedArray<std::uint32_t> column;     ///< ascending in each row, row < column < n
+  SharedArray<float> exchange_area;      ///< m², > 0
+
+  std::size_t patch_count() const { return row_begin.empty() ? 0 : row_begin.size() - 1; }
+};
+
+/// Form factors by full rows, ready for gathering: row i lists every j with F(i,j) > 0.
+///
+/// Twice the entries of the ExchangeMatrix it is made from, in exchange for row access.
+class FormFactorRows {
+ public:
+  /// Expands `exchange`. `area` has n entries in m². Throws Error if the sizes do not agree.
+  FormFactorRows(const ExchangeMatrix& exchange, std::span<const float> area);
+
+  std::size_t patch_count() const { return row_begin_.size() - 1; }
+  std::span<const std::uint32_t> columns(std::size_t row) const {
+    return {column_.data() + row_begin_[row], column_.data() + row_begin_[row + 1]};
+  }
+  std::span<const float> form_factors(std::size_t row) const {
+    return {form_factor_.data() + row_begin_[row], form_factor_.data() + row_begin_[row + 1]};
+  }
+  std::size_t bytes() const;
+
+  /// Gathers: out(i) = sum over j of F(i,j) in(j), each of [n][3]. `out` must not overlap `in`.
+  /// Rows are shared out among OpenMP threads; the bits do not depend on how many there are.
+  void gather(std::span<const Float3> in, std::span<Float3> out) const;
+
+ private:
+  std::vector<std::uint64_t> row_begin_;
+  std::vector<std::uint32_t> column_;
+  std::vector<float> form_factor_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,63 @@
+#pragma once
+
+// What a renderer needs of the scene besides its geometry: materials, textures, cameras, lights.
+// Shared by the importer (which fills it), the transfer file (which stores it) and the runtime.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "rebounce/transfer/types.h"
+
+namespace rebounce {
+
+enum class LightType : std::uint8_t { kPoint, kSpot, kDirectional };
+
+/// A punctual light with the fields and units of KHR_lights_punctual, placed in the world.
+struct Light {
+  LightType type = LightType::kPoint;
+  std::string name;
+  Float3 position{0, 0, 0};    ///< metres; not used by directional lights
+  Float3 direction{0, -1, 0};  ///< unit; the way the light travels; not used by point lights
+  Float3 color{1, 1, 1};       ///< linear Rec.709, each >= 0
+  float intensity = 1;         ///< candela (point, spot) or lux (directional), >= 0
+  float range = 0;             ///< metres; beyond it no light arrives; 0 means unlimited
+  float inner_cone_angle = 0;  ///< radians from the axis: full intensity inside (spot)
+  float outer_cone_angle = 0.785398163F;  ///< radians from the axis: none outside (spot)
+};
+
+/// A uniform sky: the same luminance from every direction in which nothing is hit.
+struct Sky {
+  Float3 color{1, 1, 1};
+  float luminance = 0;  ///< cd/m², >= 0
+};
+
+/// A perspective camera placed in the world. `right`, `up` and `backward` are orthonormal.
+struct Camera {
+  std::string name;
+  Float3 position{0, 0, 0};
+  Float3 right{1, 0, 0};
+  Float3 up{0, 1, 0};
+  Float3 backward{0, 0, 1};  ///< the camera looks along -backward, as in glTF
+  float vertical_fov = 0.8F;  ///< radians
+};
+
+enum class TextureWrap : std::uint8_t { kRepeat, kClampToEdge, kMirroredRepeat };
+
+/// An image in its encoded form (PNG or JPEG bytes), as the asset carries it.
+struct Texture {
+  std::vector<std::uint8_t> encoded;
+  TextureWrap wrap_s = TextureWrap::kRepeat;
+  TextureWrap wrap_t = TextureWrap::kRepeat;
+};
+
+struct Material {
+  std::string name;
+  Float3 base_color{1, 1, 1};         ///< linear; multiplies texture and vertex colour
+  Float3 emitted_luminance{0, 0, 0};  ///< cd/m² (nit): emissiveFactor x emissiveStrength
+  std::uint32_t base_color_texture = kNone;
+  std::uint32_t emissive_texture = kNone;
+  bool double_sided = false;
+};
+
+}  // namespace rebounce

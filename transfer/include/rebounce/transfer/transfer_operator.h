@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+
+#include "rebounce/transfer/types.h"
+
+namespace rebounce {
+
+/// Y = F (I - rho F)^-1: takes the light that leaves the patches the first time to the complete
+/// indirect light that arrives at them, H = Y M0, one matrix per colour channel.
+///
+/// An operator is immutable: any number of threads may apply one at the same time, each with a
+/// workspace of its own.
+class TransferOperator {
+ public:
+  virtual ~TransferOperator() = default;
+
+  virtual std::size_t patch_count() const = 0;
+
+  /// Bytes of the stored operator, all three channels.
+  virtual std::size_t bytes() const = 0;
+
+  /// The kind as the command line names it: "dense".
+  virtual std::string kind() const = 0;
+
+  /// Floats of workspace that `apply` needs.
+  virtual std::size_t workspace_size() const = 0;
+
+  /// Writes the indirect irradiance [n][3] in lx that `initial_exitance` [n][3] in lx gives rise
+  /// to. The two must not overlap; `workspace` has at least workspace_size() floats and is
+  /// overwritten. Neither allocates nor locks; the same bits for any number of OpenMP threads.
+  virtual void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+                     std::span<float> workspace) const = 0;
+};
+
+}  // namespace rebounce
