@@ -1,7 +1,6 @@
 #include "rebounce/precompute/lit_sides.h"
 
-#include "float3_glm.h"
-#include "rebounce/precompute/sampling.h"
+#include "hemisphere_rays.h"
 #include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
@@ -12,23 +11,10 @@ constexpr std::uint32_t kRaysPerSide = 256;
 
 void make_rays(const Scene& scene, std::uint32_t t, bool front, std::vector<Ray>& rays) {
   const Uint3& corner = scene.triangle[t];
-  const glm::dvec3 a = to_dvec3(scene.position[corner[0]]);
-  const glm::dvec3 ab = to_dvec3(scene.position[corner[1]]) - a;
-  const glm::dvec3 ac = to_dvec3(scene.position[corner[2]]) - a;
-  const glm::dvec3 normal = glm::normalize(glm::cross(ab, ac)) * (front ? 1.0 : -1.0);
-  const glm::dmat3 frame = frame_around(normal);
-  const glm::dvec2 point_shift = unit_square(mix_bits(2 * t)), way_shift(unit_square(mix_bits(2 * t + 1)));
-  for (std::uint32_t k = 0; k < kRaysPerSide; ++k) {
-    const glm::dvec2 b = square_to_triangle(r2_point(k, point_shift));
-    // A second sequence with other steps, so that points and directions do not march together.
-    const glm::dvec2 s = glm::fract(way_shift + (k + 0.5) * glm::dvec2(0.41421356, 0.73205081));
-    Ray& ray = rays[k];
-    ray = Ray{};
-    ray.origin = offset_point(to_float3(a + b.x * ab + b.y * ac), to_float3(normal));
-    ray.direction = to_float3(frame * square_to_cosine_hemisphere(s));
-    ray.t_near = 0;
-    ray.t_far = std::numeric_limits<float>::infinity();
-  }
+  const glm::dvec3 a = to_dvec3(scene.position[corner[0]]), b = to_dvec3(scene.position[corner[1]]),
+                   c = to_dvec3(scene.position[corner[2]]);
+  const glm::dvec3 normal = glm::normalize(glm::cross(b - a, c - a)) * (front ? 1.0 : -1.0);
+  make_hemisphere_rays({a, b, c}, normal, mix_bits(t), rays);
 }
 
 }  // namespace

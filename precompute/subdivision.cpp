@@ -7,7 +7,7 @@
 #include <queue>
 #include <unordered_map>
 
-#include "float3_glm.h"
+#include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
 namespace {

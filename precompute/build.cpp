@@ -1,0 +1,201 @@
+#include "rebounce/precompute/build.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/measured_error.h"
+#include "rebounce/precompute/patch_model.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/version.h"
+
+namespace rebounce {
+namespace {
+
+constexpr int kTestLightCount = 16;
+
+// A residual above this is not rounding but a mistake; f32 and f16 entries.
+constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
+
+std::uint64_t machine_memory_bytes() {
+  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
+         static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
+}
+
+CostEstimate estimate_cost(const PatchTable& patches, int probe_rays) {
+  std::array<std::uint32_t, kChannelCount> channel_matrix{};
+  const std::uint32_t matrices = distinct_channels(patches.reflectance, channel_matrix);
+  const auto n = static_cast<double>(patches.size());
+  CostEstimate estimate;
+  estimate.patch_count = patches.size();
+  // Form factors at their fullest: half of all pairs, 16 bytes each while they are made and 24 when
+  // they are compressed and expanded; then the inversion beside the compressed ones.
+  const double factors = n * n / 4;
+  estimate.peak_bytes = static_cast<std::uint64_t>(
+      std::max(40 * factors, 8 * factors + static_cast<double>(dense_transfer_peak_bytes(
+                                               patches.size(), matrices))));
+  // Ten million rays and fifty billion operations a second, about one slow core.
+  estimate.seconds = factors * probe_rays / 1e7 + 2 * n * n * n * matrices / 5e10;
+  return estimate;
+}
+
+std::string in_gib(std::uint64_t bytes) {
+  return fmt::format("{:.1f} GiB", static_cast<double>(bytes) / (1ULL << 30));
+}
+
+void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
+                         std::size_t triangle_count) {
+  const std::uint64_t limit = limit_bytes > 0 ? limit_bytes : machine_memory_bytes() / 2;
+  if (estimate.peak_bytes <= limit) return;
+  throw Error(fmt::format("{} patches (from {} triangles) need about {} and the limit is {}; ask for "
+                          "fewer patches, simplify the scene or raise --memory-limit",
+                          estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes),
+                          in_gib(limit)));
+}
+
+/// Times phases and passes their progress on.
+class PhaseClock {
+ public:
+  PhaseClock(BuildReport& report, const BuildProgress& progress)
+      : report_(report), progress_(progress) {}
+
+  template <typename Work>
+  auto run(const char* phase, const Work& work) {
+    const Progress progress = [this, phase](double fraction) {
+      return !progress_ || progress_(phase, fraction);
+    };
+    if (!progress(0)) throw Cancelled();
+    const auto begin = std::chrono::steady_clock::now();
+    auto result = work(progress);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    report_.seconds.emplace_back(phase, seconds.count());
+    if (!progress(1)) throw Cancelled();
+    return result;
+  }
+
+ private:
+  BuildReport& report_;
+  const BuildProgress& progress_;
+};
+
+void describe_patches(const PatchModel& model, BuildReport& report) {
+  report.display_triangle_count = model.mesh.triangle.size();
+  report.patch_count = model.patches.size();
+  report.unlit_side_count = model.unlit_side_count;
+  std::vector<float> size(model.patches.area);
+  for (float& s : size) s = std::sqrt(s);
+  std::ranges::sort(size);
+  report.patch_size_min = size.front();
+  report.patch_size_median = size[size.size() / 2];
+  report.patch_size_max = size.back();
+  report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
+}
+
+std::string settings_json(const BuildSettings& settings) {
+  const FormFactorSettings& f = settings.form_factors;
+  return nlohmann::json{{"operator", "dense"},
+                        {"precision", settings.precision == Precision::kF16 ? "f16" : "f32"},
+                        {"patches", settings.subdivision.patch_count},
+                        {"patch_size", settings.subdivision.patch_size},
+                        {"seed", f.seed},
+                        {"probe_rays", f.probe_rays},
+                        {"full_rays", f.full_rays},
+                        {"escape_rays", f.escape_rays},
+                        {"kernel_tolerance", f.kernel_tolerance}}
+      .dump();
+}
+
+/// The part of the report that is the same in every run: it goes into the file, times do not.
+std::string report_json(const BuildReport& report) {
+  return nlohmann::json{{"triangles", report.triangle_count},
+                        {"degenerate_triangles", report.degenerate_triangle_count},
+                        {"display_triangles", report.display_triangle_count},
+                        {"unlit_sides", report.unlit_side_count},
+                        {"patch_size_min", report.patch_size_min},
+                        {"patch_size_median", report.patch_size_median},
+                        {"patch_size_max", report.patch_size_max},
+                        {"rays", report.ray_count},
+                        {"pairs", report.pair_count},
+                        {"form_factors", report.form_factor_count},
+                        {"row_sum_error_before", report.closure.row_sum_error_before},
+                        {"row_sum_error_after", report.closure.row_sum_error_after},
+                        {"closure_change", report.closure.relative_change},
+                        {"warnings", report.warnings}}
+      .dump();
+}
+
+void check_residual(double residual, Precision precision) {
+  const double largest = precision == Precision::kF16 ? kLargestResidualF16 : kLargestResidualF32;
+  if (residual <= largest) return;
+  throw Error(fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
+                          "please report this scene",
+                          residual, largest));
+}
+
+}  // namespace
+
+TransferData build_transfer_data(const std::filesystem::path& scene_path,
+                                 const BuildSettings& settings, BuildReport& report,
+                                 const BuildProgress& progress,
+                                 const EstimateListener& on_estimate) {
+  PhaseClock clock(report, progress);
+  TransferData data;
+
+  Scene scene = clock.run("import", [&](const Progress&) { return import_gltf(scene_path); });
+  report.triangle_count = scene.triangle.size();
+  report.degenerate_triangle_count = scene.degenerate_triangle_count;
+  report.warnings = scene.warnings;
+  data.materials = scene.materials;
+  data.textures = scene.textures;
+  data.cameras = scene.cameras;
+  data.lights = scene.lights;
+  data.record.generator = std::string("rebounce ") + version();
+  data.record.scene_name = scene.name;
+  data.record.scene_hash = scene.hash;
+
+  PatchModel model = clock.run("patches", [&](const Progress&) {
+    return make_patch_model(std::move(scene), settings.subdivision);
+  });
+  describe_patches(model, report);
+  report.estimate = estimate_cost(model.patches, settings.form_factors.probe_rays);
+  if (on_estimate) on_estimate(report.estimate);
+  refuse_if_too_large(report.estimate, settings.memory_limit_bytes, report.triangle_count);
+
+  const RayTracer tracer(model.mesh.position,
+                         std::span(model.mesh.triangle).first(model.mesh.surface_count()));
+  FormFactors form_factors = clock.run("form factors", [&](const Progress& part) {
+    return compute_form_factors(model, tracer, settings.form_factors, part);
+  });
+  report.ray_count = form_factors.ray_count;
+  report.pair_count = form_factors.pair_count;
+  report.form_factor_count = form_factors.exchange.column.size();
+  report.closure = form_factors.closure;
+  data.patches = std::move(model.patches);
+  data.patches.sky_visibility = std::move(form_factors.sky_visibility);
+  data.patches.absorbed = std::move(form_factors.absorbed);
+  data.mesh = std::move(model.mesh);
+  data.exchange = std::move(form_factors.exchange);
+
+  data.transfer = clock.run("operator", [&](const Progress& part) {
+    return build_dense_transfer(data.exchange, data.patches, settings.precision, part);
+  });
+  const MeasuredError error = clock.run("check", [&](const Progress& part) {
+    data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
+    check_residual(data.record.solve_residual, settings.precision);
+    return measure_error(data, tracer, kTestLightCount, settings.form_factors.seed, part);
+  });
+  data.record.error_mean = error.mean;
+  data.record.error_max = error.max;
+  data.record.error_bound = 2 * error.max;
+  data.record.settings_json = settings_json(settings);
+  data.record.report_json = report_json(report);
+  return data;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/precompute/form_factors.h"
+
+namespace rebounce {
+
+/// One pair in the upper triangle of the exchange matrix while it is being made.
+struct ExchangeEntry {
+  std::uint32_t column;
+  float exchange_area;  ///< m²
+  double variance;      ///< of exchange_area, m⁴: how sure its visibility is
+};
+
+using ExchangeRows = std::vector<std::vector<ExchangeEntry>>;
+
+/// What a row of F should add up to, and how sure that is (0: certain).
+struct RowTarget {
+  double sum;
+  double deviation;
+};
+
+/// Corrects the exchange areas so that rows add up to their targets, reciprocity untouched.
+///
+/// Minimises sum (S' - S)² / variance + sum over i of (row sum of F' - target)² / deviation² over
+/// symmetric S': the least squares of M. E. Larsen and J. R. Howell, "Least-squares smoothing of
+/// direct-exchange areas in zonal analysis", 1986, with two differences. The weights are variances
+/// that we know, so that pairs in penumbrae give way and fully visible ones stay; and targets that are
+/// themselves measured (rows that escape in part) pull only as hard as they are certain. Entries stay
+/// within half of what they were.
+ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
+                              std::span<const RowTarget> target);
+
+}  // namespace rebounce

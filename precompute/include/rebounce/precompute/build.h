@@ -1,0 +1,61 @@
+#pragma once
+
+// The offline stage from end to end: scene file in, transfer data out.
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/subdivision.h"
+#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+struct BuildSettings {
+  SubdivisionSettings subdivision;
+  FormFactorSettings form_factors;
+  Precision precision = Precision::kF32;  ///< kF16: half the bytes, an error of some 1e-4
+  std::uint64_t memory_limit_bytes = 0;   ///< refuse to start what needs more; 0: half the machine's
+};
+
+/// What the expensive part will take, known before it begins.
+struct CostEstimate {
+  std::size_t patch_count = 0;
+  std::uint64_t peak_bytes = 0;
+  double seconds = 0;  ///< rough: from the number of pairs and the flops of the inversion
+};
+
+struct BuildReport {
+  std::size_t triangle_count = 0;  ///< of the scene, without degenerate ones
+  std::size_t degenerate_triangle_count = 0;
+  std::size_t display_triangle_count = 0;
+  std::size_t patch_count = 0;
+  std::size_t unlit_side_count = 0;
+  float patch_size_min = 0, patch_size_median = 0, patch_size_max = 0;  ///< sqrt(area), metres
+  std::vector<std::string> warnings;
+  std::vector<std::pair<std::string, double>> seconds;  ///< by phase, in order
+  std::uint64_t ray_count = 0, pair_count = 0, form_factor_count = 0;
+  ClosureReport closure;
+  CostEstimate estimate;
+};
+
+/// Called when a phase begins, during it and at its end; returning false stops the build.
+using BuildProgress = std::function<bool(std::string_view phase, double fraction)>;
+
+/// Called once patches are known and before form factors are begun.
+using EstimateListener = std::function<void(const CostEstimate&)>;
+
+/// Runs the offline stage. Throws Error if the scene cannot be used or what it needs is over the
+/// memory limit (before the expensive part), Cancelled if asked to stop.
+TransferData build_transfer_data(const std::filesystem::path& scene_path,
+                                 const BuildSettings& settings, BuildReport& report,
+                                 const BuildProgress& progress = {},
+                                 const EstimateListener& on_estimate = {});
+
+}  // namespace rebounce

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "rebounce/precompute/progress.h"
+#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// Builds Y = F (I - rho F)^-1 for each channel, dense.
+///
+/// With G = A^1/2 F A^-1/2 and R = rho^1/2, the matrix I - R G R is symmetric positive definite, and
+/// (I - R G R)^-1 = I + R Yhat R gives Yhat = A^1/2 Y A^-1/2. A floor of 1e-7 under the reflectance
+/// makes the division by R harmless for black patches and changes Y by less than 1e-7.
+/// Channels with the same reflectances share one matrix. Throws Cancelled if asked to stop.
+std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& exchange,
+                                                          const PatchTable& patches,
+                                                          Precision precision,
+                                                          const Progress& progress = {});
+
+/// Bytes that build_dense_transfer holds at its peak: the matrix that is inverted and the operator.
+std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
+
+/// Number of different reflectance channels, 1 to 3, and which of them each channel uses.
+std::uint32_t distinct_channels(std::span<const Float3> reflectance,
+                                std::array<std::uint32_t, kChannelCount>& channel_matrix);
+
+/// The largest relative area-weighted L2 residual of Y (I - rho F) v = F v over a few random v.
+double transfer_residual(const TransferOperator& transfer, const ExchangeMatrix& exchange,
+                         const PatchTable& patches);
+
+}  // namespace rebounce

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rebounce/precompute/form_factor_kernel.h"
+#include "rebounce/precompute/patch_model.h"
+#include "rebounce/precompute/progress.h"
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/exchange_matrix.h"
+
+namespace rebounce {
+
+struct FormFactorSettings {
+  std::uint64_t seed = 1;  ///< of the sample points; another seed is another, equally good F
+  /// Shadow rays for a pair of patches to begin with; if they agree that is all. More: partly
+  /// hidden pairs are noticed more often. At most 64.
+  int probe_rays = 8;
+  /// Shadow rays for a pair that is partly hidden. More: smoother penumbrae, slower. At most 64.
+  int full_rays = 64;
+  /// Rays per patch that measure what escapes or meets back faces. More: better row sums in open
+  /// scenes; closed rooms do not need them.
+  int escape_rays = 1024;
+  /// Relative error aimed at by the unoccluded kernel.
+  double kernel_tolerance = 3e-4;
+};
+
+/// How large the correction for closure was (closure.h).
+struct ClosureReport {
+  double row_sum_error_before = 0;  ///< largest |sum over j of F(i,j) - target| before
+  double row_sum_error_after = 0;   ///< the same after, over rows whose target is exact
+  double relative_change = 0;       ///< |S' - S| / |S|, Frobenius
+};
+
+struct FormFactors {
+  ExchangeMatrix exchange;
+  std::vector<float> sky_visibility;  ///< [n] fraction of a patch's light that leaves the scene
+  std::vector<float> absorbed;        ///< [n] fraction that meets back faces; with the row sum of F
+                                      ///< the three add up to 1
+  ClosureReport closure;
+  std::uint64_t ray_count = 0;
+  std::uint64_t pair_count = 0;  ///< pairs of patches that face each other
+};
+
+/// Finds the form factors of every pair of patches: exact exchange of the unoccluded triangles times
+/// the kernel-weighted part of shadow rays that get through (form_factor_kernel.h), corrected so that
+/// reciprocity and closure hold together (closure.h).
+///
+/// `tracer` holds the first surface_count triangles of model.mesh. Rows are shared out among OpenMP
+/// threads; the bits do not depend on how many. Throws Cancelled when `progress` says so.
+FormFactors compute_form_factors(const PatchModel& model, const RayTracer& tracer,
+                                 const FormFactorSettings& settings = {},
+                                 const Progress& progress = {});
+
+}  // namespace rebounce

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "rebounce/precompute/scene.h"
+#include "rebounce/precompute/subdivision.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// Reflectances above this are clamped to it, so that the light of infinitely many bounces is finite.
+inline constexpr float kMaxReflectance = 0.99F;
+
+/// The scene as patches: what is shown, and what exchanges light.
+struct PatchModel {
+  PatchTable patches;  ///< sky_visibility and absorbed are left to the form factors
+  DisplayMesh mesh;
+  std::vector<std::uint32_t> patch_triangle;  ///< [n] display triangle of each patch
+  std::size_t scene_triangle_count = 0;       ///< before subdivision
+  std::size_t unlit_side_count = 0;           ///< sides that see nothing and got no patch
+  std::vector<std::string> warnings;
+};
+
+/// Subdivides the scene's triangles and makes every lit side of every one a patch: reflectance and
+/// emission are means over the triangle, textures integrated. Double-sided triangles get a second
+/// display triangle. Also fills the reconstruction weights (reconstruction_weights.h).
+PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);
+
+}  // namespace rebounce

@@ -1,0 +1,85 @@
+#include "rebounce/precompute/measured_error.h"
+
+#include <algorithm>
+#include <array>
+#include <glm/glm.hpp>
+
+#include "hemisphere_rays.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/runtime/direct_lighting.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+glm::dvec3 lowest_corner(const DisplayMesh& mesh) {
+  glm::dvec3 low(std::numeric_limits<double>::max());
+  for (const Float3& p : mesh.position) low = glm::min(low, to_dvec3(p));
+  return low;
+}
+
+glm::dvec3 highest_corner(const DisplayMesh& mesh) {
+  glm::dvec3 high(std::numeric_limits<double>::lowest());
+  for (const Float3& p : mesh.position) high = glm::max(high, to_dvec3(p));
+  return high;
+}
+
+}  // namespace
+
+std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
+                                       std::uint64_t seed) {
+  const DisplayMesh& mesh = data.mesh;
+  const double open_reach = 0.25 * glm::distance(lowest_corner(mesh), highest_corner(mesh));
+  std::vector<std::uint32_t> triangle_of(data.patches.size());
+  for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+    if (mesh.triangle_patch[t] != kNone) triangle_of[mesh.triangle_patch[t]] = t;
+  }
+  std::vector<Light> lights(count);
+  for (int k = 0; k < count; ++k) {
+    const std::uint64_t bits = mix_bits(seed + 0x51ED270BULL * k);
+    const std::uint32_t patch = static_cast<std::uint32_t>(bits % data.patches.size());
+    const Uint3& v = mesh.triangle[triangle_of[patch]];
+    std::array<Ray, 1> ray;
+    std::array<Hit, 1> hit;
+    make_hemisphere_rays({to_dvec3(mesh.position[v[0]]), to_dvec3(mesh.position[v[1]]),
+                          to_dvec3(mesh.position[v[2]])},
+                         to_dvec3(data.patches.normal[patch]), bits, ray);
+    tracer.intersect(ray, hit);
+    const double reach = hit[0].triangle == kNone ? open_reach : hit[0].t;
+    const double part = 0.2 + 0.6 * unit_square(mix_bits(bits)).x;
+    lights[k].position =
+        to_float3(to_dvec3(ray[0].origin) + part * reach * to_dvec3(ray[0].direction));
+  }
+  return lights;
+}
+
+MeasuredError measure_error(const TransferData& data, const RayTracer& tracer, int light_count,
+                            std::uint64_t seed, const Progress& progress) {
+  const std::size_t n = data.patches.size();
+  const ReferenceSolver reference(data.exchange, data.patches);
+  DirectLighting direct_lighting(data, tracer);
+  std::vector<Float3> initial_exitance(n), indirect_irradiance(n);
+  std::vector<float> workspace(data.transfer->workspace_size());
+  MeasuredError error;
+  int lit = 0;
+  const std::vector<Light> lights = random_point_lights(data, tracer, light_count, seed);
+  for (int k = 0; k < light_count; ++k) {
+    if (progress && !progress(static_cast<double>(k) / light_count)) throw Cancelled();
+    direct_lighting.compute({&lights[k], 1}, {}, initial_exitance);
+    for (std::size_t i = 0; i < n; ++i) {
+      for (int c = 0; c < kChannelCount; ++c) initial_exitance[i][c] *= data.patches.reflectance[i][c];
+    }
+    if (area_norm(initial_exitance, data.patches.area) == 0) continue;
+    data.transfer->apply(initial_exitance, indirect_irradiance, workspace);
+    const std::vector<Float3> truth = reference.indirect_irradiance(initial_exitance, 1e-9);
+    const double e = relative_difference(indirect_irradiance, truth, data.patches.area);
+    error.mean += e;
+    error.max = std::max(error.max, e);
+    ++lit;
+  }
+  if (lit > 0) error.mean /= lit;
+  return error;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,142 @@
+#define EIGEN_USE_BLAS
+#define EIGEN_DONT_PARALLELIZE
+#include "tiled_cholesky.h"
+
+#include <cblas.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Dense>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+using Tile = TiledMatrix::Tile;
+
+/// Makes OpenBLAS run on the thread that calls it, for as long as this lives.
+class SingleThreadedBlas {
+ public:
+  SingleThreadedBlas() : before_(openblas_get_num_threads()) { openblas_set_num_threads(1); }
+  ~SingleThreadedBlas() { openblas_set_num_threads(before_); }
+  SingleThreadedBlas(const SingleThreadedBlas&) = delete;
+  SingleThreadedBlas& operator=(const SingleThreadedBlas&) = delete;
+
+ private:
+  int before_;
+};
+
+/// Reports progress over three stages of equal work, each cubic in the step.
+class StageProgress {
+ public:
+  StageProgress(const Progress& progress, std::size_t steps) : progress_(progress), steps_(steps) {}
+
+  void report(int stage, double done_of_stage) const {
+    if (progress_ && !progress_((stage + done_of_stage) / 3)) throw Cancelled();
+  }
+  double fraction(std::size_t step) const {
+    return static_cast<double>(step + 1) / static_cast<double>(steps_);
+  }
+
+ private:
+  const Progress& progress_;
+  std::size_t steps_;
+};
+
+void factor(TiledMatrix& m, const StageProgress& progress) {
+  for (std::size_t k = 0; k < m.side(); ++k) {
+    Tile diagonal = m.tile(k, k);
+    const Eigen::LLT<Eigen::MatrixXd> llt(diagonal);
+    if (llt.info() != Eigen::Success) {
+      throw Error("the radiosity system is not positive definite; a reflectance must be 1 or more");
+    }
+    diagonal = llt.matrixL();
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = k + 1; i < m.side(); ++i) {
+      Tile a = m.tile(i, k);
+      diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(a);
+    }
+    // All tiles (i, j) with k < j <= i, as one index so that threads share them evenly.
+    const std::size_t left = m.side() - k - 1;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t index = 0; index < left * left; ++index) {
+      const std::size_t i = k + 1 + index / left, j = k + 1 + index % left;
+      if (j > i) continue;
+      m.tile(i, j).noalias() -= m.tile(i, k) * m.tile(j, k).transpose();
+    }
+    const double rest = 1 - progress.fraction(k);
+    progress.report(0, 1 - rest * rest * rest);
+  }
+}
+
+void invert_lower(TiledMatrix& m, const StageProgress& progress) {
+  for (std::size_t k = 0; k < m.side(); ++k) {
+    Tile diagonal = m.tile(k, k);
+    const auto lower = diagonal.triangularView<Eigen::Lower>();
+    const std::size_t below = m.side() - k - 1;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t i = k + 1; i < m.side(); ++i) {
+      Tile a = m.tile(i, k);
+      lower.solveInPlace<Eigen::OnTheRight>(a);
+      a = -a;
+    }
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t index = 0; index < below * k; ++index) {
+      const std::size_t i = k + 1 + index / k, j = index % k;
+      m.tile(i, j).noalias() += m.tile(i, k) * m.tile(k, j);
+    }
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t j = 0; j < k; ++j) {
+      Tile a = m.tile(k, j);
+      lower.solveInPlace(a);
+    }
+    Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(TiledMatrix::kTile, TiledMatrix::kTile);
+    lower.solveInPlace(inverse);
+    diagonal = inverse;
+    progress.report(1, progress.fraction(k));
+  }
+}
+
+/// L^-T L^-1 in place of L^-1.
+void multiply_by_transpose(TiledMatrix& m, const StageProgress& progress) {
+  for (std::size_t k = 0; k < m.side(); ++k) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t index = 0; index < k * k; ++index) {
+      const std::size_t i = index / k, j = index % k;
+      if (j > i) continue;
+      m.tile(i, j).noalias() += m.tile(k, i).transpose() * m.tile(k, j);
+    }
+    Tile diagonal = m.tile(k, k);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t j = 0; j < k; ++j) {
+      Tile a = m.tile(k, j);
+      a = diagonal.triangularView<Eigen::Lower>().transpose() * a.eval();
+    }
+    const Eigen::MatrixXd product = diagonal.transpose() * diagonal;
+    diagonal = product;
+    const double done = progress.fraction(k);
+    progress.report(2, done * done * done);
+  }
+}
+
+}  // namespace
+
+TiledMatrix::TiledMatrix(std::size_t size)
+    : size_(size), side_((size + kTile - 1) / kTile), values_(bytes(size) / sizeof(double), 0.0) {
+  for (std::size_t i = size; i < side_ * kTile; ++i) at(i, i) = 1;
+}
+
+std::size_t TiledMatrix::bytes(std::size_t size) {
+  const std::size_t side = (size + kTile - 1) / kTile;
+  return side * (side + 1) / 2 * kTile * kTile * sizeof(double);
+}
+
+void invert_positive_definite(TiledMatrix& matrix, const Progress& progress) {
+  const SingleThreadedBlas single_threaded;
+  const StageProgress stages(progress, matrix.side());
+  factor(matrix, stages);
+  invert_lower(matrix, stages);
+  multiply_by_transpose(matrix, stages);
+}
+
+}  // namespace rebounce
