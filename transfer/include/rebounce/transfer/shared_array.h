@@ -31,6 +31,9 @@ class SharedArray {
   auto end() const { return view_.end(); }
   std::span<const T> span() const { return view_; }
 
+  /// What keeps the memory alive, for arrays that are parts of this one.
+  const std::shared_ptr<const void>& owner() const { return owner_; }
+
  private:
   std::span<const T> view_;
   std::shared_ptr<const void> owner_;

@@ -1,0 +1,234 @@
+#include "transfer_data_check.h"
+
+#include <concepts>
+#include <limits>
+
+#include "rebounce/transfer/error.h"
+#include "shortest_decimal.h"
+#include "transfer_file_format.h"
+
+namespace rebounce {
+namespace {
+
+// What a number may be. Each is false for a NaN.
+constexpr float kLargest = std::numeric_limits<float>::max();
+constexpr float kPi = 3.14159265F;
+
+struct Range {
+  const char* text;
+  bool (*holds)(float);
+};
+constexpr Range kFinite{"finite", [](float x) { return x >= -kLargest && x <= kLargest; }};
+constexpr Range kPositive{"finite and > 0", [](float x) { return x > 0 && x <= kLargest; }};
+constexpr Range kNotNegative{"finite and >= 0", [](float x) { return x >= 0 && x <= kLargest; }};
+constexpr Range kFraction{"in [0, 1]", [](float x) { return x >= 0 && x <= 1; }};
+constexpr Range kReflectance{"in [0, 1)", [](float x) { return x >= 0 && x < 1; }};
+constexpr Range kFieldOfView{"in (0, pi)", [](float x) { return x > 0 && x < kPi; }};
+
+class Checker {
+ public:
+  Checker(const TransferData& data, const std::string& file) : data_(data), file_(file) {}
+
+  void check() const {
+    check_sizes();
+    check_patches();
+    check_mesh();
+    check_weights();
+    check_materials();
+    check_cameras();
+    check_lights();
+    check_exchange();
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& name, const std::string& reason) const {
+    throw Error(file_ + ": tensor " + name + ": " + reason + "; make the file again");
+  }
+
+  [[noreturn]] void refuse_entry(const std::string& name, std::size_t entry,
+                                 const std::string& value, const std::string& wanted) const {
+    refuse(name, "entry " + std::to_string(entry) + " is " + value + ", not " + wanted);
+  }
+
+  void rows(const char* name, std::size_t rows, std::size_t wanted) const {
+    if (rows != wanted) {
+      refuse(name, std::to_string(rows) + " rows, not " + std::to_string(wanted));
+    }
+  }
+
+  void number(const char* name, std::size_t entry, float value, Range range) const {
+    if (!range.holds(value)) refuse_entry(name, entry, shortest_decimal(value), range.text);
+  }
+
+  template <std::size_t N>
+  void number(const char* name, std::size_t entry, const std::array<float, N>& value,
+              Range range) const {
+    for (const float component : value) number(name, entry, component, range);
+  }
+
+  template <typename Values>
+  void numbers(const char* name, const Values& values, Range range) const {
+    for (std::size_t i = 0; i < values.size(); ++i) number(name, i, values[i], range);
+  }
+
+  template <typename Item, typename T>
+  void numbers(const char* name, const std::vector<Item>& items, T Item::*member,
+               Range range) const {
+    for (std::size_t i = 0; i < items.size(); ++i) number(name, i, items[i].*member, range);
+  }
+
+  void index(const char* name, std::size_t entry, std::uint32_t value, std::size_t count) const {
+    if (value >= count) {
+      refuse_entry(name, entry, std::to_string(value), "below " + std::to_string(count));
+    }
+  }
+
+  void index_or_none(const char* name, std::size_t entry, std::uint32_t value,
+                     std::size_t count) const {
+    if (value != kNone) index(name, entry, value, count);
+  }
+
+  /// Row begins: from 0, never descending, to `end`.
+  template <std::unsigned_integral T>
+  void begins(const char* name, std::span<const T> begin, std::size_t end) const {
+    if (begin.front() != 0) refuse(name, "does not begin with 0");
+    for (std::size_t i = 1; i < begin.size(); ++i) {
+      if (begin[i] < begin[i - 1]) refuse(name, "descends at entry " + std::to_string(i));
+    }
+    if (begin.back() != end) refuse(name, "does not end with " + std::to_string(end));
+  }
+
+  void check_sizes() const {
+    const std::size_t n = data_.patches.size();
+    if (n == 0) refuse("patch.area", "there are no patches");
+    if (n >= kNone) refuse("patch.area", "there are more patches than indices");
+    visit_tensors_of_patches(
+        data_.patches, [&](const char* name, const auto& values) { rows(name, values.size(), n); });
+
+    const DisplayMesh& mesh = data_.mesh;
+    const std::size_t vertices = mesh.position.size();
+    const std::size_t triangles = mesh.triangle.size();
+    rows("mesh.normal", mesh.normal.size(), vertices);
+    rows("mesh.base_color_texcoord", mesh.base_color_texcoord.size(), vertices);
+    rows("mesh.emissive_texcoord", mesh.emissive_texcoord.size(), vertices);
+    rows("mesh.vertex_color", mesh.vertex_color.size(), vertices);
+    rows("mesh.weight_begin", mesh.weight_begin.size(), vertices + 1);
+    rows("mesh.weight", mesh.weight.size(), mesh.weight_patch.size());
+    rows("mesh.triangle_patch", mesh.triangle_patch.size(), triangles);
+    rows("mesh.triangle_material", mesh.triangle_material.size(), triangles);
+    if (mesh.surface_count() > triangles) {
+      refuse("mesh.back_triangle", "more rows than there are triangles");
+    }
+
+    rows(tensor::kRowBegin, data_.exchange.row_begin.size(), n + 1);
+    rows(tensor::kExchangeArea, data_.exchange.exchange_area.size(), data_.exchange.column.size());
+  }
+
+  void check_patches() const {
+    const PatchTable& patches = data_.patches;
+    numbers("patch.area", patches.area, kPositive);
+    numbers("patch.centroid", patches.centroid, kFinite);
+    numbers("patch.normal", patches.normal, kFinite);
+    numbers("patch.reflectance", patches.reflectance, kReflectance);
+    numbers("patch.emitted_exitance", patches.emitted_exitance, kNotNegative);
+    numbers("patch.sky_visibility", patches.sky_visibility, kFraction);
+    numbers("patch.absorbed", patches.absorbed, kFraction);
+  }
+
+  void check_mesh() const {
+    const DisplayMesh& mesh = data_.mesh;
+    numbers("mesh.position", mesh.position, kFinite);
+    numbers("mesh.normal", mesh.normal, kFinite);
+    numbers("mesh.base_color_texcoord", mesh.base_color_texcoord, kFinite);
+    numbers("mesh.emissive_texcoord", mesh.emissive_texcoord, kFinite);
+    numbers("mesh.vertex_color", mesh.vertex_color, kNotNegative);
+    for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
+      for (const std::uint32_t vertex : mesh.triangle[t]) {
+        index("mesh.triangle", t, vertex, mesh.position.size());
+      }
+      index_or_none("mesh.triangle_patch", t, mesh.triangle_patch[t], data_.patches.size());
+      index("mesh.triangle_material", t, mesh.triangle_material[t], data_.materials.size());
+    }
+    check_back_triangles();
+  }
+
+  void check_back_triangles() const {
+    const DisplayMesh& mesh = data_.mesh;
+    for (std::size_t t = 0; t < mesh.surface_count(); ++t) {
+      const std::uint32_t back = mesh.back_triangle[t];
+      index_or_none("mesh.back_triangle", t, back, mesh.triangle.size());
+      if (back < mesh.surface_count()) {
+        refuse_entry("mesh.back_triangle", t, std::to_string(back), "after the surface");
+      }
+    }
+  }
+
+  void check_weights() const {
+    const DisplayMesh& mesh = data_.mesh;
+    begins<std::uint32_t>("mesh.weight_begin", mesh.weight_begin, mesh.weight.size());
+    numbers("mesh.weight", mesh.weight, kNotNegative);
+    for (std::size_t i = 0; i < mesh.weight_patch.size(); ++i) {
+      index("mesh.weight_patch", i, mesh.weight_patch[i], data_.patches.size());
+    }
+  }
+
+  void check_materials() const {
+    const std::vector<Material>& materials = data_.materials;
+    const std::size_t textures = data_.textures.size();
+    numbers("material.base_color", materials, &Material::base_color, kNotNegative);
+    numbers("material.emitted_luminance", materials, &Material::emitted_luminance, kNotNegative);
+    for (std::size_t i = 0; i < materials.size(); ++i) {
+      const Material& material = materials[i];
+      index_or_none("material.base_color_texture", i, material.base_color_texture, textures);
+      index_or_none("material.emissive_texture", i, material.emissive_texture, textures);
+    }
+  }
+
+  void check_cameras() const {
+    const std::vector<Camera>& cameras = data_.cameras;
+    numbers("camera.position", cameras, &Camera::position, kFinite);
+    numbers("camera.right", cameras, &Camera::right, kFinite);
+    numbers("camera.up", cameras, &Camera::up, kFinite);
+    numbers("camera.backward", cameras, &Camera::backward, kFinite);
+    numbers("camera.vertical_fov", cameras, &Camera::vertical_fov, kFieldOfView);
+  }
+
+  void check_lights() const {
+    const std::vector<Light>& lights = data_.lights;
+    numbers("light.position", lights, &Light::position, kFinite);
+    numbers("light.direction", lights, &Light::direction, kFinite);
+    numbers("light.color", lights, &Light::color, kNotNegative);
+    numbers("light.intensity", lights, &Light::intensity, kNotNegative);
+    numbers("light.range", lights, &Light::range, kNotNegative);
+    numbers("light.inner_cone_angle", lights, &Light::inner_cone_angle, kNotNegative);
+    numbers("light.outer_cone_angle", lights, &Light::outer_cone_angle, kNotNegative);
+  }
+
+  void check_exchange() const {
+    const ExchangeMatrix& exchange = data_.exchange;
+    begins(tensor::kRowBegin, exchange.row_begin.span(), exchange.column.size());
+    for (std::size_t row = 0; row < data_.patches.size(); ++row) {
+      std::size_t previous = row;  // above the diagonal
+      for (std::size_t i = exchange.row_begin[row]; i < exchange.row_begin[row + 1]; ++i) {
+        index(tensor::kColumn, i, exchange.column[i], data_.patches.size());
+        if (exchange.column[i] <= previous) {
+          refuse_entry(tensor::kColumn, i, std::to_string(exchange.column[i]),
+                       "above " + std::to_string(previous));
+        }
+        previous = exchange.column[i];
+      }
+    }
+    numbers(tensor::kExchangeArea, exchange.exchange_area, kPositive);
+  }
+
+  const TransferData& data_;
+  const std::string& file_;
+};
+
+}  // namespace
+
+void check_transfer_data(const TransferData& data, const std::string& file) {
+  Checker(data, file).check();
+}
+
+}  // namespace rebounce

@@ -1,0 +1,246 @@
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "checked_json.h"
+#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "transfer_data_check.h"
+#include "transfer_file_format.h"
+
+namespace rebounce {
+namespace {
+
+using nlohmann::json;
+
+// Settings and reports nest by subject; nothing of ours comes near.
+constexpr std::size_t kRecordDepth = 16;
+
+[[noreturn]] void refuse(const SafetensorsFile& file, const std::string& reason) {
+  throw Error(file.name() + ": " + reason + "; make the file again");
+}
+
+const std::string& metadata(const SafetensorsFile& file, const char* name) {
+  const auto found = file.metadata().find(name);
+  if (found == file.metadata().end()) refuse(file, std::string("metadata ") + name + " is missing");
+  return found->second;
+}
+
+template <typename Number>
+Number number(const SafetensorsFile& file, const char* name) {
+  const std::string& text = metadata(file, name);
+  const char* end = text.data() + text.size();
+  Number value{};
+  const auto result = std::from_chars(text.data(), end, value);
+  if (result.ec != std::errc() || result.ptr != end) {
+    refuse(file, std::string("metadata ") + name + " is not a number");
+  }
+  return value;
+}
+
+void check_version(const SafetensorsFile& file) {
+  const auto format = file.metadata().find(key::kFormat);
+  if (format == file.metadata().end() || format->second != kFormatName) {
+    throw Error(file.name() + " is not a transfer file; give one that Rebounce wrote");
+  }
+  const int version = number<int>(file, key::kFormatVersion);
+  if (version != kFileFormatVersion) {
+    throw Error(file.name() + " is of format version " + std::to_string(version) +
+                ", and this program reads version " + std::to_string(kFileFormatVersion) +
+                "; make the file again with this program");
+  }
+}
+
+void check_checksum(const SafetensorsFile& file) {
+  const auto bytes = file.prefix();
+  const std::string_view prefix(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::size_t digits = find_checksum_digits(prefix);
+  if (digits == std::string_view::npos) refuse(file, "the checksum is missing");
+  FileChecksum checksum(prefix, digits);
+  checksum.update(file.data());
+  if (checksum.text() != metadata(file, key::kChecksum)) {
+    refuse(file, "the checksum does not match, the file is damaged");
+  }
+}
+
+/// The largest byte that stores a flag or an enumerator.
+template <typename T>
+constexpr std::uint8_t kLastByte = 0;
+template <>
+constexpr std::uint8_t kLastByte<bool> = 1;
+template <>
+constexpr std::uint8_t kLastByte<LightType> = static_cast<std::uint8_t>(LightType::kDirectional);
+template <>
+constexpr std::uint8_t kLastByte<TextureWrap> =
+    static_cast<std::uint8_t>(TextureWrap::kMirroredRepeat);
+
+/// Fills arrays, and members of arrays of structs, from tensors.
+class TensorReader {
+ public:
+  explicit TensorReader(const SafetensorsFile& file) : file_(file) {}
+
+  template <typename T>
+  void operator()(const char* name, std::vector<T>& values) const {
+    const auto scalars = scalars_of<T>(name, kAnySize);
+    values.resize(scalars.size() / Stored<T>::kColumns);
+    if (!values.empty()) std::memcpy(values.data(), scalars.data(), scalars.size_bytes());
+  }
+
+  template <typename Item, typename T>
+  void operator()(const char* name, std::vector<Item>& items, T Item::*member) const {
+    const auto scalars = scalars_of<T>(name, items.size());
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      assign(name, i, scalars.data() + i * Stored<T>::kColumns, items[i].*member);
+    }
+  }
+
+  /// Of a tensor that stores this member.
+  template <typename Item, typename T>
+  std::size_t row_count(const char* name, T Item::* /*member*/) const {
+    return scalars_of<T>(name, kAnySize).size() / Stored<T>::kColumns;
+  }
+
+ private:
+  template <typename T>
+  SharedArray<typename Stored<T>::Scalar> scalars_of(const char* name, std::uint64_t rows) const {
+    return file_.tensor<typename Stored<T>::Scalar>(name, stored_shape<T>(rows));
+  }
+
+  template <typename T>
+  void assign(const char* name, std::size_t entry, const typename Stored<T>::Scalar* from,
+              T& to) const {
+    if constexpr (std::is_enum_v<T> || std::is_same_v<T, bool>) {
+      if (*from > kLastByte<T>) {
+        refuse(file_, std::string("tensor ") + name + ": entry " + std::to_string(entry) + " is " +
+                          std::to_string(*from) + ", not at most " + std::to_string(kLastByte<T>));
+      }
+      to = static_cast<T>(*from);
+    } else {
+      std::memcpy(&to, from, sizeof(T));
+    }
+  }
+
+  const SafetensorsFile& file_;
+};
+
+void read_textures(const SafetensorsFile& file, std::vector<Texture>& textures) {
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    const auto encoded = file.tensor<std::uint8_t>(texture_tensor(i), {kAnySize});
+    textures[i].encoded.assign(encoded.begin(), encoded.end());
+  }
+}
+
+template <typename Item>
+void read_names(const SafetensorsFile& file, const json& names, const char* kind,
+                std::vector<Item>& items) {
+  const json list = names.value(kind, json());
+  if (!list.is_array() || list.size() != items.size()) {
+    refuse(file, std::string("metadata names: not one for each of the ") + kind);
+  }
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (!list[i].is_string()) refuse(file, "metadata names: something else than a string");
+    items[i].name = list[i].template get<std::string>();
+  }
+}
+
+json parse_object(const SafetensorsFile& file, const char* name) {
+  try {
+    json value = parse_untrusted_json(metadata(file, name), kRecordDepth);
+    if (!value.is_object()) throw Error("not an object");
+    return value;
+  } catch (const Error& error) {
+    refuse(file, std::string("metadata ") + name + ": " + error.what());
+  }
+}
+
+void read_scene(const SafetensorsFile& file, TransferData& data) {
+  const TensorReader reader(file);
+  data.materials.resize(reader.row_count("material.base_color", &Material::base_color));
+  data.textures.resize(reader.row_count("texture.wrap_s", &Texture::wrap_s));
+  data.cameras.resize(reader.row_count("camera.position", &Camera::position));
+  data.lights.resize(reader.row_count("light.position", &Light::position));
+  visit_tensors_of_scene(data, reader);
+  read_textures(file, data.textures);
+  const json names = parse_object(file, key::kNames);
+  visit_named_items(data,
+                    [&](const char* kind, auto& items) { read_names(file, names, kind, items); });
+}
+
+ExchangeMatrix read_exchange(const SafetensorsFile& file) {
+  return {file.tensor<std::uint64_t>(tensor::kRowBegin, {kAnySize}),
+          file.tensor<std::uint32_t>(tensor::kColumn, {kAnySize}),
+          file.tensor<float>(tensor::kExchangeArea, {kAnySize})};
+}
+
+BuildRecord read_record(const SafetensorsFile& file) {
+  BuildRecord record;
+  visit_texts_of_record(record,
+                        [&](const char* name, std::string& text) { text = metadata(file, name); });
+  visit_numbers_of_record(record, [&](const char* name, double& value) {
+    value = number<double>(file, name);
+    if (!std::isfinite(value) || value < 0) {
+      refuse(file, std::string("metadata ") + name + " is not finite and >= 0");
+    }
+  });
+  for (const char* name : {"settings", "report"}) {
+    if (!metadata(file, name).empty()) parse_object(file, name);
+  }
+  return record;
+}
+
+std::shared_ptr<const DenseOperator> read_dense_operator(const SafetensorsFile& file,
+                                                         const std::vector<float>& area) {
+  DenseOperator::Storage storage;
+  storage.area = area;
+  const TensorInfo& tiles = file.info(tensor::kDenseTiles);
+  const TensorShape shape{kAnySize, DenseOperator::tile_count(area.size()), DenseOperator::kTile,
+                          DenseOperator::kTile};
+  if (tiles.type == TensorType::kF16) {
+    storage.precision = Precision::kF16;
+    storage.tiles_f16 = file.tensor<std::uint16_t>(tensor::kDenseTiles, shape, TensorType::kF16);
+  } else {
+    storage.tiles_f32 = file.tensor<float>(tensor::kDenseTiles, shape);
+  }
+  if (tiles.shape[0] < 1 || tiles.shape[0] > kChannelCount) {
+    refuse(file, std::string("tensor ") + tensor::kDenseTiles + ": not 1, 2 or 3 matrices");
+  }
+  storage.matrix_count = static_cast<std::uint32_t>(tiles.shape[0]);
+  const auto channels =
+      file.tensor<std::uint32_t>(tensor::kDenseChannelMatrix, {storage.channel_matrix.size()});
+  for (std::size_t channel = 0; channel < channels.size(); ++channel) {
+    if (channels[channel] >= storage.matrix_count) {
+      refuse(file, std::string("tensor ") + tensor::kDenseChannelMatrix + ": no such matrix");
+    }
+    storage.channel_matrix[channel] = channels[channel];
+  }
+  return std::make_shared<const DenseOperator>(std::move(storage));
+}
+
+std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& file,
+                                                      const std::vector<float>& area) {
+  const std::string& kind = metadata(file, key::kOperator);
+  if (kind != "dense") refuse(file, "the operator is of a kind that this program does not know");
+  return read_dense_operator(file, area);
+}
+
+}  // namespace
+
+TransferData load_transfer_file(const std::filesystem::path& path) {
+  const SafetensorsFile file(path);
+  check_version(file);
+  check_checksum(file);
+
+  TransferData data;
+  visit_tensors_of_patches(data.patches, TensorReader(file));
+  visit_tensors_of_mesh(data.mesh, TensorReader(file));
+  read_scene(file, data);
+  data.exchange = read_exchange(file);
+  data.record = read_record(file);
+  check_transfer_data(data, file.name());
+  data.transfer = read_operator(file, data.patches.area);
+  return data;
+}
+
+}  // namespace rebounce

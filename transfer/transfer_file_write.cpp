@@ -1,0 +1,129 @@
+#include <cstring>
+#include <deque>
+#include <nlohmann/json.hpp>
+
+#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "shortest_decimal.h"
+#include "transfer_file_format.h"
+
+namespace rebounce {
+namespace {
+
+/// Collects tensors: borrows what is an array already, copies members out of arrays of structs.
+class TensorCollector {
+ public:
+  template <typename T>
+  void add(std::string name, TensorShape shape, std::span<const T> values,
+           TensorType type = tensor_type<T>()) {
+    tensors_.push_back({std::move(name), type, std::move(shape), std::as_bytes(values)});
+  }
+
+  template <typename T>
+  void operator()(const char* name, const std::vector<T>& values) {
+    tensors_.push_back({name, tensor_type<typename Stored<T>::Scalar>(),
+                        stored_shape<T>(values.size()), std::as_bytes(std::span(values))});
+  }
+
+  template <typename Item, typename T>
+  void operator()(const char* name, const std::vector<Item>& items, T Item::*member) {
+    std::vector<std::byte>& column = columns_.emplace_back(items.size() * sizeof(T));
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      std::memcpy(column.data() + i * sizeof(T), &(items[i].*member), sizeof(T));
+    }
+    tensors_.push_back(
+        {name, tensor_type<typename Stored<T>::Scalar>(), stored_shape<T>(items.size()), column});
+  }
+
+  const std::vector<TensorView>& tensors() const { return tensors_; }
+
+ private:
+  std::vector<TensorView> tensors_;
+  std::deque<std::vector<std::byte>> columns_;
+};
+
+void collect_textures(const std::vector<Texture>& textures, TensorCollector& collector) {
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    const std::vector<std::uint8_t>& encoded = textures[i].encoded;
+    collector.add<std::uint8_t>(texture_tensor(i), {encoded.size()}, encoded);
+  }
+}
+
+void collect_exchange(const ExchangeMatrix& exchange, TensorCollector& collector) {
+  collector.add(tensor::kRowBegin, {exchange.row_begin.size()}, exchange.row_begin.span());
+  collector.add(tensor::kColumn, {exchange.column.size()}, exchange.column.span());
+  collector.add(tensor::kExchangeArea, {exchange.exchange_area.size()},
+                exchange.exchange_area.span());
+}
+
+void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollector& collector) {
+  const TensorShape shape{storage.matrix_count, DenseOperator::tile_count(storage.area.size()),
+                          DenseOperator::kTile, DenseOperator::kTile};
+  if (storage.precision == Precision::kF16) {
+    collector.add(tensor::kDenseTiles, shape, storage.tiles_f16.span(), TensorType::kF16);
+  } else {
+    collector.add(tensor::kDenseTiles, shape, storage.tiles_f32.span());
+  }
+  collector.add<std::uint32_t>(tensor::kDenseChannelMatrix, {storage.channel_matrix.size()},
+                               storage.channel_matrix);
+}
+
+void collect_operator(const TransferOperator* transfer, TensorCollector& collector) {
+  const auto* dense = dynamic_cast<const DenseOperator*>(transfer);
+  if (dense == nullptr) {
+    throw Error("a transfer file cannot hold this kind of operator; give it a dense one");
+  }
+  collect_dense_operator(dense->storage(), collector);
+}
+
+std::string names_text(const TransferData& data) {
+  nlohmann::json names;
+  visit_named_items(data, [&](const char* kind, const auto& items) {
+    names[kind] = nlohmann::json::array();
+    for (const auto& item : items) names[kind].push_back(item.name);
+  });
+  return names.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+SafetensorsMetadata make_metadata(const TransferData& data) {
+  SafetensorsMetadata metadata{{key::kFormat, kFormatName},
+                               {key::kFormatVersion, std::to_string(kFileFormatVersion)},
+                               {key::kChecksum, zero_checksum()},
+                               {key::kOperator, data.transfer->kind()},
+                               {key::kNames, names_text(data)}};
+  visit_texts_of_record(data.record,
+                        [&](const char* name, const std::string& text) { metadata[name] = text; });
+  visit_numbers_of_record(data.record, [&](const char* name, double value) {
+    metadata[name] = shortest_decimal(value);
+  });
+  return metadata;
+}
+
+/// Puts the checksum of the whole file where its zeros are.
+void seal(SafetensorsLayout& layout) {
+  const std::size_t digits = find_checksum_digits(layout.prefix);
+  FileChecksum checksum(layout.prefix, digits);
+  for (const TensorView& tensor : layout.tensors) checksum.update(tensor.bytes);
+  const std::string text = checksum.text();
+  layout.prefix.replace(digits, ContentHash::kDigitCount,
+                        text.substr(text.size() - ContentHash::kDigitCount));
+}
+
+}  // namespace
+
+void save_transfer_file(const std::filesystem::path& path, const TransferData& data) {
+  TensorCollector collector;
+  visit_tensors_of_patches(data.patches, collector);
+  visit_tensors_of_mesh(data.mesh, collector);
+  visit_tensors_of_scene(data, collector);
+  collect_textures(data.textures, collector);
+  collect_exchange(data.exchange, collector);
+  collect_operator(data.transfer.get(), collector);
+
+  SafetensorsLayout layout = lay_out_safetensors(collector.tensors(), make_metadata(data));
+  seal(layout);
+  write_safetensors(path, layout);
+}
+
+}  // namespace rebounce
