@@ -24,6 +24,9 @@ class DenseOperator final : public TransferOperator {
  public:
   static constexpr std::size_t kTile = 64;
 
+  /// Half-precision tiles hold the entries times this, so that small ones stay normal numbers.
+  static constexpr float kHalfScale = 1024;
+
   struct Storage {
     std::vector<float> area;  ///< [n] m²
     std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
@@ -35,6 +38,9 @@ class DenseOperator final : public TransferOperator {
 
   /// Tiles of one matrix for n patches: t (t + 1) / 2 with t = ceil(n / kTile).
   static std::size_t tile_count(std::size_t patch_count);
+
+  /// Encodes tiles for Precision::kF16. Throws Error if an entry is beyond half precision's range.
+  static std::vector<std::uint16_t> encode_half(std::span<const float> tiles);
 
   /// Takes over `storage`. Throws Error if its sizes do not agree.
   explicit DenseOperator(Storage storage);
@@ -52,6 +58,8 @@ class DenseOperator final : public TransferOperator {
   void expand(int channel, std::span<float> transfer) const;
 
  private:
+  float symmetric_entry(std::uint32_t matrix, std::size_t row, std::size_t column) const;
+
   Storage storage_;
   std::vector<float> sqrt_area_;
 };

@@ -44,6 +44,9 @@ class FormFactorRows {
   /// Rows are shared out among OpenMP threads; the bits do not depend on how many there are.
   void gather(std::span<const Float3> in, std::span<Float3> out) const;
 
+  /// One row of gather, summed in double precision in the order of the columns.
+  Float3 gather_row(std::size_t row, std::span<const Float3> in) const;
+
  private:
   std::vector<std::uint64_t> row_begin_;
   std::vector<std::uint32_t> column_;

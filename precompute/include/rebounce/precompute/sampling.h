@@ -1,0 +1,65 @@
+#pragma once
+
+// Low-discrepancy points and the maps from the unit square to triangles and hemispheres.
+
+#include <cmath>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <numbers>
+
+namespace rebounce {
+
+/// Mixes 64 bits well: splitmix64 (Steele, Lea and Flood 2014).
+inline std::uint64_t mix_bits(std::uint64_t x) {
+  x += 0x9E3779B97F4A7C15ULL;
+  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9ULL;
+  x = (x ^ (x >> 27)) * 0x94D049BB133111EBULL;
+  return x ^ (x >> 31);
+}
+
+/// A point of [0, 1)^2 from 64 random bits.
+inline glm::dvec2 unit_square(std::uint64_t bits) {
+  return {static_cast<double>(bits >> 32) * 0x1p-32,
+          static_cast<double>(bits & 0xFFFFFFFFULL) * 0x1p-32};
+}
+
+/// Point k of the R2 sequence (M. Roberts 2018, after the plastic number), shifted by `shift`
+/// modulo 1. Every prefix is well spread over [0, 1)^2.
+inline glm::dvec2 r2_point(std::uint32_t k, const glm::dvec2& shift) {
+  constexpr double kG = 1.32471795724474602596;
+  return glm::fract(shift + (k + 0.5) * glm::dvec2(1.0 / kG, 1.0 / (kG * kG)));
+}
+
+/// Barycentric weights (of the second and third vertex), uniform over the triangle: the
+/// low-distortion map of E. Heitz, "A low-distortion map between triangle and square", 2019.
+inline glm::dvec2 square_to_triangle(glm::dvec2 s) {
+  if (s.y > s.x) {
+    s.x *= 0.5;
+    s.y -= s.x;
+  } else {
+    s.y *= 0.5;
+    s.x -= s.y;
+  }
+  return s;
+}
+
+/// A direction around +Z with density cos / pi, by Shirley and Chiu's concentric map (1997).
+inline glm::dvec3 square_to_cosine_hemisphere(const glm::dvec2& s) {
+  const double x = 2 * s.x - 1, y = 2 * s.y - 1;
+  if (x == 0 && y == 0) return {0, 0, 1};
+  constexpr double kQuarter = std::numbers::pi / 4;
+  const bool wide = std::abs(x) > std::abs(y);
+  const double r = wide ? x : y;
+  const double phi = wide ? kQuarter * (y / x) : 2 * kQuarter - kQuarter * (x / y);
+  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0, 1 - r * r))};
+}
+
+/// An orthonormal frame with `normal` as third column (Duff et al. 2017).
+inline glm::dmat3 frame_around(const glm::dvec3& n) {
+  const double sign = std::copysign(1.0, n.z);
+  const double a = -1.0 / (sign + n.z), b = n.x * n.y * a;
+  return {glm::dvec3(1 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+          glm::dvec3(b, sign + n.y * n.y * a, -n.y), n};
+}
+
+}  // namespace rebounce

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "rebounce/precompute/scene.h"
+
+namespace rebounce {
+
+struct SubdivisionSettings {
+  /// Stop once there are this many patches; 0: no such limit. More patches: finer light, offline
+  /// time and memory that grow with their square.
+  std::size_t patch_count = 4096;
+  /// Stop once no edge is longer than this, in metres; 0: no such limit.
+  float patch_size = 0;
+};
+
+/// Splits the scene's triangles until `settings` is met, and returns for each triangle the index
+/// of the triangle it came from.
+///
+/// The longest edge of the whole scene is bisected over and over, in all triangles that share it
+/// (edges are the same where their end points are, whatever their materials). Being the longest of
+/// all, it is the longest of each of its triangles: this is Rivara's longest-edge bisection
+/// (M.-C. Rivara, "Algorithms for refining triangular grids suitable for adaptive and multigrid
+/// techniques", 1984), which keeps angles bounded, and it never makes a T-junction.
+///
+/// `patches_per_triangle` [t] is the number of patches that a triangle is worth (1, or 2 if both
+/// of its sides are lit). Triangles that come from one keep its order, neighbours stay close.
+std::vector<std::uint32_t> subdivide(Scene& scene, std::span<const std::uint8_t> patches_per_triangle,
+                                     const SubdivisionSettings& settings);
+
+/// For each vertex the number of its position, equal for vertices at the same place, in [0, count).
+struct WeldedPositions {
+  std::vector<std::uint32_t> id;  ///< [v]
+  std::uint32_t count = 0;
+};
+WeldedPositions weld_positions(std::span<const Float3> position);
+
+}  // namespace rebounce

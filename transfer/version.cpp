@@ -1,0 +1,9 @@
+#include "rebounce/transfer/version.h"
+
+namespace rebounce {
+
+const char* version() {
+  return REBOUNCE_VERSION;
+}
+
+}  // namespace rebounce
