@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+
+#include "gltf_document.h"
+#include "gltf_nodes.h"
+#include "rebounce/precompute/scene.h"
+
+namespace rebounce::gltf {
+
+/// Adds the lights (KHR_lights_punctual) and perspective cameras of `nodes` to `scene`, placed in
+/// the world. What cannot be used (an unknown type, a negative intensity, an orthographic camera, a
+/// node scaled to nothing) is left out with a warning.
+void import_lights_and_cameras(const Document& document, std::span<const PlacedNode> nodes,
+                               Scene& scene, Warnings& warnings);
+
+}  // namespace rebounce::gltf

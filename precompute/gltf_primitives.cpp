@@ -1,0 +1,219 @@
+#include "gltf_primitives.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "gltf_accessors.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce::gltf {
+namespace {
+
+template <std::size_t N>
+bool is_finite(const std::array<float, N>& v) {
+  return std::all_of(v.begin(), v.end(), [](float value) { return std::isfinite(value); });
+}
+
+bool draws_triangles(int mode) {
+  return mode == TINYGLTF_MODE_TRIANGLES || mode == TINYGLTF_MODE_TRIANGLE_STRIP ||
+         mode == TINYGLTF_MODE_TRIANGLE_FAN;
+}
+
+// Corners i, j, k of triangle `t` in the sequence of vertices, glTF 2.0 section 3.7.2.1.
+Uint3 corners(int mode, std::uint32_t t) {
+  switch (mode) {
+    case TINYGLTF_MODE_TRIANGLE_STRIP:
+      return {t, t + 1 + t % 2, t + 2 - t % 2};
+    case TINYGLTF_MODE_TRIANGLE_FAN:
+      return {t + 1, t + 2, 0};
+    default:
+      return {3 * t, 3 * t + 1, 3 * t + 2};
+  }
+}
+
+std::vector<Uint3> assemble_triangles(int mode, std::span<const std::uint32_t> index) {
+  const std::size_t count = mode == TINYGLTF_MODE_TRIANGLES ? index.size() / 3
+                            : index.size() < 3              ? 0
+                                                            : index.size() - 2;
+  std::vector<Uint3> triangles(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    const Uint3 corner = corners(mode, static_cast<std::uint32_t>(t));
+    triangles[t] = {index[corner[0]], index[corner[1]], index[corner[2]]};
+  }
+  return triangles;
+}
+
+class PrimitiveReader {
+ public:
+  PrimitiveReader(const Document& document, const tinygltf::Primitive& source, Warnings& warnings)
+      : document_(document), source_(source), warnings_(warnings) {}
+
+  void read(const MaterialTexcoords& texcoords, Primitive& primitive) {
+    read_positions(primitive);
+    read_triangles(primitive);
+    if (const int accessor = attribute("NORMAL"); accessor >= 0) {
+      primitive.normal = vectors<3>(read(accessor, "NORMAL", {3}));
+    }
+    primitive.base_color_texcoord = read_texcoords(texcoords.base_color);
+    primitive.emissive_texcoord = read_texcoords(texcoords.emissive);
+    read_colors(primitive);
+  }
+
+ private:
+  int attribute(const std::string& name) const {
+    const auto found = source_.attributes.find(name);
+    return found == source_.attributes.end() ? -1 : found->second;
+  }
+
+  // An attribute with one of the allowed numbers of components and one element for each vertex.
+  FloatElements read(int accessor, const std::string& name,
+                     std::initializer_list<std::size_t> allowed_components) const {
+    FloatElements elements = read_floats(document_, accessor);
+    if (std::find(allowed_components.begin(), allowed_components.end(), elements.component_count) ==
+        allowed_components.end()) {
+      throw Error(fmt::format("{} (accessors[{}]) has {} components", name, accessor,
+                              elements.component_count));
+    }
+    if (name != "POSITION" && elements.count != vertex_count_) {
+      throw Error(fmt::format("{} (accessors[{}]) has {} elements, but POSITION has {}", name,
+                              accessor, elements.count, vertex_count_));
+    }
+    return elements;
+  }
+
+  template <std::size_t N>
+  static std::vector<std::array<float, N>> vectors(const FloatElements& elements) {
+    std::vector<std::array<float, N>> result(elements.count);
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      for (std::size_t component = 0; component < N; ++component) {
+        result[i][component] = elements.at(i, component);
+      }
+    }
+    return result;
+  }
+
+  void read_positions(Primitive& primitive) {
+    const int accessor = attribute("POSITION");
+    const FloatElements elements = read(accessor, "POSITION", {3});
+    vertex_count_ = elements.count;
+    primitive.position = vectors<3>(elements);
+    const auto bad =
+        std::find_if_not(primitive.position.begin(), primitive.position.end(), is_finite<3>);
+    if (bad != primitive.position.end()) {
+      throw Error(fmt::format("the position of vertex {} is not finite; repair the mesh",
+                              bad - primitive.position.begin()));
+    }
+  }
+
+  void read_triangles(Primitive& primitive) {
+    std::vector<std::uint32_t> index;
+    if (source_.indices >= 0) {
+      index = read_indices(document_, source_.indices);
+    } else {
+      index.resize(vertex_count_);
+      std::iota(index.begin(), index.end(), 0U);
+    }
+    const auto bad = std::find_if(index.begin(), index.end(),
+                                  [&](std::uint32_t vertex) { return vertex >= vertex_count_; });
+    if (bad != index.end()) {
+      throw Error(fmt::format("index {} is {}, but there are {} vertices; repair the mesh",
+                              bad - index.begin(), *bad, vertex_count_));
+    }
+    if (source_.mode == TINYGLTF_MODE_TRIANGLES && index.size() % 3 != 0) {
+      warnings_.count("{} triangle lists do not end with a whole triangle; the rest is ignored");
+    }
+    primitive.triangle = assemble_triangles(source_.mode, index);
+  }
+
+  std::vector<Float2> read_texcoords(const TexcoordSource& source) {
+    const std::string name = fmt::format("TEXCOORD_{}", source.set);
+    const int accessor = source.used ? attribute(name) : -1;
+    if (accessor < 0) {
+      if (source.used) warnings_.count("{} textured primitives lack their texture coordinates");
+      return std::vector<Float2>(vertex_count_, Float2{0, 0});
+    }
+    auto texcoords = vectors<2>(read(accessor, name, {2}));
+    for (Float2& texcoord : texcoords) {
+      texcoord = source.transformed(texcoord);
+      if (is_finite(texcoord)) continue;
+      texcoord = {0, 0};
+      warnings_.count("{} texture coordinates were not finite and were set to 0");
+    }
+    return texcoords;
+  }
+
+  void read_colors(Primitive& primitive) {
+    const int accessor = attribute("COLOR_0");
+    if (accessor < 0) {
+      primitive.vertex_color.assign(vertex_count_, Float3{1, 1, 1});
+      return;
+    }
+    const FloatElements elements = read(accessor, "COLOR_0", {3, 4});
+    if (elements.was_integer) {
+      throw Error(fmt::format("COLOR_0 (accessors[{}]) is not normalized", accessor));
+    }
+    primitive.vertex_color = vectors<3>(elements);
+    for (Float3& color : primitive.vertex_color) {
+      for (float& channel : color) {
+        if (channel >= 0 && std::isfinite(channel)) continue;
+        channel = 0;
+        warnings_.count("{} vertex colour values were negative or not finite and were set to 0");
+      }
+    }
+  }
+
+  const Document& document_;
+  const tinygltf::Primitive& source_;
+  Warnings& warnings_;
+  std::size_t vertex_count_ = 0;
+};
+
+// Whether there is something to read; counts what is passed over.
+bool is_wanted(const tinygltf::Primitive& source, Warnings& warnings) {
+  if (!draws_triangles(source.mode)) {
+    if (source.mode > TINYGLTF_MODE_TRIANGLE_FAN) {
+      throw Error(fmt::format("its mode {} is unknown", source.mode));
+    }
+    warnings.count("{} primitives of points or lines were skipped");
+    return false;
+  }
+  if (!source.attributes.contains("POSITION")) {
+    warnings.count("{} primitives without positions were skipped");
+    return false;
+  }
+  if (!source.targets.empty()) {
+    warnings.count("{} primitives with morph targets are taken in their base shape");
+  }
+  return true;
+}
+
+}  // namespace
+
+std::vector<Primitive> read_primitives(const Document& document, std::size_t mesh,
+                                       std::span<const MaterialTexcoords> texcoords,
+                                       Warnings& warnings) {
+  const tinygltf::Mesh& source = document.model.meshes[mesh];
+  std::vector<Primitive> primitives;
+  for (std::size_t i = 0; i < source.primitives.size(); ++i) {
+    Primitive primitive;
+    primitive.place = fmt::format("meshes[{}] \"{}\", primitives[{}]", mesh, source.name, i);
+    try {
+      if (!is_wanted(source.primitives[i], warnings)) continue;
+      const int material = source.primitives[i].material;
+      const std::size_t default_material = texcoords.size() - 1;
+      primitive.material = static_cast<std::uint32_t>(
+          material < 0 ? default_material : static_cast<std::size_t>(material));
+      PrimitiveReader(document, source.primitives[i], warnings)
+          .read(texcoords[primitive.material], primitive);
+    } catch (const Error& failure) {
+      throw Error(fmt::format("{}: {}", primitive.place, failure.what()));
+    }
+    primitives.push_back(std::move(primitive));
+  }
+  return primitives;
+}
+
+}  // namespace rebounce::gltf

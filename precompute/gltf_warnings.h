@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace rebounce::gltf {
+
+/// What the import of one file left out or changed without refusing it: single lines, and lines
+/// that count how often something happened. Order of first appearance.
+class Warnings {
+ public:
+  /// Adds a line of its own.
+  void add(std::string line) { entries_.emplace_back(std::move(line), 0); }
+
+  /// Counts `amount` more occurrences. `format` is a line with one {} for the total.
+  void count(const std::string& format, std::size_t amount = 1);
+
+  std::vector<std::string> lines() const;
+
+ private:
+  std::vector<std::pair<std::string, std::size_t>> entries_;  ///< a count of 0: a plain line
+};
+
+}  // namespace rebounce::gltf

@@ -1,0 +1,73 @@
+#include "rebounce/precompute/import_gltf.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <new>
+
+#include "gltf_document.h"
+#include "gltf_lights.h"
+#include "gltf_materials.h"
+#include "gltf_meshes.h"
+#include "gltf_nodes.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+// The default material comes last, for the primitives that name none.
+void drop_unused_default_material(Scene& scene) {
+  const auto last = static_cast<std::uint32_t>(scene.materials.size() - 1);
+  const auto& used = scene.triangle_material;
+  if (last > 0 && std::find(used.begin(), used.end(), last) == used.end()) {
+    scene.materials.pop_back();
+  }
+}
+
+Scene import_document(const gltf::Document& document) {
+  Scene scene;
+  gltf::Warnings warnings;
+  const auto nodes = gltf::place_nodes(document.model);
+  const auto texcoords = gltf::import_materials(document, scene, warnings);
+  gltf::import_meshes(document, nodes, texcoords, scene, warnings);
+  if (scene.triangle.empty()) {
+    throw Error(scene.degenerate_triangle_count == 0
+                    ? std::string("no triangles: the scene is empty")
+                    : fmt::format("no triangles: all {} of them have no area",
+                                  scene.degenerate_triangle_count));
+  }
+  gltf::import_lights_and_cameras(document, nodes, scene, warnings);
+  drop_unused_default_material(scene);
+  warnings.count("{} triangles without area were dropped", scene.degenerate_triangle_count);
+  scene.warnings = warnings.lines();
+  scene.hash = document.hash;
+  return scene;
+}
+
+// Messages quote names from the file, and some of tinygltf's have several lines.
+std::string one_line(const std::string& text) {
+  std::string line;
+  for (const char character : text) {
+    const bool is_control = static_cast<unsigned char>(character) < 0x20 || character == 0x7F;
+    line += is_control ? ' ' : character;
+  }
+  line.erase(line.find_last_not_of(' ') + 1);
+  return line;
+}
+
+}  // namespace
+
+Scene import_gltf(const std::filesystem::path& path) {
+  try {
+    Scene scene = import_document(gltf::read_document(path));
+    scene.name = path.filename().string();
+    for (std::string& warning : scene.warnings) warning = one_line(warning);
+    return scene;
+  } catch (const std::bad_alloc&) {
+    throw Error(one_line(fmt::format("{}: not enough memory to import it", path.string())));
+  } catch (const std::exception& failure) {
+    throw Error(one_line(fmt::format("{}: {}", path.string(), failure.what())));
+  }
+}
+
+}  // namespace rebounce
