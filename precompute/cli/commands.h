@@ -1,0 +1,17 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "console.h"
+
+namespace rebounce::cli {
+
+// Each adds its sub-command to `app`; the command runs when the command line is parsed. `options`
+// must outlive `app`.
+void add_precompute_command(CLI::App& app, const CommonOptions& options);
+void add_info_command(CLI::App& app, const CommonOptions& options);
+void add_solve_command(CLI::App& app, const CommonOptions& options);
+void add_export_command(CLI::App& app, const CommonOptions& options);
+void add_render_command(CLI::App& app, const CommonOptions& options);
+
+}  // namespace rebounce::cli

@@ -1,0 +1,70 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "commands.h"
+#include "info_json.h"
+#include "rebounce/transfer/transfer_file.h"
+
+namespace rebounce::cli {
+namespace {
+
+/// JSON text of the file's own making; a file by another hand may hold anything.
+nlohmann::json parse_or_text(const std::string& text) {
+  nlohmann::json parsed = nlohmann::json::parse(text, nullptr, false);
+  return parsed.is_discarded() ? nlohmann::json(text) : parsed;
+}
+
+void print_summary(const nlohmann::json& info) {
+  for (const auto& [key, value] : info.items()) {
+    fmt::print("{:<20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+  }
+}
+
+void run(const std::string& path, const CommonOptions& options) {
+  const TransferData data = load_transfer_file(path);
+  const nlohmann::json info = info_json(data, std::filesystem::file_size(path));
+  if (options.json) {
+    fmt::print("{}\n", info.dump(2));
+  } else {
+    print_summary(info);
+  }
+}
+
+}  // namespace
+
+nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
+  const auto n = static_cast<double>(data.patches.size());
+  const BuildRecord& record = data.record;
+  return {{"format_version", kFileFormatVersion},
+          {"generator", record.generator},
+          {"scene", record.scene_name},
+          {"scene_hash", record.scene_hash},
+          {"patch_count", data.patches.size()},
+          {"display_triangle_count", data.mesh.triangle.size()},
+          {"display_vertex_count", data.mesh.position.size()},
+          {"material_count", data.materials.size()},
+          {"light_count", data.lights.size()},
+          {"camera_count", data.cameras.size()},
+          {"form_factor_count", data.exchange.column.size()},
+          {"operator", data.transfer->kind()},
+          {"operator_bytes", data.transfer->bytes()},
+          {"bytes_per_patch", static_cast<double>(data.transfer->bytes()) / n},
+          {"file_bytes", file_bytes},
+          {"residual", record.solve_residual},
+          {"tolerance", record.tolerance},
+          {"error_mean", record.error_mean},
+          {"error_max", record.error_max},
+          {"error_bound", record.error_bound},
+          {"settings", parse_or_text(record.settings_json)},
+          {"report", parse_or_text(record.report_json)}};
+}
+
+void add_info_command(CLI::App& app, const CommonOptions& options) {
+  auto path = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand("info", "What is inside a transfer file");
+  command->add_option("file", *path, "Transfer file")->required();
+  command->callback([path, &options] { run(*path, options); });
+}
+
+}  // namespace rebounce::cli

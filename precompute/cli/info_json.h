@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce::cli {
+
+/// What is inside a transfer file of `file_bytes`, under the keys that scripts rely on.
+nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes);
+
+}  // namespace rebounce::cli

@@ -1,0 +1,60 @@
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <new>
+
+#include "commands.h"
+#include "console.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/version.h"
+
+namespace {
+
+constexpr int kBadInput = 1, kUsage = 2;
+
+void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options) {
+  command.add_flag("--json", options.json,
+                   "Print a machine-readable summary on standard output, all else on standard error");
+  command.add_flag("--quiet", options.quiet, "No progress and no summary");
+  command
+      .add_option("--threads", options.threads, "Threads to use; 0: one per processor")
+      ->check(CLI::Range(0, 4096))
+      ->each([](const std::string& value) {
+        if (const int threads = std::stoi(value); threads > 0) omp_set_num_threads(threads);
+      });
+}
+
+int run(int argc, char** argv) {
+  rebounce::cli::CommonOptions options;
+  CLI::App app("Rebounce: all bounces of moving lights in a static scene, in one product.", "rebounce");
+  app.set_version_flag("--version", std::string("rebounce ") + rebounce::version());
+  app.require_subcommand(1);
+  rebounce::cli::add_precompute_command(app, options);
+  rebounce::cli::add_info_command(app, options);
+  rebounce::cli::add_solve_command(app, options);
+  rebounce::cli::add_export_command(app, options);
+  rebounce::cli::add_render_command(app, options);
+  for (CLI::App* command : app.get_subcommands({})) add_common_options(*command, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsage;
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  rebounce::cli::install_interrupt_handler();
+  try {
+    return run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "rebounce: out of memory; ask for fewer patches\n");
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "rebounce: {}\n", error.what());
+  }
+  return kBadInput;
+}

@@ -1,0 +1,129 @@
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "info_json.h"
+#include "rebounce/precompute/build.h"
+#include "rebounce/transfer/transfer_file.h"
+
+namespace rebounce::cli {
+namespace {
+
+struct PrecomputeOptions {
+  std::string scene, output, operator_kind = "dense", precision = "f32";
+  BuildSettings settings;
+  double memory_limit_gib = 0;
+};
+
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+void print_json(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
+  nlohmann::json summary = info_json(data, file_bytes);
+  nlohmann::json seconds;
+  double total = 0;
+  for (const auto& [phase, s] : report.seconds) {
+    seconds[phase] = s;
+    total += s;
+  }
+  seconds["total"] = total;
+  summary["seconds"] = seconds;
+  summary["rays"] = report.ray_count;
+  summary["peak_memory_bytes"] = peak_memory_bytes();
+  summary["estimate"] = {{"seconds", report.estimate.seconds},
+                         {"peak_bytes", report.estimate.peak_bytes}};
+  fmt::print("{}\n", summary.dump(2));
+}
+
+void print_summary(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
+  fmt::print("{} triangles ({} degenerate dropped), {} patches of {:.3g} / {:.3g} / {:.3g} m "
+             "(min / median / max)\n",
+             report.triangle_count, report.degenerate_triangle_count, report.patch_count,
+             report.patch_size_min, report.patch_size_median, report.patch_size_max);
+  fmt::print("form factors: {} from {} pairs, {:.1f} million rays; row sums off by {:.1e} before and "
+             "{:.1e} after closure, which changed F by {:.2f} %\n",
+             report.form_factor_count, report.pair_count,
+             static_cast<double>(report.ray_count) / 1e6, report.closure.row_sum_error_before,
+             report.closure.row_sum_error_after, 100 * report.closure.relative_change);
+  fmt::print("operator: {}, {:.1f} MiB ({:.0f} bytes per patch), residual {:.1e}, error of the indirect "
+             "light {:.1e} mean, {:.1e} max\n",
+             data.transfer->kind(), static_cast<double>(data.transfer->bytes()) / (1 << 20),
+             static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
+             data.record.solve_residual, data.record.error_mean, data.record.error_max);
+  std::string times;
+  for (const auto& [phase, s] : report.seconds) times += fmt::format("{} {:.1f} s, ", phase, s);
+  fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
+}
+
+void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
+  BuildSettings settings = chosen.settings;
+  settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
+  settings.memory_limit_bytes =
+      static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
+  BuildReport report;
+  TransferData data;
+  {
+    ProgressBar bar(!options.quiet);
+    data = build_transfer_data(
+        chosen.scene, settings, report,
+        [&](std::string_view phase, double fraction) { return bar.update(phase, fraction); },
+        [&](const CostEstimate& estimate) {
+          print_note(options, fmt::format("{} patches: about {:.0f} s and {:.1f} GiB", estimate.patch_count,
+                                          estimate.seconds,
+                                          static_cast<double>(estimate.peak_bytes) / (1ULL << 30)));
+        });
+  }
+  for (const std::string& warning : report.warnings) print_note(options, "warning: " + warning);
+  save_transfer_file(chosen.output, data);
+  const std::uint64_t file_bytes = std::filesystem::file_size(chosen.output);
+  if (options.json) {
+    print_json(data, report, file_bytes);
+  } else if (!options.quiet) {
+    print_summary(data, report, file_bytes);
+  }
+}
+
+}  // namespace
+
+void add_precompute_command(CLI::App& app, const CommonOptions& options) {
+  auto chosen = std::make_shared<PrecomputeOptions>();
+  CLI::App* command =
+      app.add_subcommand("precompute", "The offline stage: from a glTF scene to a transfer file");
+  command->add_option("scene", chosen->scene, "Scene (.glb or .gltf)")->required();
+  command->add_option("-o,--output", chosen->output, "Transfer file to write (.safetensors)")->required();
+  SubdivisionSettings& subdivision = chosen->settings.subdivision;
+  CLI::Option* patches =
+      command
+          ->add_option("--patches", subdivision.patch_count,
+                       "Subdivide until there are about this many patches")
+          ->check(CLI::Range(1, 1000000))
+          ->capture_default_str();
+  command
+      ->add_option("--patch-size", subdivision.patch_size,
+                   "Subdivide until no edge is longer than this, in metres")
+      ->check(CLI::PositiveNumber)
+      ->excludes(patches)
+      ->each([&subdivision](const std::string&) { subdivision.patch_count = 0; });
+  command->add_option("--operator", chosen->operator_kind, "Kind of the operator")
+      ->check(CLI::IsMember({"dense"}))
+      ->capture_default_str();
+  command
+      ->add_option("--precision", chosen->precision,
+                   "Numbers of the operator: f32, or f16 for half the bytes")
+      ->check(CLI::IsMember({"f16", "f32"}))
+      ->capture_default_str();
+  command
+      ->add_option("--memory-limit", chosen->memory_limit_gib,
+                   "Refuse to start what needs more GiB; by default half of the machine's memory")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--seed", chosen->settings.form_factors.seed, "Seed of the sample points")
+      ->capture_default_str();
+  command->callback([chosen, &options] { run(*chosen, options); });
+}
+
+}  // namespace rebounce::cli

@@ -1,0 +1,165 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "commands.h"
+#include "light_file.h"
+#include "rebounce/precompute/csv_writer.h"
+#include "rebounce/precompute/npz_writer.h"
+#include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/gauss_seidel.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
+
+namespace rebounce::cli {
+namespace {
+
+struct SolveOptions {
+  std::string file, lights, method = "transfer", output;
+  GaussSeidelSettings gauss_seidel;
+};
+
+struct Solution {
+  std::vector<Float3> indirect_irradiance, radiosity;
+  int sweeps = 0;
+  double microseconds = 0;
+};
+
+/// Median time of `work`, repeated for about half a second but at least three times.
+template <typename Work>
+double median_microseconds(const Work& work) {
+  std::vector<double> times;
+  double total = 0;
+  while (times.size() < 3 || (total < 5e5 && times.size() < 1000)) {
+    const auto begin = std::chrono::steady_clock::now();
+    work();
+    const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
+    times.push_back(time.count());
+    total += time.count();
+  }
+  std::ranges::nth_element(times, times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2));
+  return times[times.size() / 2];
+}
+
+Solution solve_by_transfer(Engine& engine) {
+  Solution solution;
+  solution.microseconds = median_microseconds([&] { engine.apply_transfer(); });
+  engine.compute_radiosity();
+  solution.indirect_irradiance.assign(engine.indirect_irradiance().begin(),
+                                      engine.indirect_irradiance().end());
+  solution.radiosity.assign(engine.radiosity().begin(), engine.radiosity().end());
+  return solution;
+}
+
+Solution solve_by_gauss_seidel(const Engine& engine, const FormFactorRows& form_factors,
+                               const GaussSeidelSettings& settings) {
+  const PatchTable& patches = engine.data().patches;
+  Solution solution;
+  solution.radiosity.resize(patches.size());
+  solution.indirect_irradiance.resize(patches.size());
+  solution.microseconds = median_microseconds([&] {
+    std::ranges::fill(solution.radiosity, Float3{0, 0, 0});
+    solution.sweeps = solve_gauss_seidel(form_factors, patches.reflectance, patches.area,
+                                         engine.initial_exitance(), settings, solution.radiosity)
+                          .sweeps;
+  });
+  form_factors.gather(solution.radiosity, solution.indirect_irradiance);
+  return solution;
+}
+
+/// |M0 + rho F B - B| / |M0| in the area-weighted norm.
+double radiosity_residual(const Engine& engine, const FormFactorRows& form_factors,
+                          const std::vector<Float3>& radiosity) {
+  const PatchTable& patches = engine.data().patches;
+  std::vector<Float3> rest(patches.size());
+  form_factors.gather(radiosity, rest);
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      rest[i][c] = engine.initial_exitance()[i][c] + patches.reflectance[i][c] * rest[i][c] -
+                   radiosity[i][c];
+    }
+  }
+  const double norm = area_norm(engine.initial_exitance(), patches.area);
+  return norm > 0 ? area_norm(rest, patches.area) / norm : 0;
+}
+
+std::span<const float> as_floats(std::span<const Float3> values) {
+  return {values.empty() ? nullptr : values.front().data(), values.size() * kChannelCount};
+}
+
+void write_solution(const std::string& path, const Engine& engine, const Solution& solution) {
+  const std::array<std::pair<std::string, std::span<const Float3>>, 3> arrays = {
+      {{"direct_irradiance", engine.direct_irradiance()},
+       {"indirect_irradiance", solution.indirect_irradiance},
+       {"radiosity", solution.radiosity}}};
+  const std::string extension = std::filesystem::path(path).extension().string();
+  if (extension == ".npz") {
+    std::vector<NumpyArray> npz;
+    for (const auto& [name, values] : arrays) npz.push_back(numpy_array(name, values));
+    write_npz(path, npz);
+    return;
+  }
+  std::vector<CsvColumns> columns;
+  for (const auto& [name, values] : arrays) {
+    columns.push_back({{name + "_r", name + "_g", name + "_b"}, as_floats(values)});
+  }
+  write_csv(path, columns);
+}
+
+void run(const SolveOptions& chosen, const CommonOptions& options) {
+  const auto data = std::make_shared<const TransferData>(load_transfer_file(chosen.file));
+  const LightSetup setup = choose_lights(chosen.lights, *data);
+  Engine engine(data);
+  engine.compute_direct(setup.lights, setup.sky);
+  engine.compute_initial_exitance();
+  const FormFactorRows form_factors(data->exchange, data->patches.area);
+  const Solution solution = chosen.method == "transfer"
+                                ? solve_by_transfer(engine)
+                                : solve_by_gauss_seidel(engine, form_factors, chosen.gauss_seidel);
+  const double residual = radiosity_residual(engine, form_factors, solution.radiosity);
+  write_solution(chosen.output, engine, solution);
+  if (options.json) {
+    const nlohmann::json summary = {{"method", chosen.method},
+                                    {"sweeps", solution.sweeps},
+                                    {"residual", residual},
+                                    {"microseconds", solution.microseconds}};
+    fmt::print("{}\n", summary.dump(2));
+  } else if (!options.quiet) {
+    fmt::print("{}: {:.0f} microseconds, {} sweeps, residual {:.2e}\n", chosen.method,
+               solution.microseconds, solution.sweeps, residual);
+  }
+}
+
+}  // namespace
+
+void add_solve_command(CLI::App& app, const CommonOptions& options) {
+  auto chosen = std::make_shared<SolveOptions>();
+  CLI::App* command = app.add_subcommand("solve", "Relight a transfer file once");
+  command->add_option("file", chosen->file, "Transfer file")->required();
+  command->add_option("--lights", chosen->lights,
+                      "Lights: .json, or a .glb that has some; by default those of the scene");
+  command->add_option("--method", chosen->method, "How to find the indirect light")
+      ->check(CLI::IsMember({"transfer", "gauss-seidel"}))
+      ->capture_default_str();
+  command
+      ->add_option("--iterations", chosen->gauss_seidel.max_sweeps, "Sweeps at most, for iterative methods")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  command
+      ->add_option("--residual", chosen->gauss_seidel.residual,
+                   "Stop an iterative method at this part of the initial exitance")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command->add_option("-o,--output", chosen->output, "Result: .npz or .csv, each array [n,3]")
+      ->required()
+      ->check([](const std::string& path) {
+        const std::string extension = std::filesystem::path(path).extension().string();
+        return extension == ".npz" || extension == ".csv" ? "" : "must end in .npz or .csv";
+      });
+  command->callback([chosen, &options] { run(*chosen, options); });
+}
+
+}  // namespace rebounce::cli
