@@ -5,18 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/glm.hpp>
 #include <limits>
+
+#include "glm_conversion.h"
 
 namespace rebounce {
 namespace {
-
-glm::vec3 to_glm(const Float3& v) {
-  return {v[0], v[1], v[2]};
-}
-Float3 to_float3(const glm::vec3& v) {
-  return {v.x, v.y, v.z};
-}
 
 float range_window(float distance, float range) {
   if (range <= 0) return 1;

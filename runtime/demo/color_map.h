@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+
+namespace rebounce {
+
+/// The viridis colour map (S. van der Walt, N. Smith, 2015) at `position` in [0, 1], linear.
+glm::vec3 viridis(float position);
+
+/// A colour that is the same for the same index and unlike those of its neighbours, linear.
+glm::vec3 distinct_color(std::uint32_t index);
+
+}  // namespace rebounce

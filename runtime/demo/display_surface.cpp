@@ -1,0 +1,171 @@
+#include "display_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "glm_conversion.h"
+
+namespace rebounce {
+namespace {
+
+// Culled layers that a camera ray may cross; more than any sensible scene has.
+constexpr int kMaxCulledLayers = 256;
+
+struct Corners {
+  glm::dvec3 a, b, c;
+};
+
+Corners corners_of(const DisplayMesh& mesh, std::uint32_t triangle) {
+  const auto at = [&](int k) {
+    return glm::dvec3(to_glm(mesh.position[mesh.triangle[triangle][k]]));
+  };
+  return {at(0), at(1), at(2)};
+}
+
+// Barycentric weights of `p`, which lies on the triangle.
+glm::vec3 barycentric(const Corners& t, const glm::dvec3& p) {
+  const glm::dvec3 normal = glm::cross(t.b - t.a, t.c - t.a);
+  const double area = std::max(glm::dot(normal, normal), 1e-300);
+  const double v = glm::dot(glm::cross(p - t.a, t.c - t.a), normal) / area;
+  const double w = glm::dot(glm::cross(t.b - t.a, p - t.a), normal) / area;
+  return {1 - v - w, v, w};
+}
+
+glm::vec3 unit_or(const glm::vec3& v, const glm::vec3& otherwise) {
+  const float length = glm::length(v);
+  return length > 1e-6F ? v / length : otherwise;
+}
+
+// Square root of the ratio of texture area to surface area.
+float texcoord_per_metre(const DisplayMesh& mesh, std::span<const Float2> texcoord,
+                         std::uint32_t triangle) {
+  const Uint3& corner = mesh.triangle[triangle];
+  const glm::vec2 a = to_glm(texcoord[corner[0]]);
+  const glm::vec2 e1 = to_glm(texcoord[corner[1]]) - a, e2 = to_glm(texcoord[corner[2]]) - a;
+  const Corners t = corners_of(mesh, triangle);
+  const double area = glm::length(glm::cross(t.b - t.a, t.c - t.a));
+  return area > 0 ? static_cast<float>(std::sqrt(std::abs(e1.x * e2.y - e1.y * e2.x) / area)) : 0;
+}
+
+}  // namespace
+
+DisplaySurface::DisplaySurface(const TransferData& data)
+    : data_(&data), textures_(data.textures.size()) {
+  const auto decode = [&](std::uint32_t texture) {
+    if (texture == kNone || textures_[texture]) return;
+    textures_[texture] = std::make_unique<const FilteredTexture>(data.textures[texture]);
+  };
+  for (const Material& material : data.materials) {
+    decode(material.base_color_texture);
+    decode(material.emissive_texture);
+  }
+}
+
+SurfacePoint DisplaySurface::point_on(std::uint32_t triangle, const glm::vec3& weight) const {
+  const DisplayMesh& m = mesh();
+  // In double precision: the error of the point must not exceed the rounding of its coordinates,
+  // or offset_point could leave it on the wrong side.
+  const Corners t = corners_of(m, triangle);
+  const double v = weight.y, w = weight.z;
+  SurfacePoint point{.triangle = triangle, .weight = weight};
+  point.position = glm::vec3((1 - v - w) * t.a + v * t.b + w * t.c);
+  point.geometric_normal =
+      unit_or(glm::vec3(glm::normalize(glm::cross(t.b - t.a, t.c - t.a))), glm::vec3(0, 1, 0));
+  const Uint3& corner = m.triangle[triangle];
+  point.shading_normal =
+      unit_or(weight.x * to_glm(m.normal[corner[0]]) + weight.y * to_glm(m.normal[corner[1]]) +
+                  weight.z * to_glm(m.normal[corner[2]]),
+              point.geometric_normal);
+  return point;
+}
+
+SurfacePoint DisplaySurface::point_at(const Hit& hit) const {
+  const glm::vec3 weight(1 - hit.u - hit.v, hit.u, hit.v);
+  if (hit.front) return point_on(hit.triangle, weight);
+  const Corners front = corners_of(mesh(), hit.triangle);
+  const glm::dvec3 p = (1.0 - hit.u - hit.v) * front.a + static_cast<double>(hit.u) * front.b +
+                       static_cast<double>(hit.v) * front.c;
+  const std::uint32_t back = mesh().back_triangle[hit.triangle];
+  return point_on(back, barycentric(corners_of(mesh(), back), p));
+}
+
+const Material& DisplaySurface::material_of(const SurfacePoint& point) const {
+  return data_->materials[mesh().triangle_material[point.triangle]];
+}
+
+glm::vec3 DisplaySurface::texture_color(std::uint32_t texture, std::span<const Float2> texcoord,
+                                        const SurfacePoint& point, float width) const {
+  if (texture == kNone) return glm::vec3(1);
+  const Uint3& corner = mesh().triangle[point.triangle];
+  const glm::vec2 at = point.weight.x * to_glm(texcoord[corner[0]]) +
+                       point.weight.y * to_glm(texcoord[corner[1]]) +
+                       point.weight.z * to_glm(texcoord[corner[2]]);
+  return textures_[texture]->sample(at,
+                                    width * texcoord_per_metre(mesh(), texcoord, point.triangle));
+}
+
+glm::vec3 DisplaySurface::albedo(const SurfacePoint& point, float width) const {
+  const Material& material = material_of(point);
+  const Uint3& corner = mesh().triangle[point.triangle];
+  const auto& color = mesh().vertex_color;
+  const glm::vec3 vertex_color = point.weight.x * to_glm(color[corner[0]]) +
+                                 point.weight.y * to_glm(color[corner[1]]) +
+                                 point.weight.z * to_glm(color[corner[2]]);
+  return to_glm(material.base_color) * vertex_color *
+         texture_color(material.base_color_texture, mesh().base_color_texcoord, point, width);
+}
+
+glm::vec3 DisplaySurface::emitted_luminance(const SurfacePoint& point, float width) const {
+  const Material& material = material_of(point);
+  if (material.emitted_luminance == Float3{0, 0, 0}) return glm::vec3(0);
+  return to_glm(material.emitted_luminance) *
+         texture_color(material.emissive_texture, mesh().emissive_texcoord, point, width);
+}
+
+bool is_culled(const DisplayMesh& mesh, const Hit& hit) {
+  return hit.triangle != kNone && !hit.front && mesh.back_triangle[hit.triangle] == kNone;
+}
+
+void intersect_visible(const RayTracer& tracer, const DisplayMesh& mesh, std::span<Ray> rays,
+                       std::span<Hit> hits) {
+  tracer.intersect(rays, hits);
+  std::vector<std::size_t> culled;
+  for (std::size_t k = 0; k < hits.size(); ++k) {
+    if (is_culled(mesh, hits[k])) culled.push_back(k);
+  }
+  std::vector<Ray> onward;
+  std::vector<Hit> next;
+  for (int layer = 0; layer < kMaxCulledLayers && !culled.empty(); ++layer) {
+    onward.clear();
+    for (const std::size_t k : culled) {
+      rays[k].t_near = hits[k].t * (1 + 1e-6F);  // a few roundings further
+      onward.push_back(rays[k]);
+    }
+    next.resize(onward.size());
+    tracer.intersect(onward, next);
+    for (std::size_t k = 0; k < culled.size(); ++k) hits[culled[k]] = next[k];
+    std::erase_if(culled, [&](std::size_t k) { return !is_culled(mesh, hits[k]); });
+  }
+  for (const std::size_t k : culled) hits[k] = {};
+}
+
+std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,
+                                               std::span<const glm::vec3> patch_value) {
+  std::vector<glm::vec3> value(mesh.position.size(), glm::vec3(0));
+  if (patch_value.empty() || mesh.weight_begin.empty()) return value;
+  for (std::size_t v = 0; v < value.size(); ++v) {
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      value[v] += mesh.weight[k] * patch_value[mesh.weight_patch[k]];
+    }
+  }
+  return value;
+}
+
+glm::vec3 interpolate(const DisplayMesh& mesh, std::span<const glm::vec3> vertex_value,
+                      const SurfacePoint& point) {
+  const Uint3& corner = mesh.triangle[point.triangle];
+  return point.weight.x * vertex_value[corner[0]] + point.weight.y * vertex_value[corner[1]] +
+         point.weight.z * vertex_value[corner[2]];
+}
+
+}  // namespace rebounce

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "rebounce/transfer/scene_description.h"
+
+namespace rebounce {
+
+/// A decoded texture with its mip levels.
+class FilteredTexture {
+ public:
+  /// Throws Error if the image cannot be decoded or is too large.
+  explicit FilteredTexture(const Texture& texture);
+
+  /// Linear colour at `texcoord`, trilinearly filtered over a footprint of `texcoord_width`
+  /// (in units of texture coordinates).
+  glm::vec3 sample(const glm::vec2& texcoord, float texcoord_width) const;
+
+ private:
+  struct Level {
+    int width = 0;
+    int height = 0;
+    std::vector<std::uint8_t> rgb{};  // sRGB
+  };
+
+  static Level half_size(const Level& level);
+  glm::vec3 bilinear(const Level& level, const glm::vec2& texcoord) const;
+
+  std::vector<Level> levels_;
+  TextureWrap wrap_s_, wrap_t_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,101 @@
+#include "rebounce/demo/image_file.h"
+
+#include <png.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <span>
+#include <string>
+#include <system_error>
+
+#include "glm_conversion.h"
+#include "rebounce/transfer/error.h"
+#include "srgb.h"
+
+namespace rebounce {
+namespace {
+
+// Maps [0, inf) into [0, 1).
+glm::vec3 tone_curve(const glm::vec3& color) {
+  constexpr float kShoulder = 0.7F;       // linear below
+  constexpr float kDesaturation = 0.15F;  // how fast highlights fade to white
+  const float peak = std::max({color.x, color.y, color.z});
+  if (peak <= kShoulder) return color;
+  constexpr float kRoom = 1 - kShoulder;
+  const float new_peak = 1 - kRoom * kRoom / (peak + kRoom - kShoulder);
+  const float white = 1 - 1 / (kDesaturation * (peak - new_peak) + 1);
+  return glm::mix(color * (new_peak / peak), glm::vec3(new_peak), white);
+}
+
+std::vector<std::uint8_t> encode_png(const ScreenImage& image) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(image.width);
+  header.height = static_cast<png_uint_32>(image.height);
+  header.format = PNG_FORMAT_RGB;
+  png_alloc_size_t byte_count = PNG_IMAGE_PNG_SIZE_MAX(header);
+  std::vector<std::uint8_t> bytes(byte_count);
+  if (!png_image_write_to_memory(&header, bytes.data(), &byte_count, 0, image.rgb.data(), 0,
+                                 nullptr)) {
+    throw Error("picture: libpng could not encode it: " + std::string(header.message) +
+                "; check its size");
+  }
+  bytes.resize(byte_count);
+  return bytes;
+}
+
+[[noreturn]] void fail(const std::filesystem::path& path, int code) {
+  throw Error(path.string() + ": cannot be written: " + std::generic_category().message(code) +
+              "; check the folder and the space left");
+}
+
+struct CloseFile {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+
+void write_flushed(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
+  std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "wb"));
+  if (!file) fail(path, errno);
+  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() &&
+                       std::fflush(file.get()) == 0 && fsync(fileno(file.get())) == 0;
+  if (!written) {
+    const int code = errno;
+    file.reset();
+    std::error_code ignored;
+    std::filesystem::remove(path, ignored);
+    fail(path, code);
+  }
+}
+
+}  // namespace
+
+ScreenImage tone_map(const Picture& picture) {
+  ScreenImage image{.width = picture.width, .height = picture.height};
+  image.rgb.reserve(3 * picture.pixel.size());
+  const float scale = std::exp2(picture.exposure);
+  for (const Float3& pixel : picture.pixel) {
+    const glm::vec3 color =
+        picture.display_referred ? to_glm(pixel) : tone_curve(scale * to_glm(pixel));
+    for (int c = 0; c < kChannelCount; ++c) image.rgb.push_back(to_srgb_byte(color[c]));
+  }
+  return image;
+}
+
+void write_png(const std::filesystem::path& path, const ScreenImage& image) {
+  const std::vector<std::uint8_t> bytes = encode_png(image);
+  std::filesystem::path temporary = path;
+  temporary += ".partial-" + std::to_string(getpid());
+  write_flushed(temporary, bytes);
+  std::error_code code;
+  std::filesystem::rename(temporary, path, code);
+  if (!code) return;
+  std::error_code ignored;
+  std::filesystem::remove(temporary, ignored);
+  fail(path, code.value());
+}
+
+}  // namespace rebounce

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// A camera at `position` that looks at `target`, +Y upwards in the picture (+Z where it looks
+/// straight up or down). `vertical_fov` in radians. Throws Error if the two points coincide or the
+/// angle is not in (0, pi).
+Camera look_at(const Float3& position, const Float3& target, float vertical_fov);
+
+/// A sensible view of a scene that has no camera: level with the horizon, from inside a room or
+/// from its open side. Of a few hundred candidates it takes the one that sees the most surface, in
+/// the most directions, through the fewest culled faces. `tracer` holds the scene's surface. The
+/// same scene gives the same view.
+Camera fit_camera(const TransferData& data, const RayTracer& tracer);
+
+}  // namespace rebounce

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "rebounce/demo/picture.h"
+
+namespace rebounce {
+
+/// 8-bit sRGB, rows from the top.
+struct ScreenImage {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgb{};  ///< [height][width][3]
+};
+
+/// Brings a picture to the screen's range: exposure, tone curve, sRGB encoding.
+///
+/// The curve is that of the Khronos PBR Neutral tone mapper (2024) without its Fresnel term: linear
+/// up to a shoulder, so that colours under white light are shown as they are, then all channels
+/// compressed by one factor, so that hues stay, with highlights that fade to white.
+ScreenImage tone_map(const Picture& picture);
+
+/// Writes a PNG file whole or not at all (a temporary file beside `path`, flushed, then renamed).
+/// Throws Error if the folder is missing, not writable or full.
+void write_png(const std::filesystem::path& path, const ScreenImage& image);
+
+}  // namespace rebounce

@@ -1,0 +1,343 @@
+#include "rebounce/demo/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "color_map.h"
+#include "direct_light.h"
+#include "display_surface.h"
+#include "emitters.h"
+#include "exposure.h"
+#include "glm_conversion.h"
+#include "rebounce/transfer/error.h"
+#include "sample_sequence.h"
+#include "srgb.h"
+
+namespace rebounce {
+namespace {
+
+constexpr int kTile = 16;  // pixels a side
+constexpr int kMaxSide = 32768;
+constexpr int kMaxSamplesPerAxis = 64;
+constexpr int kMaxEmitterSamples = 65536;
+const glm::vec3 kNothing(0.02F);  // what is behind patches and errors
+
+void check_setting(int value, int most, const char* name) {
+  if (value >= 1 && value <= most) return;
+  throw Error("picture: " + std::string(name) + " is " + std::to_string(value) +
+              "; it must be from 1 to " + std::to_string(most));
+}
+
+void check(const PictureSettings& settings) {
+  check_setting(settings.width, kMaxSide, "width");
+  check_setting(settings.height, kMaxSide, "height");
+  check_setting(settings.samples_per_axis, kMaxSamplesPerAxis, "samples_per_axis");
+  check_setting(settings.emitter_samples, kMaxEmitterSamples, "emitter_samples");
+  const float fov = settings.camera.vertical_fov;
+  if (!(fov > 0 && fov < std::numbers::pi_v<float>)) {
+    throw Error("picture: the camera's vertical field of view is " + std::to_string(fov) +
+                " radians; it must be between 0 and pi");
+  }
+}
+
+void check_length(std::size_t length, std::size_t patch_count, const char* name) {
+  if (length == 0 || length == patch_count) return;
+  throw Error("picture: " + std::string(name) + " has " + std::to_string(length) + " entries for " +
+              std::to_string(patch_count) + " patches; give one for each");
+}
+
+// The light of one picture as values at the vertices, in lx.
+struct VertexLight {
+  std::vector<glm::vec3> sky;
+  std::vector<glm::vec3> bounced;  // H without the emitters' first flight
+};
+
+VertexLight light_at_vertices(const TransferData& data, const PictureLight& light) {
+  const std::size_t n = data.patches.size();
+  check_length(light.indirect_irradiance.size(), n, "indirect_irradiance");
+  check_length(light.emitted_irradiance.size(), n, "emitted_irradiance");
+  const glm::vec3 sky_irradiance =
+      to_glm(light.sky.color) * light.sky.luminance * std::numbers::pi_v<float>;
+  std::vector<glm::vec3> sky(n), bounced(n, glm::vec3(0));
+  for (std::size_t i = 0; i < n; ++i) {
+    sky[i] = sky_irradiance * data.patches.sky_visibility[i];
+    if (!light.indirect_irradiance.empty()) bounced[i] = to_glm(light.indirect_irradiance[i]);
+    if (!light.emitted_irradiance.empty()) bounced[i] -= to_glm(light.emitted_irradiance[i]);
+    // The operator's error may leave a little less than the first flight.
+    bounced[i] = glm::max(bounced[i], glm::vec3(0));
+  }
+  return {reconstruct_at_vertices(data.mesh, sky), reconstruct_at_vertices(data.mesh, bounced)};
+}
+
+// Camera rays of a tile, in the order of pixels and then samples.
+struct CameraRays {
+  std::vector<Ray> rays;
+  std::vector<std::uint32_t> pixel;
+  std::vector<std::uint32_t> index;
+};
+
+class View {
+ public:
+  explicit View(const PictureSettings& settings)
+      : settings_(settings),
+        pixel_width_(2 * std::tan(0.5F * settings.camera.vertical_fov) /
+                     static_cast<float>(settings.height)) {}
+
+  int samples_per_pixel() const { return settings_.samples_per_axis * settings_.samples_per_axis; }
+
+  // Metres between neighbouring samples at ray parameter t.
+  float footprint(float t) const {
+    return pixel_width_ * t / static_cast<float>(settings_.samples_per_axis);
+  }
+
+  CameraRays rays_of_tile(int left, int top) const {
+    CameraRays tile;
+    for (int y = top; y < std::min(top + kTile, settings_.height); ++y) {
+      for (int x = left; x < std::min(left + kTile, settings_.width); ++x) {
+        add_pixel(x, y, tile);
+      }
+    }
+    return tile;
+  }
+
+ private:
+  void add_pixel(int x, int y, CameraRays& tile) const {
+    const auto pixel = static_cast<std::uint32_t>(y * settings_.width + x);
+    const int n = settings_.samples_per_axis;
+    for (int k = 0; k < n * n; ++k) {
+      const auto index = static_cast<std::uint32_t>(k);
+      const std::uint32_t seed = hash(pixel) ^ index;
+      const float inside_x = (static_cast<float>(k % n) + hash_to_unit(seed, 3)) / n;
+      const float inside_y = (static_cast<float>(k / n) + hash_to_unit(seed, 4)) / n;
+      tile.rays.push_back(
+          ray_through(static_cast<float>(x) + inside_x, static_cast<float>(y) + inside_y));
+      tile.pixel.push_back(pixel);
+      tile.index.push_back(index);
+    }
+  }
+
+  Ray ray_through(float x, float y) const {
+    const Camera& camera = settings_.camera;
+    const float right = (x - 0.5F * static_cast<float>(settings_.width)) * pixel_width_;
+    const float up = (0.5F * static_cast<float>(settings_.height) - y) * pixel_width_;
+    return {.origin = camera.position,
+            .t_near = 0,
+            .direction = to_float3(right * to_glm(camera.right) + up * to_glm(camera.up) -
+                                   to_glm(camera.backward)),
+            .t_far = std::numeric_limits<float>::infinity()};
+  }
+
+  const PictureSettings& settings_;
+  float pixel_width_;  // at unit distance along the axis
+};
+
+std::vector<CameraSample> seen_surface(const CameraRays& tile, std::span<const Hit> hits,
+                                       const DisplaySurface& surface, const View& view) {
+  std::vector<CameraSample> samples;
+  samples.reserve(hits.size());
+  for (std::size_t k = 0; k < hits.size(); ++k) {
+    if (hits[k].triangle == kNone) continue;
+    CameraSample sample{.pixel = tile.pixel[k], .index = tile.index[k]};
+    sample.point = surface.point_at(hits[k]);
+    const glm::vec3 direction = glm::normalize(to_glm(tile.rays[k].direction));
+    // A slanted surface spreads the footprint in one direction; its mean width is what counts.
+    const float cosine = std::abs(glm::dot(direction, sample.point.geometric_normal));
+    sample.footprint = view.footprint(hits[k].t) / std::sqrt(std::max(cosine, 0.01F));
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+// Draws into pixels; one per picture, used by all threads.
+class Painter {
+ public:
+  virtual ~Painter() = default;
+  virtual glm::vec3 background() const = 0;
+
+  // Adds the colours of `samples` to their pixels, each times `weight`.
+  virtual void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) = 0;
+};
+
+class LightPainter final : public Painter {
+ public:
+  LightPainter(const TransferData& data, const RayTracer& tracer, const DisplaySurface& surface,
+               const PictureLight& light, const PictureSettings& settings)
+      : tracer_(tracer),
+        surface_(surface),
+        emitters_(data, surface, settings.emitter_samples),
+        light_(light),
+        settings_(settings),
+        vertex_light_(light_at_vertices(data, light)),
+        reflected_(static_cast<std::size_t>(settings.width) * settings.height, 0.0F),
+        coverage_(reflected_.size(), 0.0F) {}
+
+  glm::vec3 background() const override {
+    const bool seen = settings_.show != Show::kIndirect;
+    return seen ? to_glm(light_.sky.color) * light_.sky.luminance : glm::vec3(0);
+  }
+
+  void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) override {
+    if (settings_.show != Show::kIndirect) add_direct_light(samples);
+    if (settings_.show != Show::kDirect) add_bounced_light(samples);
+    for (const CameraSample& sample : samples) {
+      const glm::vec3 emitted = surface_.emitted_luminance(sample.point, sample.footprint);
+      const glm::vec3 reflected = surface_.albedo(sample.point, sample.footprint) *
+                                  sample.irradiance * std::numbers::inv_pi_v<float>;
+      pixel[sample.pixel] += weight * reflected;
+      if (settings_.show != Show::kIndirect) pixel[sample.pixel] += weight * emitted;
+      if (emitted != glm::vec3(0)) continue;
+      reflected_[sample.pixel] += weight * luminance(reflected);
+      coverage_[sample.pixel] += weight;
+    }
+  }
+
+  // The luminance of what does not emit, of each pixel that shows any.
+  std::vector<float> reflected_luminance() const {
+    std::vector<float> mean;
+    for (std::size_t k = 0; k < reflected_.size(); ++k) {
+      if (coverage_[k] > 0) mean.push_back(reflected_[k] / coverage_[k]);
+    }
+    return mean;
+  }
+
+ private:
+  void add_direct_light(std::span<CameraSample> samples) const {
+    add_punctual_light(samples, light_.lights, tracer_);
+    add_emitter_light(samples, emitters_, tracer_,
+                      settings_.samples_per_axis * settings_.samples_per_axis);
+    add_from_vertices(vertex_light_.sky, samples);
+  }
+
+  void add_bounced_light(std::span<CameraSample> samples) const {
+    add_from_vertices(vertex_light_.bounced, samples);
+  }
+
+  void add_from_vertices(std::span<const glm::vec3> value, std::span<CameraSample> samples) const {
+    for (CameraSample& sample : samples) {
+      sample.irradiance += interpolate(surface_.mesh(), value, sample.point);
+    }
+  }
+
+  const RayTracer& tracer_;
+  const DisplaySurface& surface_;
+  Emitters emitters_;
+  const PictureLight& light_;
+  const PictureSettings& settings_;
+  VertexLight vertex_light_;
+  std::vector<float> reflected_, coverage_;  // by pixel
+};
+
+class PatchPainter final : public Painter {
+ public:
+  PatchPainter(const DisplaySurface& surface, const PictureLight& light,
+               const PictureSettings& settings, std::size_t patch_count)
+      : surface_(surface), error_(light.error), settings_(settings) {
+    check_length(error_.size(), patch_count, "error");
+    if (settings.show == Show::kError && error_.size() != patch_count) {
+      throw Error("picture: no errors were given to show; give one number for each patch");
+    }
+    top_ = settings.error_top;
+    if (!(top_ > 0) && !error_.empty()) top_ = *std::max_element(error_.begin(), error_.end());
+  }
+
+  glm::vec3 background() const override { return kNothing; }
+
+  void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) override {
+    for (const CameraSample& sample : samples) {
+      pixel[sample.pixel] += weight * color_of(sample.point);
+    }
+  }
+
+ private:
+  glm::vec3 color_of(const SurfacePoint& point) const {
+    const std::uint32_t patch = surface_.mesh().triangle_patch[point.triangle];
+    if (patch == kNone) return kNothing;
+    if (settings_.show == Show::kError) return viridis(top_ > 0 ? error_[patch] / top_ : 0);
+    const float facing = glm::dot(point.geometric_normal, to_glm(settings_.camera.backward) * 0.6F +
+                                                              to_glm(settings_.camera.up) * 0.8F);
+    return distinct_color(patch) * (0.75F + 0.25F * facing);
+  }
+
+  const DisplaySurface& surface_;
+  std::span<const float> error_;
+  const PictureSettings& settings_;
+  float top_ = 0;
+};
+
+// Pixels belong to one tile each and tiles to one thread each: the order of every sum is fixed.
+std::vector<glm::vec3> paint_tiles(const RayTracer& tracer, const DisplaySurface& surface,
+                                   const PictureSettings& settings, Painter& painter) {
+  const View view(settings);
+  const float weight = 1.0F / static_cast<float>(view.samples_per_pixel());
+  const int columns = (settings.width + kTile - 1) / kTile;
+  const int rows = (settings.height + kTile - 1) / kTile;
+  std::vector<glm::vec3> pixel(static_cast<std::size_t>(settings.width) * settings.height,
+                               glm::vec3(0));
+#pragma omp parallel for schedule(dynamic)
+  for (int tile = 0; tile < columns * rows; ++tile) {
+    CameraRays camera = view.rays_of_tile(tile % columns * kTile, tile / columns * kTile);
+    std::vector<Hit> hits(camera.rays.size());
+    intersect_visible(tracer, surface.mesh(), camera.rays, hits);
+    for (std::size_t k = 0; k < hits.size(); ++k) {
+      if (hits[k].triangle == kNone) pixel[camera.pixel[k]] += weight * painter.background();
+    }
+    std::vector<CameraSample> samples = seen_surface(camera, hits, surface, view);
+    painter.paint(samples, weight, pixel);
+  }
+  return pixel;
+}
+
+std::vector<Float3> to_float3s(std::span<const glm::vec3> values) {
+  std::vector<Float3> out(values.size());
+  std::transform(values.begin(), values.end(), out.begin(),
+                 [](const glm::vec3& v) { return to_float3(v); });
+  return out;
+}
+
+}  // namespace
+
+struct PictureRenderer::Impl {
+  const TransferData& data;
+  const RayTracer& tracer;
+  DisplaySurface surface;
+
+  Impl(const TransferData& scene, const RayTracer& rays)
+      : data(scene), tracer(rays), surface(scene) {}
+};
+
+PictureRenderer::PictureRenderer(const TransferData& data, const RayTracer& tracer)
+    : impl_(std::make_unique<Impl>(data, tracer)) {}
+PictureRenderer::~PictureRenderer() = default;
+PictureRenderer::PictureRenderer(PictureRenderer&&) noexcept = default;
+PictureRenderer& PictureRenderer::operator=(PictureRenderer&&) noexcept = default;
+
+Picture PictureRenderer::render(const PictureLight& light, const PictureSettings& settings) const {
+  check(settings);
+  const auto& [data, tracer, surface] = *impl_;
+  Picture picture{.width = settings.width, .height = settings.height};
+  if (settings.show == Show::kPatches || settings.show == Show::kError) {
+    PatchPainter painter(surface, light, settings, data.patches.size());
+    picture.pixel = to_float3s(paint_tiles(tracer, surface, settings, painter));
+    picture.display_referred = true;
+    return picture;
+  }
+  LightPainter painter(data, tracer, surface, light, settings);
+  picture.pixel = to_float3s(paint_tiles(tracer, surface, settings, painter));
+  picture.exposure =
+      settings.exposure ? *settings.exposure : automatic_exposure(painter.reflected_luminance());
+  return picture;
+}
+
+Picture render_picture(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
+                       const PictureSettings& settings) {
+  return PictureRenderer(data, tracer).render(light, settings);
+}
+
+RayTracer make_surface_tracer(const DisplayMesh& mesh) {
+  return {mesh.position, std::span(mesh.triangle).first(mesh.surface_count())};
+}
+
+}  // namespace rebounce

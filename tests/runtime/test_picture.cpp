@@ -1,0 +1,486 @@
+#include <gtest/gtest.h>
+#include <omp.h>
+#include <stb_image.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <numbers>
+#include <string>
+
+#include "rebounce/demo/camera.h"
+#include "rebounce/demo/image_file.h"
+#include "rebounce/demo/picture.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+// Scenes of rectangles, one patch each, every vertex with the value of its patch.
+class SceneBuilder {
+ public:
+  SceneBuilder() { data_.mesh.weight_begin.push_back(0); }
+
+  std::uint32_t add_material(const Float3& base_color, const Float3& luminance = {0, 0, 0}) {
+    Material material;
+    material.base_color = base_color;
+    material.emitted_luminance = luminance;
+    data_.materials.push_back(material);
+    return static_cast<std::uint32_t>(data_.materials.size() - 1);
+  }
+
+  // The front is the side from which a, b, c, d run counter-clockwise.
+  void add_rectangle(const std::array<Float3, 4>& corner, std::uint32_t material) {
+    add_side(corner, material);
+    data_.mesh.back_triangle.insert(data_.mesh.back_triangle.end(), 2, kNone);
+  }
+
+  // All rectangles so far get a second side. Called once, last.
+  void make_double_sided() {
+    const std::size_t count = data_.mesh.triangle.size();
+    for (std::size_t first = 0; first < count; first += 2) {
+      const Uint3 t = data_.mesh.triangle[first];
+      const Uint3 u = data_.mesh.triangle[first + 1];
+      const auto at = [&](std::uint32_t v) { return data_.mesh.position[v]; };
+      const auto back = static_cast<std::uint32_t>(data_.mesh.triangle.size());
+      add_side({at(t[0]), at(u[2]), at(t[2]), at(t[1])}, data_.mesh.triangle_material[first]);
+      // The second side's first triangle covers the first side's second one.
+      data_.mesh.back_triangle[first] = back + 1;
+      data_.mesh.back_triangle[first + 1] = back;
+    }
+  }
+
+  std::size_t patch_count() const { return data_.patches.size(); }
+  TransferData& data() { return data_; }
+
+ private:
+  void add_side(const std::array<Float3, 4>& corner, std::uint32_t material) {
+    const Float3 e1 = minus(corner[1], corner[0]), e2 = minus(corner[3], corner[0]);
+    Float3 normal{e1[1] * e2[2] - e1[2] * e2[1], e1[2] * e2[0] - e1[0] * e2[2],
+                  e1[0] * e2[1] - e1[1] * e2[0]};
+    const float area = std::hypot(normal[0], normal[1], normal[2]);
+    for (float& axis : normal) axis /= area;
+    DisplayMesh& mesh = data_.mesh;
+    const auto v = static_cast<std::uint32_t>(mesh.position.size());
+    const auto patch = static_cast<std::uint32_t>(data_.patches.size());
+    for (int k = 0; k < 4; ++k) {
+      mesh.position.push_back(corner[k]);
+      mesh.normal.push_back(normal);
+      mesh.base_color_texcoord.push_back({k == 1 || k == 2 ? 1.0F : 0.0F, k >= 2 ? 1.0F : 0.0F});
+      mesh.emissive_texcoord.push_back({0, 0});
+      mesh.vertex_color.push_back({1, 1, 1});
+      mesh.weight_patch.push_back(patch);
+      mesh.weight.push_back(1);
+      mesh.weight_begin.push_back(static_cast<std::uint32_t>(mesh.weight.size()));
+    }
+    for (const Uint3& t : {Uint3{v, v + 1, v + 2}, Uint3{v, v + 2, v + 3}}) {
+      mesh.triangle.push_back(t);
+      mesh.triangle_patch.push_back(patch);
+      mesh.triangle_material.push_back(material);
+    }
+    const Material& m = data_.materials[material];
+    PatchTable& patches = data_.patches;
+    patches.area.push_back(area);
+    patches.centroid.push_back(corner[0]);
+    patches.normal.push_back(normal);
+    patches.reflectance.push_back(m.base_color);
+    patches.emitted_exitance.push_back(
+        {kPi * m.emitted_luminance[0], kPi * m.emitted_luminance[1], kPi * m.emitted_luminance[2]});
+    patches.sky_visibility.push_back(1);
+    patches.absorbed.push_back(0);
+  }
+
+  static Float3 minus(const Float3& a, const Float3& b) {
+    return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+  }
+
+  TransferData data_;
+};
+
+// A floor at height 0 from -half to half, facing up.
+std::array<Float3, 4> floor_corners(float half) {
+  return {{{-half, 0, half}, {half, 0, half}, {half, 0, -half}, {-half, 0, -half}}};
+}
+
+// Nine pixels over about 2 cm of floor around `target`, seen from above.
+PictureSettings close_up(const Float3& target, Show show) {
+  PictureSettings settings;
+  settings.width = settings.height = 3;
+  settings.camera = look_at({target[0], 0.5F, target[2]}, target, 0.02F);
+  settings.show = show;
+  return settings;
+}
+
+Picture render(TransferData& data, const PictureLight& light, const PictureSettings& settings) {
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  return render_picture(data, tracer, light, settings);
+}
+
+// A closed room of side 2 around (0, 1, 0) with a square lamp below the ceiling.
+SceneBuilder lamp_room() {
+  SceneBuilder scene;
+  const std::uint32_t white = scene.add_material({0.75F, 0.75F, 0.75F});
+  const std::uint32_t red = scene.add_material({0.6F, 0.05F, 0.05F});
+  const std::uint32_t green = scene.add_material({0.1F, 0.5F, 0.1F});
+  const std::uint32_t lamp = scene.add_material({0.5F, 0.5F, 0.5F}, {20, 18, 12});
+  scene.add_rectangle(floor_corners(1), white);
+  scene.add_rectangle({{{-1, 2, -1}, {1, 2, -1}, {1, 2, 1}, {-1, 2, 1}}}, white);
+  scene.add_rectangle({{{-1, 0, -1}, {1, 0, -1}, {1, 2, -1}, {-1, 2, -1}}}, white);
+  scene.add_rectangle({{{-1, 0, 1}, {-1, 0, -1}, {-1, 2, -1}, {-1, 2, 1}}}, red);
+  scene.add_rectangle({{{1, 0, -1}, {1, 0, 1}, {1, 2, 1}, {1, 2, -1}}}, green);
+  scene.add_rectangle({{{1, 0, 1}, {-1, 0, 1}, {-1, 2, 1}, {1, 2, 1}}}, white);
+  scene.add_rectangle(
+      {{{-0.3F, 1.98F, -0.3F}, {0.3F, 1.98F, -0.3F}, {0.3F, 1.98F, 0.3F}, {-0.3F, 1.98F, 0.3F}}},
+      lamp);
+  scene.add_rectangle(
+      {{{-0.5F, 0.6F, 0.1F}, {0.2F, 0.6F, 0.1F}, {0.2F, 0.6F, -0.6F}, {-0.5F, 0.6F, -0.6F}}},
+      white);
+  return scene;
+}
+
+TEST(Picture, UniformIrradianceShowsAlbedoTimesIrradianceOverPi) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(5), scene.add_material({0.5F, 0.25F, 1}));
+  const std::vector<Float3> indirect{{100, 200, 50}};
+  const Picture picture =
+      render(scene.data(), {.indirect_irradiance = indirect}, close_up({0, 0, 0}, Show::kIndirect));
+  ASSERT_EQ(picture.pixel.size(), 9U);
+  for (const Float3& pixel : picture.pixel) {
+    for (const float channel : pixel) EXPECT_NEAR(channel, 50 / kPi, 2e-4F);
+  }
+}
+
+TEST(Picture, FirstFlightIsTakenOutOfTheInterpolatedLight) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(5), scene.add_material({1, 1, 1}));
+  const std::vector<Float3> indirect{{3, 3, 3}}, emitted{{1, 4, 0}};
+  const Picture picture =
+      render(scene.data(), {.indirect_irradiance = indirect, .emitted_irradiance = emitted},
+             close_up({0, 0, 0}, Show::kRadiosity));
+  EXPECT_NEAR(picture.pixel[4][0], 2 / kPi, 1e-5F);
+  EXPECT_EQ(picture.pixel[4][1], 0);
+  EXPECT_NEAR(picture.pixel[4][2], 3 / kPi, 1e-5F);
+}
+
+TEST(Picture, PointLightMatchesClosedFormInEveryPixel) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(5), scene.add_material({0.8F, 0.8F, 0.8F}));
+  Light lamp;
+  lamp.position = {0, 2, 0};
+  lamp.intensity = 100;
+  PictureSettings settings;
+  settings.width = settings.height = 33;
+  settings.camera = look_at({0, 4, 0}, {0, 0, 0}, kPi / 3);
+  settings.show = Show::kDirect;
+  const std::vector<Light> lights{lamp};
+  const Picture picture = render(scene.data(), {.lights = lights}, settings);
+  const float pixel_size = 2 * 4 * std::tan(kPi / 6) / 33;
+  for (int y = 0; y < 33; ++y) {
+    for (int x = 0; x < 33; ++x) {
+      const float dx = static_cast<float>(x - 16) * pixel_size;
+      const float dz = static_cast<float>(y - 16) * pixel_size;
+      const float distance_squared = dx * dx + dz * dz + 4;
+      const float expected =
+          0.8F / kPi * 100 * 2 / (distance_squared * std::sqrt(distance_squared));
+      // A pixel is the mean over 0.14 m of floor, by jittered samples.
+      EXPECT_NEAR(picture.pixel[y * 33 + x][1], expected, 0.015F * expected) << x << ' ' << y;
+    }
+  }
+}
+
+TEST(Picture, SomethingBetweenLampAndFloorCastsAShadow) {
+  SceneBuilder scene;
+  const std::uint32_t white = scene.add_material({0.8F, 0.8F, 0.8F});
+  scene.add_rectangle(floor_corners(5), white);
+  scene.add_rectangle({{{-1, 1, 1}, {1, 1, 1}, {1, 1, -1}, {-1, 1, -1}}}, white);
+  Light lamp;
+  lamp.position = {0, 2, 0};
+  const std::vector<Light> lights{lamp};
+  const PictureLight light{.lights = lights};
+  const Picture dark = render(scene.data(), light, close_up({0, 0, 0}, Show::kDirect));
+  for (const Float3& pixel : dark.pixel) EXPECT_EQ(pixel[0], 0);
+  const Picture lit = render(scene.data(), light, close_up({3, 0, 0}, Show::kDirect));
+  for (const Float3& pixel : lit.pixel) EXPECT_GT(pixel[0], 0);
+}
+
+TEST(Picture, SquareLampMatchesTheViewFactorOfItsCorner) {
+  // Howell's catalogue, a differential element below the corner of a parallel rectangle: 1 x 1 at
+  // distance 1.
+  constexpr float kViewFactor = 0.13853160599489F;
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(5), scene.add_material({0.5F, 0.5F, 0.5F}));
+  scene.add_rectangle({{{0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {0, 1, 1}}},
+                      scene.add_material({0, 0, 0}, {10, 10, 10}));
+  const Picture picture = render(scene.data(), {}, close_up({0, 0, 0}, Show::kDirect));
+  for (const Float3& pixel : picture.pixel) {
+    EXPECT_NEAR(pixel[0], 0.5F * 10 * kViewFactor, 0.01F * 0.5F * 10 * kViewFactor);
+  }
+}
+
+TEST(Picture, UniformSkyLightsAnOpenFloorEvenly) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(5), scene.add_material({0.5F, 0.5F, 0.5F}));
+  PictureLight light;
+  light.sky = {.color = {1, 0.5F, 0.25F}, .luminance = 8};
+  const Picture floor = render(scene.data(), light, close_up({0, 0, 0}, Show::kDirect));
+  EXPECT_NEAR(floor.pixel[4][0], 4, 1e-4F);
+  EXPECT_NEAR(floor.pixel[4][2], 1, 1e-4F);
+  PictureSettings upward = close_up({0, 0, 0}, Show::kDirect);
+  upward.camera = look_at({0, 1, 0}, {0, 2, 0}, 0.5F);
+  const Picture sky = render(scene.data(), light, upward);
+  EXPECT_NEAR(sky.pixel[4][1], 4, 1e-4F);
+}
+
+TEST(Picture, EmittersShowTheirLuminanceExceptInIndirect) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(5), scene.add_material({0, 0, 0}, {7, 8, 9}));
+  const Picture direct = render(scene.data(), {}, close_up({0, 0, 0}, Show::kDirect));
+  EXPECT_NEAR(direct.pixel[4][2], 9, 1e-4F);
+  const Picture indirect = render(scene.data(), {}, close_up({0, 0, 0}, Show::kIndirect));
+  EXPECT_EQ(indirect.pixel[4][2], 0);
+}
+
+TEST(Picture, CameraSeesThroughTheBackOfOneSidedSurfacesOnly) {
+  SceneBuilder scene;
+  const std::uint32_t dark = scene.add_material({0, 0, 0}, {1, 1, 1});
+  const std::uint32_t bright = scene.add_material({0, 0, 0}, {5, 5, 5});
+  scene.add_rectangle(floor_corners(1), dark);                                      // faces up
+  scene.add_rectangle({{{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}}}, bright);  // faces down
+  PictureSettings settings = close_up({0, 0, 0}, Show::kRadiosity);
+  settings.camera = look_at({0, 3, 0}, {0, 0, 0}, 0.02F);
+  EXPECT_NEAR(render(scene.data(), {}, settings).pixel[4][0], 1, 1e-5F);
+  scene.make_double_sided();
+  EXPECT_NEAR(render(scene.data(), {}, settings).pixel[4][0], 5, 1e-5F);
+}
+
+TEST(Picture, SecondSideIsShadedByItsOwnPatch) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(1), scene.add_material({1, 1, 1}));
+  scene.make_double_sided();
+  ASSERT_EQ(scene.patch_count(), 2U);
+  const std::vector<Float3> indirect{{1, 1, 1}, {2, 2, 2}};
+  const PictureLight light{.indirect_irradiance = indirect};
+  PictureSettings settings = close_up({0, 0, 0}, Show::kIndirect);
+  EXPECT_NEAR(render(scene.data(), light, settings).pixel[4][0], 1 / kPi, 1e-5F);
+  settings.camera = look_at({0.1F, -1, 0.2F}, {0.1F, 0, 0.2F}, 0.02F);
+  EXPECT_NEAR(render(scene.data(), light, settings).pixel[4][0], 2 / kPi, 1e-5F);
+}
+
+TEST(Picture, VertexWithoutWeightsGetsNoIndirectLight) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(1), scene.add_material({1, 1, 1}));
+  DisplayMesh& mesh = scene.data().mesh;
+  mesh.weight_begin.assign(mesh.weight_begin.size(), 0);
+  const std::vector<Float3> indirect{{1, 1, 1}};
+  const Picture picture =
+      render(scene.data(), {.indirect_irradiance = indirect}, close_up({0, 0, 0}, Show::kIndirect));
+  EXPECT_EQ(picture.pixel[4][0], 0);
+}
+
+TEST(Picture, SameBitsForAnyNumberOfThreads) {
+  SceneBuilder scene = lamp_room();
+  Light lamp;
+  lamp.position = {0.3F, 1.2F, 0.4F};
+  const std::vector<Light> lights{lamp};
+  const std::vector<Float3> indirect(scene.patch_count(), {2, 2, 2});
+  const PictureLight light{.lights = lights, .indirect_irradiance = indirect};
+  PictureSettings settings;
+  settings.width = 70;
+  settings.height = 50;
+  settings.camera = look_at({0, 1, 0.9F}, {0, 1, 0}, 1.2F);
+  const int threads_before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const Picture one = render(scene.data(), light, settings);
+  omp_set_num_threads(2);
+  const Picture two = render(scene.data(), light, settings);
+  omp_set_num_threads(threads_before);
+  EXPECT_EQ(std::memcmp(one.pixel.data(), two.pixel.data(), one.pixel.size() * sizeof(Float3)), 0);
+  EXPECT_EQ(one.exposure, two.exposure);
+}
+
+TEST(Picture, DirectAndIndirectAddUpToRadiosity) {
+  SceneBuilder scene = lamp_room();
+  const std::vector<Float3> indirect(scene.patch_count(), {2, 2, 2});
+  const PictureLight light{.indirect_irradiance = indirect};
+  PictureSettings settings;
+  settings.width = settings.height = 24;
+  settings.camera = look_at({0, 1, 0.9F}, {0, 1, 0}, 1.2F);
+  settings.show = Show::kDirect;
+  const Picture direct = render(scene.data(), light, settings);
+  settings.show = Show::kIndirect;
+  const Picture bounced = render(scene.data(), light, settings);
+  settings.show = Show::kRadiosity;
+  const Picture both = render(scene.data(), light, settings);
+  for (std::size_t k = 0; k < both.pixel.size(); ++k) {
+    const float sum = direct.pixel[k][0] + bounced.pixel[k][0];
+    EXPECT_NEAR(both.pixel[k][0], sum, 1e-5F * (1 + sum));
+  }
+}
+
+TEST(Picture, ExposureBringsUniformGreyToMidGreyAndCanBeFixed) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(5), scene.add_material({0.5F, 0.5F, 0.5F}));
+  const std::vector<Float3> indirect{{4000, 4000, 4000}};
+  const PictureLight light{.indirect_irradiance = indirect};
+  PictureSettings settings = close_up({0, 0, 0}, Show::kRadiosity);
+  const Picture automatic = render(scene.data(), light, settings);
+  EXPECT_NEAR(automatic.pixel[4][0] * std::exp2(automatic.exposure), 0.18F, 1e-4F);
+  settings.exposure = -3;
+  EXPECT_EQ(render(scene.data(), light, settings).exposure, -3);
+}
+
+TEST(Picture, TextureIsFilteredAndMultiplied) {
+  SceneBuilder scene;
+  const std::uint32_t white = scene.add_material({1, 1, 1});
+  scene.add_rectangle(floor_corners(1), white);
+  // A checkerboard of black and white texels: its mean is one half in linear light.
+  ScreenImage checker{.width = 64, .height = 64};
+  for (int k = 0; k < 64 * 64; ++k) {
+    checker.rgb.insert(checker.rgb.end(), 3, (k / 64 + k) % 2 == 0 ? 255 : 0);
+  }
+  const auto path = std::filesystem::temp_directory_path() / "rebounce_test_checker.png";
+  write_png(path, checker);
+  std::FILE* file = std::fopen(path.c_str(), "rb");
+  ASSERT_NE(file, nullptr);
+  Texture texture;
+  for (int byte; (byte = std::fgetc(file)) != EOF;) {
+    texture.encoded.push_back(static_cast<std::uint8_t>(byte));
+  }
+  std::fclose(file);
+  std::filesystem::remove(path);
+  scene.data().textures.push_back(texture);
+  scene.data().materials[white].base_color_texture = 0;
+  const std::vector<Float3> indirect{{kPi, kPi, kPi}};
+  PictureSettings settings;
+  settings.width = settings.height = 5;  // about 20 x 20 texels in a pixel
+  settings.camera = look_at({0, 5, 0}, {0, 0, 0}, 0.25F);
+  settings.show = Show::kIndirect;
+  const Picture far = render(scene.data(), {.indirect_irradiance = indirect}, settings);
+  for (const Float3& pixel : far.pixel) EXPECT_NEAR(pixel[1], 0.5F, 0.01F);
+  settings.camera = look_at({0.0156F, 0.5F, 0.0156F}, {0.0156F, 0, 0.0156F}, 0.01F);
+  const Picture near = render(scene.data(), {.indirect_irradiance = indirect}, settings);
+  EXPECT_TRUE(near.pixel[12][0] > 0.9F || near.pixel[12][0] < 0.1F) << near.pixel[12][0];
+}
+
+TEST(Picture, DamagedTextureIsRefused) {
+  SceneBuilder scene;
+  const std::uint32_t white = scene.add_material({1, 1, 1});
+  scene.add_rectangle(floor_corners(1), white);
+  scene.data().textures.push_back(
+      Texture{{0x89, 0x50, 0x4e, 0x47, 1, 2, 3}, TextureWrap::kRepeat, TextureWrap::kRepeat});
+  scene.data().materials[white].base_color_texture = 0;
+  EXPECT_THROW(render(scene.data(), {}, close_up({0, 0, 0}, Show::kDirect)), Error);
+}
+
+TEST(Picture, PatchesAndErrorsAreColors) {
+  SceneBuilder scene = lamp_room();
+  std::vector<float> error(scene.patch_count());
+  for (std::size_t k = 0; k < error.size(); ++k) error[k] = static_cast<float>(k);
+  PictureSettings settings = close_up({0, 0, 0.8F}, Show::kPatches);
+  const Picture patches = render(scene.data(), {}, settings);
+  EXPECT_TRUE(patches.display_referred);
+  EXPECT_GT(patches.pixel[4][0], 0.02F);
+  settings.show = Show::kError;
+  const Picture errors = render(scene.data(), {.error = error}, settings);
+  const ScreenImage screen = tone_map(errors);
+  EXPECT_NEAR(screen.rgb[0], 68, 1) << "the floor is patch 0, with no error: viridis' low end";
+  EXPECT_NEAR(screen.rgb[2], 84, 1);
+  EXPECT_THROW(render(scene.data(), {}, settings), Error);
+}
+
+TEST(Picture, WrongInputsAreRefused) {
+  SceneBuilder scene = lamp_room();
+  const std::vector<Float3> short_array(3);
+  PictureSettings settings = close_up({0, 0, 0}, Show::kDirect);
+  EXPECT_THROW(render(scene.data(), {.indirect_irradiance = short_array}, settings), Error);
+  settings.width = 0;
+  EXPECT_THROW(render(scene.data(), {}, settings), Error);
+  settings.width = 3;
+  settings.samples_per_axis = 0;
+  EXPECT_THROW(render(scene.data(), {}, settings), Error);
+  EXPECT_THROW(look_at({1, 2, 3}, {1, 2, 3}, 1), Error);
+  EXPECT_THROW(look_at({1, 2, 3}, {0, 0, 0}, 4), Error);
+}
+
+TEST(ToneMap, KeepsMidtonesAndHue) {
+  const Picture picture{.width = 3,
+                        .height = 1,
+                        .pixel = {{0.18F, 0.18F, 0.18F}, {0.4F, 0.1F, 0.05F}, {1e6F, 1e6F, 1e6F}}};
+  const ScreenImage image = tone_map(picture);
+  EXPECT_EQ(image.rgb[0], 118);  // sRGB of 0.18
+  EXPECT_EQ(image.rgb[3], 170);  // of 0.4
+  EXPECT_EQ(image.rgb[4], 89);   // of 0.1
+  EXPECT_EQ(image.rgb[6], 255);
+}
+
+TEST(ToneMap, BrighterStaysBrighter) {
+  Picture picture{.width = 400, .height = 1};
+  for (int k = 0; k < 400; ++k) {
+    const float y = 0.01F * static_cast<float>(k);
+    picture.pixel.push_back({y, 0.5F * y, 0.25F * y});
+  }
+  const ScreenImage image = tone_map(picture);
+  for (std::size_t k = 3; k < image.rgb.size(); ++k) EXPECT_GE(image.rgb[k], image.rgb[k - 3]);
+}
+
+TEST(Png, IsWrittenAndReadBack) {
+  ScreenImage image{.width = 7, .height = 5};
+  for (int k = 0; k < 7 * 5 * 3; ++k) image.rgb.push_back(static_cast<std::uint8_t>(k * 37));
+  const auto folder = std::filesystem::temp_directory_path() / "rebounce_test_png";
+  std::filesystem::create_directories(folder);
+  const auto path = folder / "picture.png";
+  write_png(path, image);
+  int width = 0, height = 0, channels = 0;
+  stbi_uc* read = stbi_load(path.c_str(), &width, &height, &channels, 3);
+  ASSERT_NE(read, nullptr);
+  EXPECT_EQ(width, 7);
+  EXPECT_EQ(height, 5);
+  EXPECT_EQ(std::memcmp(read, image.rgb.data(), image.rgb.size()), 0);
+  stbi_image_free(read);
+  const auto files = std::filesystem::directory_iterator(folder);
+  EXPECT_EQ(std::distance(begin(files), end(files)), 1) << "no temporary file is left";
+  std::filesystem::remove_all(folder);
+}
+
+TEST(Png, MissingFolderIsAnError) {
+  const ScreenImage image{.width = 1, .height = 1, .rgb = {1, 2, 3}};
+  EXPECT_THROW(write_png("/no/such/folder/picture.png", image), Error);
+}
+
+TEST(Camera, LookAtIsOrthonormalAndAims) {
+  const Camera camera = look_at({1, 2, 3}, {1, 2, -3}, 1);
+  EXPECT_EQ(camera.backward, (Float3{0, 0, 1}));
+  EXPECT_EQ(camera.right, (Float3{1, 0, 0}));
+  EXPECT_EQ(camera.up, (Float3{0, 1, 0}));
+  const Camera down = look_at({0, 5, 0}, {0, 0, 0}, 1);
+  EXPECT_NEAR(down.backward[1], 1, 1e-6F);
+  EXPECT_NEAR(std::abs(down.right[0]), 1, 1e-6F);
+}
+
+TEST(Camera, FitStandsInsideAClosedRoom) {
+  for (const bool double_sided : {false, true}) {
+    SceneBuilder scene = lamp_room();
+    if (double_sided) scene.make_double_sided();
+    const RayTracer tracer = make_surface_tracer(scene.data().mesh);
+    const Camera camera = fit_camera(scene.data(), tracer);
+    EXPECT_LT(std::abs(camera.position[0]), 1);
+    EXPECT_LT(std::abs(camera.position[2]), 1);
+    EXPECT_EQ(camera.up, (Float3{0, 1, 0})) << "level";
+  }
+}
+
+TEST(Camera, FitLooksIntoAnOpenBoxFromItsOpenSide) {
+  SceneBuilder scene = lamp_room();
+  // Rectangle 5 is the wall at z = 1: shrunk to nothing, it leaves the box open.
+  DisplayMesh& mesh = scene.data().mesh;
+  for (int k = 20; k < 24; ++k) mesh.position[k] = {0, 0, 0.99F};
+  const RayTracer tracer = make_surface_tracer(mesh);
+  const Camera camera = fit_camera(scene.data(), tracer);
+  EXPECT_GT(camera.backward[2], 0.7F);
+  EXPECT_GT(camera.position[2], 0.5F);
+}
+
+}  // namespace
+}  // namespace rebounce
