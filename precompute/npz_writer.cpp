@@ -91,7 +91,7 @@ class ZipWriter {
       ::zip_error_init_with_code(&details, error);
       const std::string reason = ::zip_error_strerror(&details);
       ::zip_error_fini(&details);
-      fail(target_, reason);
+      fail(target_, reason + "; choose another place to write to");
     }
   }
 
@@ -122,7 +122,10 @@ class ZipWriter {
     void operator()(zip_t* archive) const { ::zip_discard(archive); }
   };
 
-  [[noreturn]] void fail_for_archive() const { fail(target_, ::zip_strerror(archive_.get())); }
+  [[noreturn]] void fail_for_archive() const {
+    fail(target_, std::string(::zip_strerror(archive_.get())) +
+                      "; check the names of the arrays and the space on the disk");
+  }
 
   zip_source_t* make_source(const std::string& header, std::span<const std::byte> data) {
     // libzip takes pointers to bytes that it could own; it is told not to, and only reads them.

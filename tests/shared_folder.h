@@ -15,7 +15,7 @@ inline std::filesystem::path shared_folder() {
 }  // namespace rebounce::test
 
 /// Skips the current test, visibly, where the shared folder is not there.
-#define REBOUNCE_NEED_SHARED(path)                                                     \
-  if (!std::filesystem::exists(path)) {                                                \
+#define REBOUNCE_NEED_SHARED(path)                                                         \
+  if (!std::filesystem::exists(path)) {                                                    \
     GTEST_SKIP() << "needs " << (path).string() << " (set REBOUNCE_SHARED to its folder)"; \
   }

@@ -54,8 +54,11 @@ fs::path resolve(const fs::path& target) {
 
 fs::path temporary_name(const fs::path& target) {
   static std::atomic<std::uint64_t> counter{0};
-  const std::string unique = std::to_string(::getpid()) + "-" + std::to_string(++counter);
-  return target.parent_path() / ("." + target.filename().string() + "." + unique + ".tmp");
+  fs::path name(".");
+  name += target.filename();
+  name += '.';
+  name += std::to_string(::getpid()) + "-" + std::to_string(++counter) + ".tmp";
+  return target.parent_path() / name;
 }
 
 /// Waits until what `path` names is on the disk; 0 or the error's number.
