@@ -231,7 +231,7 @@ class FormFactorAssembly {
       const double rest = std::max(0.0, left[i]), lost = escape[i].sky + escape[i].absorbed;
       const double sky = lost > 0 ? rest * escape[i].sky / lost : 0;
       result.sky_visibility.push_back(static_cast<float>(sky));
-      result.absorbed.push_back(static_cast<float>(rest - sky));
+      result.absorbed.push_back(static_cast<float>(std::max(0.0, rest - sky)));
     }
   }
 

@@ -1,5 +1,6 @@
 #include "gltf_meshes.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 
 #include <array>

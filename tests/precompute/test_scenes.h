@@ -1,0 +1,71 @@
+#pragma once
+
+// Scenes made by hand for the tests of the offline stage.
+
+#include <array>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "rebounce/precompute/patch_model.h"
+#include "rebounce/precompute/scene.h"
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/ray_tracer.h"
+
+namespace rebounce::test {
+
+/// A scene without triangles and with one material.
+inline Scene empty_scene(const Float3& reflectance = {0.5F, 0.5F, 0.5F}) {
+  Scene scene;
+  scene.name = "test";
+  scene.hash = "xxh3:00000000000000000000000000000000";
+  Material material;
+  material.base_color = reflectance;
+  scene.materials.push_back(material);
+  return scene;
+}
+
+/// Adds a flat convex polygon, counter-clockwise from its front, as a fan of triangles.
+inline void add_polygon(Scene& scene, std::span<const glm::dvec3> corner,
+                        std::uint32_t material = 0) {
+  const auto first = static_cast<std::uint32_t>(scene.position.size());
+  const glm::dvec3 normal =
+      glm::normalize(glm::cross(corner[1] - corner[0], corner[2] - corner[0]));
+  for (const glm::dvec3& p : corner) {
+    scene.position.push_back(to_float3(p));
+    scene.normal.push_back(to_float3(normal));
+    scene.base_color_texcoord.push_back({0, 0});
+    scene.emissive_texcoord.push_back({0, 0});
+    scene.vertex_color.push_back({1, 1, 1});
+  }
+  for (std::uint32_t k = 2; k < corner.size(); ++k) {
+    scene.triangle.push_back({first, first + k - 1, first + k});
+    scene.triangle_material.push_back(material);
+  }
+}
+
+/// The six faces of the box [low, high], in the order -x +x -y +y -z +z; `inwards` makes a room of it.
+inline void add_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high, bool inwards,
+                    std::uint32_t material = 0) {
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int side = 0; side < 2; ++side) {
+      const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+      std::array<glm::dvec3, 4> corner;
+      for (int k = 0; k < 4; ++k) {
+        corner[k][axis] = side == 1 ? high[axis] : low[axis];
+        corner[k][u] = (k == 1 || k == 2) ? high[u] : low[u];
+        corner[k][v] = k >= 2 ? high[v] : low[v];
+      }
+      // (u, v) turns counter-clockwise seen from +axis.
+      const bool faces_up = inwards ? side == 0 : side == 1;
+      if (!faces_up) std::swap(corner[1], corner[3]);
+      add_polygon(scene, corner, material);
+    }
+  }
+}
+
+inline RayTracer make_tracer(const PatchModel& model) {
+  return {model.mesh.position, std::span(model.mesh.triangle).first(model.mesh.surface_count())};
+}
+
+}  // namespace rebounce::test
