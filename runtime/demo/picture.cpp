@@ -111,8 +111,9 @@ class View {
     for (int k = 0; k < n * n; ++k) {
       const auto index = static_cast<std::uint32_t>(k);
       const std::uint32_t seed = hash(pixel) ^ index;
-      const float inside_x = (static_cast<float>(k % n) + hash_to_unit(seed, 3)) / n;
-      const float inside_y = (static_cast<float>(k / n) + hash_to_unit(seed, 4)) / n;
+      const int column = k % n, row = k / n;
+      const float inside_x = (static_cast<float>(column) + hash_to_unit(seed, 3)) / n;
+      const float inside_y = (static_cast<float>(row) + hash_to_unit(seed, 4)) / n;
       tile.rays.push_back(
           ray_through(static_cast<float>(x) + inside_x, static_cast<float>(y) + inside_y));
       tile.pixel.push_back(pixel);
