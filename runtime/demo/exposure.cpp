@@ -6,7 +6,8 @@
 namespace rebounce {
 namespace {
 
-constexpr double kMidGrey = 0.18;
+// Half a stop above the 18 % of outdoor photographs: most of a room is light walls.
+constexpr double kKey = 0.25;
 constexpr double kBrightShare = 0.95;  // of the pixels must stay below kBrightLevel
 constexpr double kBrightLevel = 1.5;   // on the tone curve's shoulder, still with some colour
 constexpr double kBlackShare = 1e-3;   // of the mean: darker pixels do not pull the exposure up
@@ -26,7 +27,7 @@ float automatic_exposure(std::vector<float> luminance) {
       static_cast<std::ptrdiff_t>(kBrightShare * static_cast<double>(luminance.size() - 1));
   std::nth_element(luminance.begin(), luminance.begin() + rank, luminance.end());
   const double bright = luminance[static_cast<std::size_t>(rank)];
-  return static_cast<float>(-std::log2(std::max(log_mean / kMidGrey, bright / kBrightLevel)));
+  return static_cast<float>(-std::log2(std::max(log_mean / kKey, bright / kBrightLevel)));
 }
 
 }  // namespace rebounce

@@ -23,7 +23,8 @@ constexpr int kTile = 16;  // pixels a side
 constexpr int kMaxSide = 32768;
 constexpr int kMaxSamplesPerAxis = 64;
 constexpr int kMaxEmitterSamples = 65536;
-const glm::vec3 kNothing(0.02F);  // what is behind patches and errors
+constexpr float kBrightestEmitter = 2;  // where the tone curve takes 1 for white
+const glm::vec3 kNothing(0.02F);        // what is behind patches and errors
 
 void check_setting(int value, int most, const char* name) {
   if (value >= 1 && value <= most) return;
@@ -110,8 +111,9 @@ class View {
     for (int k = 0; k < n * n; ++k) {
       const auto index = static_cast<std::uint32_t>(k);
       const std::uint32_t seed = hash(pixel) ^ index;
-      const float inside_x = (static_cast<float>(k % n) + hash_to_unit(seed, 3)) / n;
-      const float inside_y = (static_cast<float>(k / n) + hash_to_unit(seed, 4)) / n;
+      const int column = k % n, row = k / n;
+      const float inside_x = (static_cast<float>(column) + hash_to_unit(seed, 3)) / n;
+      const float inside_y = (static_cast<float>(row) + hash_to_unit(seed, 4)) / n;
       tile.rays.push_back(
           ray_through(static_cast<float>(x) + inside_x, static_cast<float>(y) + inside_y));
       tile.pixel.push_back(pixel);
@@ -151,14 +153,40 @@ std::vector<CameraSample> seen_surface(const CameraRays& tile, std::span<const H
   return samples;
 }
 
-// Draws into pixels; one per picture, used by all threads.
+// Draws into pixels; one per picture, used by all threads on different pixels.
 class Painter {
  public:
   virtual ~Painter() = default;
-  virtual glm::vec3 background() const = 0;
+
+  // Adds to `pixel` what a camera ray of this `weight` sees where there is no surface.
+  virtual void paint_background(std::uint32_t index, float weight, std::span<glm::vec3> pixel) = 0;
 
   // Adds the colours of `samples` to their pixels, each times `weight`.
   virtual void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) = 0;
+};
+
+// What shines by itself, apart from what is lit: its mean where it covers a pixel.
+struct ShiningLayer {
+  std::vector<glm::vec3> luminance;  // cd/m² x coverage
+  std::vector<float> coverage;       // [0, 1]
+
+  explicit ShiningLayer(std::size_t pixel_count)
+      : luminance(pixel_count, glm::vec3(0)), coverage(pixel_count, 0.0F) {}
+
+  void add(std::uint32_t pixel, const glm::vec3& value, float weight) {
+    luminance[pixel] += weight * value;
+    coverage[pixel] += weight;
+  }
+
+  // A lamp may be a thousand times brighter than the screen's white: a pixel that it covers by a
+  // sixteenth would be white as well, and its edge jagged. So it is dimmed, hue kept, to
+  // `brightest` before it is mixed in.
+  glm::vec3 dimmed(std::size_t pixel, float brightest) const {
+    const glm::vec3& value = luminance[pixel];
+    const float peak = std::max({value.x, value.y, value.z});
+    const float allowed = brightest * coverage[pixel];
+    return peak > allowed ? value * (allowed / peak) : value;
+  }
 };
 
 class LightPainter final : public Painter {
@@ -172,11 +200,12 @@ class LightPainter final : public Painter {
         settings_(settings),
         vertex_light_(light_at_vertices(data, light)),
         reflected_(static_cast<std::size_t>(settings.width) * settings.height, 0.0F),
-        coverage_(reflected_.size(), 0.0F) {}
+        coverage_(reflected_.size(), 0.0F),
+        shining_(reflected_.size()) {}
 
-  glm::vec3 background() const override {
-    const bool seen = settings_.show != Show::kIndirect;
-    return seen ? to_glm(light_.sky.color) * light_.sky.luminance : glm::vec3(0);
+  void paint_background(std::uint32_t index, float weight, std::span<glm::vec3>) override {
+    if (settings_.show == Show::kIndirect) return;
+    shining_.add(index, to_glm(light_.sky.color) * light_.sky.luminance, weight);
   }
 
   void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) override {
@@ -187,20 +216,28 @@ class LightPainter final : public Painter {
       const glm::vec3 reflected = surface_.albedo(sample.point, sample.footprint) *
                                   sample.irradiance * std::numbers::inv_pi_v<float>;
       pixel[sample.pixel] += weight * reflected;
-      if (settings_.show != Show::kIndirect) pixel[sample.pixel] += weight * emitted;
-      if (emitted != glm::vec3(0)) continue;
-      reflected_[sample.pixel] += weight * luminance(reflected);
-      coverage_[sample.pixel] += weight;
+      if (emitted == glm::vec3(0)) {
+        reflected_[sample.pixel] += weight * luminance(reflected);
+        coverage_[sample.pixel] += weight;
+      } else if (settings_.show != Show::kIndirect) {
+        shining_.add(sample.pixel, emitted, weight);
+      }
     }
   }
 
-  // The luminance of what does not emit, of each pixel that shows any.
-  std::vector<float> reflected_luminance() const {
+  // Stops that suit what does not emit.
+  float exposure() const {
     std::vector<float> mean;
     for (std::size_t k = 0; k < reflected_.size(); ++k) {
       if (coverage_[k] > 0) mean.push_back(reflected_[k] / coverage_[k]);
     }
-    return mean;
+    return automatic_exposure(std::move(mean));
+  }
+
+  // Adds emitters and sky, once the exposure is known.
+  void add_shining(float exposure, std::span<glm::vec3> pixel) const {
+    const float brightest = kBrightestEmitter * std::exp2(-exposure);
+    for (std::size_t k = 0; k < pixel.size(); ++k) pixel[k] += shining_.dimmed(k, brightest);
   }
 
  private:
@@ -227,7 +264,8 @@ class LightPainter final : public Painter {
   const PictureLight& light_;
   const PictureSettings& settings_;
   VertexLight vertex_light_;
-  std::vector<float> reflected_, coverage_;  // by pixel
+  std::vector<float> reflected_, coverage_;  // by pixel, of what does not emit
+  ShiningLayer shining_;
 };
 
 class PatchPainter final : public Painter {
@@ -243,7 +281,9 @@ class PatchPainter final : public Painter {
     if (!(top_ > 0) && !error_.empty()) top_ = *std::max_element(error_.begin(), error_.end());
   }
 
-  glm::vec3 background() const override { return kNothing; }
+  void paint_background(std::uint32_t index, float weight, std::span<glm::vec3> pixel) override {
+    pixel[index] += weight * kNothing;
+  }
 
   void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) override {
     for (const CameraSample& sample : samples) {
@@ -282,7 +322,7 @@ std::vector<glm::vec3> paint_tiles(const RayTracer& tracer, const DisplaySurface
     std::vector<Hit> hits(camera.rays.size());
     intersect_visible(tracer, surface.mesh(), camera.rays, hits);
     for (std::size_t k = 0; k < hits.size(); ++k) {
-      if (hits[k].triangle == kNone) pixel[camera.pixel[k]] += weight * painter.background();
+      if (hits[k].triangle == kNone) painter.paint_background(camera.pixel[k], weight, pixel);
     }
     std::vector<CameraSample> samples = seen_surface(camera, hits, surface, view);
     painter.paint(samples, weight, pixel);
@@ -325,9 +365,10 @@ Picture PictureRenderer::render(const PictureLight& light, const PictureSettings
     return picture;
   }
   LightPainter painter(data, tracer, surface, light, settings);
-  picture.pixel = to_float3s(paint_tiles(tracer, surface, settings, painter));
-  picture.exposure =
-      settings.exposure ? *settings.exposure : automatic_exposure(painter.reflected_luminance());
+  std::vector<glm::vec3> pixel = paint_tiles(tracer, surface, settings, painter);
+  picture.exposure = settings.exposure ? *settings.exposure : painter.exposure();
+  painter.add_shining(picture.exposure, pixel);
+  picture.pixel = to_float3s(pixel);
   return picture;
 }
 

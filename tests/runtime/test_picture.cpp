@@ -228,6 +228,7 @@ TEST(Picture, UniformSkyLightsAnOpenFloorEvenly) {
   EXPECT_NEAR(floor.pixel[4][0], 4, 1e-4F);
   EXPECT_NEAR(floor.pixel[4][2], 1, 1e-4F);
   PictureSettings upward = close_up({0, 0, 0}, Show::kDirect);
+  upward.exposure = -4;
   upward.camera = look_at({0, 1, 0}, {0, 2, 0}, 0.5F);
   const Picture sky = render(scene.data(), light, upward);
   EXPECT_NEAR(sky.pixel[4][1], 4, 1e-4F);
@@ -236,8 +237,13 @@ TEST(Picture, UniformSkyLightsAnOpenFloorEvenly) {
 TEST(Picture, EmittersShowTheirLuminanceExceptInIndirect) {
   SceneBuilder scene;
   scene.add_rectangle(floor_corners(5), scene.add_material({0, 0, 0}, {7, 8, 9}));
-  const Picture direct = render(scene.data(), {}, close_up({0, 0, 0}, Show::kDirect));
-  EXPECT_NEAR(direct.pixel[4][2], 9, 1e-4F);
+  PictureSettings settings = close_up({0, 0, 0}, Show::kDirect);
+  settings.exposure = -4;
+  EXPECT_NEAR(render(scene.data(), {}, settings).pixel[4][2], 9, 1e-4F);
+  settings.exposure = 0;  // and no more than twice white, in their own hue
+  const Picture dimmed = render(scene.data(), {}, settings);
+  EXPECT_NEAR(dimmed.pixel[4][2], 2, 1e-4F);
+  EXPECT_NEAR(dimmed.pixel[4][0], 2 * 7.0F / 9, 1e-4F);
   const Picture indirect = render(scene.data(), {}, close_up({0, 0, 0}, Show::kIndirect));
   EXPECT_EQ(indirect.pixel[4][2], 0);
 }
@@ -250,6 +256,7 @@ TEST(Picture, CameraSeesThroughTheBackOfOneSidedSurfacesOnly) {
   scene.add_rectangle({{{-1, 1, -1}, {1, 1, -1}, {1, 1, 1}, {-1, 1, 1}}}, bright);  // faces down
   PictureSettings settings = close_up({0, 0, 0}, Show::kRadiosity);
   settings.camera = look_at({0, 3, 0}, {0, 0, 0}, 0.02F);
+  settings.exposure = -4;
   EXPECT_NEAR(render(scene.data(), {}, settings).pixel[4][0], 1, 1e-5F);
   scene.make_double_sided();
   EXPECT_NEAR(render(scene.data(), {}, settings).pixel[4][0], 5, 1e-5F);
@@ -307,6 +314,7 @@ TEST(Picture, DirectAndIndirectAddUpToRadiosity) {
   PictureSettings settings;
   settings.width = settings.height = 24;
   settings.camera = look_at({0, 1, 0.9F}, {0, 1, 0}, 1.2F);
+  settings.exposure = 0;
   settings.show = Show::kDirect;
   const Picture direct = render(scene.data(), light, settings);
   settings.show = Show::kIndirect;
@@ -319,14 +327,14 @@ TEST(Picture, DirectAndIndirectAddUpToRadiosity) {
   }
 }
 
-TEST(Picture, ExposureBringsUniformGreyToMidGreyAndCanBeFixed) {
+TEST(Picture, ExposureBringsUniformGreyToAQuarterOfWhiteAndCanBeFixed) {
   SceneBuilder scene;
   scene.add_rectangle(floor_corners(5), scene.add_material({0.5F, 0.5F, 0.5F}));
   const std::vector<Float3> indirect{{4000, 4000, 4000}};
   const PictureLight light{.indirect_irradiance = indirect};
   PictureSettings settings = close_up({0, 0, 0}, Show::kRadiosity);
   const Picture automatic = render(scene.data(), light, settings);
-  EXPECT_NEAR(automatic.pixel[4][0] * std::exp2(automatic.exposure), 0.18F, 1e-4F);
+  EXPECT_NEAR(automatic.pixel[4][0] * std::exp2(automatic.exposure), 0.25F, 1e-4F);
   settings.exposure = -3;
   EXPECT_EQ(render(scene.data(), light, settings).exposure, -3);
 }

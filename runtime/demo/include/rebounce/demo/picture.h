@@ -42,7 +42,8 @@ struct PictureLight {
   std::span<const float> error{};  ///< >= 0, drawn by Show::kError
 };
 
-/// Linear Rec.709, rows from the top.
+/// Linear Rec.709, rows from the top. Emitters and sky are drawn no brighter than twice what the
+/// exposure takes to white, so that their edges are smooth.
 struct Picture {
   int width = 0;
   int height = 0;
