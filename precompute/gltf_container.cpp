@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -50,6 +50,27 @@ Chunk take_chunk(Bytes& rest) {
   return chunk;
 }
 
+// How deeply brackets are nested outside strings. Counted beforehand: the parser's own callback
+// makes it quadratic in the length of an array.
+int nesting_depth(Bytes text) {
+  int depth = 0;
+  int deepest = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char character = static_cast<char>(text[i]);
+    if (in_string && character == '\\') {
+      ++i;
+    } else if (character == '"') {
+      in_string = !in_string;
+    } else if (!in_string && (character == '[' || character == '{')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!in_string && (character == ']' || character == '}')) {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> read_file(const std::filesystem::path& path) {
@@ -88,14 +109,11 @@ Container split_container(Bytes file) {
 
 nlohmann::json parse_json(Bytes text) {
   if (text.size() > kMaxJsonBytes) throw Error("the JSON part is larger than 1 GiB");
-  const auto limit_depth = [](int depth, nlohmann::json::parse_event_t, nlohmann::json&) {
-    if (depth > kMaxJsonDepth) {
-      throw Error(fmt::format("the JSON is nested more than {} levels deep", kMaxJsonDepth));
-    }
-    return true;
-  };
+  if (nesting_depth(text) > kMaxJsonDepth) {
+    throw Error(fmt::format("the JSON is nested more than {} levels deep", kMaxJsonDepth));
+  }
   try {
-    auto root = nlohmann::json::parse(text.begin(), text.end(), limit_depth);
+    auto root = nlohmann::json::parse(text.begin(), text.end());
     if (!root.is_object()) throw Error("this is not glTF: the JSON is not an object");
     return root;
   } catch (const nlohmann::json::exception& failure) {

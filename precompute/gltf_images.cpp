@@ -15,33 +15,57 @@ namespace {
 
 constexpr std::uint64_t kMaxDecodedBytes = std::uint64_t{1} << 30;
 
-// glTF allows these two; stb would take many more formats, each with its own way to be damaged.
-bool is_png_or_jpeg(Bytes encoded) {
+template <std::size_t N>
+bool starts_with(Bytes encoded, const std::array<std::uint8_t, N>& magic) {
+  return encoded.size() >= N && std::equal(magic.begin(), magic.end(), encoded.begin());
+}
+
+std::uint64_t big_endian_u32(Bytes bytes, std::size_t offset) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < 4; ++i) value = value << 8 | bytes[offset + i];
+  return value;
+}
+
+// Width and height; empty for what is neither PNG nor JPEG. glTF allows these two only; stb would
+// take many more formats, each with its own way to be damaged.
+std::optional<std::array<std::uint64_t, 2>> pixel_size(Bytes encoded) {
   constexpr std::array<std::uint8_t, 4> kPng{0x89, 'P', 'N', 'G'};
   constexpr std::array<std::uint8_t, 3> kJpeg{0xFF, 0xD8, 0xFF};
-  const auto starts_with = [&](const auto& magic) {
-    return encoded.size() > magic.size() && std::equal(magic.begin(), magic.end(), encoded.begin());
-  };
-  return starts_with(kPng) || starts_with(kJpeg);
+  constexpr std::size_t kPngWidth = 16;  // the header chunk comes first
+  if (starts_with(encoded, kPng) && encoded.size() >= kPngWidth + 8) {
+    return {{big_endian_u32(encoded, kPngWidth), big_endian_u32(encoded, kPngWidth + 4)}};
+  }
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  if (!starts_with(encoded, kJpeg) ||
+      !stbi_info_from_memory(encoded.data(), static_cast<int>(encoded.size()), &width, &height,
+                             &channels)) {
+    return {};
+  }
+  return {{static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height)}};
 }
 
 }  // namespace
 
 std::optional<Image> decode_image(Bytes encoded) {
-  if (!is_png_or_jpeg(encoded) || encoded.size() > std::numeric_limits<int>::max()) return {};
-  const int size = static_cast<int>(encoded.size());
+  if (encoded.size() > std::numeric_limits<int>::max()) return {};
+  const auto size = pixel_size(encoded);
+  if (!size) return {};
+  const auto [columns, rows] = *size;
+  if (rows != 0 && columns > kMaxDecodedBytes / 4 / rows) {
+    throw Error(fmt::format(
+        "an image of {} x {} pixels is too large (at most 1 GiB); scale it down", columns, rows));
+  }
   int width = 0;
   int height = 0;
   int channels = 0;
-  if (!stbi_info_from_memory(encoded.data(), size, &width, &height, &channels)) return {};
-  const auto bytes = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) * 4;
-  if (bytes > kMaxDecodedBytes) {
-    throw Error(fmt::format(
-        "an image of {} x {} pixels is too large (at most 1 GiB); scale it down", width, height));
-  }
   const std::unique_ptr<stbi_uc, decltype(&stbi_image_free)> pixels(
-      stbi_load_from_memory(encoded.data(), size, &width, &height, &channels, 4), stbi_image_free);
+      stbi_load_from_memory(encoded.data(), static_cast<int>(encoded.size()), &width, &height,
+                            &channels, 4),
+      stbi_image_free);
   if (!pixels || width <= 0 || height <= 0) return {};
+  const std::size_t bytes = static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4;
   return Image{width, height, {pixels.get(), pixels.get() + bytes}};
 }
 

@@ -8,12 +8,10 @@
 #include <numbers>
 #include <optional>
 
+#include "float3_glm.h"
+
 namespace rebounce::gltf {
 namespace {
-
-Float3 to_float3(const glm::dvec3& v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
 
 bool is_finite(const Float3& v) {
   return std::all_of(v.begin(), v.end(), [](float value) { return std::isfinite(value); });
@@ -53,7 +51,7 @@ std::optional<Light> place_light(const tinygltf::Light& source, const tinygltf::
   light.name = source.name.empty() ? node.name : source.name;
   light.position = to_float3(glm::dvec3(world[3]));
   if (source.color.size() == light.color.size()) {
-    light.color = to_float3({source.color[0], source.color[1], source.color[2]});
+    light.color = to_float3(glm::dvec3(source.color[0], source.color[1], source.color[2]));
   }
   light.intensity = static_cast<float>(source.intensity);
   light.range = static_cast<float>(std::max(source.range, 0.0));

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <optional>
 
+#include "float3_glm.h"
 #include "gltf_primitives.h"
 #include "rebounce/transfer/error.h"
 
@@ -25,14 +26,6 @@ constexpr double kDegenerateAreaRatio = 1e-12;
 
 // Below this a stored normal has no direction worth the name: quantised ones are within 1 % of 1.
 constexpr double kShortestNormal = 1e-6;
-
-glm::dvec3 to_double(const Float3& v) {
-  return {v[0], v[1], v[2]};
-}
-
-Float3 to_float3(const glm::dvec3& v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
 
 // The matrix of cofactors: the inverse transpose times the determinant, and of use where the
 // inverse does not exist. It takes the cross product of two vectors to that of their images.
@@ -73,7 +66,7 @@ class Placement {
   void place_positions(const glm::dmat4& world) {
     position_.reserve(primitive_.position.size());
     for (const Float3& local : primitive_.position) {
-      position_.push_back(to_float3(glm::dvec3(world * glm::dvec4(to_double(local), 1))));
+      position_.push_back(to_float3(glm::dvec3(world * glm::dvec4(to_dvec3(local), 1))));
       const Float3& placed = position_.back();
       if (!std::isfinite(placed[0]) || !std::isfinite(placed[1]) || !std::isfinite(placed[2])) {
         throw Error(
@@ -85,9 +78,9 @@ class Placement {
 
   // The unit normal of a triangle of this primitive, empty where it has no area.
   std::optional<glm::dvec3> geometric_normal(const Uint3& triangle) const {
-    const glm::dvec3 a = to_double(position_[triangle[0]]);
-    const glm::dvec3 b = to_double(position_[triangle[1]]);
-    const glm::dvec3 c = to_double(position_[triangle[2]]);
+    const glm::dvec3 a = to_dvec3(position_[triangle[0]]);
+    const glm::dvec3 b = to_dvec3(position_[triangle[1]]);
+    const glm::dvec3 c = to_dvec3(position_[triangle[2]]);
     const glm::dvec3 cross = glm::cross(b - a, c - a);
     const double twice_area = glm::length(cross);
     const double longest_squared =
@@ -107,7 +100,7 @@ class Placement {
   }
 
   glm::dvec3 shading_normal(std::uint32_t local, const glm::dvec3& geometric) const {
-    const glm::dvec3 stored = to_double(primitive_.normal[local]);
+    const glm::dvec3 stored = to_dvec3(primitive_.normal[local]);
     const glm::dvec3 placed = normal_transform_ * stored;
     const double length = glm::length(placed);
     const bool usable =

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -10,6 +11,10 @@
 
 namespace rebounce::gltf {
 namespace {
+
+// A node with several parents is placed several times, and so are its children: a small file could
+// otherwise fill the memory.
+constexpr std::size_t kMaxPlacedNodes = std::size_t{1} << 20;
 
 glm::dmat4 local_transform(const tinygltf::Node& node) {
   if (!node.matrix.empty()) return glm::make_mat4(node.matrix.data());
@@ -45,34 +50,80 @@ std::vector<int> root_nodes(const tinygltf::Model& model) {
   return roots;
 }
 
+// Walks the hierarchy depth first with a stack of its own: a hierarchy may be of any depth.
+class Traversal {
+ public:
+  explicit Traversal(const tinygltf::Model& model)
+      : model_(model), is_root_(model.nodes.size(), false), is_open_(model.nodes.size(), false) {}
+
+  std::vector<PlacedNode> run() {
+    const std::vector<int> roots = root_nodes(model_);
+    for (const int root : roots) mark_root(static_cast<std::size_t>(root));
+    push(roots, glm::dmat4(1.0));
+    while (!pending_.empty()) {
+      Step step = pending_.back();
+      pending_.pop_back();
+      if (step.leaves) {
+        is_open_[step.placed.node] = false;
+      } else {
+        enter(step.placed);
+      }
+    }
+    return std::move(placed_);
+  }
+
+ private:
+  struct Step {
+    PlacedNode placed;  ///< `world` is still the parent's
+    bool leaves;        ///< after the node's last descendant
+  };
+
+  void mark_root(std::size_t node) {
+    if (is_root_[node]) {
+      throw Error(fmt::format("nodes[{}] is reached twice: the scene lists it twice", node));
+    }
+    is_root_[node] = true;
+  }
+
+  void push(const std::vector<int>& nodes, const glm::dmat4& parent) {
+    for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) {
+      pending_.push_back({{static_cast<std::size_t>(*node), parent}, false});
+    }
+  }
+
+  void enter(PlacedNode next) {
+    if (is_open_[next.node]) {
+      throw Error(
+          fmt::format("nodes[{}] is its own ancestor: the hierarchy has a cycle", next.node));
+    }
+    if (placed_.size() == kMaxPlacedNodes) {
+      throw Error(fmt::format("the hierarchy unfolds to more than {} nodes", kMaxPlacedNodes));
+    }
+    const tinygltf::Node& node = model_.nodes[next.node];
+    for (const int child : node.children) {
+      if (!is_root_[static_cast<std::size_t>(child)]) continue;
+      throw Error(fmt::format(
+          "nodes[{}] is reached twice: it is a root of the scene and a child of nodes[{}]", child,
+          next.node));
+    }
+    next.world *= local_transform(node);
+    is_open_[next.node] = true;
+    pending_.push_back({next, true});
+    push(node.children, next.world);
+    placed_.push_back(next);
+  }
+
+  const tinygltf::Model& model_;
+  std::vector<bool> is_root_;
+  std::vector<bool> is_open_;  // entered and not yet left: the ancestors of the current node
+  std::vector<Step> pending_;
+  std::vector<PlacedNode> placed_;
+};
+
 }  // namespace
 
 std::vector<PlacedNode> place_nodes(const tinygltf::Model& model) {
-  std::vector<PlacedNode> placed;
-  std::vector<PlacedNode> pending;  // a stack of our own: a hierarchy may be of any depth
-  const auto push = [&](const std::vector<int>& nodes, const glm::dmat4& parent) {
-    for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) {
-      pending.push_back({static_cast<std::size_t>(*node), parent});
-    }
-  };
-  push(root_nodes(model), glm::dmat4(1.0));
-  std::vector<bool> reached(model.nodes.size(), false);
-  while (!pending.empty()) {
-    PlacedNode next = pending.back();
-    pending.pop_back();
-    if (reached[next.node]) {
-      throw Error(
-          fmt::format("nodes[{}] is reached twice: it has two parents or is its own ancestor; give "
-                      "it one parent",
-                      next.node));
-    }
-    reached[next.node] = true;
-    const auto& node = model.nodes[next.node];
-    next.world *= local_transform(node);
-    push(node.children, next.world);
-    placed.push_back(next);
-  }
-  return placed;
+  return Traversal(model).run();
 }
 
 }  // namespace rebounce::gltf

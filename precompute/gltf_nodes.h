@@ -14,8 +14,9 @@ struct PlacedNode {
 };
 
 /// The nodes of the default scene (the first where none is named, every root node where there are
-/// no scenes), parents before children, siblings in order. Throws Error where a node is reached
-/// twice, which includes every cycle.
+/// no scenes), parents before children, siblings in order. A node with several parents, which glTF
+/// forbids and exporters write, stands below each of them. Throws Error where a node is its own
+/// ancestor, a root more than once, or both a root and a child.
 std::vector<PlacedNode> place_nodes(const tinygltf::Model& model);
 
 }  // namespace rebounce::gltf

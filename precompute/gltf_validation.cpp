@@ -108,6 +108,7 @@ class StructureCheck {
     for_each(root_, "materials", "",
              [&](json& item, const std::string& at) { material(item, at); });
     for_each(root_, "cameras", "", [&](json& camera, const std::string& at) {
+      text(camera, "type", at, kRequired);
       if (json* lens = object(camera, "perspective", at)) real(*lens, "yfov", at + ".perspective");
     });
     lights();
@@ -180,7 +181,8 @@ class StructureCheck {
   static void size(json& parent, const char* key, const std::string& at, bool required = false) {
     json* value = member(parent, key, at, required);
     if (value && whole_number(*value, join(at, key)) > std::numeric_limits<int>::max()) {
-      throw Error(fmt::format("{} is {}; at most 2 GiB are read", join(at, key), value->dump()));
+      throw Error(
+          fmt::format("{} is {}, above the limit of 2147483647", join(at, key), value->dump()));
     }
   }
 
@@ -227,8 +229,8 @@ class StructureCheck {
     for (json& value : *values) real(value, join(at, key));
   }
 
-  static void text(json& parent, const char* key, const std::string& at) {
-    json* value = member(parent, key, at);
+  static void text(json& parent, const char* key, const std::string& at, bool required = false) {
+    json* value = member(parent, key, at, required);
     if (value && !value->is_string()) throw Error(join(at, key) + " is not a string");
   }
 
@@ -237,6 +239,7 @@ class StructureCheck {
     size(item, "byteOffset", at);
     size(item, "componentType", at, kRequired);
     size(item, "count", at, kRequired);
+    text(item, "type", at, kRequired);
     json* sparse = object(item, "sparse", at);
     if (!sparse) return;
     const std::string place = at + ".sparse";
@@ -345,6 +348,7 @@ class StructureCheck {
     if (!punctual) return;
     for_each(*punctual, "lights", "extensions.KHR_lights_punctual",
              [&](json& light, const std::string& at) {
+               text(light, "type", at, kRequired);
                reals(light, "color", 3, at);
                real(light, "intensity", at);
                real(light, "range", at);

@@ -4,6 +4,9 @@
 #include <array>
 #include <cmath>
 
+#include "float3_glm.h"
+#include "rebounce/precompute/sampling.h"
+
 namespace rebounce {
 namespace {
 
@@ -102,34 +105,23 @@ int subdivision(const Image& image, const std::array<Float2, 3>& texcoord) {
 }
 
 // Averages value(barycentric) over the triangle: one sample in each of n² congruent parts, its
-// place in the part from the R2 sequence (Roberts 2018), so that no texture that repeats with the
-// parts can hide between the samples. The same samples every time.
+// place in the part from the R2 sequence, so that no texture that repeats with the parts can hide
+// between the samples. The same samples every time.
 template <typename Value>
 Float3 stratified_mean(int n, const Value& value) {
-  constexpr double kFirstStep = 0.7548776662466927;   // 1 / plastic number
-  constexpr double kSecondStep = 0.5698402909980532;  // its square
-  std::array<double, 3> sum{};
-  double s = 0.5;
-  double t = 0.5;
+  glm::dvec3 sum(0.0);
+  std::uint32_t sample = 0;
   for (int row = 0; row < n; ++row) {
     // Row `row` has 2 (n - row) - 1 parts, upright ones and between them inverted ones.
     for (int part = 0; part < 2 * (n - row) - 1; ++part) {
-      s = std::fmod(s + kFirstStep, 1.0);
-      t = std::fmod(t + kSecondStep, 1.0);
-      const bool folded = s + t > 1;
-      const double x = folded ? 1 - s : s;
-      const double y = folded ? 1 - t : t;
+      const glm::dvec2 inside = square_to_triangle(r2_point(sample++, glm::dvec2(0.0)));
       const bool inverted = part % 2 == 1;
-      const double u = (part / 2 + (inverted ? 1 - x : x)) / n;
-      const double v = (row + (inverted ? 1 - y : y)) / n;
-      const Float3 sample = value(std::array<double, 3>{1 - u - v, u, v});
-      for (std::size_t channel = 0; channel < sum.size(); ++channel)
-        sum[channel] += sample[channel];
+      const glm::dvec2 place =
+          (glm::dvec2(part / 2, row) + (inverted ? 1.0 - inside : inside)) / static_cast<double>(n);
+      sum += to_dvec3(value(std::array<double, 3>{1 - place.x - place.y, place.x, place.y}));
     }
   }
-  const double count = static_cast<double>(n) * n;
-  return {static_cast<float>(sum[0] / count), static_cast<float>(sum[1] / count),
-          static_cast<float>(sum[2] / count)};
+  return to_float3(sum / (static_cast<double>(n) * n));
 }
 
 Float3 product(const Float3& a, const Float3& b) {
