@@ -12,6 +12,7 @@
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/patch_model.h"
+#include "rebounce/precompute/reconstruction_weights.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
 
@@ -181,6 +182,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.patches.absorbed = std::move(form_factors.absorbed);
   data.mesh = std::move(model.mesh);
   data.exchange = std::move(form_factors.exchange);
+  compute_reconstruction_weights(data.patches.absorbed, data.mesh);
 
   data.transfer = clock.run("operator", [&](const Progress& part) {
     return build_dense_transfer(data.exchange, data.patches, settings.precision, part);

@@ -18,18 +18,6 @@ double dot(const Vector& a, const Vector& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-Vector row_sums(const ExchangeRows& rows, std::span<const double> area) {
-  Vector sum(rows.size(), 0.0);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    for (const ExchangeEntry& entry : rows[i]) {
-      sum[i] += entry.exchange_area;
-      sum[entry.column] += entry.exchange_area;
-    }
-  }
-  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] /= area[i];
-  return sum;
-}
-
 /// The normal equations of the constraints: (diagonal + V) multiplier = rest, V the variances.
 class NormalEquations {
  public:
@@ -102,6 +90,18 @@ double largest_certain_error(const Vector& sum, std::span<const RowTarget> targe
 }
 
 }  // namespace
+
+std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> area) {
+  std::vector<double> sum(rows.size(), 0.0);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (const ExchangeEntry& entry : rows[i]) {
+      sum[i] += entry.exchange_area;
+      sum[entry.column] += entry.exchange_area;
+    }
+  }
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] /= area[i];
+  return sum;
+}
 
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
                               std::span<const RowTarget> target) {

@@ -23,6 +23,9 @@ struct RowTarget {
   double deviation;
 };
 
+/// The row sums of F that `rows` amount to; `area` [n] in m².
+std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> area);
+
 /// Corrects the exchange areas so that rows add up to their targets, reciprocity untouched.
 ///
 /// Minimises sum (S' - S)² / variance + sum over i of (row sum of F' - target)² / deviation² over

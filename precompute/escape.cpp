@@ -10,8 +10,8 @@ Escape measure_escape(const PatchModel& model, const FlatTriangle& triangle, std
                       std::vector<Ray>& rays, std::vector<Hit>& hits) {
   rays.resize(ray_count);
   hits.resize(ray_count);
-  make_hemisphere_rays(triangle.vertex, triangle.normal, mix_bits(seed ^ (patch * 2654435761ULL)),
-                       rays);
+  make_hemisphere_rays(triangle.vertex, triangle.normal, tracer,
+                       mix_bits(seed ^ (patch * 2654435761ULL)), rays);
   tracer.intersect(rays, hits);
 
   int sky = 0, absorbed = 0;

@@ -18,6 +18,10 @@ namespace {
 
 constexpr std::uint32_t kPointCount = 64;  // sample points per patch; powers of two only
 
+// A row whose sum is off its target by more than this (and three deviations) is traced again: it is
+// partly covered, and probe rays miss what little of it is seen.
+constexpr double kRowSumTolerance = 0.005;
+
 // A pair whose rays all agree may still be partly hidden: its variance is not zero but this part
 // of the squared exchange.
 constexpr double kVarianceFloor = 1e-6;
@@ -41,14 +45,19 @@ class FormFactorAssembly {
     const std::size_t n = triangles_.size();
     ExchangeRows rows(n);
     std::vector<Escape> escape(n);
-    for_each_patch([&](std::uint32_t i, Scratch& scratch) {
+    for_each_patch(0.0, 0.8, [&](std::uint32_t i, Scratch& scratch) {
       compute_row(i, scratch, rows[i]);
       escape[i] = measure_escape(model_, triangles_[i], i, tracer_, settings_.escape_rays,
                                  settings_.seed, scratch.rays, scratch.hits);
     });
+    const std::vector<RowTarget> target = row_targets(escape);
+    const std::vector<bool> doubtful = find_doubtful_rows(rows, target);
+    for_each_patch(0.8, 1.0, [&](std::uint32_t i, Scratch& scratch) {
+      refine_row(i, doubtful, scratch, rows[i]);
+    });
 
     FormFactors result;
-    result.closure = close(rows, escape);
+    result.closure = enforce_closure(rows, areas(), target);
     store_escape(rows, escape, result);
     result.exchange = compress_rows(rows);
     result.ray_count = ray_count_ + n * settings_.escape_rays;
@@ -79,14 +88,15 @@ class FormFactorAssembly {
         const glm::dvec2 b = square_to_triangle(r2_point(k, shift));
         const glm::dvec3 p =
             t.vertex[0] + b.x * (t.vertex[1] - t.vertex[0]) + b.y * (t.vertex[2] - t.vertex[0]);
-        points_[i * kPointCount + k] = offset_point(to_float3(p), to_float3(t.normal));
+        points_[i * kPointCount + k] = tracer_.offset_point(to_float3(p), to_float3(t.normal));
       }
     }
   }
 
   /// Runs `work` for every patch on all threads, with progress; throws Cancelled if asked to.
+  /// The work is the part from `begin` to `end` of the whole.
   template <typename Work>
-  void for_each_patch(const Work& work) {
+  void for_each_patch(double begin, double end, const Work& work) {
     const std::size_t n = triangles_.size();
     std::atomic<bool> stop = false;
     std::atomic<std::size_t> rows_done = 0;
@@ -101,7 +111,7 @@ class FormFactorAssembly {
         if (progress_ && omp_get_thread_num() == 0) {
           // Row i has n - i pairs: what is left is a triangle.
           const double left = 1.0 - static_cast<double>(done) / static_cast<double>(n);
-          if (!progress_(1.0 - left * left)) stop = true;
+          if (!progress_(end - (end - begin) * left * left)) stop = true;
         }
       }
     }
@@ -109,7 +119,7 @@ class FormFactorAssembly {
   }
 
   void compute_row(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
-    find_pairs(i, scratch.pairs);
+    find_pairs(i, scratch.pairs, [](std::uint32_t) { return true; });
     trace(i, scratch.pairs, settings_.probe_rays, scratch.rays);
     scratch.mixed.clear();
     const int probe = settings_.probe_rays;
@@ -122,6 +132,22 @@ class FormFactorAssembly {
         scratch.mixed.push_back(scratch.pairs[p]);
       }
     }
+    append_mixed(i, scratch, row);
+    pair_count_ += scratch.pairs.size();
+    ray_count_ += scratch.pairs.size() * settings_.probe_rays;
+  }
+
+  /// Traces all rays of the pairs of row i that have a doubtful patch, and replaces their entries.
+  void refine_row(std::uint32_t i, const std::vector<bool>& doubtful, Scratch& scratch,
+                  std::vector<ExchangeEntry>& row) {
+    const auto is_doubtful = [&](std::uint32_t j) { return doubtful[i] || doubtful[j]; };
+    std::erase_if(row, [&](const ExchangeEntry& entry) { return is_doubtful(entry.column); });
+    find_pairs(i, scratch.mixed, is_doubtful);
+    append_mixed(i, scratch, row);
+  }
+
+  /// Traces all rays of scratch.mixed and adds what gets through to the row.
+  void append_mixed(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
     trace(i, scratch.mixed, settings_.full_rays, scratch.rays);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
       const std::span rays(&scratch.rays[p * settings_.full_rays], settings_.full_rays);
@@ -131,15 +157,16 @@ class FormFactorAssembly {
     std::sort(row.begin(), row.end(), [](const ExchangeEntry& a, const ExchangeEntry& b) {
       return a.column < b.column;
     });
-    pair_count_ += scratch.pairs.size();
-    ray_count_ += scratch.pairs.size() * settings_.probe_rays +
-                  scratch.mixed.size() * settings_.full_rays;
+    ray_count_ += scratch.mixed.size() * settings_.full_rays;
   }
 
-  void find_pairs(std::uint32_t i, std::vector<Pair>& pairs) const {
+  /// The patches j > i that patch i would exchange light with, if `wanted`(j).
+  template <typename Wanted>
+  void find_pairs(std::uint32_t i, std::vector<Pair>& pairs, const Wanted& wanted) const {
     pairs.clear();
     const FlatTriangle& a = triangles_[i];
     for (std::uint32_t j = i + 1; j < triangles_.size(); ++j) {
+      if (!wanted(j)) continue;
       const FlatTriangle& b = triangles_[j];
       const glm::dvec3 d = b.centroid - a.centroid;
       if (glm::dot(a.normal, d) + b.radius <= 0 || a.radius - glm::dot(b.normal, d) <= 0) continue;
@@ -205,30 +232,40 @@ class FormFactorAssembly {
                    pair.unoccluded * pair.unoccluded * (variance + kVarianceFloor)});
   }
 
-  ClosureReport close(ExchangeRows& rows, const std::vector<Escape>& escape) const {
+  std::vector<double> areas() const {
     std::vector<double> area;
+    area.reserve(triangles_.size());
+    for (const FlatTriangle& t : triangles_) area.push_back(t.area);
+    return area;
+  }
+
+  std::vector<RowTarget> row_targets(const std::vector<Escape>& escape) const {
     std::vector<RowTarget> target;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      area.push_back(triangles_[i].area);
-      const double lost = escape[i].sky + escape[i].absorbed;
+    target.reserve(escape.size());
+    for (const Escape& e : escape) {
+      const double lost = e.sky + e.absorbed;
       // Low-discrepancy rays err about half as much as random ones here.
       target.push_back({1 - lost, 0.5 * std::sqrt(lost * (1 - lost) / settings_.escape_rays)});
     }
-    return enforce_closure(rows, area, target);
+    return target;
+  }
+
+  std::vector<bool> find_doubtful_rows(const ExchangeRows& rows,
+                                       const std::vector<RowTarget>& target) const {
+    const std::vector<double> sum = row_sums(rows, areas());
+    std::vector<bool> doubtful(rows.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      doubtful[i] = std::abs(sum[i] - target[i].sum) > kRowSumTolerance + 3 * target[i].deviation;
+    }
+    return doubtful;
   }
 
   /// What the rows of F leave of 1 is what escapes; its parts are shared as they were measured.
   void store_escape(const ExchangeRows& rows, const std::vector<Escape>& escape,
                     FormFactors& result) const {
-    std::vector<double> left(rows.size(), 1.0);
+    const std::vector<double> sum = row_sums(rows, areas());
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      for (const ExchangeEntry& entry : rows[i]) {
-        left[i] -= entry.exchange_area / triangles_[i].area;
-        left[entry.column] -= entry.exchange_area / triangles_[entry.column].area;
-      }
-    }
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double rest = std::max(0.0, left[i]), lost = escape[i].sky + escape[i].absorbed;
+      const double rest = std::max(0.0, 1 - sum[i]), lost = escape[i].sky + escape[i].absorbed;
       const double sky = lost > 0 ? rest * escape[i].sky / lost : 0;
       result.sky_visibility.push_back(static_cast<float>(sky));
       result.absorbed.push_back(static_cast<float>(std::max(0.0, rest - sky)));

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <optional>
 
-#include "float3_glm.h"
+#include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -10,7 +10,7 @@
 #include <glm/matrix.hpp>
 #include <optional>
 
-#include "float3_glm.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "gltf_primitives.h"
 #include "rebounce/transfer/error.h"
 

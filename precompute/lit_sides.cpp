@@ -9,12 +9,13 @@ namespace {
 // A side that sees less than about one part in this many of other surfaces counts as seeing none.
 constexpr std::uint32_t kRaysPerSide = 256;
 
-void make_rays(const Scene& scene, std::uint32_t t, bool front, std::vector<Ray>& rays) {
+void make_rays(const Scene& scene, const RayTracer& tracer, std::uint32_t t, bool front,
+               std::vector<Ray>& rays) {
   const Uint3& corner = scene.triangle[t];
   const glm::dvec3 a = to_dvec3(scene.position[corner[0]]), b = to_dvec3(scene.position[corner[1]]),
                    c = to_dvec3(scene.position[corner[2]]);
   const glm::dvec3 normal = glm::normalize(glm::cross(b - a, c - a)) * (front ? 1.0 : -1.0);
-  make_hemisphere_rays({a, b, c}, normal, mix_bits(t), rays);
+  make_hemisphere_rays({a, b, c}, normal, tracer, mix_bits(t), rays);
 }
 
 }  // namespace
@@ -27,7 +28,7 @@ std::vector<std::uint8_t> find_lit_sides(const Scene& scene) {
   };
   const auto sees_a_surface = [&](std::uint32_t t, bool front, std::vector<Ray>& rays,
                                   std::vector<Hit>& hits) {
-    make_rays(scene, t, front, rays);
+    make_rays(scene, tracer, t, front, rays);
     tracer.intersect(rays, hits);
     for (const Hit& hit : hits) {
       if (hit.triangle != kNone && (hit.front || is_double_sided(hit.triangle))) return true;

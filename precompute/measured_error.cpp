@@ -44,7 +44,7 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
     std::array<Hit, 1> hit;
     make_hemisphere_rays({to_dvec3(mesh.position[v[0]]), to_dvec3(mesh.position[v[1]]),
                           to_dvec3(mesh.position[v[2]])},
-                         to_dvec3(data.patches.normal[patch]), bits, ray);
+                         to_dvec3(data.patches.normal[patch]), tracer, bits, ray);
     tracer.intersect(ray, hit);
     const double reach = hit[0].triangle == kNone ? open_reach : hit[0].t;
     const double part = 0.2 + 0.6 * unit_square(mix_bits(bits)).x;

@@ -6,7 +6,6 @@
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/precompute/lit_sides.h"
-#include "rebounce/precompute/reconstruction_weights.h"
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/transfer/error.h"
 
@@ -30,7 +29,6 @@ class PatchModelBuilder {
     copy_surface();
     add_second_sides();
     for (std::uint32_t t = 0; t < model_.mesh.triangle.size(); ++t) add_patch_of(t);
-    compute_reconstruction_weights(model_.mesh);
     if (clamped_count_ > 0) {
       model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
                                 " patches was clamped to 0.99");

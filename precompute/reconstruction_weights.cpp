@@ -10,6 +10,7 @@
 namespace rebounce {
 namespace {
 
+constexpr float kMostlyCovered = 0.9F;   // what little is left of such a patch is too noisy to show
 constexpr double kCreaseCosine = 0.766;  // 40 degrees: rounder is meant to look smooth
 
 /// One corner of a display triangle, as seen from the place where it is.
@@ -33,7 +34,7 @@ double corner_angle(const DisplayMesh& mesh, const Uint3& t, int corner) {
 
 }  // namespace
 
-void compute_reconstruction_weights(DisplayMesh& mesh) {
+void compute_reconstruction_weights(std::span<const float> absorbed, DisplayMesh& mesh) {
   const WeldedPositions welded = weld_positions(mesh.position);
   std::vector<std::vector<Corner>> corners_at(welded.count);
   std::vector<glm::dvec3> vertex_normal(mesh.position.size(), glm::dvec3(0));
@@ -43,9 +44,10 @@ void compute_reconstruction_weights(DisplayMesh& mesh) {
     for (int corner = 0; corner < 3; ++corner) {
       const std::uint32_t v = mesh.triangle[t][corner];
       vertex_normal[v] += area;
-      if (mesh.triangle_patch[t] == kNone) continue;
+      const std::uint32_t patch = mesh.triangle_patch[t];
+      if (patch == kNone || absorbed[patch] > kMostlyCovered) continue;
       const auto angle = static_cast<float>(corner_angle(mesh, mesh.triangle[t], corner));
-      corners_at[welded.id[v]].push_back({mesh.triangle_patch[t], normal, angle});
+      corners_at[welded.id[v]].push_back({patch, normal, angle});
     }
   }
 
@@ -59,7 +61,7 @@ void compute_reconstruction_weights(DisplayMesh& mesh) {
     for (const Corner& corner : corners_at[welded.id[v]]) {
       if (glm::dot(normal, glm::dvec3(corner.normal)) < kCreaseCosine) continue;
       weight_of[corner.patch] += corner.angle;
-      sum += corner.angle;
+      sum += corner.angle * (1.0 - absorbed[corner.patch]);
     }
     for (const auto& [patch, weight] : weight_of) {
       mesh.weight_patch.push_back(patch);

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "float3_glm.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/precompute/sampling.h"
 
 namespace rebounce {

@@ -40,7 +40,7 @@ DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer
     for (std::size_t k = 0; k < points_per_patch_; ++k) {
       const glm::dvec2 b = square_to_triangle(r2_point(static_cast<std::uint32_t>(k), shift));
       points_[patch * points_per_patch_ + k] =
-          offset_point(to_float3(a + b.x * ab + b.y * ac), data.patches.normal[patch]);
+          tracer.offset_point(to_float3(a + b.x * ab + b.y * ac), data.patches.normal[patch]);
     }
   }
 }

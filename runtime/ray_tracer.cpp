@@ -1,7 +1,4 @@
 // The only file of the project that knows Embree.
-//
-// offset_point follows C. Waechter and N. Binder, "A Fast and Robust Method for Avoiding
-// Self-Intersection", Ray Tracing Gems (2019), chapter 6.
 
 #include "rebounce/runtime/ray_tracer.h"
 
@@ -89,6 +86,7 @@ Hit to_hit(const RTCRayHit& traced) {
 struct RayTracer::Impl {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
+  float offset_distance = 0;
 
   Impl() = default;
   Impl(const Impl&) = delete;
@@ -109,6 +107,11 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   rtcSetSceneBuildQuality(impl_->scene, RTC_BUILD_QUALITY_HIGH);
   if (!triangle.empty()) attach_triangles(impl_->device, impl_->scene, position, triangle);
   rtcCommitScene(impl_->scene);
+  float largest = 0;
+  for (const Float3& p : position) {
+    for (const float x : p) largest = std::max(largest, std::abs(x));
+  }
+  impl_->offset_distance = largest * 0x1p-18F;
   throw_if_failed(impl_->device, "building the acceleration structure");
 }
 
@@ -140,25 +143,14 @@ void RayTracer::intersect(std::span<const Ray> rays, std::span<Hit> hits) const 
   }
 }
 
-Float3 offset_point(const Float3& point, const Float3& geometric_normal) {
-  // Far from zero, rounding errors are a fixed number of steps of the representation, so the point
-  // moves by steps; near zero they have an absolute size, set by the coordinates they came from.
-  constexpr float kNearZero = 1.0F / 32;       // metres
-  constexpr float kAbsolute = 1.0F / 65536;    // metres along the normal, near zero
-  constexpr float kRepresentationSteps = 256;  // along the normal, elsewhere
+Float3 RayTracer::offset_point(const Float3& point, const Float3& geometric_normal) const {
   Float3 moved;
   for (int axis = 0; axis < 3; ++axis) {
-    const float p = point[axis];
-    const float n = geometric_normal[axis];
-    if (std::abs(p) < kNearZero) {
-      moved[axis] = p + kAbsolute * n;
-    } else {
-      const auto steps = static_cast<std::int32_t>(kRepresentationSteps * n);
-      const auto bits = std::bit_cast<std::int32_t>(p);
-      moved[axis] = std::bit_cast<float>(bits + (p < 0 ? -steps : steps));
-    }
+    moved[axis] = point[axis] + impl_->offset_distance * geometric_normal[axis];
   }
   return moved;
 }
+
+float RayTracer::offset_distance() const { return impl_->offset_distance; }
 
 }  // namespace rebounce

@@ -45,8 +45,8 @@ float receiving_cosine(const SurfacePoint& point, const glm::vec3& direction) {
   return std::max(0.0F, glm::dot(point.shading_normal, direction));
 }
 
-Float3 above(const SurfacePoint& point) {
-  return offset_point(to_float3(point.position), to_float3(point.geometric_normal));
+Float3 above(const SurfacePoint& point, const RayTracer& tracer) {
+  return tracer.offset_point(to_float3(point.position), to_float3(point.geometric_normal));
 }
 
 Ray ray_to_lamp(const Light& light, const IncidentLight& incident, const Float3& origin) {
@@ -89,9 +89,9 @@ glm::vec3 point_on(const EmitterPiece& piece, const glm::vec2& place) {
 
 // A shadow ray to `target` on the piece; false if it starts or ends below a surface.
 bool ray_to_piece(const SurfacePoint& receiver, const EmitterPiece& piece, const glm::vec3& target,
-                  Ray& ray) {
-  ray.origin = above(receiver);
-  const glm::vec3 end = to_glm(offset_point(to_float3(target), to_float3(piece.normal)));
+                  const RayTracer& tracer, Ray& ray) {
+  ray.origin = above(receiver, tracer);
+  const glm::vec3 end = to_glm(tracer.offset_point(to_float3(target), to_float3(piece.normal)));
   const glm::vec3 path = end - to_glm(ray.origin);
   ray.direction = to_float3(path);
   ray.t_near = 0;
@@ -110,7 +110,7 @@ void add_punctual_light(std::span<CameraSample> samples, std::span<const Light> 
       const glm::vec3 arriving =
           to_glm(incident.illuminance) * receiving_cosine(sample.point, to_glm(incident.direction));
       if (arriving == glm::vec3(0)) continue;
-      shadow_rays.add(sample, ray_to_lamp(light, incident, above(sample.point)), arriving);
+      shadow_rays.add(sample, ray_to_lamp(light, incident, above(sample.point, tracer)), arriving);
     }
     shadow_rays.deliver(tracer);
   }
@@ -130,7 +130,7 @@ void add_emitter_light(std::span<CameraSample> samples, const Emitters& emitters
       // What arrives is exact; only whether it does is found from one point of the piece.
       const glm::vec2 shift(hash_to_unit(sample.pixel, 1), hash_to_unit(sample.pixel, 2));
       Ray ray;
-      if (!ray_to_piece(sample.point, *piece, point_on(*piece, r2_point(index, shift)), ray)) {
+      if (!ray_to_piece(sample.point, *piece, point_on(*piece, r2_point(index, shift)), tracer, ray)) {
         continue;
       }
       shadow_rays.add(sample, ray, arriving * (weight * static_cast<float>(samples_per_pixel)));

@@ -198,7 +198,7 @@ TEST(RayTracer, RaysFromOffsetPointsDoNotMeetTheirTriangle) {
       std::vector<Ray> rays;
       for (int r = 0; r < 100; ++r) {
         const double u = random.uniform(0, 1), v = random.uniform(0, 1) * (1 - u);
-        const Float3 origin = offset_point(to_float3(a + u * e1 + v * e2), to_float3(normal));
+        const Float3 origin = tracer.offset_point(to_float3(a + u * e1 + v * e2), to_float3(normal));
         const glm::dvec3 d(random.unit());
         const double cosine = glm::dot(d, normal);
         rays.push_back(make_ray(origin, to_float3(cosine < 0 ? d - 2 * cosine * normal : d)));
@@ -211,13 +211,24 @@ TEST(RayTracer, RaysFromOffsetPointsDoNotMeetTheirTriangle) {
   EXPECT_EQ(ray_count, 160000);
 }
 
-TEST(RayTracer, OffsetIsSmall) {
-  const Float3 moved = offset_point({100, -0.5F, 0.001F}, {0, -0.6F, 0.8F});
-  EXPECT_EQ(moved[0], 100);
-  EXPECT_LT(moved[1], -0.5F);
-  EXPECT_NEAR(moved[1], -0.5F, 1e-5F);
-  EXPECT_GT(moved[2], 0.001F);
-  EXPECT_NEAR(moved[2], 0.001F, 2e-5F);
+TEST(RayTracer, RaysBetweenOffsetPointsMeetNeitherEnd) {
+  // Two large walls, one of them through the origin, where coordinates are finer than the rays.
+  RandomNumbers random(8);
+  const std::vector<Float3> position = {{0, 0, 0},     {0, 500, 0},   {0, 0, 500},
+                                        {600, 0, 500}, {600, 500, 0}, {600, 0, 0}};
+  const std::vector<Uint3> triangle = {{0, 1, 2}, {3, 4, 5}};
+  const RayTracer tracer(position, triangle);
+  std::vector<Ray> rays;
+  for (int k = 0; k < 20000; ++k) {
+    const auto u = static_cast<float>(random.uniform(0.01, 0.49));
+    const auto v = static_cast<float>(random.uniform(0.01, 0.49));
+    const Float3 x = tracer.offset_point({0, 500 * u, 500 * v}, {1, 0, 0});
+    const Float3 y = tracer.offset_point({600, 500 * v, 500 * u}, {-1, 0, 0});
+    rays.push_back(make_ray(x, {y[0] - x[0], y[1] - x[1], y[2] - x[2]}));
+    rays.back().t_far = 1;
+  }
+  tracer.occluded(rays);
+  for (const Ray& ray : rays) ASSERT_FALSE(is_occluded(ray));
 }
 
 // A closed sphere-like mesh, triangulated from longitudes and latitudes.

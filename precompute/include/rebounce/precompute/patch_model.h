@@ -25,7 +25,7 @@ struct PatchModel {
 
 /// Subdivides the scene's triangles and makes every lit side of every one a patch: reflectance and
 /// emission are means over the triangle, textures integrated. Double-sided triangles get a second
-/// display triangle. Also fills the reconstruction weights (reconstruction_weights.h).
+/// display triangle. The reconstruction weights are left to reconstruction_weights.h.
 PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);
 
 }  // namespace rebounce

@@ -45,6 +45,16 @@ class RayTracer {
   /// Finds the nearest hit of every ray. hits.size() == rays.size().
   void intersect(std::span<const Ray> rays, std::span<Hit> hits) const;
 
+  /// A point moved off its surface along the unit `geometric_normal`, so that a ray that begins or
+  /// ends there does not meet that surface: by offset_distance().
+  Float3 offset_point(const Float3& point, const Float3& geometric_normal) const;
+
+  /// 2^-18 of the largest coordinate of the scene. The rounding errors of a ray's origin, of its end
+  /// and of the plane equation in between are each some 2^-24 of the coordinates they are found from,
+  /// however near to zero the point itself is: this is some tens of them, 40 micrometres in a room
+  /// of ten metres.
+  float offset_distance() const;
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
@@ -52,9 +62,5 @@ class RayTracer {
 
 /// True if a shadow ray given to RayTracer::occluded met something.
 inline bool is_occluded(const Ray& ray) { return ray.t_far < 0; }
-
-/// A point moved off its surface along the geometric normal by just more than the rounding error
-/// of its coordinates, so that a ray that leaves it does not meet that surface.
-Float3 offset_point(const Float3& point, const Float3& geometric_normal);
 
 }  // namespace rebounce

@@ -44,7 +44,8 @@ struct DisplayMesh {
   std::vector<std::uint32_t> back_triangle;  ///< [surface_count] second side, or kNone if one-sided
 
   /// Reconstruction: the value at vertex v is the sum of weight x patch value over
-  /// [weight_begin[v], weight_begin[v + 1]). Weights of a vertex sum to 1, or there are none.
+  /// [weight_begin[v], weight_begin[v + 1]). The sum of weight x (1 - absorbed) is 1,
+  /// so that patches that are partly covered do not darken what is seen of them; or there are none.
   std::vector<std::uint32_t> weight_begin;  ///< [v + 1]
   std::vector<std::uint32_t> weight_patch;  ///< patch indices
   std::vector<float> weight;                ///< >= 0
