@@ -1,6 +1,5 @@
 #include "gltf_meshes.h"
 
-#include <algorithm>
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "rebounce/runtime/float3_glm.h"
-#include "rebounce/precompute/sampling.h"
+#include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
 namespace {
