@@ -55,9 +55,10 @@ class DenseOperator final : public TransferOperator {
              std::span<float> workspace) const override;
   void expand(int channel, std::span<float> transfer) const override;
 
- private:
+  /// Yhat(row, column) of one matrix.
   float symmetric_entry(std::uint32_t matrix, std::size_t row, std::size_t column) const;
 
+ private:
   Storage storage_;
   std::vector<float> sqrt_area_;
 };
