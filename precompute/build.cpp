@@ -47,7 +47,7 @@ CostEstimate estimate_cost(const PatchTable& patches, int probe_rays) {
 }
 
 std::string in_gib(std::uint64_t bytes) {
-  return fmt::format("{:.1f} GiB", static_cast<double>(bytes) / (1ULL << 30));
+  return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
 }
 
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
