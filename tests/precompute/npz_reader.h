@@ -44,7 +44,7 @@ struct Npy {
 inline Npy parse_npy(const std::string& bytes) {
   EXPECT_EQ(bytes.substr(0, 6), "\x93NUMPY");
   Npy npy;
-  npy.version = bytes.at(6);
+  npy.version = static_cast<unsigned char>(bytes.at(6));
   const int length_size = npy.version == 1 ? 2 : 4;
   std::size_t length = 0;
   for (int i = 0; i < length_size; ++i) {
