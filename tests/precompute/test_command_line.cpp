@@ -253,7 +253,7 @@ TEST_F(CommandLine, SolvesTheSameByEitherMethod) {
                      "indirect_irradiance_r", "indirect_irradiance_g", "indirect_irradiance_b",
                      "radiosity_r", "radiosity_g", "radiosity_b"}));
     ASSERT_EQ(a.names, b.names);
-    ASSERT_EQ(a.rows.size(), static_cast<std::size_t>(kPatchCount));
+    ASSERT_NEAR(static_cast<double>(a.rows.size()), kPatchCount, 0.2 * kPatchCount);
     ASSERT_EQ(a.rows.size(), b.rows.size());
     EXPECT_LT(difference(a, b, 3), 1e-4) << setup;
     EXPECT_LT(difference(a, b, 6), 1e-4) << setup;
@@ -337,7 +337,8 @@ TEST_F(CommandLine, ExportsPatchesAndMesh) {
     EXPECT_TRUE(patches["arrays"].contains(name)) << name;
   }
   const auto area = test::npz_values<float>(test::unzip(path("p.npz")), "area", "<f4");
-  EXPECT_EQ(area.size(), static_cast<std::size_t>(kPatchCount));
+  EXPECT_EQ(patches["arrays"]["area"][0], area.size());
+  EXPECT_NEAR(static_cast<double>(area.size()), kPatchCount, 0.2 * kPatchCount);
   const json mesh = summary_of({"export", file, "--what", "mesh", "-o", path("m.npz")});
   EXPECT_EQ(mesh["arrays"]["triangle"][1], 3);
 }
@@ -371,7 +372,7 @@ TEST_F(CommandLine, StopsCleanlyWhenInterrupted) {
   test::Subprocess program(
       {REBOUNCE_PROGRAM, "precompute", kScene, "--patches", "4000", "-o", path("x.safetensors")},
       printed_ / "out", printed_ / "err");
-  ASSERT_TRUE(program.has_said("4000 patches"));
+  ASSERT_TRUE(program.has_said(" patches: about "));
   program.send(SIGINT);
   const Outcome outcome = program.finish();
   EXPECT_GT(outcome.exit_code, 0) << "should end by itself, with an error";
