@@ -4,13 +4,11 @@ namespace rebounce::bench {
 
 std::vector<const DenseKernels*> available_kernels() {
   std::vector<const DenseKernels*> sets = {&kDenseKernelsPortable};
+  const DenseKernels* widest = &dense_kernels();
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("f16c")) {
-    sets.push_back(&kDenseKernelsAvx2);
-  }
-  if (__builtin_cpu_supports("avx512f")) sets.push_back(&kDenseKernelsAvx512);
+  if (widest == &kDenseKernelsAvx512) sets.push_back(&kDenseKernelsAvx2);
 #endif
+  if (widest != sets.front()) sets.push_back(widest);
   return sets;
 }
 

@@ -56,7 +56,7 @@ void register_form_factor_kernels() {
   const auto unoccluded = [](const FlatTriangle& a, const FlatTriangle& b) {
     return unoccluded_exchange_area(a, b);
   };
-  const auto add = [](const std::string& name, double distance, const auto& kernel) {
+  const auto add = [](const std::string& name, double distance, auto kernel) {
     benchmark::RegisterBenchmark(name.c_str(), [distance, kernel](benchmark::State& state) {
       time_pairs(state, distance, kernel);
     });

@@ -48,6 +48,7 @@ Timing summarise(std::vector<double> samples) {
 std::vector<Timing> time_interleaved(std::span<const TimedCase> cases,
                                      const InterleavingSettings& settings) {
   std::vector<int> runs;
+  runs.reserve(cases.size());
   for (const TimedCase& timed : cases) {
     sample(timed, 1);
     runs.push_back(runs_per_sample(timed, settings.sample_seconds));
@@ -59,6 +60,7 @@ std::vector<Timing> time_interleaved(std::span<const TimedCase> cases,
     }
   }
   std::vector<Timing> timings;
+  timings.reserve(cases.size());
   for (std::vector<double>& of_case : samples) timings.push_back(summarise(std::move(of_case)));
   return timings;
 }
