@@ -25,17 +25,17 @@ namespace rebounce::bench {
 namespace {
 
 struct ApplyOptions {
-  std::string input;
+  std::vector<std::string> inputs;
   BuildSettings settings;
   CommonOptions common{.repeats = 51};
 };
 
-TransferData load_or_build(const ApplyOptions& options) {
-  if (std::filesystem::path(options.input).extension() == ".safetensors") {
-    return load_transfer_file(options.input);
+TransferData load_or_build(const std::string& input, const BuildSettings& settings) {
+  if (std::filesystem::path(input).extension() == ".safetensors") {
+    return load_transfer_file(input);
   }
   BuildReport report;
-  return build_transfer_data(options.input, options.settings, report);
+  return build_transfer_data(input, settings, report);
 }
 
 /// The operator of `data` in f32, built anew if the data hold another.
@@ -84,7 +84,8 @@ const char* name(Precision precision) {
 class ApplyBenchmark {
  public:
   ApplyBenchmark(const TransferData& data, const CommonOptions& options)
-      : patches_(data.patches),
+      : scene_(std::filesystem::path(data.record.scene_name).stem().string()),
+        patches_(data.patches),
         options_(options),
         f32_(operator_f32(data)),
         f16_(to_f16(*f32_)),
@@ -199,7 +200,7 @@ class ApplyBenchmark {
       const Timing& time = timings[k];
       const bool is_read = !measure.error;
       if (is_read) read_seconds = time.median;  // each read comes before what is measured by it
-      table.add({patches_.size(), threads, measure.name, text(measure.instruction_set),
+      table.add({scene_, patches_.size(), threads, measure.name, text(measure.instruction_set),
                  text(measure.precision), time.median * 1e6, time.spread, measure.bytes,
                  static_cast<double>(measure.bytes) / time.median / 1e9,
                  is_read ? Table::Cell() : Table::Cell(read_seconds / time.median),
@@ -207,6 +208,7 @@ class ApplyBenchmark {
     }
   }
 
+  std::string scene_;
   const PatchTable& patches_;
   const CommonOptions& options_;
   std::shared_ptr<const DenseOperator> f32_, f16_;
@@ -218,12 +220,16 @@ class ApplyBenchmark {
 };
 
 void run(const ApplyOptions& options) {
-  const TransferData data = load_or_build(options);
-  Table table({"patches", "threads", "measure", "instructions", "precision", "microseconds",
-               "spread", "bytes", "GB/s", "of read", "error"});
-  ApplyBenchmark benchmark(data, options.common);
-  benchmark.run(1, table);
-  if (const int all = thread_count(options.common); all > 1) benchmark.run(all, table);
+  Table table({"scene", "patches", "threads", "measure", "instructions", "precision",
+               "microseconds", "spread", "bytes", "GB/s", "of read", "error"});
+  for (const std::string& input : options.inputs) {
+    const TransferData data = load_or_build(input, options.settings);
+    ApplyBenchmark benchmark(data, options.common);
+    benchmark.run(1, table);
+    const int all = thread_count(options.common);
+    if (all > 1) benchmark.run(all, table);
+    omp_set_num_threads(all);
+  }
   publish("apply", table, options.common);
 }
 
@@ -233,8 +239,10 @@ void run(const ApplyOptions& options) {
 int main(int argc, char** argv) {
   rebounce::bench::ApplyOptions options;
   CLI::App app("Times a relight beside the bandwidth of memory in the same run.", "bench_apply");
-  app.add_option("input", options.input, "Transfer file, or a scene to build one from")->required();
-  app.add_option("--patches", options.settings.subdivision.patch_count, "Patches of a scene, about")
+  app.add_option("inputs", options.inputs, "Transfer files, or scenes to build them from")
+      ->required();
+  app.add_option("--patches", options.settings.subdivision.patch_count,
+                 "Patches of each scene, about")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   add_common_options(app, options.common);

@@ -51,22 +51,17 @@ void time_pairs(benchmark::State& state, double distance, const Kernel& kernel) 
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(pairs.size()));
 }
 
-/// The distances make unoccluded_exchange_area() choose the contour, degree 5 and degree 2.
-void register_form_factor_kernels() {
-  const auto unoccluded = [](const FlatTriangle& a, const FlatTriangle& b) {
-    return unoccluded_exchange_area(a, b);
-  };
-  const auto add = [](const std::string& name, double distance, auto kernel) {
-    benchmark::RegisterBenchmark(name.c_str(), [distance, kernel](benchmark::State& state) {
-      time_pairs(state, distance, kernel);
-    });
-  };
-  add("can_exchange", 1, can_exchange);
-  add("contour_exchange_area", 1, contour_exchange_area);
-  add("unoccluded_exchange_area/near", 1, unoccluded);
-  add("unoccluded_exchange_area/degree_5", 5, unoccluded);
-  add("unoccluded_exchange_area/degree_2", 20, unoccluded);
+double unoccluded(const FlatTriangle& a, const FlatTriangle& b) {
+  return unoccluded_exchange_area(a, b);
 }
+
+BENCHMARK_CAPTURE(time_pairs, can_exchange, 1, can_exchange)->Name("can_exchange");
+BENCHMARK_CAPTURE(time_pairs, contour, 1, contour_exchange_area)->Name("contour_exchange_area");
+
+// The distances make it choose the contour integral, degree 5 and degree 2.
+BENCHMARK_CAPTURE(time_pairs, near, 1, unoccluded)->Name("unoccluded_exchange_area/near");
+BENCHMARK_CAPTURE(time_pairs, degree_5, 5, unoccluded)->Name("unoccluded_exchange_area/degree_5");
+BENCHMARK_CAPTURE(time_pairs, degree_2, 20, unoccluded)->Name("unoccluded_exchange_area/degree_2");
 
 template <typename Value>
 void time_tile(benchmark::State& state, const TileKernels<Value>& kernels, bool diagonal) {
@@ -102,27 +97,27 @@ void register_tile_kernels() {
   }
 }
 
-void register_half_conversion() {
-  benchmark::RegisterBenchmark("float_to_half", [](benchmark::State& state) {
-    const std::vector<float> values = random_values(kTile * kTile);
-    std::vector<std::uint16_t> half(values.size());
-    for ([[maybe_unused]] auto _ : state) {
-      for (std::size_t k = 0; k < values.size(); ++k) half[k] = float_to_half(values[k]);
-      benchmark::ClobberMemory();
-    }
-    state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(values.size()));
-  });
-  benchmark::RegisterBenchmark("half_to_float", [](benchmark::State& state) {
-    const std::vector<std::uint16_t> half =
-        DenseOperator::encode_half(random_values(kTile * kTile));
-    std::vector<float> values(half.size());
-    for ([[maybe_unused]] auto _ : state) {
-      for (std::size_t k = 0; k < half.size(); ++k) values[k] = half_to_float(half[k]);
-      benchmark::ClobberMemory();
-    }
-    state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(half.size()));
-  });
+void time_float_to_half(benchmark::State& state) {
+  const std::vector<float> values = random_values(kTile * kTile);
+  std::vector<std::uint16_t> half(values.size());
+  for ([[maybe_unused]] auto _ : state) {
+    for (std::size_t k = 0; k < values.size(); ++k) half[k] = float_to_half(values[k]);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(values.size()));
 }
+BENCHMARK(time_float_to_half)->Name("float_to_half");
+
+void time_half_to_float(benchmark::State& state) {
+  const std::vector<std::uint16_t> half = DenseOperator::encode_half(random_values(kTile * kTile));
+  std::vector<float> values(half.size());
+  for ([[maybe_unused]] auto _ : state) {
+    for (std::size_t k = 0; k < half.size(); ++k) values[k] = half_to_float(half[k]);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(half.size()));
+}
+BENCHMARK(time_half_to_float)->Name("half_to_float");
 
 void describe_run() {
   const Machine machine = describe_machine();
@@ -139,9 +134,7 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   rebounce::bench::describe_run();
-  rebounce::bench::register_form_factor_kernels();
   rebounce::bench::register_tile_kernels();
-  rebounce::bench::register_half_conversion();
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
 }
