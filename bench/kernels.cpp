@@ -64,7 +64,7 @@ BENCHMARK_CAPTURE(time_pairs, degree_5, 5, unoccluded)->Name("unoccluded_exchang
 BENCHMARK_CAPTURE(time_pairs, degree_2, 20, unoccluded)->Name("unoccluded_exchange_area/degree_2");
 
 template <typename Value>
-void time_tile(benchmark::State& state, const TileKernels<Value>& kernels, bool diagonal) {
+void time_product(benchmark::State& state, const TileKernels<Value>& kernels, bool diagonal) {
   const std::vector<float> values = random_values(kTile * kTile);
   std::vector<Value> tile(values.begin(), values.end());
   if constexpr (sizeof(Value) == sizeof(std::uint16_t)) tile = DenseOperator::encode_half(values);
@@ -82,20 +82,24 @@ void time_tile(benchmark::State& state, const TileKernels<Value>& kernels, bool 
   state.SetBytesProcessed(state.iterations() * bytes);
 }
 
-void register_tile_kernels() {
-  for (const DenseKernels* set : available_kernels()) {
-    for (const bool diagonal : {false, true}) {
-      const std::string name =
-          std::string("tile/") + set->instruction_set + (diagonal ? "/diagonal" : "/off_diagonal");
-      benchmark::RegisterBenchmark((name + "/f32").c_str(), [=](benchmark::State& state) {
-        time_tile(state, set->f32, diagonal);
-      });
-      benchmark::RegisterBenchmark((name + "/f16").c_str(), [=](benchmark::State& state) {
-        time_tile(state, set->f16, diagonal);
-      });
-    }
+/// Arguments: which instruction set, and whether half precision and a tile on the diagonal.
+void time_tile(benchmark::State& state) {
+  const DenseKernels& set = *available_kernels()[static_cast<std::size_t>(state.range(0))];
+  state.SetLabel(set.instruction_set);
+  const bool half = state.range(1) != 0, diagonal = state.range(2) != 0;
+  if (half) {
+    time_product(state, set.f16, diagonal);
+  } else {
+    time_product(state, set.f32, diagonal);
   }
 }
+BENCHMARK(time_tile)
+    ->Name("tile")
+    ->ArgNames({"set", "f16", "diagonal"})
+    ->ArgsProduct({benchmark::CreateDenseRange(
+                       0, static_cast<std::int64_t>(available_kernels().size()) - 1, 1),
+                   {0, 1},
+                   {0, 1}});
 
 void time_float_to_half(benchmark::State& state) {
   const std::vector<float> values = random_values(kTile * kTile);
@@ -134,7 +138,6 @@ int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
   rebounce::bench::describe_run();
-  rebounce::bench::register_tile_kernels();
   benchmark::RunSpecifiedBenchmarks();
   benchmark::Shutdown();
 }

@@ -122,8 +122,9 @@ class FormFactorAssembly {
     trace(i, scratch.mixed, settings_.full_rays, scratch.rays);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
       const std::span rays(&scratch.rays[p * settings_.full_rays], settings_.full_rays);
-      const double visible = shadow_rays_.visible_part(i, scratch.mixed[p].patch, rays);
-      append(row, scratch.mixed[p], visible, visible * (1 - visible) / settings_.full_rays);
+      const ShadowRays::Visibility visible =
+          shadow_rays_.visibility(i, scratch.mixed[p].patch, rays);
+      append(row, scratch.mixed[p], visible.part, visible.variance);
     }
     std::sort(row.begin(), row.end(),
               [](const ExchangeEntry& a, const ExchangeEntry& b) { return a.column < b.column; });
@@ -141,8 +142,8 @@ class FormFactorAssembly {
               double variance) const {
     const double exchange = pair.unoccluded * visible;
     if (static_cast<float>(exchange) <= 0) return;
-    row.push_back({pair.patch, static_cast<float>(exchange),
-                   pair.unoccluded * pair.unoccluded * (variance + kVarianceFloor)});
+    row.push_back({pair.patch, static_cast<float>(exchange), static_cast<float>(pair.unoccluded),
+                   static_cast<float>(variance + kVarianceFloor)});
   }
 
   std::vector<double> areas() const {
@@ -157,9 +158,11 @@ class FormFactorAssembly {
     std::vector<RowTarget> target;
     target.reserve(escape.size());
     for (const Escape& e : escape) {
-      const double lost = e.sky + e.absorbed;
-      // Low-discrepancy rays err about half as much as random ones here.
-      target.push_back({1 - lost, 0.5 * std::sqrt(lost * (1 - lost) / settings_.escape_rays)});
+      const double lost = e.sky + e.absorbed, count = settings_.escape_rays;
+      // Where no ray at all is lost, the row is taken as closed. Else the measurement is as sure as
+      // the rule of succession says; low-discrepancy rays err about half as much as random ones.
+      const double p = (lost * count + 1) / (count + 2);
+      target.push_back({1 - lost, lost > 0 ? 0.5 * std::sqrt(p * (1 - p) / count) : 0.0});
     }
     return target;
   }

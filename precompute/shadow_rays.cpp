@@ -62,19 +62,24 @@ void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& faci
   }
 }
 
-double ShadowRays::visible_part(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const {
+ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
+                                              std::span<const Ray> rays) const {
   const std::uint64_t hash = pair_hash(i, j);
-  double sum = 0, visible = 0, count = 0;
+  double sum = 0, sum_of_squares = 0, visible = 0, count = 0;
   for (std::size_t k = 0; k < rays.size(); ++k) {
     const auto [x, y] = ray_ends(i, j, static_cast<std::uint32_t>(k), hash);
     const double weight =
         point_kernel(to_dvec3(*x), triangles_[i].normal, to_dvec3(*y), triangles_[j].normal);
     const bool clear = !is_occluded(rays[k]);
     sum += weight;
+    sum_of_squares += weight * weight;
     visible += clear ? weight : 0;
     count += clear ? 1 : 0;
   }
-  return sum > 0 ? visible / sum : count / static_cast<double>(rays.size());
+  const double part = sum > 0 ? visible / sum : count / static_cast<double>(rays.size());
+  // As sure as that many rays of equal weight (Kish's effective sample size).
+  const double effective = sum > 0 ? sum * sum / sum_of_squares : 1;
+  return {part, part * (1 - part) / effective};
 }
 
 }  // namespace rebounce

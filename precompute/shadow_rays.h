@@ -42,9 +42,14 @@ class ShadowRays {
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
 
-  /// The part of the pair's light that gets through its traced `rays`: each is weighted by the
-  /// kernel between its ends.
-  double visible_part(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const;
+  struct Visibility {
+    double part;      ///< of the pair's light that gets through, [0, 1]
+    double variance;  ///< of `part`
+  };
+
+  /// What the traced `rays` of the pair (i, j) say of it: each is weighted by the kernel between
+  /// its ends.
+  Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const;
 
  private:
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
