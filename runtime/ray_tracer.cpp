@@ -1,4 +1,4 @@
-// The only file of the project that knows Embree.
+// The only file of the libraries that knows Embree.
 
 #include "rebounce/runtime/ray_tracer.h"
 
