@@ -29,6 +29,9 @@ constexpr std::size_t kBatchPaths = 4096;  // that advance together on one threa
 // Surfaces that every path visits before it may be ended by chance.
 constexpr int kSureVertices = 4;
 
+// Below this throughput, chance decides: those that survive have it again.
+constexpr double kRouletteThroughput = 0.25;
+
 // A shadow ray stops this part of its length before the lamp, which may hang on a surface: as
 // DirectLighting has it.
 constexpr float kLampGap = 1e-4F;
@@ -214,9 +217,10 @@ class PathTracer {
     const double largest = std::max({path.throughput.x, path.throughput.y, path.throughput.z});
     if (!(largest > 0)) return false;
     path.numbers = random_numbers(path.random);
-    if (vertex + 1 >= kSureVertices && largest < 1) {
-      if (path.numbers.survival >= largest) return false;
-      path.throughput /= largest;
+    const double survival = largest / kRouletteThroughput;
+    if (vertex + 1 >= kSureVertices && survival < 1) {
+      if (path.numbers.survival >= survival) return false;
+      path.throughput /= survival;
     }
     path.origin = tracer_.offset_point(to_float3(corners.at(barycentric)), to_float3(normal));
     path.normal = normal;

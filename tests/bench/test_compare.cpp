@@ -45,7 +45,7 @@ struct Furnace {
 };
 
 PatchComparisonSettings quick_settings(std::size_t patch_count) {
-  return {.patch_count = patch_count, .points_per_patch = 8, .samples_per_point = 32};
+  return {.patch_count = patch_count, .points_per_patch = 16, .samples_per_point = 32};
 }
 
 TEST(PatchMeans, ErrorIsWhatWasPutIn) {
@@ -57,7 +57,8 @@ TEST(PatchMeans, ErrorIsWhatWasPutIn) {
         compare_patch_means(furnace.data, furnace.uniform(2), lit_scene, quick_settings(count));
     const PatchComparison off =
         compare_patch_means(furnace.data, furnace.uniform(2.2F), lit_scene, quick_settings(count));
-    EXPECT_LT(exact.relative.error, 0.01);
+    // What is left of 50 patches' noise is known to within some 0.45 of the noise.
+    EXPECT_LT(exact.relative.error, 0.8 * exact.relative.noise);
     EXPECT_GT(exact.relative.noise, 0.005);
     EXPECT_LT(exact.relative.noise, 0.05);
     EXPECT_NEAR(off.relative.error, 0.1, 0.005);

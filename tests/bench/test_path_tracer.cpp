@@ -104,7 +104,7 @@ TEST_P(Furnace, IndirectIrradianceIsTheRadiosityEverywhere) {
   add_box(scene, {0, 0, 0}, {3, 2, 1}, true);
   const IrradianceEstimate estimate = measure(scene, points_on(scene, 64), 256);
   const double radiosity = 1 / (1 - static_cast<double>(rho));
-  expect_mean(estimate, radiosity, 0.005);
+  expect_mean(estimate, radiosity, 0.01);
   for (std::size_t k = 0; k < estimate.mean.size(); ++k) {
     // Seven degrees of freedom: eight estimated deviations are about four true ones.
     EXPECT_NEAR(estimate.mean[k][1], radiosity, 8 * estimate.standard_error[k][1] + 1e-4);
@@ -158,8 +158,8 @@ TEST(IntegratingSphere, IndirectIrradianceIsUniform) {
     const std::vector<Light> lamps{point_lamp({0.3F, 0, 0.2F}, 1)};
     const IrradianceEstimate estimate = measure(scene, points_on(scene, 200), 128, lamps);
     // All light is absorbed in the end, so the mean over the flat triangles is exact.
-    expect_mean(estimate, expected * 4 * kPi / surface_area(scene), 0.005);
-    EXPECT_NEAR(over_all_points(estimate).mean, expected, 0.01 * expected);
+    expect_mean(estimate, expected * 4 * kPi / surface_area(scene), 0.01);
+    EXPECT_NEAR(over_all_points(estimate).mean, expected, 0.02 * expected);
   }
 }
 
@@ -239,7 +239,7 @@ TEST(TwoSides, OneSidedSurfacesAbsorbFromBehind) {
   add_square(scene, {0.5, 0.5, 1}, 0.5, true, 0);  // its back looks down at the point
   const std::vector points{point_at({0, 0, 0}, {0, 0, 1})};
   const std::vector<Light> lamps{point_lamp({0, 0, 0.5F}, 100)};  // between them
-  const IrradianceEstimate estimate = measure(scene, points, 1024, lamps);
+  const IrradianceEstimate estimate = measure(scene, points, 8192, lamps);
   EXPECT_EQ(estimate.mean[0], (Float3{0, 0, 0}));
   EXPECT_NEAR(estimate.absorbed[0], 0.13853160599489, 0.005);
 }
@@ -410,7 +410,7 @@ TEST(SampleSurface, IsUniformByAreaOverLitSides) {
     const bool is_small = p.position[2] > 0.5F;
     EXPECT_EQ(std::abs(p.normal[2]), 1);
     ++count[is_small ? 2 : p.normal[2] > 0 ? 0 : 1];
-    if (is_small) EXPECT_LT(p.normal[2], 0);
+    EXPECT_TRUE(!is_small || p.normal[2] < 0);
     centroid += to_dvec3(p.position) / 900.0;
     const glm::dvec3 again =
         SceneSurface(scene).corners(p.triangle).at({p.barycentric[0], p.barycentric[1]});
