@@ -55,9 +55,9 @@ PatchComparison compare_patch_means(const TransferData& data,
 /// at `points` (sample_surface), each of equal weight. The value at a point is that of the display
 /// mesh: patch values brought to its vertices by the reconstruction weights, then interpolated.
 ///
-/// `mesh_tracer` holds the first surface_count triangles of data.mesh. Left out are points that see
-/// nothing but back faces (the floor under a box: nobody sees them) and points that the mesh does
-/// not have. Throws Error if the sizes do not agree.
+/// `mesh_tracer` holds the first surface_count triangles of data.mesh. Left out are points whose
+/// view is all but back faces (the floor under a box: nobody sees them) and points that the mesh
+/// does not have. Throws Error if the sizes do not agree or the mesh has no weights.
 RelativeError compare_reconstruction(const TransferData& data, const RayTracer& mesh_tracer,
                                      std::span<const Float3> indirect_irradiance,
                                      std::span<const SurfacePoint> points,

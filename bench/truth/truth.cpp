@@ -5,10 +5,11 @@
 #include <omp.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <exception>
 #include <memory>
-#include <optional>
 
 #include "console.h"
 #include "light_file.h"
@@ -92,6 +93,12 @@ class TruthBench {
       setup_.lights = {reference::make_key_light(scene_, tracer_, lit_sides_)};
     } else {
       setup_.lights = scene_.lights;
+    }
+    const bool emits = std::ranges::any_of(scene_.materials, [](const Material& m) {
+      return m.emitted_luminance != Float3{0, 0, 0};
+    });
+    if (setup_.lights.empty() && setup_.sky.luminance == 0 && !emits) {
+      throw Error(options_.scene + " has no light of its own; give --lights or --key-light");
     }
   }
 
