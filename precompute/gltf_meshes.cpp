@@ -9,8 +9,8 @@
 #include <glm/matrix.hpp>
 #include <optional>
 
-#include "rebounce/runtime/float3_glm.h"
 #include "gltf_primitives.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce::gltf {

@@ -21,7 +21,7 @@ struct BuildSettings {
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
   Precision precision = Precision::kF32;  ///< kF16: half the bytes, an error of some 1e-4
-  std::uint64_t memory_limit_bytes = 0;   ///< refuse to start what needs more; 0: half the machine's
+  std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
 };
 
 /// What the expensive part will take, known before it begins.
