@@ -26,16 +26,19 @@ std::vector<ChosenPatch> choose_patches(std::span<const float> area, std::size_t
   double total = 0, passed = 0;
   for (const float a : area) total += a;
   const double step = total / static_cast<double>(all ? area.size() : count);
-  double next = step * unit_square(mix_bits(seed)).x;
+  const double offset = unit_square(mix_bits(seed)).x;
+  std::size_t steps = 0;
   for (std::uint32_t i = 0; i < area.size(); ++i) {
     if (all) {
       chosen.push_back({i, area[i]});
       continue;
     }
     passed += area[i];
-    double weight = 0;
-    for (; next < passed; next += step) weight += step;
-    if (weight > 0) chosen.push_back({i, weight});
+    const std::size_t steps_before = steps;
+    while ((static_cast<double>(steps) + offset) * step < passed) ++steps;
+    if (steps > steps_before) {
+      chosen.push_back({i, static_cast<double>(steps - steps_before) * step});
+    }
   }
   return chosen;
 }

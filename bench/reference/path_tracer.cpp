@@ -298,21 +298,22 @@ class Measurement {
       const std::uint32_t last = std::min(samples_, first + samples_per_batch_);
       scratch.paths.clear();
       for (std::size_t p = begin; p < end; ++p) {
-        for (std::uint32_t s = first; s < last; ++s) scratch.paths.push_back(path(p, s));
+        for (std::uint32_t s = first; s < last; ++s) scratch.paths.push_back(make_path(p, s));
       }
       path_tracer_.follow(scratch);
-      for (std::size_t k = 0; k < scratch.paths.size(); ++k) {
-        PointSums& sum = sums[k / (last - first)];
-        const auto sample = first + static_cast<std::uint32_t>(k % (last - first));
-        sum.gathered[sample % kReplicateCount] += scratch.paths[k].gathered;
-        sum.absorbed += scratch.paths[k].absorbed ? 1 : 0;
+      auto path = scratch.paths.begin();
+      for (PointSums& sum : sums) {
+        for (std::uint32_t s = first; s < last; ++s, ++path) {
+          sum.gathered[s % kReplicateCount] += path->gathered;
+          sum.absorbed += path->absorbed ? 1 : 0;
+        }
       }
     }
     for (std::size_t p = begin; p < end; ++p) store(p, sums[p - begin]);
   }
 
   /// Path `sample` of a point: replicates take turns.
-  Path path(std::size_t point, std::uint32_t sample) const {
+  Path make_path(std::size_t point, std::uint32_t sample) const {
     const std::uint64_t key =
         mix_bits(mix_bits(seed_ ^ mix_bits(point)) + sample % kReplicateCount);
     const std::uint32_t k = sample / kReplicateCount;

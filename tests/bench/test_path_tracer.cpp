@@ -9,7 +9,6 @@
 #include <numbers>
 #include <vector>
 
-#include "expect_error.h"
 #include "precompute/test_scenes.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/texture_sampling.h"
