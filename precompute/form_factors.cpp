@@ -253,9 +253,11 @@ class FormFactorAssembly {
     std::vector<RowTarget> target;
     target.reserve(escape.size());
     for (const Escape& e : escape) {
-      const double lost = e.sky + e.absorbed;
-      // Low-discrepancy rays err about half as much as random ones here.
-      target.push_back({1 - lost, 0.5 * std::sqrt(lost * (1 - lost) / settings_.escape_rays)});
+      const double lost = e.sky + e.absorbed, count = settings_.escape_rays;
+      // Where no ray at all is lost, the row is taken as closed. Else the measurement is as sure as
+      // the rule of succession says; low-discrepancy rays err about half as much as random ones.
+      const double p = (lost * count + 1) / (count + 2);
+      target.push_back({1 - lost, lost > 0 ? 0.5 * std::sqrt(p * (1 - p) / count) : 0.0});
     }
     return target;
   }
