@@ -1,5 +1,6 @@
 #include <optional>
 
+#include "rebounce/precompute/lit_sides.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 #include "reference/compare.h"
@@ -9,7 +10,7 @@
 namespace rebounce::reference {
 namespace {
 
-/// Of two faces at the same place, that one is meant whose normal is nearly the point's.
+/// Of faces that meet or cross at a place, those are meant whose normal is nearly the point's.
 constexpr double kSameSideCosine = 0.99;
 
 /// A point whose view is back faces by more than this is hidden: the floor under a box, or a
@@ -22,21 +23,6 @@ struct MeshPoint {
   glm::dvec3 weight;  ///< barycentric, of its three vertices
 };
 
-/// A short ray straight down through each point.
-std::vector<Ray> rays_through(std::span<const SurfacePoint> points, const RayTracer& tracer) {
-  std::vector<Ray> rays;
-  rays.reserve(points.size());
-  for (const SurfacePoint& p : points) {
-    Ray ray{};
-    ray.origin = tracer.offset_point(p.position, p.normal);
-    ray.direction = {-p.normal[0], -p.normal[1], -p.normal[2]};
-    ray.t_near = 0;
-    ray.t_far = 2 * tracer.offset_distance();
-    rays.push_back(ray);
-  }
-  return rays;
-}
-
 /// The weights of the vertices of `corners` at `p`, which lies on the triangle.
 glm::dvec3 barycentric_weights(const TriangleCorners& corners, const glm::dvec3& p) {
   const glm::dvec3 ab = corners.b - corners.a, ac = corners.c - corners.a, ap = p - corners.a;
@@ -47,16 +33,37 @@ glm::dvec3 barycentric_weights(const TriangleCorners& corners, const glm::dvec3&
   return {1 - v - w, v, w};
 }
 
-/// The display triangle on the side that the ray came from; nothing if that side is not there.
-std::optional<MeshPoint> locate(const DisplayMesh& mesh, const SurfacePoint& point,
-                                const Hit& hit) {
-  if (hit.triangle == kNone) return {};
-  const std::uint32_t triangle = hit.front ? hit.triangle : mesh.back_triangle[hit.triangle];
-  if (triangle == kNone) return {};
-  const TriangleCorners corners(mesh.position, mesh.triangle[triangle]);
-  if (glm::dot(corners.front_normal(), to_dvec3(point.normal)) < kSameSideCosine) return {};
-  return MeshPoint{triangle, barycentric_weights(corners, to_dvec3(point.position))};
-}
+/// Finds points of the scene on the display mesh.
+class MeshLocator {
+ public:
+  /// Both must outlive it.
+  MeshLocator(const DisplayMesh& mesh, const RayTracer& tracer) : mesh_(mesh), tracer_(tracer) {}
+
+  /// The place of `point`; nothing where the mesh has no such side. Of copies that lie in one
+  /// another one that has a patch, if any has.
+  std::optional<MeshPoint> locate(const SurfacePoint& point) {
+    find_coincident_sides(
+        tracer_, point.position, point.normal, kNone,
+        [&](std::uint32_t t) { return mesh_.back_triangle[t] != kNone; }, hits_, sides_);
+    std::uint32_t found = kNone;
+    for (const CoincidentSide& side : sides_) {
+      const std::uint32_t t = side.front ? side.triangle : mesh_.back_triangle[side.triangle];
+      const glm::dvec3 normal = corners(t).front_normal();
+      if (glm::dot(normal, to_dvec3(point.normal)) < kSameSideCosine) continue;
+      if (found == kNone || mesh_.triangle_patch[found] == kNone) found = t;
+    }
+    if (found == kNone) return {};
+    return MeshPoint{found, barycentric_weights(corners(found), to_dvec3(point.position))};
+  }
+
+ private:
+  TriangleCorners corners(std::uint32_t t) const { return {mesh_.position, mesh_.triangle[t]}; }
+
+  const DisplayMesh& mesh_;
+  const RayTracer& tracer_;
+  std::vector<Hit> hits_;
+  std::vector<CoincidentSide> sides_;
+};
 
 glm::dvec3 vertex_value(const DisplayMesh& mesh, std::span<const Float3> patch_value,
                         std::uint32_t vertex) {
@@ -90,13 +97,11 @@ RelativeError compare_reconstruction(const TransferData& data, const RayTracer& 
   if (data.mesh.weight_begin.size() != data.mesh.position.size() + 1) {
     throw Error("comparison of the reconstruction: the mesh has no reconstruction weights");
   }
-  const std::vector<Ray> rays = rays_through(points, mesh_tracer);
-  std::vector<Hit> hits(rays.size());
-  mesh_tracer.intersect(rays, hits);
+  MeshLocator locator(data.mesh, mesh_tracer);
   ErrorSum sum;
   std::size_t left_out = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const std::optional<MeshPoint> place = locate(data.mesh, points[k], hits[k]);
+    const std::optional<MeshPoint> place = locator.locate(points[k]);
     if (!place || truth.absorbed[k] > kHidden) {
       ++left_out;
       continue;

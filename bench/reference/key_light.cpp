@@ -4,7 +4,6 @@
 #include <limits>
 #include <numbers>
 
-#include "rebounce/precompute/lit_sides.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 #include "reference/scene_surface.h"
@@ -29,11 +28,11 @@ double diagonal(const Scene& scene) {
   return glm::distance(low, high);
 }
 
-double lit_area(const Scene& scene, std::span<const std::uint8_t> lit_sides) {
+double lit_area(const Scene& scene, std::span<const TriangleSides> sides) {
   const SceneSurface surface(scene);
   double area = 0;
-  for (std::uint32_t t = 0; t < lit_sides.size(); ++t) {
-    area += surface.corners(t).area() * (lit_sides[t] == kBothSides ? 2 : 1);
+  for (std::uint32_t t = 0; t < sides.size(); ++t) {
+    area += surface.corners(t).area() * sides[t].patch_count();
   }
   return area;
 }
@@ -103,15 +102,15 @@ double clearance(const Float3& place, const RayTracer& tracer, double reach) {
 }  // namespace
 
 Light make_key_light(const Scene& scene, const RayTracer& tracer,
-                     std::span<const std::uint8_t> lit_sides, std::uint64_t seed) {
+                     std::span<const TriangleSides> sides, std::uint64_t seed) {
   const double size = diagonal(scene);
-  const auto receivers = sample_surface(scene, lit_sides, kReceivers, seed);
-  const auto candidates = make_candidates(sample_surface(scene, lit_sides, kCandidates, seed + 1),
+  const auto receivers = sample_surface(scene, sides, kReceivers, seed);
+  const auto candidates = make_candidates(sample_surface(scene, sides, kCandidates, seed + 1),
                                           tracer, 0.5 * size, seed);
   Light light;
   light.name = "key light";
   light.intensity =
-      static_cast<float>(kFluxPerArea * lit_area(scene, lit_sides) / (4 * std::numbers::pi));
+      static_cast<float>(kFluxPerArea * lit_area(scene, sides) / (4 * std::numbers::pi));
   double best = -1;
   for (const Float3& place : candidates) {
     const double merit =

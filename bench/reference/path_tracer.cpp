@@ -270,6 +270,7 @@ class Measurement {
 
   IrradianceEstimate run(const Progress& progress) {
     const std::size_t blocks = (points_.size() + points_per_block_ - 1) / points_per_block_;
+    if (progress && !progress(0)) throw Cancelled();
     std::atomic<bool> stop = false;
     std::atomic<std::size_t> blocks_done = 0;
 #pragma omp parallel

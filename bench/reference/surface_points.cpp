@@ -1,6 +1,5 @@
 #include "reference/surface_points.h"
 
-#include "rebounce/precompute/lit_sides.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
@@ -21,20 +20,19 @@ SurfacePoint point_on(const SceneSurface& surface, std::uint32_t triangle, bool 
 
 }  // namespace
 
-std::vector<SurfacePoint> sample_surface(const Scene& scene,
-                                         std::span<const std::uint8_t> lit_sides, std::size_t count,
-                                         std::uint64_t seed) {
-  if (lit_sides.size() != scene.triangle.size()) {
-    throw Error("points on " + scene.name + ": one entry of lit sides per triangle is needed");
+std::vector<SurfacePoint> sample_surface(const Scene& scene, std::span<const TriangleSides> sides,
+                                         std::size_t count, std::uint64_t seed) {
+  if (sides.size() != scene.triangle.size()) {
+    throw Error("points on " + scene.name + ": one entry of sides per triangle is needed");
   }
   const SceneSurface surface(scene);
-  CumulativeChoice sides;  // front and back of each triangle
+  CumulativeChoice choice;  // front and back of each triangle
   for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
     const double area = surface.corners(t).area();
-    sides.add(lit_sides[t] & kFrontSide ? area : 0);
-    sides.add(lit_sides[t] & kBackSide ? area : 0);
+    choice.add(sides[t].front == SideKind::kLit ? area : 0);
+    choice.add(sides[t].back == SideKind::kLit ? area : 0);
   }
-  if (!(sides.total() > 0) || !std::isfinite(sides.total())) {
+  if (!(choice.total() > 0) || !std::isfinite(choice.total())) {
     throw Error("points on " + scene.name + ": it has no surface to put them on");
   }
   std::vector<SurfacePoint> points;
@@ -43,7 +41,7 @@ std::vector<SurfacePoint> sample_surface(const Scene& scene,
     const std::uint64_t bits = mix_bits(seed ^ mix_bits(k));
     const double jitter = unit_square(bits).x;
     const auto side =
-        sides.choose((static_cast<double>(k) + jitter) / static_cast<double>(count)).index;
+        choice.choose((static_cast<double>(k) + jitter) / static_cast<double>(count)).index;
     points.push_back(point_on(surface, static_cast<std::uint32_t>(side / 2), side % 2 == 0,
                               square_to_triangle(unit_square(mix_bits(bits)))));
   }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/scene.h"
 
 namespace rebounce::reference {
@@ -17,11 +18,10 @@ struct SurfacePoint {
   Float2 barycentric{0, 0};        ///< weights of the second and third vertex
 };
 
-/// `count` points spread uniformly by area over the sides that `lit_sides` [t] names (lit_sides.h),
-/// each from a stratum of equal area. The same `seed`, the same points. Throws Error if there is
+/// `count` points spread uniformly by area over the lit ones of `sides` [t] (find_lit_sides), each
+/// from a stratum of equal area. The same `seed`, the same points. Throws Error if there is
 /// no such side or its area is not finite.
-std::vector<SurfacePoint> sample_surface(const Scene& scene,
-                                         std::span<const std::uint8_t> lit_sides, std::size_t count,
-                                         std::uint64_t seed);
+std::vector<SurfacePoint> sample_surface(const Scene& scene, std::span<const TriangleSides> sides,
+                                         std::size_t count, std::uint64_t seed);
 
 }  // namespace rebounce::reference

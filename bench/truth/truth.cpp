@@ -56,9 +56,9 @@ class TruthBench {
         bar_(bar),
         scene_(import_gltf(options.scene)),
         tracer_(reference::make_scene_tracer(scene_)),
-        lit_sides_(find_lit_sides(scene_)) {
+        sides_(find_lit_sides(scene_, tracer_)) {
     choose_lights();
-    points_ = reference::sample_surface(scene_, lit_sides_, options.point_count,
+    points_ = reference::sample_surface(scene_, sides_, options.point_count,
                                         options.patch_comparison.seed);
     truth_ =
         reference::indirect_irradiance(lit_scene(), points_, options.samples,
@@ -90,7 +90,7 @@ class TruthBench {
     if (!options_.lights.empty()) {
       setup_ = cli::read_lights(options_.lights);
     } else if (options_.key_light) {
-      setup_.lights = {reference::make_key_light(scene_, tracer_, lit_sides_)};
+      setup_.lights = {reference::make_key_light(scene_, tracer_, sides_)};
     } else {
       setup_.lights = scene_.lights;
     }
@@ -149,7 +149,7 @@ class TruthBench {
   cli::ProgressBar& bar_;
   Scene scene_;
   RayTracer tracer_;
-  std::vector<std::uint8_t> lit_sides_;
+  std::vector<TriangleSides> sides_;
   cli::LightSetup setup_;
   std::vector<reference::SurfacePoint> points_;
   reference::IrradianceEstimate truth_;

@@ -24,7 +24,7 @@ struct Furnace {
     data.patches = std::move(model.patches);
     data.patches.absorbed.assign(data.patches.size(), 0.0F);
     data.mesh = std::move(model.mesh);
-    compute_reconstruction_weights(data.patches.absorbed, data.mesh);
+    compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, data.mesh);
   }
 
   void add_box_without_underside() {
@@ -86,7 +86,7 @@ struct FurnacePoints {
   IrradianceEstimate truth;
 
   explicit FurnacePoints(const Scene& scene)
-      : points(sample_surface(scene, find_lit_sides(scene), 500, 1)) {
+      : points(sample_surface(scene, find_lit_sides(scene, make_scene_tracer(scene)), 500, 1)) {
     truth.mean.assign(points.size(), Float3{2, 2, 2});
     truth.standard_error.assign(points.size(), Float3{0, 0, 0});
     truth.absorbed.assign(points.size(), 0.0F);
@@ -146,7 +146,7 @@ TEST(Reconstruction, NoiseIsTakenOut) {
 TEST(Reconstruction, PointsThatSeeOnlyBackFacesAreLeftOut) {
   const Furnace furnace(true);
   const RayTracer tracer = make_scene_tracer(furnace.scene);
-  const auto points = sample_surface(furnace.scene, find_lit_sides(furnace.scene), 500, 1);
+  const auto points = sample_surface(furnace.scene, find_lit_sides(furnace.scene, tracer), 500, 1);
   const IrradianceEstimate truth =
       indirect_irradiance({furnace.scene, tracer, {}, {}}, points, 64, 1);
   const RelativeError error = compare_reconstruction(furnace.data, furnace.mesh_tracer(),

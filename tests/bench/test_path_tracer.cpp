@@ -34,7 +34,7 @@ IrradianceEstimate measure(const Scene& scene, std::span<const SurfacePoint> poi
 }
 
 std::vector<SurfacePoint> points_on(const Scene& scene, std::size_t count) {
-  return sample_surface(scene, find_lit_sides(scene), count, 7);
+  return sample_surface(scene, find_lit_sides(scene, make_scene_tracer(scene)), count, 7);
 }
 
 /// The luminance that makes an exitance of 1 lx.
@@ -400,7 +400,9 @@ TEST(SampleSurface, IsUniformByAreaOverLitSides) {
   scene.materials[0].double_sided = true;
   add_square(scene, {0, 0, 0}, 1, true, 0);
   add_square(scene, {0, 0, 1}, 0.5, true, 0);
-  const std::vector<std::uint8_t> sides{kBothSides, kBothSides, kBackSide, kBackSide};
+  const TriangleSides both{SideKind::kLit, SideKind::kLit};
+  const TriangleSides only_back{SideKind::kCovered, SideKind::kLit};
+  const std::vector sides{both, both, only_back, only_back};
   const auto points = sample_surface(scene, sides, 900, 3);
   // Two sides of 4 m² and one of 1 m²: strata make the shares exact but for their borders.
   std::array<int, 3> count{};
