@@ -1,6 +1,7 @@
 #include "block_kernels.h"
 
 #include "block_kernels_impl.h"
+#include "instruction_set.h"
 #include "vector_portable.h"
 
 namespace rebounce {
@@ -8,10 +9,13 @@ namespace {
 
 const BlockKernelSet& pick_block_kernels() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f")) return kBlockKernelsAvx512;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("f16c")) {
-    return kBlockKernelsAvx2;
+  switch (widest_instruction_set()) {
+    case InstructionSet::kAvx512:
+      return kBlockKernelsAvx512;
+    case InstructionSet::kAvx2:
+      return kBlockKernelsAvx2;
+    case InstructionSet::kPortable:
+      break;
   }
 #endif
   return kBlockKernelsPortable;

@@ -1,6 +1,7 @@
 #include "dense_kernels.h"
 
 #include "dense_kernels_impl.h"
+#include "instruction_set.h"
 #include "vector_portable.h"
 
 namespace rebounce {
@@ -8,10 +9,13 @@ namespace {
 
 const DenseKernels& pick_dense_kernels() {
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx512f")) return kDenseKernelsAvx512;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("f16c")) {
-    return kDenseKernelsAvx2;
+  switch (widest_instruction_set()) {
+    case InstructionSet::kAvx512:
+      return kDenseKernelsAvx512;
+    case InstructionSet::kAvx2:
+      return kDenseKernelsAvx2;
+    case InstructionSet::kPortable:
+      break;
   }
 #endif
   return kDenseKernelsPortable;
