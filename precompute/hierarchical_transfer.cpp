@@ -178,10 +178,11 @@ void add_pieces(const ClusterTree& tree, const Cluster& row, const Cluster& colu
   }
 }
 
-// The search for the price: errors are about proportional to its root, and a result is good enough
-// between these parts of the tolerance.
+// The search for the price ends with an error between these parts of the tolerance: other lights
+// than those that it sees may do a little worse. Errors are about proportional to the root of the
+// price.
 constexpr int kMostRounds = 5;
-constexpr double kAim = 0.85, kGoodEnough = 0.7;
+constexpr double kLeast = 0.6, kAim = 0.7, kMost = 0.8;
 
 // The largest error may be this many times the tolerance: gates of 0.5 % and 1.5 %.
 constexpr double kLargestOverMean = 3;
@@ -294,14 +295,14 @@ std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
     if (settings.precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
     auto candidate = std::make_shared<const HierarchicalOperator>(std::move(storage));
     const double error = lights.error(*candidate);
-    const bool within = error <= settings.tolerance;
-    const bool best_within = best && best_error <= settings.tolerance;
+    const bool within = error <= kMost * settings.tolerance;
+    const bool best_within = best && best_error <= kMost * settings.tolerance;
     if (!best || (within && (!best_within || candidate->bytes() < best->bytes())) ||
         (!within && !best_within && error < best_error)) {
       best = std::move(candidate);
       best_error = error;
     }
-    if (within && error >= kGoodEnough * settings.tolerance) break;
+    if (within && error >= kLeast * settings.tolerance) break;
     // An error of nothing means that everything is stored; a price of a thousand times more is a
     // bold enough next step.
     const double step = error > 0 ? kAim * settings.tolerance / error : 32;

@@ -366,16 +366,21 @@ void HierarchicalOperator::apply(std::span<const Float3> initial_exitance,
   }
 
   const float scale = half ? 1.0F / kHalfScale : 1.0F;
-#pragma omp parallel for schedule(static)
-  for (std::size_t k = 0; k < n; ++k) {
-    Float3 sum{};
-    for (std::size_t s = 0; s < kSlotCount; ++s) {
-      if (k < slots_[s].begin || k >= slots_[s].end) continue;
-      const float* y = slots + s * slot_size() + k;
-      for (int c = 0; c < kChannelCount; ++c) sum[c] += y[c * stride];
+  for (int c = 0; c < kChannelCount; ++c) {
+    float* const sum = x + c * stride;  // x has done its work
+    add_slots(c, slots, sum);
+    for (std::size_t k = 0; k < n; ++k) {
+      indirect_irradiance[storage_.patch[k]][c] = sum[k] * scale / sqrt_area_[k];
     }
-    for (float& value : sum) value *= scale / sqrt_area_[k];
-    indirect_irradiance[storage_.patch[k]] = sum;
+  }
+}
+
+void HierarchicalOperator::add_slots(int channel, const float* slots, float* sum) const {
+  const std::size_t stride = position_count(patch_count());
+  std::fill_n(sum, stride, 0.0F);
+  for (std::size_t s = 0; s < kSlotCount; ++s) {
+    const float* y = slots + s * slot_size() + channel * stride;
+    for (std::size_t k = slots_[s].begin; k < slots_[s].end; ++k) sum[k] += y[k];
   }
 }
 

@@ -25,7 +25,7 @@ HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
                                                 const Progress& progress = {});
 
 /// The smallest such operator whose errors under `test_lights`, each an initial exitance [n] in lx,
-/// are within the tolerance in the mean and within three times of it at most, found in a few
+/// are well within the tolerance in the mean, and within three times of it at most, found in a few
 /// rounds. If none of them is, the most exact one: measure it. Without lights that reach the
 /// patches, uniform ones are taken.
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(

@@ -101,6 +101,8 @@ class HierarchicalOperator final : public TransferOperator {
   template <typename Value>
   void apply_slots(const BlockKernels<Value>& kernels, const Value* values, const float* x,
                    float* slots) const;
+  /// Adds up what the slots hold of one channel, in their order, into sum [positions].
+  void add_slots(int channel, const float* slots, float* sum) const;
   std::size_t slot_size() const;
 
   Storage storage_;
