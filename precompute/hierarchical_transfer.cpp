@@ -28,6 +28,48 @@ constexpr double kBlockOverhead = 32;
 // of an eighth of all where that is smaller, so that there are enough of them to share.
 constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
 
+// How much more the uniform part of light counts than any other, for a cluster of kLeafSize
+// positions. Measured: notes/operator.md.
+constexpr double kUniformStress = 1;
+
+/// I + s u u^T for the unit vector u over a cluster that uniform light is. Lights are smooth: of
+/// the energy that falls on a cluster, most is uniform, and the more so the more patches it has. An
+/// error in what uniform light does therefore weighs more than others, and singular vectors are
+/// those of the blocks with this on both sides.
+class UniformStress {
+ public:
+  UniformStress(const Cluster& cluster, const ClusterTree& tree, const std::vector<float>& area)
+      : uniform_(Eigen::VectorXd::Zero(cluster.count)),
+        strength_(kUniformStress * std::sqrt(static_cast<double>(cluster.count) / kLeafSize)) {
+    for (std::uint32_t i = 0; i < cluster.count; ++i) {
+      const std::size_t position = cluster.begin + i;
+      if (position < tree.patch.size()) uniform_[i] = std::sqrt(area[tree.patch[position]]);
+    }
+    uniform_.normalize();
+  }
+
+  template <typename Matrix>
+  void put_left(Matrix&& matrix) const {
+    const Eigen::RowVectorXd part = uniform_.transpose() * matrix;
+    matrix += (strength_ * uniform_) * part;
+  }
+
+  template <typename Matrix>
+  void put_right(Matrix&& matrix) const {
+    const Eigen::VectorXd part = matrix * uniform_;
+    matrix += part * (strength_ * uniform_.transpose());
+  }
+
+  void take_away(Eigen::MatrixXd& basis) const {
+    const Eigen::RowVectorXd part = uniform_.transpose() * basis;
+    basis -= (strength_ / (1 + strength_) * uniform_) * part;
+  }
+
+ private:
+  Eigen::VectorXd uniform_;
+  double strength_;
+};
+
 /// A part of the operator: blocks in the order of traversal and what they hold.
 struct Part {
   std::vector<TransferBlock> blocks;
@@ -54,7 +96,7 @@ class PieceCompressor {
  public:
   PieceCompressor(const DenseOperator& dense, const ClusterTree& tree, double price,
                   const Cluster& row, const Cluster& column)
-      : tree_(tree), price_(price), row_(row), column_(column) {
+      : area_(dense.storage().area), tree_(tree), price_(price), row_(row), column_(column) {
     for (std::uint32_t m = 0; m < dense.storage().matrix_count; ++m) gather(dense, m);
   }
 
@@ -90,7 +132,12 @@ class PieceCompressor {
   }
 
   Part compress(const Cluster& row, const Cluster& column) const {
-    const WideBlock block = wide_block(row, column);
+    WideBlock block = wide_block(row, column);
+    const UniformStress row_stress(row, tree_, area_), column_stress(column, tree_, area_);
+    row_stress.put_left(block.entries);
+    for (Index m = 0; m < matrix_count(); ++m) {
+      column_stress.put_right(block.entries.middleCols(m * column.count, column.count));
+    }
     const CompressionCost cost{price_, block.on_diagonal ? 1.0 : 2.0};
     const TransferBlock place{.row_begin = row.begin,
                               .row_count = row.count,
@@ -99,12 +146,15 @@ class PieceCompressor {
     const double zero_cost = cost.total(block.entries.squaredNorm(), kBlockOverhead);
     const double overhead = price_ * kBlockOverhead;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
-    Part best = row.is_leaf() && column.is_leaf() ? dense_part(place, block)
+    Part best = row.is_leaf() && column.is_leaf() ? dense_part(place, wide_block(row, column))
                                                   : compress_children(row, column);
     if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
     const std::uint64_t seed = (std::uint64_t{row.begin} << 32) + column.begin + row.count;
-    const auto low_rank = compress_block(block, cost, best.cost - overhead, seed);
-    return low_rank ? low_rank_part(place, *low_rank, cost) : best;
+    auto low_rank = compress_block(block, cost, best.cost - overhead, seed);
+    if (!low_rank) return best;
+    row_stress.take_away(low_rank->row_basis);
+    if (!block.on_diagonal) column_stress.take_away(low_rank->column_basis);
+    return low_rank_part(place, *low_rank, cost);
   }
 
   Part compress_children(const Cluster& row, const Cluster& column) const {
@@ -149,6 +199,7 @@ class PieceCompressor {
     return part;
   }
 
+  const std::vector<float>& area_;
   const ClusterTree& tree_;
   double price_;
   Cluster row_, column_;

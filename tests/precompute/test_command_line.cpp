@@ -231,6 +231,32 @@ TEST_F(CommandLine, SaysWhatScriptsRelyOn) {
   EXPECT_GT(solved["microseconds"].get<double>(), 0);
 }
 
+TEST_F(CommandLine, CompressesToATolerance) {
+  const Words words = {"precompute",  kScene, "--patches", "1200",
+                       "--tolerance", "0.02", "-o",        path("box.safetensors")};
+  const json info = summary_of(words);
+  EXPECT_EQ(info["operator"], "hierarchical");
+  EXPECT_EQ(info["tolerance"], 0.02);
+  EXPECT_LT(info["error_mean"].get<double>(), 0.02);
+  EXPECT_GT(info["error_mean"].get<double>(), 1e-4);
+  EXPECT_LT(info["bytes_per_patch"].get<double>(), 1000);  // dense: 7,200
+  summary_of({"export", path("box.safetensors"), "--what", "transfer", "-o", path("y.npz")});
+  const auto arrays = test::unzip(path("y.npz"));
+  const auto n = info["patch_count"].get<std::size_t>();
+  EXPECT_EQ(test::npz_values<float>(arrays, "transfer", "<f4").size(), 3 * n * n);
+}
+
+TEST_F(CommandLine, AMissedToleranceFails) {
+  // Half precision cannot be this exact.
+  const Outcome outcome =
+      run({"precompute", kScene, "--patches", "300", "--operator", "hierarchical", "--tolerance",
+           "0.00001", "-o", path("box.safetensors"), "--quiet"});
+  EXPECT_EQ(outcome.exit_code, kBadInput);
+  EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+  EXPECT_NE(outcome.err.find("misses its tolerance"), std::string::npos) << outcome.err;
+  EXPECT_GT(summary_of({"info", path("box.safetensors")})["error_mean"].get<double>(), 1e-5);
+}
+
 TEST_F(CommandLine, MeetsThePatchSize) {
   const json made = summary_of(
       {"precompute", kScene, "--patch-size", "0.1", "-o", path("box.safetensors"), "--quiet"});

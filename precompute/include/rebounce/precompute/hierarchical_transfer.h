@@ -19,7 +19,8 @@ struct HierarchicalSettings {
 };
 
 /// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
-/// Frobenius norm of Yhat is worth 1 / `price` stored values. Throws Cancelled if asked to stop.
+/// Frobenius norm of Yhat, in which what uniform light does counts more than the rest, is worth
+/// 1 / `price` stored values. Throws Cancelled if asked to stop.
 HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
                                                 const PatchTable& patches, double price,
                                                 const Progress& progress = {});
