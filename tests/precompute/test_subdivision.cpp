@@ -52,7 +52,9 @@ TEST(Subdivision, KeepsAreaMaterialAndSource) {
   for (std::size_t t = 0; t < scene.triangle.size(); ++t) {
     area[source[t]] += area_of(scene, t);
     EXPECT_EQ(scene.triangle_material[t], before.triangle_material[source[t]]);
-    if (t > 0) EXPECT_GE(source[t], source[t - 1]) << "neighbours stay together";
+    if (t > 0) {
+      EXPECT_GE(source[t], source[t - 1]) << "neighbours stay together";
+    }
   }
   for (std::size_t t = 0; t < area.size(); ++t) {
     EXPECT_NEAR(area[t], area_of(before, t), 1e-5 * area_of(before, t));

@@ -37,7 +37,7 @@ TEST(DirectLighting, PointOverAPlane) {
     const glm::dvec3 c = to_dvec3(data.patches.centroid[i]);
     const double r2 = c.x * c.x + 4 + c.z * c.z;
     const double truth = 2 / (r2 * std::sqrt(r2));
-    EXPECT_NEAR(e[i][0] / truth, 1, 1e-2);  // the mean of eight points is not quite in the middle
+    EXPECT_NEAR(e[i][0] / truth, 1, 2e-2);  // the mean of eight points is not quite in the middle
     EXPECT_FLOAT_EQ(e[i][1], 0.5F * e[i][0]);
     EXPECT_EQ(e[i][2], 0);
     total += e[i][0];
