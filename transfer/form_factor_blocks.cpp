@@ -1,6 +1,7 @@
 #include "rebounce/transfer/form_factor_blocks.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 
 #include "gather_kernels.h"
@@ -10,6 +11,21 @@ namespace {
 
 constexpr std::uint32_t position_of(std::size_t column) {
   return static_cast<std::uint32_t>(column / kFormFactorBlock);
+}
+
+bool same_group(std::size_t row, std::size_t column) {
+  return row / FormFactorBlocks::kGroup == column / FormFactorBlocks::kGroup;
+}
+
+/// Counts the blocks of `row`: those outside its group, those inside.
+std::array<std::uint64_t, 2> count_blocks(std::span<const std::uint32_t> columns, std::size_t row) {
+  std::array<std::uint64_t, 2> count{0, 0};
+  std::uint32_t last = kNone;
+  for (const std::uint32_t j : columns) {
+    if (position_of(j) != last) ++count[same_group(row, j)];
+    last = position_of(j);
+  }
+  return count;
 }
 
 }  // namespace
@@ -22,42 +38,32 @@ FormFactorBlocks::FormFactorBlocks(const ExchangeMatrix& exchange, std::span<con
 FormFactorBlocks::FormFactorBlocks(const FormFactorRows& rows) {
   const std::size_t n = rows.patch_count();
   row_begin_.assign(n + 1, 0);
-  group_range_.resize(n);
+  inside_begin_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    std::uint32_t last = kNone;
-    row_begin_[i + 1] = row_begin_[i];
-    for (const std::uint32_t j : rows.columns(i)) {
-      if (position_of(j) != last) ++row_begin_[i + 1];
-      last = position_of(j);
-    }
+    const auto [outside, inside] = count_blocks(rows.columns(i), i);
+    inside_begin_[i] = row_begin_[i] + outside;
+    row_begin_[i + 1] = inside_begin_[i] + inside;
     entry_count_ += rows.columns(i).size();
   }
   position_.resize(row_begin_[n]);
   block_.resize(row_begin_[n]);
-  for (std::size_t i = 0; i < n; ++i) {
-    std::uint64_t k = row_begin_[i];
-    std::uint32_t last = kNone;
-    for (std::size_t e = 0; e < rows.columns(i).size(); ++e) {
-      const std::uint32_t j = rows.columns(i)[e];
-      if (last != kNone && position_of(j) != last) ++k;
-      last = position_of(j);
-      position_[k] = last;
-      block_[k].value[j % kFormFactorBlock] = rows.form_factors(i)[e];
-    }
-    const auto first = position_.begin() + static_cast<std::ptrdiff_t>(row_begin_[i]);
-    const auto end = position_.begin() + static_cast<std::ptrdiff_t>(row_begin_[i + 1]);
-    const std::size_t group = i / kGroup * kGroup;
-    const auto inside = [&](std::size_t column) {
-      return static_cast<std::uint64_t>(std::lower_bound(first, end, position_of(column)) -
-                                        position_.begin());
-    };
-    group_range_[i] = {inside(group), inside(group + kGroup)};
+  for (std::size_t i = 0; i < n; ++i) fill_row(rows, i);
+}
+
+void FormFactorBlocks::fill_row(const FormFactorRows& rows, std::size_t row) {
+  const auto columns = rows.columns(row);
+  std::array<std::uint64_t, 2> next{row_begin_[row], inside_begin_[row]};
+  std::uint32_t last = kNone;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    std::uint64_t& end = next[same_group(row, columns[k])];
+    if (position_of(columns[k]) != last) position_[end++] = last = position_of(columns[k]);
+    block_[end - 1].value[columns[k] % kFormFactorBlock] = rows.form_factors(row)[k];
   }
 }
 
 std::size_t FormFactorBlocks::bytes() const {
-  return row_begin_.size() * sizeof(row_begin_[0]) + position_.size() * sizeof(position_[0]) +
-         block_.size() * sizeof(block_[0]);
+  return (row_begin_.size() + inside_begin_.size()) * sizeof(std::uint64_t) +
+         position_.size() * sizeof(position_[0]) + block_.size() * sizeof(block_[0]);
 }
 
 double FormFactorBlocks::fill() const {
@@ -108,13 +114,11 @@ Float3 FormFactorBlocks::gather_row(std::size_t row, std::span<const float> plan
 
 Float3 FormFactorBlocks::gather_outside_group(std::size_t row,
                                               std::span<const float> planes) const {
-  const Float3 before = gather_range(row_begin_[row], group_range_[row].begin, planes);
-  const Float3 after = gather_range(group_range_[row].end, row_begin_[row + 1], planes);
-  return {before[0] + after[0], before[1] + after[1], before[2] + after[2]};
+  return gather_range(row_begin_[row], inside_begin_[row], planes);
 }
 
 Float3 FormFactorBlocks::gather_inside_group(std::size_t row, std::span<const float> planes) const {
-  return gather_range(group_range_[row].begin, group_range_[row].end, planes);
+  return gather_range(inside_begin_[row], row_begin_[row + 1], planes);
 }
 
 void FormFactorBlocks::shoot(std::size_t row, const Float3& power, std::span<const float> scale,

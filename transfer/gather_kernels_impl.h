@@ -23,8 +23,10 @@ void gather_blocks(const FormFactorBlock* values, const std::uint32_t* position,
   V total[kChannelCount] = {V::zero(), V::zero(), V::zero()};
   for (std::size_t begin = 0; begin < count; begin += kChunk) {
     const std::size_t end = std::min(begin + kChunk, count);
-    V part[kChannelCount] = {V::zero(), V::zero(), V::zero()};
-    for (std::size_t k = begin; k < end; ++k) {
+    // Two sums for each channel, so that one addition need not wait for the one before.
+    V even[kChannelCount] = {V::zero(), V::zero(), V::zero()};
+    V odd[kChannelCount] = {V::zero(), V::zero(), V::zero()};
+    const auto add_block = [&](std::size_t k, V* part) {
       const float* at = x + kFormFactorBlock * static_cast<std::size_t>(position[k]);
       for (std::size_t v = 0; v < kVectors; ++v) {
         const V f = V::load(values[k].value + v * V::kWidth);
@@ -32,8 +34,14 @@ void gather_blocks(const FormFactorBlock* values, const std::uint32_t* position,
           part[c] = multiply_add(f, V::load(at + c * stride + v * V::kWidth), part[c]);
         }
       }
+    };
+    std::size_t k = begin;
+    for (; k + 1 < end; k += 2) {
+      add_block(k, even);
+      add_block(k + 1, odd);
     }
-    for (int c = 0; c < kChannelCount; ++c) total[c] = add(total[c], part[c]);
+    if (k < end) add_block(k, even);
+    for (int c = 0; c < kChannelCount; ++c) total[c] = add(total[c], add(even[c], odd[c]));
   }
   for (int c = 0; c < kChannelCount; ++c) sum[c] = total[c].sum();
 }
@@ -64,13 +72,21 @@ V magnitude(const float* x, std::size_t stride) {
 
 template <typename V>
 std::size_t largest_magnitude(const float* x, std::size_t stride) {
-  V most = V::zero();
-  for (std::size_t j = 0; j < stride; j += V::kWidth) {
-    most = maximum(most, magnitude<V>(x + j, stride));
+  constexpr std::size_t kChunk = 256;
+  float largest = 0;
+  std::size_t chunk = 0;
+  for (std::size_t begin = 0; begin < stride; begin += kChunk) {
+    V most = V::zero();
+    for (std::size_t j = begin; j < std::min(begin + kChunk, stride); j += V::kWidth) {
+      most = maximum(most, magnitude<V>(x + j, stride));
+    }
+    if (most.largest() > largest) {
+      largest = most.largest();
+      chunk = begin;
+    }
   }
-  const float wanted = most.largest();
-  for (std::size_t j = 0; j < stride; ++j) {
-    if ((std::abs(x[j]) + std::abs(x[j + stride])) + std::abs(x[j + 2 * stride]) == wanted) {
+  for (std::size_t j = chunk; j < std::min(chunk + kChunk, stride); ++j) {
+    if ((std::abs(x[j]) + std::abs(x[j + stride])) + std::abs(x[j + 2 * stride]) == largest) {
       return j;
     }
   }

@@ -164,7 +164,7 @@ TEST(FormFactorBlocks, CountsItsBytes) {
   EXPECT_GT(blocks.fill(), 0.3);
   EXPECT_LE(blocks.fill(), 1);
   const double slots = 2 * static_cast<double>(pairs.exchange.column.size()) / blocks.fill();
-  EXPECT_NEAR(static_cast<double>(blocks.bytes()), slots * 4.5 + 513 * 8, 1);
+  EXPECT_NEAR(static_cast<double>(blocks.bytes()), slots * 4.5 + (512 + 513) * 8, 1);
   EXPECT_THROW(FormFactorBlocks(pairs.exchange, std::span(pairs.area).first(5)), Error);
 }
 

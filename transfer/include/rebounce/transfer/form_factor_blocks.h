@@ -70,15 +70,12 @@ class FormFactorBlocks final : public FormFactorOperator {
  private:
   Float3 gather_range(std::uint64_t begin, std::uint64_t end, std::span<const float> planes) const;
 
-  /// Where the row's blocks inside its own group begin and end.
-  struct GroupRange {
-    std::uint64_t begin = 0, end = 0;
-  };
+  void fill_row(const FormFactorRows& rows, std::size_t row);
 
-  std::vector<std::uint64_t> row_begin_;  ///< [n + 1] index of a row's first block
-  std::vector<GroupRange> group_range_;   ///< [n]
-  std::vector<std::uint32_t> position_;   ///< [blocks] first column / kFormFactorBlock, ascending
-  std::vector<FormFactorBlock> block_;    ///< [blocks]
+  std::vector<std::uint64_t> row_begin_;     ///< [n + 1] index of a row's first block
+  std::vector<std::uint64_t> inside_begin_;  ///< [n] of its first block inside its group: the last
+  std::vector<std::uint32_t> position_;      ///< [blocks] first column / kFormFactorBlock
+  std::vector<FormFactorBlock> block_;       ///< [blocks]
   std::uint64_t entry_count_ = 0;
 };
 
