@@ -101,6 +101,7 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
 std::string settings_json(const BuildSettings& settings) {
   const FormFactorSettings& f = settings.form_factors;
   return nlohmann::json{{"operator", "dense"},
+                        {"scale", settings.scale},
                         {"precision", settings.precision == Precision::kF16 ? "f16" : "f32"},
                         {"patches", settings.subdivision.patch_count},
                         {"patch_size", settings.subdivision.patch_size},
@@ -148,7 +149,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   PhaseClock clock(report, progress);
   TransferData data;
 
-  Scene scene = clock.run("import", [&](const Progress&) { return import_gltf(scene_path); });
+  Scene scene = clock.run("import", [&](const Progress&) { return import_gltf(scene_path, settings.scale); });
   report.triangle_count = scene.triangle.size();
   report.degenerate_triangle_count = scene.degenerate_triangle_count;
   report.warnings = scene.warnings;

@@ -18,10 +18,11 @@
 namespace rebounce {
 
 struct BuildSettings {
+  double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
   Precision precision = Precision::kF32;  ///< kF16: half the bytes, an error of some 1e-4
-  std::uint64_t memory_limit_bytes = 0;   ///< refuse to start what needs more; 0: half the machine's
+  std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
 };
 
 /// What the expensive part will take, known before it begins.
