@@ -38,9 +38,9 @@ CostEstimate estimate_cost(const PatchTable& patches, int probe_rays) {
   // Form factors at their fullest: half of all pairs, 16 bytes each while they are made and 24 when
   // they are compressed and expanded; then the inversion beside the compressed ones.
   const double factors = n * n / 4;
-  estimate.peak_bytes = static_cast<std::uint64_t>(
-      std::max(40 * factors, 8 * factors + static_cast<double>(dense_transfer_peak_bytes(
-                                               patches.size(), matrices))));
+  estimate.peak_bytes = static_cast<std::uint64_t>(std::max(
+      40 * factors,
+      8 * factors + static_cast<double>(dense_transfer_peak_bytes(patches.size(), matrices))));
   // Ten million rays and fifty billion operations a second, about one slow core.
   estimate.seconds = factors * probe_rays / 1e7 + 2 * n * n * n * matrices / 5e10;
   return estimate;
@@ -54,10 +54,10 @@ void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes
                          std::size_t triangle_count) {
   const std::uint64_t limit = limit_bytes > 0 ? limit_bytes : machine_memory_bytes() / 2;
   if (estimate.peak_bytes <= limit) return;
-  throw Error(fmt::format("{} patches (from {} triangles) need about {} and the limit is {}; ask for "
-                          "fewer patches, simplify the scene or raise --memory-limit",
-                          estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes),
-                          in_gib(limit)));
+  throw Error(fmt::format(
+      "{} patches (from {} triangles) need about {} and the limit is {}; ask for "
+      "fewer patches, simplify the scene or raise --memory-limit",
+      estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes), in_gib(limit)));
 }
 
 /// Times phases and passes their progress on.
@@ -135,9 +135,10 @@ std::string report_json(const BuildReport& report) {
 void check_residual(double residual, Precision precision) {
   const double largest = precision == Precision::kF16 ? kLargestResidualF16 : kLargestResidualF32;
   if (residual <= largest) return;
-  throw Error(fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
-                          "please report this scene",
-                          residual, largest));
+  throw Error(
+      fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
+                  "please report this scene",
+                  residual, largest));
 }
 
 }  // namespace

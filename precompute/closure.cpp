@@ -9,9 +9,9 @@ namespace {
 
 using Vector = std::vector<double>;
 
-constexpr int kPassCount = 3;          // clamped entries leave a rest, which the next pass shares out
-constexpr int kMaxIterations = 500;    // of conjugate gradients; some 20 to 60 are usual
-constexpr double kResidual = 1e-11;    // relative; row sums are wanted to 1e-6
+constexpr int kPassCount = 3;        // clamped entries leave a rest, which the next pass shares out
+constexpr int kMaxIterations = 500;  // of conjugate gradients; some 20 to 60 are usual
+constexpr double kResidual = 1e-11;  // relative; row sums are wanted to 1e-6
 constexpr float kLargestChange = 0.5F;
 
 double dot(const Vector& a, const Vector& b) {
@@ -127,9 +127,9 @@ ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
         ExchangeEntry& entry = rows[i][k];
         const double wanted =
             entry.exchange_area + entry.variance * (multiplier[i] + multiplier[entry.column]);
-        entry.exchange_area = std::clamp(static_cast<float>(wanted),
-                                         original[i][k] * (1 - kLargestChange),
-                                         original[i][k] * (1 + kLargestChange));
+        entry.exchange_area =
+            std::clamp(static_cast<float>(wanted), original[i][k] * (1 - kLargestChange),
+                       original[i][k] * (1 + kLargestChange));
       }
     }
     sum = row_sums(rows, area);

@@ -31,9 +31,9 @@ std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> a
 /// Minimises sum (S' - S)² / variance + sum over i of (row sum of F' - target)² / deviation² over
 /// symmetric S': the least squares of M. E. Larsen and J. R. Howell, "Least-squares smoothing of
 /// direct-exchange areas in zonal analysis", 1986, with two differences. The weights are variances
-/// that we know, so that pairs in penumbrae give way and fully visible ones stay; and targets that are
-/// themselves measured (rows that escape in part) pull only as hard as they are certain. Entries stay
-/// within half of what they were.
+/// that we know, so that pairs in penumbrae give way and fully visible ones stay; and targets that
+/// are themselves measured (rows that escape in part) pull only as hard as they are certain.
+/// Entries stay within half of what they were.
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
                               std::span<const RowTarget> target);
 

@@ -91,8 +91,8 @@ std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& 
   const std::size_t matrix_values = DenseOperator::tile_count(patches.size()) * kTile * kTile;
   std::vector<float> tiles(storage.matrix_count * matrix_values, 0.0F);
   for (std::uint32_t matrix = 0; matrix < storage.matrix_count; ++matrix) {
-    const auto channel = static_cast<int>(
-        std::ranges::find(storage.channel_matrix, matrix) - storage.channel_matrix.begin());
+    const auto channel = static_cast<int>(std::ranges::find(storage.channel_matrix, matrix) -
+                                          storage.channel_matrix.begin());
     const std::vector<double> root = root_reflectance(patches, channel);
     TiledMatrix system(patches.size());
     fill_system(exchange, patches, root, system);
@@ -126,7 +126,8 @@ double transfer_residual(const TransferOperator& transfer, const ExchangeMatrix&
     }
     rows.gather(v, fv);
     for (std::size_t i = 0; i < n; ++i) {
-      for (int c = 0; c < kChannelCount; ++c) w[i][c] = v[i][c] - patches.reflectance[i][c] * fv[i][c];
+      for (int c = 0; c < kChannelCount; ++c)
+        w[i][c] = v[i][c] - patches.reflectance[i][c] * fv[i][c];
     }
     transfer.apply(w, result, workspace);
     largest = std::max(largest, relative_difference(result, fv, patches.area));

@@ -1,6 +1,5 @@
 #include "escape.h"
 
-
 #include "hemisphere_rays.h"
 
 namespace rebounce {
@@ -20,8 +19,7 @@ Escape measure_escape(const PatchModel& model, const FlatTriangle& triangle, std
       ++sky;
       continue;
     }
-    const std::uint32_t side =
-        hit.front ? hit.triangle : model.mesh.back_triangle[hit.triangle];
+    const std::uint32_t side = hit.front ? hit.triangle : model.mesh.back_triangle[hit.triangle];
     if (side == kNone || model.mesh.triangle_patch[side] == kNone) ++absorbed;
   }
   return {static_cast<double>(sky) / ray_count, static_cast<double>(absorbed) / ray_count};

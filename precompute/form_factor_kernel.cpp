@@ -99,8 +99,8 @@ double integrate_graded(double begin, double end, const Function& f) {
   return sum * (end - begin);
 }
 
-/// The double integral of ln r over two segments. The outer interval is cut where the inner integral
-/// is least smooth: beside the ends of the inner segment.
+/// The double integral of ln r over two segments. The outer interval is cut where the inner
+/// integral is least smooth: beside the ends of the inner segment.
 double integrate_log_distance(const Segment& outer, const Segment& inner) {
   std::array<double, 4> cut = {0, outer.length, outer.length, outer.length};
   int count = 1;
@@ -177,8 +177,8 @@ double quadrature(const FlatTriangle& a, const FlatTriangle& b, const TriangleRu
 }
 
 // Measured over random pairs of triangles (tests/precompute/test_form_factor_kernel.cpp): a rule of
-// degree p is wrong by less than kErrorConstant q^(p+1), where q = (sum of radii) / distance, in all
-// but a few of a thousand pairs.
+// degree p is wrong by less than kErrorConstant q^(p+1), where q = (sum of radii) / distance, in
+// all but a few of a thousand pairs.
 constexpr double kErrorConstant2 = 0.1;
 constexpr double kErrorConstant5 = 0.01;
 

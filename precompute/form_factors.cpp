@@ -154,9 +154,8 @@ class FormFactorAssembly {
       const double visible = visible_part(i, scratch.mixed[p].other, rays);
       append(row, scratch.mixed[p], visible, visible * (1 - visible) / settings_.full_rays);
     }
-    std::sort(row.begin(), row.end(), [](const ExchangeEntry& a, const ExchangeEntry& b) {
-      return a.column < b.column;
-    });
+    std::sort(row.begin(), row.end(),
+              [](const ExchangeEntry& a, const ExchangeEntry& b) { return a.column < b.column; });
     ray_count_ += scratch.mixed.size() * settings_.full_rays;
   }
 
@@ -176,7 +175,8 @@ class FormFactorAssembly {
   }
 
   /// The points that ray k of the pair (i, j) joins. Both walk the patches' point sets, the second
-  /// by steps of 19 from a start of the pair's own, so that every prefix covers all four dimensions.
+  /// by steps of 19 from a start of the pair's own, so that every prefix covers all four
+  /// dimensions.
   std::pair<const Float3*, const Float3*> ray_ends(std::uint32_t i, std::uint32_t j,
                                                    std::uint32_t k, std::uint64_t hash) const {
     const std::uint32_t a = (k + static_cast<std::uint32_t>(hash)) % kPointCount;
@@ -208,7 +208,8 @@ class FormFactorAssembly {
     tracer_.occluded(rays);
   }
 
-  /// The part of the pair's light that gets through: rays weighted by the kernel between their ends.
+  /// The part of the pair's light that gets through: rays weighted by the kernel between their
+  /// ends.
   double visible_part(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const {
     const std::uint64_t hash = pair_hash(i, j);
     double sum = 0, visible = 0, count = 0;

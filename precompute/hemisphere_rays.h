@@ -6,8 +6,8 @@
 #include <span>
 
 #include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/sampling.h"
 #include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
 
@@ -24,8 +24,7 @@ inline void make_hemisphere_rays(const std::array<glm::dvec3, 3>& triangle,
     // Other irrational steps than the points', so that the two do not march together.
     const glm::dvec2 s =
         glm::fract(direction_shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
-    const glm::dvec3 origin =
-        (1 - b.x - b.y) * triangle[0] + b.x * triangle[1] + b.y * triangle[2];
+    const glm::dvec3 origin = (1 - b.x - b.y) * triangle[0] + b.x * triangle[1] + b.y * triangle[2];
     rays[k] = Ray{};
     rays[k].origin = tracer.offset_point(to_float3(origin), to_float3(normal));
     rays[k].direction = to_float3(frame * square_to_cosine_hemisphere(s));

@@ -68,7 +68,8 @@ MeasuredError measure_error(const TransferData& data, const RayTracer& tracer, i
     if (progress && !progress(static_cast<double>(k) / light_count)) throw Cancelled();
     direct_lighting.compute({&lights[k], 1}, {}, initial_exitance);
     for (std::size_t i = 0; i < n; ++i) {
-      for (int c = 0; c < kChannelCount; ++c) initial_exitance[i][c] *= data.patches.reflectance[i][c];
+      for (int c = 0; c < kChannelCount; ++c)
+        initial_exitance[i][c] *= data.patches.reflectance[i][c];
     }
     if (area_norm(initial_exitance, data.patches.area) == 0) continue;
     data.transfer->apply(initial_exitance, indirect_irradiance, workspace);

@@ -4,9 +4,9 @@
 #include <numbers>
 #include <unordered_map>
 
-#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/texture_sampling.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <map>
 
-#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/precompute/subdivision.h"
+#include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
 namespace {

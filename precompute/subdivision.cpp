@@ -129,7 +129,8 @@ class Subdivision {
     const auto middle = static_cast<std::uint32_t>(scene_.position.size());
     const auto average = [&](auto& values) {
       auto value = values[a];
-      for (std::size_t k = 0; k < value.size(); ++k) value[k] = 0.5F * (values[a][k] + values[b][k]);
+      for (std::size_t k = 0; k < value.size(); ++k)
+        value[k] = 0.5F * (values[a][k] + values[b][k]);
       values.push_back(value);
     };
     average(scene_.position);
@@ -174,7 +175,8 @@ WeldedPositions weld_positions(std::span<const Float3> position) {
   std::unordered_map<Float3, std::uint32_t, Hash> id_of;
   id_of.reserve(position.size());
   for (const Float3& p : position) {
-    welded.id.push_back(id_of.try_emplace(p, static_cast<std::uint32_t>(id_of.size())).first->second);
+    welded.id.push_back(
+        id_of.try_emplace(p, static_cast<std::uint32_t>(id_of.size())).first->second);
   }
   welded.count = static_cast<std::uint32_t>(id_of.size());
   return welded;

@@ -8,8 +8,8 @@
 
 namespace rebounce {
 
-/// A symmetric matrix of doubles, of which the lower triangle of square tiles is stored; both halves
-/// of a tile on the diagonal are. The last tiles are padded with the identity.
+/// A symmetric matrix of doubles, of which the lower triangle of square tiles is stored; both
+/// halves of a tile on the diagonal are. The last tiles are padded with the identity.
 class TiledMatrix {
  public:
   static constexpr Eigen::Index kTile = 256;
@@ -41,10 +41,11 @@ class TiledMatrix {
 /// Replaces a symmetric positive definite matrix by its inverse (lower triangle), through its
 /// Cholesky factor L: M = L L^T, then L^-1, then L^-T L^-1. n³ multiply-adds.
 ///
-/// The algorithms are the tiled ones of A. Buttari, J. Langou, J. Kurzak and J. Dongarra, "A class of
-/// parallel tiled linear algebra algorithms for multicore architectures", 2009. Every tile meets its
-/// updates in a fixed order and BLAS runs on one thread, so the bits do not depend on the number of
-/// OpenMP threads. Throws Error if the matrix is not positive definite, Cancelled if asked to stop.
+/// The algorithms are the tiled ones of A. Buttari, J. Langou, J. Kurzak and J. Dongarra, "A class
+/// of parallel tiled linear algebra algorithms for multicore architectures", 2009. Every tile meets
+/// its updates in a fixed order and BLAS runs on one thread, so the bits do not depend on the
+/// number of OpenMP threads. Throws Error if the matrix is not positive definite, Cancelled if
+/// asked to stop.
 void invert_positive_definite(TiledMatrix& matrix, const Progress& progress = {});
 
 }  // namespace rebounce

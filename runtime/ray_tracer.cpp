@@ -151,6 +151,8 @@ Float3 RayTracer::offset_point(const Float3& point, const Float3& geometric_norm
   return moved;
 }
 
-float RayTracer::offset_distance() const { return impl_->offset_distance; }
+float RayTracer::offset_distance() const {
+  return impl_->offset_distance;
+}
 
 }  // namespace rebounce

@@ -18,9 +18,13 @@ constexpr std::size_t kTileSize = kTile * kTile;
 // additions, and with it every bit, is always the same.
 constexpr std::size_t kSlotCount = 16;
 
-std::size_t tiles_per_side(std::size_t patch_count) { return (patch_count + kTile - 1) / kTile; }
+std::size_t tiles_per_side(std::size_t patch_count) {
+  return (patch_count + kTile - 1) / kTile;
+}
 
-std::size_t padded_size(std::size_t patch_count) { return tiles_per_side(patch_count) * kTile; }
+std::size_t padded_size(std::size_t patch_count) {
+  return tiles_per_side(patch_count) * kTile;
+}
 
 /// Row and column of the tile at `index` in the order (0,0) (1,0) (1,1) (2,0) ...
 struct TilePosition {
@@ -148,12 +152,11 @@ float DenseOperator::symmetric_entry(std::uint32_t matrix, std::size_t row,
                                      std::size_t column) const {
   if (row < column) std::swap(row, column);
   const std::size_t tile_row = row / kTile, tile_column = column / kTile;
-  const std::size_t tile = matrix * tile_count(patch_count()) + tile_row * (tile_row + 1) / 2 +
-                           tile_column;
+  const std::size_t tile =
+      matrix * tile_count(patch_count()) + tile_row * (tile_row + 1) / 2 + tile_column;
   const std::size_t k = tile * kTileSize + (row % kTile) * kTile + column % kTile;
-  return storage_.precision == Precision::kF16
-             ? half_to_float(storage_.tiles_f16[k]) / kHalfScale
-             : storage_.tiles_f32[k];
+  return storage_.precision == Precision::kF16 ? half_to_float(storage_.tiles_f16[k]) / kHalfScale
+                                               : storage_.tiles_f32[k];
 }
 
 void DenseOperator::expand(int channel, std::span<float> transfer) const {

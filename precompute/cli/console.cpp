@@ -30,11 +30,15 @@ void install_interrupt_handler() {
   std::signal(SIGTERM, on_interrupt);
 }
 
-bool interrupted() { return interrupt_seen != 0; }
+bool interrupted() {
+  return interrupt_seen != 0;
+}
 
 ProgressBar::ProgressBar(bool enabled) : enabled_(enabled && isatty(STDERR_FILENO) != 0) {}
 
-ProgressBar::~ProgressBar() { clear(); }
+ProgressBar::~ProgressBar() {
+  clear();
+}
 
 bool ProgressBar::update(std::string_view phase, double fraction) {
   if (!enabled_) return !interrupted();

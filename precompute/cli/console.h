@@ -8,7 +8,7 @@ namespace rebounce::cli {
 
 /// Options that every sub-command has.
 struct CommonOptions {
-  bool json = false;   ///< a machine-readable summary on standard output, all else on standard error
+  bool json = false;  ///< a machine-readable summary on standard output, all else on standard error
   bool quiet = false;  ///< no progress, no summary
   int threads = 0;     ///< OpenMP threads; 0: all processors
 };

@@ -95,7 +95,8 @@ void read_cone(const Field& light_field, Light& light) {
 
 Light read_light(const Field& field) {
   if (!field.object.is_object()) throw Error(field.where + ": must be an object");
-  field.check_names({"type", "name", "position", "direction", "color", "intensity", "range", "spot"});
+  field.check_names(
+      {"type", "name", "position", "direction", "color", "intensity", "range", "spot"});
   Light light;
   light.type = light_type(field);
   if (field.object.contains("name")) {
@@ -128,7 +129,8 @@ LightSetup read_json(const std::filesystem::path& path) {
     const json& lights = document.at("lights");
     if (!lights.is_array()) root.fail("lights", "an array");
     for (std::size_t k = 0; k < lights.size(); ++k) {
-      setup.lights.push_back(read_light({lights[k], fmt::format("{}: light {}", path.string(), k)}));
+      setup.lights.push_back(
+          read_light({lights[k], fmt::format("{}: light {}", path.string(), k)}));
     }
   }
   if (document.contains("sky")) {

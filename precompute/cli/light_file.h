@@ -17,8 +17,8 @@ struct LightSetup {
 /// KHR_lights_punctual. Throws Error naming the file, the light and the field that is wrong.
 LightSetup read_lights(const std::filesystem::path& path);
 
-/// The lights of `path`, or those stored in the transfer file if `path` is empty. Throws Error if there
-/// is no light at all: no lamp, no sky and no patch that emits.
+/// The lights of `path`, or those stored in the transfer file if `path` is empty. Throws Error if
+/// there is no light at all: no lamp, no sky and no patch that emits.
 LightSetup choose_lights(const std::filesystem::path& path, const TransferData& data);
 
 }  // namespace rebounce::cli

@@ -15,11 +15,11 @@ namespace {
 constexpr int kBadInput = 1, kUsage = 2;
 
 void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options) {
-  command.add_flag("--json", options.json,
-                   "Print a machine-readable summary on standard output, all else on standard error");
+  command.add_flag(
+      "--json", options.json,
+      "Print a machine-readable summary on standard output, all else on standard error");
   command.add_flag("--quiet", options.quiet, "No progress and no summary");
-  command
-      .add_option("--threads", options.threads, "Threads to use; 0: one per processor")
+  command.add_option("--threads", options.threads, "Threads to use; 0: one per processor")
       ->check(CLI::Range(0, 4096))
       ->each([](const std::string& value) {
         if (const int threads = std::stoi(value); threads > 0) omp_set_num_threads(threads);
@@ -28,7 +28,8 @@ void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options
 
 int run(int argc, char** argv) {
   rebounce::cli::CommonOptions options;
-  CLI::App app("Rebounce: all bounces of moving lights in a static scene, in one product.", "rebounce");
+  CLI::App app("Rebounce: all bounces of moving lights in a static scene, in one product.",
+               "rebounce");
   app.set_version_flag("--version", std::string("rebounce ") + rebounce::version());
   app.require_subcommand(1);
   rebounce::cli::add_precompute_command(app, options);

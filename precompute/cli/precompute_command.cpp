@@ -41,20 +41,23 @@ void print_json(const TransferData& data, const BuildReport& report, std::uint64
 }
 
 void print_summary(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
-  fmt::print("{} triangles ({} degenerate dropped), {} patches of {:.3g} / {:.3g} / {:.3g} m "
-             "(min / median / max)\n",
-             report.triangle_count, report.degenerate_triangle_count, report.patch_count,
-             report.patch_size_min, report.patch_size_median, report.patch_size_max);
-  fmt::print("form factors: {} from {} pairs, {:.1f} million rays; row sums off by {:.1e} before and "
-             "{:.1e} after closure, which changed F by {:.2f} %\n",
-             report.form_factor_count, report.pair_count,
-             static_cast<double>(report.ray_count) / 1e6, report.closure.row_sum_error_before,
-             report.closure.row_sum_error_after, 100 * report.closure.relative_change);
-  fmt::print("operator: {}, {:.1f} MiB ({:.0f} bytes per patch), residual {:.1e}, error of the indirect "
-             "light {:.1e} mean, {:.1e} max\n",
-             data.transfer->kind(), static_cast<double>(data.transfer->bytes()) / (1 << 20),
-             static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
-             data.record.solve_residual, data.record.error_mean, data.record.error_max);
+  fmt::print(
+      "{} triangles ({} degenerate dropped), {} patches of {:.3g} / {:.3g} / {:.3g} m "
+      "(min / median / max)\n",
+      report.triangle_count, report.degenerate_triangle_count, report.patch_count,
+      report.patch_size_min, report.patch_size_median, report.patch_size_max);
+  fmt::print(
+      "form factors: {} from {} pairs, {:.1f} million rays; row sums off by {:.1e} before and "
+      "{:.1e} after closure, which changed F by {:.2f} %\n",
+      report.form_factor_count, report.pair_count, static_cast<double>(report.ray_count) / 1e6,
+      report.closure.row_sum_error_before, report.closure.row_sum_error_after,
+      100 * report.closure.relative_change);
+  fmt::print(
+      "operator: {}, {:.1f} MiB ({:.0f} bytes per patch), residual {:.1e}, error of the indirect "
+      "light {:.1e} mean, {:.1e} max\n",
+      data.transfer->kind(), static_cast<double>(data.transfer->bytes()) / (1 << 20),
+      static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
+      data.record.solve_residual, data.record.error_mean, data.record.error_max);
   std::string times;
   for (const auto& [phase, s] : report.seconds) times += fmt::format("{} {:.1f} s, ", phase, s);
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
@@ -73,8 +76,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
         chosen.scene, settings, report,
         [&](std::string_view phase, double fraction) { return bar.update(phase, fraction); },
         [&](const CostEstimate& estimate) {
-          print_note(options, fmt::format("{} patches: about {:.0f} s and {:.1f} GiB", estimate.patch_count,
-                                          estimate.seconds,
+          print_note(options, fmt::format("{} patches: about {:.0f} s and {:.1f} GiB",
+                                          estimate.patch_count, estimate.seconds,
                                           static_cast<double>(estimate.peak_bytes) / (1ULL << 30)));
         });
   }
@@ -95,14 +98,14 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
   CLI::App* command =
       app.add_subcommand("precompute", "The offline stage: from a glTF scene to a transfer file");
   command->add_option("scene", chosen->scene, "Scene (.glb or .gltf)")->required();
-  command->add_option("-o,--output", chosen->output, "Transfer file to write (.safetensors)")->required();
+  command->add_option("-o,--output", chosen->output, "Transfer file to write (.safetensors)")
+      ->required();
   SubdivisionSettings& subdivision = chosen->settings.subdivision;
-  CLI::Option* patches =
-      command
-          ->add_option("--patches", subdivision.patch_count,
-                       "Subdivide until there are about this many patches")
-          ->check(CLI::Range(1, 1000000))
-          ->capture_default_str();
+  CLI::Option* patches = command
+                             ->add_option("--patches", subdivision.patch_count,
+                                          "Subdivide until there are about this many patches")
+                             ->check(CLI::Range(1, 1000000))
+                             ->capture_default_str();
   command
       ->add_option("--patch-size", subdivision.patch_size,
                    "Subdivide until no edge is longer than this, in metres")

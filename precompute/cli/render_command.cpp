@@ -71,7 +71,8 @@ std::pair<int, int> parse_size(const std::string& text) {
       return {width, height};
     }
   }
-  throw Error(fmt::format("size \"{}\" must be WIDTHxHEIGHT with sides from 1 to {}", text, kLargestSide));
+  throw Error(
+      fmt::format("size \"{}\" must be WIDTHxHEIGHT with sides from 1 to {}", text, kLargestSide));
 }
 
 Show parse_show(const std::string& show) {
@@ -146,12 +147,14 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
 
 void add_render_command(CLI::App& app, const CommonOptions& options) {
   auto chosen = std::make_shared<RenderOptions>();
-  CLI::App* command = app.add_subcommand("render", "Draw a picture of a relit scene, without a window");
+  CLI::App* command =
+      app.add_subcommand("render", "Draw a picture of a relit scene, without a window");
   command->add_option("file", chosen->file, "Transfer file")->required();
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
-  command->add_option("--camera", chosen->camera,
-                      "Name or number of a camera of the scene, or px,py,pz,tx,ty,tz[,degrees] in metres");
+  command->add_option(
+      "--camera", chosen->camera,
+      "Name or number of a camera of the scene, or px,py,pz,tx,ty,tz[,degrees] in metres");
   command->add_option("--size", chosen->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
   command
       ->add_option("--show", chosen->show,

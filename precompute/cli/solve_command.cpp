@@ -145,7 +145,8 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
       ->check(CLI::IsMember({"transfer", "gauss-seidel"}))
       ->capture_default_str();
   command
-      ->add_option("--iterations", chosen->gauss_seidel.max_sweeps, "Sweeps at most, for iterative methods")
+      ->add_option("--iterations", chosen->gauss_seidel.max_sweeps,
+                   "Sweeps at most, for iterative methods")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command

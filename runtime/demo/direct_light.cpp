@@ -130,7 +130,8 @@ void add_emitter_light(std::span<CameraSample> samples, const Emitters& emitters
       // What arrives is exact; only whether it does is found from one point of the piece.
       const glm::vec2 shift(hash_to_unit(sample.pixel, 1), hash_to_unit(sample.pixel, 2));
       Ray ray;
-      if (!ray_to_piece(sample.point, *piece, point_on(*piece, r2_point(index, shift)), tracer, ray)) {
+      if (!ray_to_piece(sample.point, *piece, point_on(*piece, r2_point(index, shift)), tracer,
+                        ray)) {
         continue;
       }
       shadow_rays.add(sample, ray, arriving * (weight * static_cast<float>(samples_per_pixel)));

@@ -44,7 +44,8 @@ inline void add_polygon(Scene& scene, std::span<const glm::dvec3> corner,
   }
 }
 
-/// The six faces of the box [low, high], in the order -x +x -y +y -z +z; `inwards` makes a room of it.
+/// The six faces of the box [low, high], in the order -x +x -y +y -z +z; `inwards` makes a room of
+/// it.
 inline void add_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high, bool inwards,
                     std::uint32_t material = 0) {
   for (int axis = 0; axis < 3; ++axis) {

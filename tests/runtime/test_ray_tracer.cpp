@@ -198,7 +198,8 @@ TEST(RayTracer, RaysFromOffsetPointsDoNotMeetTheirTriangle) {
       std::vector<Ray> rays;
       for (int r = 0; r < 100; ++r) {
         const double u = random.uniform(0, 1), v = random.uniform(0, 1) * (1 - u);
-        const Float3 origin = tracer.offset_point(to_float3(a + u * e1 + v * e2), to_float3(normal));
+        const Float3 origin =
+            tracer.offset_point(to_float3(a + u * e1 + v * e2), to_float3(normal));
         const glm::dvec3 d(random.unit());
         const double cosine = glm::dot(d, normal);
         rays.push_back(make_ray(origin, to_float3(cosine < 0 ? d - 2 * cosine * normal : d)));

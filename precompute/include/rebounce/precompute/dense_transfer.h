@@ -12,9 +12,9 @@ namespace rebounce {
 
 /// Builds Y = F (I - rho F)^-1 for each channel, dense.
 ///
-/// With G = A^1/2 F A^-1/2 and R = rho^1/2, the matrix I - R G R is symmetric positive definite, and
-/// (I - R G R)^-1 = I + R Yhat R gives Yhat = A^1/2 Y A^-1/2. A floor of 1e-7 under the reflectance
-/// makes the division by R harmless for black patches and changes Y by less than 1e-7.
+/// With G = A^1/2 F A^-1/2 and R = rho^1/2, the matrix I - R G R is symmetric positive definite,
+/// and (I - R G R)^-1 = I + R Yhat R gives Yhat = A^1/2 Y A^-1/2. A floor of 1e-7 under the
+/// reflectance makes the division by R harmless for black patches and changes Y by less than 1e-7.
 /// Channels with the same reflectances share one matrix. Throws Cancelled if asked to stop.
 std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& exchange,
                                                           const PatchTable& patches,

@@ -42,9 +42,9 @@ struct FormFactors {
   std::uint64_t pair_count = 0;  ///< pairs of patches that face each other
 };
 
-/// Finds the form factors of every pair of patches: exact exchange of the unoccluded triangles times
-/// the kernel-weighted part of shadow rays that get through (form_factor_kernel.h), corrected so that
-/// reciprocity and closure hold together (closure.h).
+/// Finds the form factors of every pair of patches: exact exchange of the unoccluded triangles
+/// times the kernel-weighted part of shadow rays that get through (form_factor_kernel.h), corrected
+/// so that reciprocity and closure hold together (closure.h).
 ///
 /// `tracer` holds the first surface_count triangles of model.mesh. Rows are shared out among OpenMP
 /// threads; the bits do not depend on how many. Throws Cancelled when `progress` says so.

@@ -10,7 +10,8 @@
 
 namespace rebounce {
 
-/// Reflectances above this are clamped to it, so that the light of infinitely many bounces is finite.
+/// Reflectances above this are clamped to it, so that the light of infinitely many bounces is
+/// finite.
 inline constexpr float kMaxReflectance = 0.99F;
 
 /// The scene as patches: what is shown, and what exchanges light.

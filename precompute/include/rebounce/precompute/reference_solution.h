@@ -17,8 +17,8 @@ class ReferenceSolver {
 
   ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches);
 
-  /// Solves (I - rho F) B = M0 until the area-weighted residual is `residual` of M0 (default 1e-10);
-  /// returns the radiosity B [n] in lx. Throws Error if 10,000 sweeps do not get there.
+  /// Solves (I - rho F) B = M0 until the area-weighted residual is `residual` of M0 (default
+  /// 1e-10); returns the radiosity B [n] in lx. Throws Error if 10,000 sweeps do not get there.
   std::vector<Double3> radiosity(std::span<const Float3> initial_exitance,
                                  double residual = 1e-10) const;
 

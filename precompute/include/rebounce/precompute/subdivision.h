@@ -27,7 +27,8 @@ struct SubdivisionSettings {
 ///
 /// `patches_per_triangle` [t] is the number of patches that a triangle is worth (1, or 2 if both
 /// of its sides are lit). Triangles that come from one keep its order, neighbours stay close.
-std::vector<std::uint32_t> subdivide(Scene& scene, std::span<const std::uint8_t> patches_per_triangle,
+std::vector<std::uint32_t> subdivide(Scene& scene,
+                                     std::span<const std::uint8_t> patches_per_triangle,
                                      const SubdivisionSettings& settings);
 
 /// For each vertex the number of its position, equal for vertices at the same place, in [0, count).

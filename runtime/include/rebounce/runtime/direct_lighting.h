@@ -41,8 +41,8 @@ class DirectLighting {
   const TransferData& data_;
   const RayTracer& tracer_;
   std::size_t points_per_patch_;
-  std::vector<Float3> points_;           ///< [n][points_per_patch], moved off the surface
-  std::vector<Ray> rays_;                ///< [n][points_per_patch] scratch
+  std::vector<Float3> points_;            ///< [n][points_per_patch], moved off the surface
+  std::vector<Ray> rays_;                 ///< [n][points_per_patch] scratch
   std::vector<ShadowRay> contributions_;  ///< [n][points_per_patch] scratch, beside rays_
 };
 

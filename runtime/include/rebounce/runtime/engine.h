@@ -12,17 +12,17 @@ namespace rebounce {
 
 /// Relights one scene: direct light, then one product with the stored operator.
 ///
-/// The transfer data are read only and may be shared by any number of engines; an engine is one light
-/// state and belongs to one thread at a time. After construction nothing allocates, locks, prints
-/// or touches a file.
+/// The transfer data are read only and may be shared by any number of engines; an engine is one
+/// light state and belongs to one thread at a time. After construction nothing allocates, locks,
+/// prints or touches a file.
 class Engine {
  public:
   /// Makes room for everything a frame needs. `data` must have an operator.
   explicit Engine(std::shared_ptr<const TransferData> data,
                   const DirectLightingSettings& settings = {});
 
-  /// One frame: finds the direct irradiance of the patches under `lights` and `sky`, and with it all
-  /// that follows.
+  /// One frame: finds the direct irradiance of the patches under `lights` and `sky`, and with it
+  /// all that follows.
   void relight(std::span<const Light> lights, const Sky& sky);
 
   /// The same with a direct irradiance [n] in lx that the caller brings, from shadow maps for

@@ -9,7 +9,7 @@
 namespace rebounce {
 
 struct GaussSeidelSettings {
-  int max_sweeps = 100;   ///< at most this many sweeps, at least 1
+  int max_sweeps = 100;    ///< at most this many sweeps, at least 1
   double residual = 1e-6;  ///< stop at this part of M0, area-weighted L2; 0: only the sweeps count
 };
 

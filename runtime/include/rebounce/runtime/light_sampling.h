@@ -6,9 +6,10 @@ namespace rebounce {
 
 /// Light from one lamp at one point, before cosine and shadow.
 struct IncidentLight {
-  Float3 direction{0, 0, 0};   ///< unit, from the point to the lamp
-  float distance = 0;          ///< metres; infinite for directional lights
-  Float3 illuminance{0, 0, 0};  ///< lx on a surface that faces the lamp; 0: the lamp is out of reach
+  Float3 direction{0, 0, 0};  ///< unit, from the point to the lamp
+  float distance = 0;         ///< metres; infinite for directional lights
+  Float3 illuminance{0, 0,
+                     0};  ///< lx on a surface that faces the lamp; 0: the lamp is out of reach
 };
 
 /// Evaluates `light` at `point`: inverse-square fall-off, range window and spot cone as

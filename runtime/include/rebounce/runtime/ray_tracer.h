@@ -49,10 +49,10 @@ class RayTracer {
   /// ends there does not meet that surface: by offset_distance().
   Float3 offset_point(const Float3& point, const Float3& geometric_normal) const;
 
-  /// 2^-18 of the largest coordinate of the scene. The rounding errors of a ray's origin, of its end
-  /// and of the plane equation in between are each some 2^-24 of the coordinates they are found from,
-  /// however near to zero the point itself is: this is some tens of them, 40 micrometres in a room
-  /// of ten metres.
+  /// 2^-18 of the largest coordinate of the scene. The rounding errors of a ray's origin, of its
+  /// end and of the plane equation in between are each some 2^-24 of the coordinates they are found
+  /// from, however near to zero the point itself is: this is some tens of them, 40 micrometres in a
+  /// room of ten metres.
   float offset_distance() const;
 
  private:
@@ -61,6 +61,8 @@ class RayTracer {
 };
 
 /// True if a shadow ray given to RayTracer::occluded met something.
-inline bool is_occluded(const Ray& ray) { return ray.t_far < 0; }
+inline bool is_occluded(const Ray& ray) {
+  return ray.t_far < 0;
+}
 
 }  // namespace rebounce

@@ -28,7 +28,7 @@ class DenseOperator final : public TransferOperator {
   static constexpr float kHalfScale = 1024;
 
   struct Storage {
-    std::vector<float> area;  ///< [n] m²
+    std::vector<float> area;                                    ///< [n] m²
     std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
     std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
     Precision precision = Precision::kF32;

@@ -38,7 +38,7 @@ struct Camera {
   Float3 position{0, 0, 0};
   Float3 right{1, 0, 0};
   Float3 up{0, 1, 0};
-  Float3 backward{0, 0, 1};  ///< the camera looks along -backward, as in glTF
+  Float3 backward{0, 0, 1};   ///< the camera looks along -backward, as in glTF
   float vertical_fov = 0.8F;  ///< radians
 };
 

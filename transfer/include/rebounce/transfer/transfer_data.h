@@ -24,7 +24,7 @@ struct PatchTable {
   std::vector<Float3> reflectance;       ///< 0 <= rho < 1
   std::vector<Float3> emitted_exitance;  ///< lx, >= 0: pi x mean luminance
   std::vector<float> sky_visibility;     ///< cosine-weighted fraction that escapes, [0, 1]
-  std::vector<float> absorbed;  ///< cosine-weighted fraction that meets back faces, [0, 1]
+  std::vector<float> absorbed;           ///< cosine-weighted fraction that meets back faces, [0, 1]
 
   std::size_t size() const { return area.size(); }
 };
@@ -33,13 +33,13 @@ struct PatchTable {
 /// the scene's surface; those after it are the second sides of double-sided ones, with reversed
 /// winding and vertices of their own. Rays are traced against the first part only.
 struct DisplayMesh {
-  std::vector<Float3> position;            ///< [v] metres
-  std::vector<Float3> normal;              ///< [v] unit shading normals
+  std::vector<Float3> position;             ///< [v] metres
+  std::vector<Float3> normal;               ///< [v] unit shading normals
   std::vector<Float2> base_color_texcoord;  ///< [v] texture transform applied
-  std::vector<Float2> emissive_texcoord;   ///< [v] likewise
-  std::vector<Float3> vertex_color;        ///< [v] linear
-  std::vector<Uint3> triangle;             ///< [t] vertex indices, counter-clockwise from the front
-  std::vector<std::uint32_t> triangle_patch;     ///< [t] patch, or kNone for a side that sees nothing
+  std::vector<Float2> emissive_texcoord;    ///< [v] likewise
+  std::vector<Float3> vertex_color;         ///< [v] linear
+  std::vector<Uint3> triangle;  ///< [t] vertex indices, counter-clockwise from the front
+  std::vector<std::uint32_t> triangle_patch;  ///< [t] patch, or kNone for a side that sees nothing
   std::vector<std::uint32_t> triangle_material;  ///< [t]
   std::vector<std::uint32_t> back_triangle;  ///< [surface_count] second side, or kNone if one-sided
 

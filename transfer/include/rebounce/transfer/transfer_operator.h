@@ -31,8 +31,8 @@ class TransferOperator {
   /// Writes the indirect irradiance [n][3] in lx that `initial_exitance` [n][3] in lx gives rise
   /// to. The two must not overlap; `workspace` has at least workspace_size() floats and is
   /// overwritten. Neither allocates nor locks; the same bits for any number of OpenMP threads.
-  virtual void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-                     std::span<float> workspace) const = 0;
+  virtual void apply(std::span<const Float3> initial_exitance,
+                     std::span<Float3> indirect_irradiance, std::span<float> workspace) const = 0;
 };
 
 }  // namespace rebounce
