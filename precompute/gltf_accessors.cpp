@@ -187,8 +187,9 @@ std::size_t component_count(int type) {
 FloatElements unpack_floats(const tinygltf::Accessor& accessor,
                             const std::vector<std::uint8_t>& packed) {
   const bool is_float = accessor.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT;
-  return {accessor.count, component_count(accessor.type), !is_float && !accessor.normalized,
-          to_floats(packed, accessor)};
+  const std::size_t components = component_count(accessor.type);
+  return {packed.size() / (components * component_bytes(accessor.componentType)), components,
+          !is_float && !accessor.normalized, to_floats(packed, accessor)};
 }
 
 FloatElements read_floats(const Document& document, int accessor) {

@@ -30,7 +30,7 @@ FloatElements read_floats(const Document& document, int accessor);
 /// The number of components of an accessor's type. Throws Error for a matrix.
 std::size_t component_count(int type);
 
-/// Converts the elements of `accessor`, tightly packed as its type and component type say,
+/// Converts elements, tightly packed, of the type, component type and normalisation of `accessor`,
 /// likewise.
 FloatElements unpack_floats(const tinygltf::Accessor& accessor,
                             const std::vector<std::uint8_t>& packed);

@@ -147,10 +147,6 @@ FloatElements DracoMesh::read_floats(std::uint32_t unique_id,
   const draco::PointAttribute* attribute = mesh_->GetAttributeByUniqueId(unique_id);
   if (!attribute) throw Error(fmt::format("its Draco data have no attribute {}", unique_id));
   const std::uint32_t points = mesh_->num_points();
-  if (points != accessor.count) {
-    throw Error(fmt::format("its Draco data have {} vertices, but the accessor {} elements", points,
-                            accessor.count));
-  }
   const std::size_t components = component_count(accessor.type);
   if (static_cast<std::size_t>(attribute->num_components()) != components) {
     throw Error(fmt::format("its Draco attribute {} has {} components instead of {}", unique_id,

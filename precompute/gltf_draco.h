@@ -21,7 +21,8 @@ class DracoMesh {
   std::vector<std::uint32_t> indices() const;
 
   /// The attribute with this unique id, as `accessor` describes it: its type, component type and
-  /// normalisation. Throws Error where there is none, or it or its length differs.
+  /// normalisation, not its count, which encoders that split vertices leave as it was. Throws Error
+  /// where there is none or its values do not fit.
   FloatElements read_floats(std::uint32_t unique_id, const tinygltf::Accessor& accessor) const;
 
  private:

@@ -1,8 +1,11 @@
 #include "rebounce/precompute/winding.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <map>
 #include <numeric>
 
 #include "hemisphere_rays.h"
@@ -279,6 +282,29 @@ class InsideOutSearch {
 
 std::vector<InsideOutPiece> find_inside_out(const Scene& scene, const RayTracer& tracer) {
   return InsideOutSearch(scene, tracer).run();
+}
+
+void make_double_sided(Scene& scene, std::span<const InsideOutPiece> pieces) {
+  if (pieces.empty()) return;
+  std::map<std::uint32_t, std::uint32_t> double_sided;  // copies of materials
+  std::size_t triangle_count = 0;
+  for (const InsideOutPiece& piece : pieces) {
+    triangle_count += piece.triangle.size();
+    for (const std::uint32_t t : piece.triangle) {
+      std::uint32_t& material = scene.triangle_material[t];
+      const auto next = static_cast<std::uint32_t>(scene.materials.size());
+      const auto [copy, is_new] = double_sided.try_emplace(material, next);
+      if (is_new) {
+        scene.materials.push_back(scene.materials[material]);
+        scene.materials.back().double_sided = true;
+      }
+      material = copy->second;
+    }
+  }
+  scene.warnings.push_back(
+      fmt::format("{} triangles are seen from behind only and were taken as double-sided; check "
+                  "their winding",
+                  triangle_count));
 }
 
 }  // namespace rebounce

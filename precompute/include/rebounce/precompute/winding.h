@@ -1,7 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <string>
+#include <span>
 #include <vector>
 
 #include "rebounce/precompute/scene.h"
@@ -32,5 +32,9 @@ struct InsideOutPiece {
 ///
 /// `tracer` holds the scene's triangles in order. Deterministic. Largest piece first.
 std::vector<InsideOutPiece> find_inside_out(const Scene& scene, const RayTracer& tracer);
+
+/// Gives the triangles of `pieces` double-sided copies of their materials, and the scene a warning
+/// where there are any.
+void make_double_sided(Scene& scene, std::span<const InsideOutPiece> pieces);
 
 }  // namespace rebounce
