@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "hemisphere_rays.h"
 
@@ -44,14 +45,13 @@ glm::dvec3 area_vector(const Corners& corner) {
 
 // [v] The same number for vertices at the same position.
 std::vector<std::uint32_t> weld(const std::vector<Float3>& position) {
-  std::vector<std::uint32_t> order(position.size());
-  std::iota(order.begin(), order.end(), 0U);
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return position[a] < position[b]; });
+  std::vector<std::pair<Float3, std::uint32_t>> order(position.size());
+  for (std::uint32_t v = 0; v < order.size(); ++v) order[v] = {position[v], v};
+  std::sort(order.begin(), order.end());
   std::vector<std::uint32_t> place(position.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool is_same = i > 0 && position[order[i]] == position[order[i - 1]];
-    place[order[i]] = is_same ? place[order[i - 1]] : order[i];
+    const bool is_same = i > 0 && order[i].first == order[i - 1].first;
+    place[order[i].second] = is_same ? place[order[i - 1].second] : order[i].second;
   }
   return place;
 }
