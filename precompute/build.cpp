@@ -89,7 +89,9 @@ class PhaseClock {
 void describe_patches(const PatchModel& model, BuildReport& report) {
   report.display_triangle_count = model.mesh.triangle.size();
   report.patch_count = model.patches.size();
+  report.sliver_count = model.sliver_count;
   report.unlit_side_count = model.unlit_side_count;
+  report.covered_side_count = model.covered_side_count;
   std::vector<float> size(model.patches.area);
   for (float& s : size) s = std::sqrt(s);
   std::ranges::sort(size);
@@ -119,7 +121,9 @@ std::string report_json(const BuildReport& report) {
   return nlohmann::json{{"triangles", report.triangle_count},
                         {"degenerate_triangles", report.degenerate_triangle_count},
                         {"display_triangles", report.display_triangle_count},
+                        {"slivers", report.sliver_count},
                         {"unlit_sides", report.unlit_side_count},
+                        {"covered_sides", report.covered_side_count},
                         {"patch_size_min", report.patch_size_min},
                         {"patch_size_median", report.patch_size_median},
                         {"patch_size_max", report.patch_size_max},
@@ -194,7 +198,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.patches.absorbed = std::move(form_factors.absorbed);
   data.mesh = std::move(model.mesh);
   data.exchange = std::move(form_factors.exchange);
-  compute_reconstruction_weights(data.patches.absorbed, data.mesh);
+  compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, data.mesh);
 
   data.transfer = clock.run("operator", [&](const Progress& part) {
     return build_dense_transfer(data.exchange, data.patches, settings.precision, part);

@@ -12,7 +12,7 @@ using Vector = std::vector<double>;
 constexpr int kPassCount = 3;        // clamped entries leave a rest, which the next pass shares out
 constexpr int kMaxIterations = 500;  // of conjugate gradients; some 20 to 60 are usual
 constexpr double kResidual = 1e-11;  // relative; row sums are wanted to 1e-6
-constexpr float kLargestChange = 0.5F;
+constexpr float kLeastPart = 0.5F, kGreatestPart = 1.5F;
 
 double dot(const Vector& a, const Vector& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -26,8 +26,8 @@ class NormalEquations {
       : rows_(rows), diagonal_(rows.size(), 0.0) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (const ExchangeEntry& entry : rows[i]) {
-        diagonal_[i] += entry.variance;
-        diagonal_[entry.column] += entry.variance;
+        diagonal_[i] += entry.variance();
+        diagonal_[entry.column] += entry.variance();
       }
     }
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -69,7 +69,7 @@ class NormalEquations {
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       double sum = 0;
       for (const ExchangeEntry& entry : rows_[i]) {
-        const double v = entry.variance;
+        const double v = entry.variance();
         sum += v * x[entry.column];
         y[entry.column] += v * x[i];
       }
@@ -126,10 +126,10 @@ ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
       for (std::size_t k = 0; k < rows[i].size(); ++k) {
         ExchangeEntry& entry = rows[i][k];
         const double wanted =
-            entry.exchange_area + entry.variance * (multiplier[i] + multiplier[entry.column]);
+            entry.exchange_area + entry.variance() * (multiplier[i] + multiplier[entry.column]);
         entry.exchange_area =
-            std::clamp(static_cast<float>(wanted), original[i][k] * (1 - kLargestChange),
-                       original[i][k] * (1 + kLargestChange));
+            std::clamp(static_cast<float>(wanted), kLeastPart * original[i][k],
+                       std::max(kGreatestPart * original[i][k], entry.unoccluded_area));
       }
     }
     sum = row_sums(rows, area);

@@ -11,8 +11,14 @@ namespace rebounce {
 /// One pair in the upper triangle of the exchange matrix while it is being made.
 struct ExchangeEntry {
   std::uint32_t column;
-  float exchange_area;  ///< m²
-  double variance;      ///< of exchange_area, m⁴: how sure its visibility is
+  float exchange_area;        ///< m²
+  float unoccluded_area;      ///< m²: what it would be with nothing between; the most it can be
+  float visibility_variance;  ///< of exchange_area / unoccluded_area
+
+  double variance() const {  ///< of exchange_area, m⁴
+    const double u = unoccluded_area;
+    return u * u * visibility_variance;
+  }
 };
 
 using ExchangeRows = std::vector<std::vector<ExchangeEntry>>;

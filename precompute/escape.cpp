@@ -19,8 +19,8 @@ Escape measure_escape(const PatchModel& model, const FlatTriangle& triangle, std
       ++sky;
       continue;
     }
-    const std::uint32_t side = hit.front ? hit.triangle : model.mesh.back_triangle[hit.triangle];
-    if (side == kNone || model.mesh.triangle_patch[side] == kNone) ++absorbed;
+    // A side without a patch counts as seen: what covers it has one.
+    if (!hit.front && model.mesh.back_triangle[hit.triangle] == kNone) ++absorbed;
   }
   return {static_cast<double>(sky) / ray_count, static_cast<double>(absorbed) / ray_count};
 }

@@ -13,7 +13,7 @@ namespace rebounce {
 /// Where the light of a patch goes that no other patch gets, as parts of 1.
 struct Escape {
   double sky = 0;       ///< leaves the scene
-  double absorbed = 0;  ///< meets the back of a one-sided surface, or a side that has no patch
+  double absorbed = 0;  ///< meets the back of a one-sided surface
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread

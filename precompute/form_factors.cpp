@@ -151,8 +151,8 @@ class FormFactorAssembly {
     trace(i, scratch.mixed, settings_.full_rays, scratch.rays);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
       const std::span rays(&scratch.rays[p * settings_.full_rays], settings_.full_rays);
-      const double visible = visible_part(i, scratch.mixed[p].other, rays);
-      append(row, scratch.mixed[p], visible, visible * (1 - visible) / settings_.full_rays);
+      const Visibility visible = visibility(i, scratch.mixed[p].other, rays);
+      append(row, scratch.mixed[p], visible.part, visible.variance);
     }
     std::sort(row.begin(), row.end(),
               [](const ExchangeEntry& a, const ExchangeEntry& b) { return a.column < b.column; });
@@ -208,29 +208,38 @@ class FormFactorAssembly {
     tracer_.occluded(rays);
   }
 
+  struct Visibility {
+    double part;
+    double variance;
+  };
+
   /// The part of the pair's light that gets through: rays weighted by the kernel between their
   /// ends.
-  double visible_part(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const {
+  Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const {
     const std::uint64_t hash = pair_hash(i, j);
-    double sum = 0, visible = 0, count = 0;
+    double sum = 0, sum_of_squares = 0, visible = 0, count = 0;
     for (std::size_t k = 0; k < rays.size(); ++k) {
       const auto [x, y] = ray_ends(i, j, static_cast<std::uint32_t>(k), hash);
       const double weight =
           point_kernel(to_dvec3(*x), triangles_[i].normal, to_dvec3(*y), triangles_[j].normal);
       const bool clear = !is_occluded(rays[k]);
       sum += weight;
+      sum_of_squares += weight * weight;
       visible += clear ? weight : 0;
       count += clear ? 1 : 0;
     }
-    return sum > 0 ? visible / sum : count / static_cast<double>(rays.size());
+    const double part = sum > 0 ? visible / sum : count / static_cast<double>(rays.size());
+    // As sure as that many rays of equal weight (Kish's effective sample size).
+    const double effective = sum > 0 ? sum * sum / sum_of_squares : 1;
+    return {part, part * (1 - part) / effective};
   }
 
   void append(std::vector<ExchangeEntry>& row, const Pair& pair, double visible,
               double variance) const {
     const double exchange = pair.unoccluded * visible;
     if (static_cast<float>(exchange) <= 0) return;
-    row.push_back({pair.other, static_cast<float>(exchange),
-                   pair.unoccluded * pair.unoccluded * (variance + kVarianceFloor)});
+    row.push_back({pair.other, static_cast<float>(exchange), static_cast<float>(pair.unoccluded),
+                   static_cast<float>(variance + kVarianceFloor)});
   }
 
   std::vector<double> areas() const {

@@ -1,7 +1,9 @@
 #include "rebounce/precompute/lit_sides.h"
 
+#include <algorithm>
+#include <array>
+
 #include "hemisphere_rays.h"
-#include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
 namespace {
@@ -9,46 +11,111 @@ namespace {
 // A side that sees less than about one part in this many of other surfaces counts as seeing none.
 constexpr std::uint32_t kRaysPerSide = 256;
 
-void make_rays(const Scene& scene, const RayTracer& tracer, std::uint32_t t, bool front,
-               std::vector<Ray>& rays) {
-  const Uint3& corner = scene.triangle[t];
-  const glm::dvec3 a = to_dvec3(scene.position[corner[0]]), b = to_dvec3(scene.position[corner[1]]),
-                   c = to_dvec3(scene.position[corner[2]]);
-  const glm::dvec3 normal = glm::normalize(glm::cross(b - a, c - a)) * (front ? 1.0 : -1.0);
-  make_hemisphere_rays({a, b, c}, normal, tracer, mix_bits(t), rays);
-}
+// Points at which a side is looked at for copies of itself.
+constexpr std::uint32_t kPointsPerSide = 32;
+
+class LitSides {
+ public:
+  LitSides(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer) {}
+
+  std::vector<TriangleSides> find() {
+    sides_.resize(scene_.triangle.size());
+    std::vector<std::vector<CoincidentSide>> front_cover(sides_.size()), back_cover(sides_.size());
+#pragma omp parallel
+    {
+      Scratch scratch;
+#pragma omp for schedule(dynamic, 16)
+      for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+        if (is_double_sided(t)) {
+          const bool front = sees_a_surface(t, true, scratch);
+          const bool back = sees_a_surface(t, false, scratch);
+          sides_[t].front = front || !back ? SideKind::kLit : SideKind::kUnlit;
+          sides_[t].back = back ? SideKind::kLit : SideKind::kUnlit;
+        }
+        if (sides_[t].front == SideKind::kLit) find_cover(t, true, scratch, front_cover[t]);
+        if (sides_[t].back == SideKind::kLit) find_cover(t, false, scratch, back_cover[t]);
+      }
+    }
+    // Later triangles give way to earlier ones that have not given way themselves.
+    for (std::size_t t = sides_.size(); t-- > 0;) {
+      if (is_covered(front_cover[t])) sides_[t].front = SideKind::kCovered;
+      if (is_covered(back_cover[t])) sides_[t].back = SideKind::kCovered;
+    }
+    return std::move(sides_);
+  }
+
+ private:
+  struct Scratch {
+    std::vector<Ray> rays = std::vector<Ray>(kRaysPerSide);
+    std::vector<Hit> hits;
+    std::vector<CoincidentSide> sides;
+  };
+
+  struct Side {
+    std::array<glm::dvec3, 3> corner;
+    glm::dvec3 normal;
+  };
+
+  bool is_double_sided(std::uint32_t t) const {
+    return scene_.materials[scene_.triangle_material[t]].double_sided;
+  }
+
+  Side side_of(std::uint32_t t, bool front) const {
+    Side side;
+    for (int k = 0; k < 3; ++k) side.corner[k] = to_dvec3(scene_.position[scene_.triangle[t][k]]);
+    const auto& [a, b, c] = side.corner;
+    side.normal = glm::normalize(glm::cross(b - a, c - a)) * (front ? 1.0 : -1.0);
+    return side;
+  }
+
+  bool sees_a_surface(std::uint32_t t, bool front, Scratch& scratch) const {
+    const Side side = side_of(t, front);
+    make_hemisphere_rays(side.corner, side.normal, tracer_, mix_bits(t), scratch.rays);
+    scratch.hits.resize(scratch.rays.size());
+    tracer_.intersect(scratch.rays, scratch.hits);
+    return std::ranges::any_of(scratch.hits, [&](const Hit& hit) {
+      return hit.triangle != kNone && (hit.front || is_double_sided(hit.triangle));
+    });
+  }
+
+  /// Lists sides that together cover this one at every point looked at; none if some point is bare.
+  /// One that covers a point is enough for it: the one of the earliest triangle.
+  void find_cover(std::uint32_t t, bool front, Scratch& scratch,
+                  std::vector<CoincidentSide>& cover) const {
+    const Side side = side_of(t, front);
+    const Float3 normal = to_float3(side.normal);
+    const glm::dvec2 shift = unit_square(mix_bits(t));
+    for (std::uint32_t k = 0; k < kPointsPerSide; ++k) {
+      const glm::dvec2 b = square_to_triangle(r2_point(k, shift));
+      const glm::dvec3 point =
+          side.corner[0] * (1 - b.x - b.y) + side.corner[1] * b.x + side.corner[2] * b.y;
+      find_coincident_sides(
+          tracer_, to_float3(point), normal, t, [&](std::uint32_t o) { return is_double_sided(o); },
+          scratch.hits, scratch.sides);
+      const auto earliest = std::ranges::min_element(scratch.sides, {}, &CoincidentSide::triangle);
+      if (earliest == scratch.sides.end()) {
+        cover.clear();
+        return;
+      }
+      cover.push_back(*earliest);
+    }
+  }
+
+  bool is_covered(const std::vector<CoincidentSide>& cover) const {
+    return !cover.empty() && std::ranges::all_of(cover, [&](const CoincidentSide& by) {
+      return (by.front ? sides_[by.triangle].front : sides_[by.triangle].back) == SideKind::kLit;
+    });
+  }
+
+  const Scene& scene_;
+  const RayTracer& tracer_;
+  std::vector<TriangleSides> sides_;
+};
 
 }  // namespace
 
-std::vector<std::uint8_t> find_lit_sides(const Scene& scene) {
-  std::vector<std::uint8_t> sides(scene.triangle.size(), kFrontSide);
-  const RayTracer tracer(scene.position, scene.triangle);
-  const auto is_double_sided = [&](std::uint32_t t) {
-    return scene.materials[scene.triangle_material[t]].double_sided;
-  };
-  const auto sees_a_surface = [&](std::uint32_t t, bool front, std::vector<Ray>& rays,
-                                  std::vector<Hit>& hits) {
-    make_rays(scene, tracer, t, front, rays);
-    tracer.intersect(rays, hits);
-    for (const Hit& hit : hits) {
-      if (hit.triangle != kNone && (hit.front || is_double_sided(hit.triangle))) return true;
-    }
-    return false;
-  };
-
-#pragma omp parallel
-  {
-    std::vector<Ray> rays(kRaysPerSide);
-    std::vector<Hit> hits(kRaysPerSide);
-#pragma omp for schedule(dynamic, 16)
-    for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
-      if (!is_double_sided(t)) continue;
-      const bool front = sees_a_surface(t, true, rays, hits);
-      const bool back = sees_a_surface(t, false, rays, hits);
-      sides[t] = back ? (front ? kBothSides : kBackSide) : kFrontSide;
-    }
-  }
-  return sides;
+std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer) {
+  return LitSides(scene, tracer).find();
 }
 
 }  // namespace rebounce

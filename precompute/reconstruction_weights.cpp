@@ -34,7 +34,8 @@ double corner_angle(const DisplayMesh& mesh, const Uint3& t, int corner) {
 
 }  // namespace
 
-void compute_reconstruction_weights(std::span<const float> absorbed, DisplayMesh& mesh) {
+void compute_reconstruction_weights(std::span<const std::uint32_t> shown_patch,
+                                    std::span<const float> absorbed, DisplayMesh& mesh) {
   const WeldedPositions welded = weld_positions(mesh.position);
   std::vector<std::vector<Corner>> corners_at(welded.count);
   std::vector<glm::dvec3> vertex_normal(mesh.position.size(), glm::dvec3(0));
@@ -44,7 +45,7 @@ void compute_reconstruction_weights(std::span<const float> absorbed, DisplayMesh
     for (int corner = 0; corner < 3; ++corner) {
       const std::uint32_t v = mesh.triangle[t][corner];
       vertex_normal[v] += area;
-      const std::uint32_t patch = mesh.triangle_patch[t];
+      const std::uint32_t patch = shown_patch[t];
       if (patch == kNone || absorbed[patch] > kMostlyCovered) continue;
       const auto angle = static_cast<float>(corner_angle(mesh, mesh.triangle[t], corner));
       corners_at[welded.id[v]].push_back({patch, normal, angle});

@@ -103,7 +103,10 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   if (impl_->device == nullptr) throw_if_failed(nullptr, "starting Embree");
   impl_->scene = rtcNewScene(impl_->device);
   throw_if_failed(impl_->device, "making a scene");
-  rtcSetSceneFlags(impl_->scene, RTC_SCENE_FLAG_ROBUST);
+  // The filter is for intersect_all.
+  rtcSetSceneFlags(
+      impl_->scene,
+      static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
   rtcSetSceneBuildQuality(impl_->scene, RTC_BUILD_QUALITY_HIGH);
   if (!triangle.empty()) attach_triangles(impl_->device, impl_->scene, position, triangle);
   rtcCommitScene(impl_->scene);
@@ -141,6 +144,30 @@ void RayTracer::intersect(std::span<const Ray> rays, std::span<Hit> hits) const 
                    sizeof(RTCRayHit));
     for (std::size_t k = 0; k < count; ++k) hits[begin + k] = to_hit(batch[k]);
   }
+}
+
+void RayTracer::intersect_all(const Ray& ray, std::vector<Hit>& hits) const {
+  // The filter keeps each hit and lets the ray go on.
+  struct CollectingContext {
+    RTCIntersectContext context;
+    std::vector<Hit>* hits;
+  } collecting{context_with(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT), &hits};
+  collecting.context.filter = [](const RTCFilterFunctionNArguments* arguments) {
+    auto* const context = reinterpret_cast<CollectingContext*>(arguments->context);
+    for (unsigned k = 0; k < arguments->N; ++k) {
+      if (arguments->valid[k] == 0) continue;
+      RTCRayHit traced;
+      traced.ray = rtcGetRayFromRayN(arguments->ray, arguments->N, k);
+      traced.hit = rtcGetHitFromHitN(arguments->hit, arguments->N, k);
+      context->hits->push_back(to_hit(traced));
+      arguments->valid[k] = 0;
+    }
+  };
+  RTCRayHit traced;
+  traced.ray = std::bit_cast<RTCRay>(ray);
+  traced.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  traced.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(impl_->scene, &collecting.context, &traced);
 }
 
 Float3 RayTracer::offset_point(const Float3& point, const Float3& geometric_normal) const {

@@ -4,18 +4,60 @@
 #include <vector>
 
 #include "rebounce/precompute/scene.h"
+#include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
 
-/// Which sides of a triangle take part in the exchange of light.
-enum Sides : std::uint8_t { kFrontSide = 1, kBackSide = 2, kBothSides = 3 };
+/// What a side of a triangle is to the exchange of light.
+enum class SideKind : std::uint8_t {
+  kLit,      ///< it has a patch
+  kUnlit,    ///< it sees no other surface, or is the back of a one-sided triangle
+  kCovered,  ///< another triangle that faces the same way lies in the same place, and has the patch
+};
 
-/// Finds the sides of each triangle [t] that need patches.
+/// Front and back of one triangle.
+struct TriangleSides {
+  SideKind front = SideKind::kLit;
+  SideKind back = SideKind::kUnlit;
+
+  int patch_count() const { return (front == SideKind::kLit) + (back == SideKind::kLit); }
+};
+
+/// Finds what each side of every triangle [t] is.
 ///
 /// A one-sided triangle has its front. Of a double-sided one, a side that sees no other surface
 /// (the outside of a room's wall) neither gives light to anything nor gets any back, so leaving it
-/// out of the system changes nothing: it is dropped when none of its rays meets a side that
-/// reflects. At least one side of every triangle is kept. Deterministic.
-std::vector<std::uint8_t> find_lit_sides(const Scene& scene);
+/// out of the system changes nothing. At least one side of every triangle is kept for that matter.
+/// Of copies that lie in one another (a box whose bottom is flush with the floor) only one can be
+/// seen, and shadow rays between points cannot tell which: a side that is covered all over by
+/// others gives way to them. `tracer` holds all triangles of the scene. Deterministic.
+std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer);
+
+/// Sides that lie where a point of a surface is and face the way it faces.
+struct CoincidentSide {
+  std::uint32_t triangle;
+  bool front;
+};
+
+/// Finds the sides of other triangles than `triangle` that lie at `point`, to within the precision
+/// of rays, and face along `normal` (unit) as it does. Backs of one-sided triangles do not count.
+/// `is_double_sided`(t) tells which are; `hits` is scratch.
+template <typename IsDoubleSided>
+void find_coincident_sides(const RayTracer& tracer, const Float3& point, const Float3& normal,
+                           std::uint32_t triangle, const IsDoubleSided& is_double_sided,
+                           std::vector<Hit>& hits, std::vector<CoincidentSide>& sides) {
+  Ray ray{};
+  ray.origin = tracer.offset_point(point, normal);
+  ray.direction = {-normal[0], -normal[1], -normal[2]};
+  ray.t_near = 0;
+  ray.t_far = 2 * tracer.offset_distance();
+  hits.clear();
+  sides.clear();
+  tracer.intersect_all(ray, hits);
+  for (const Hit& hit : hits) {
+    if (hit.triangle == triangle || !(hit.front || is_double_sided(hit.triangle))) continue;
+    sides.push_back({hit.triangle, hit.front});
+  }
+}
 
 }  // namespace rebounce

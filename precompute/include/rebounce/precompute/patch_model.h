@@ -19,14 +19,20 @@ struct PatchModel {
   PatchTable patches;  ///< sky_visibility and absorbed are left to the form factors
   DisplayMesh mesh;
   std::vector<std::uint32_t> patch_triangle;  ///< [n] display triangle of each patch
-  std::size_t scene_triangle_count = 0;       ///< before subdivision
-  std::size_t unlit_side_count = 0;           ///< sides that see nothing and got no patch
+  /// [t] the patch whose light a display triangle shows: its own, or that of the surface that
+  /// covers it; kNone for a side that sees nothing.
+  std::vector<std::uint32_t> shown_patch;
+  std::size_t scene_triangle_count = 0;  ///< before subdivision, slivers not counted
+  std::size_t sliver_count = 0;          ///< triangles thinner than rays are precise: dropped
+  std::size_t unlit_side_count = 0;      ///< sides of display triangles that see nothing: no patch
+  std::size_t covered_side_count = 0;  ///< sides that lie in another surface: no patch of their own
   std::vector<std::string> warnings;
 };
 
-/// Subdivides the scene's triangles and makes every lit side of every one a patch: reflectance and
-/// emission are means over the triangle, textures integrated. Double-sided triangles get a second
-/// display triangle. The reconstruction weights are left to reconstruction_weights.h.
+/// Subdivides the scene's triangles and makes every lit side of every one (lit_sides.h) a patch:
+/// reflectance and emission are means over the triangle, textures integrated. Double-sided
+/// triangles get a second display triangle. The reconstruction weights are left to
+/// reconstruction_weights.h.
 PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);
 
 }  // namespace rebounce

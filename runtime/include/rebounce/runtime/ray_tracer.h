@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "rebounce/transfer/types.h"
 
@@ -44,6 +45,9 @@ class RayTracer {
 
   /// Finds the nearest hit of every ray. hits.size() == rays.size().
   void intersect(std::span<const Ray> rays, std::span<Hit> hits) const;
+
+  /// Appends every hit of `ray` to `hits`, in no particular order of distance but always the same.
+  void intersect_all(const Ray& ray, std::vector<Hit>& hits) const;
 
   /// A point moved off its surface along the unit `geometric_normal`, so that a ray that begins or
   /// ends there does not meet that surface: by offset_distance().
