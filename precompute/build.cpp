@@ -48,7 +48,7 @@ CostEstimate estimate_cost(const PatchTable& patches, int probe_rays) {
 }
 
 std::string in_gib(std::uint64_t bytes) {
-  return fmt::format("{:.1f} GiB", static_cast<double>(bytes) / (1ULL << 30));
+  return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
 }
 
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
@@ -198,7 +198,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.patches.absorbed = std::move(form_factors.absorbed);
   data.mesh = std::move(model.mesh);
   data.exchange = std::move(form_factors.exchange);
-  compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, data.mesh);
+  compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh);
 
   data.transfer = clock.run("operator", [&](const Progress& part) {
     return build_dense_transfer(data.exchange, data.patches, settings.precision, part);

@@ -17,7 +17,7 @@ struct Escape {
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over it. `rays` and `hits` are scratch.
+/// over it. `rays` and `hits` are scratch; afterwards they hold what was traced.
 Escape measure_escape(const PatchModel& model, const FlatTriangle& triangle, std::uint32_t patch,
                       const RayTracer& tracer, int ray_count, std::uint64_t seed,
                       std::vector<Ray>& rays, std::vector<Hit>& hits);

@@ -99,16 +99,27 @@ double integrate_graded(double begin, double end, const Function& f) {
   return sum * (end - begin);
 }
 
+/// Where along the line of `a` it comes closest to the line of `b`; nothing sensible if parallel.
+double closest_approach(const Segment& a, const Segment& b) {
+  const double cosine = glm::dot(a.direction, b.direction);
+  const double sine_squared = 1 - cosine * cosine;
+  if (sine_squared < 1e-12) return 0;
+  const glm::dvec3 d = b.begin - a.begin;
+  return (glm::dot(d, a.direction) - cosine * glm::dot(d, b.direction)) / sine_squared;
+}
+
 /// The double integral of ln r over two segments. The outer interval is cut where the inner
-/// integral is least smooth: beside the ends of the inner segment.
+/// integral is least smooth: beside the ends of the inner segment, and where the two cross or
+/// nearly do.
 double integrate_log_distance(const Segment& outer, const Segment& inner) {
-  std::array<double, 4> cut = {0, outer.length, outer.length, outer.length};
-  int count = 1;
   const glm::dvec3 inner_end = inner.begin + inner.length * inner.direction;
-  std::array<double, 2> foot = {glm::dot(inner.begin - outer.begin, outer.direction),
-                                glm::dot(inner_end - outer.begin, outer.direction)};
-  std::sort(foot.begin(), foot.end());
-  for (const double s : foot) {
+  std::array<double, 3> candidate = {glm::dot(inner.begin - outer.begin, outer.direction),
+                                     glm::dot(inner_end - outer.begin, outer.direction),
+                                     closest_approach(outer, inner)};
+  std::sort(candidate.begin(), candidate.end());
+  std::array<double, 5> cut = {0};
+  int count = 1;
+  for (const double s : candidate) {
     if (s > cut[count - 1] + 1e-9 * outer.length && s < (1 - 1e-9) * outer.length) cut[count++] = s;
   }
   cut[count] = outer.length;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 
 #include "hemisphere_rays.h"
 
@@ -32,8 +33,12 @@ class LitSides {
           sides_[t].front = front || !back ? SideKind::kLit : SideKind::kUnlit;
           sides_[t].back = back ? SideKind::kLit : SideKind::kUnlit;
         }
-        if (sides_[t].front == SideKind::kLit) find_cover(t, true, scratch, front_cover[t]);
-        if (sides_[t].back == SideKind::kLit) find_cover(t, false, scratch, back_cover[t]);
+        if (sides_[t].front == SideKind::kLit) {
+          sides_[t].front = look_for_contact(t, true, scratch, front_cover[t]);
+        }
+        if (sides_[t].back == SideKind::kLit) {
+          sides_[t].back = look_for_contact(t, false, scratch, back_cover[t]);
+        }
       }
     }
     // Later triangles give way to earlier ones that have not given way themselves.
@@ -78,13 +83,15 @@ class LitSides {
     });
   }
 
-  /// Lists sides that together cover this one at every point looked at; none if some point is bare.
-  /// One that covers a point is enough for it: the one of the earliest triangle.
-  void find_cover(std::uint32_t t, bool front, Scratch& scratch,
-                  std::vector<CoincidentSide>& cover) const {
+  /// Looks at points all over a side for other surfaces in the same place. Returns kUnlit if it
+  /// lies on fronts everywhere; else lists in `cover` sides that together cover it, none if some
+  /// point is bare. One that covers a point is enough for it: that of the earliest triangle.
+  SideKind look_for_contact(std::uint32_t t, bool front, Scratch& scratch,
+                            std::vector<CoincidentSide>& cover) const {
     const Side side = side_of(t, front);
     const Float3 normal = to_float3(side.normal);
     const glm::dvec2 shift = unit_square(mix_bits(t));
+    std::uint32_t sealed_count = 0;
     for (std::uint32_t k = 0; k < kPointsPerSide; ++k) {
       const glm::dvec2 b = square_to_triangle(r2_point(k, shift));
       const glm::dvec3 point =
@@ -92,13 +99,16 @@ class LitSides {
       find_coincident_sides(
           tracer_, to_float3(point), normal, t, [&](std::uint32_t o) { return is_double_sided(o); },
           scratch.hits, scratch.sides);
-      const auto earliest = std::ranges::min_element(scratch.sides, {}, &CoincidentSide::triangle);
-      if (earliest == scratch.sides.end()) {
-        cover.clear();
-        return;
-      }
-      cover.push_back(*earliest);
+      std::ranges::sort(scratch.sides, {}, &CoincidentSide::triangle);
+      const auto earliest = std::ranges::find_if(scratch.sides, &CoincidentSide::same_way);
+      if (earliest != scratch.sides.end()) cover.push_back(*earliest);
+      const bool sealed =
+          std::ranges::any_of(scratch.sides, std::not_fn(&CoincidentSide::same_way));
+      if (sealed) ++sealed_count;
+      if (sealed_count <= k && cover.size() <= k) break;
     }
+    if (cover.size() < kPointsPerSide) cover.clear();
+    return sealed_count == kPointsPerSide ? SideKind::kUnlit : SideKind::kLit;
   }
 
   bool is_covered(const std::vector<CoincidentSide>& cover) const {

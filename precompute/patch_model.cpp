@@ -168,7 +168,7 @@ class PatchModelBuilder {
           sides);
       for (const CoincidentSide& side : sides) {
         const std::uint32_t other = side.front ? side.triangle : mesh.back_triangle[side.triangle];
-        if (mesh.triangle_patch[other] == kNone) continue;
+        if (!side.same_way || mesh.triangle_patch[other] == kNone) continue;
         model_.shown_patch[t] = std::min(model_.shown_patch[t], mesh.triangle_patch[other]);
       }
     }

@@ -1,4 +1,4 @@
-// The only file of the project that knows Embree.
+// The only file of the libraries that knows Embree.
 
 #include "rebounce/runtime/ray_tracer.h"
 
@@ -131,7 +131,8 @@ void RayTracer::occluded(std::span<Ray> rays) const {
 
 void RayTracer::intersect(std::span<const Ray> rays, std::span<Hit> hits) const {
   assert(rays.size() == hits.size());
-  RTCIntersectContext context = context_with(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  // Nearest hits are asked for over whole hemispheres: such rays soon part.
+  RTCIntersectContext context = context_with(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
   std::array<RTCRayHit, kBatch> batch;
   for (std::size_t begin = 0; begin < rays.size(); begin += kBatch) {
     const std::size_t count = std::min(kBatch, rays.size() - begin);

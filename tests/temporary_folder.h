@@ -11,14 +11,15 @@
 
 namespace rebounce::test {
 
-/// A folder of the current test's own, gone when it ends.
+/// A folder of the current test's own, gone when it ends; a test that needs several tells them
+/// apart by `purpose`.
 class TemporaryFolder {
  public:
-  TemporaryFolder() {
+  explicit TemporaryFolder(const std::string& purpose = "") {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
     path_ = std::filesystem::temp_directory_path() /
             (std::string("rebounce-") + info->test_suite_name() + "-" + info->name() + "-" +
-             std::to_string(::getpid()));
+             std::to_string(::getpid()) + purpose);
     std::filesystem::create_directories(path_);
   }
   ~TemporaryFolder() {

@@ -1,6 +1,9 @@
 #include "dense_kernels.h"
 
 #include <cstring>
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
 
 #include "dense_kernels_impl.h"
 #include "half_float.h"
@@ -27,11 +30,18 @@ struct Vector4 {
   }
 };
 
+#if defined(__x86_64__)
+// By hand: __builtin_cpu_supports of Clang before 18 does not know the name.
+bool cpu_supports_f16c() {
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  return __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_F16C) != 0;
+}
+#endif
+
 const DenseKernels& pick_dense_kernels() {
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx512f")) return kDenseKernelsAvx512;
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("f16c")) {
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && cpu_supports_f16c()) {
     return kDenseKernelsAvx2;
   }
 #endif

@@ -63,24 +63,58 @@ void apply_tile(const TileKernels<Value>& kernels, const Value* tile, const Tile
   }
 }
 
+/// The tiles of one matrix that one slot works on, counted within the matrix.
+struct SlotPart {
+  std::size_t begin, end;
+
+  SlotPart(std::size_t slot, std::uint32_t matrix, std::size_t per_matrix, std::uint32_t matrices) {
+    const std::size_t total = per_matrix * matrices, first = matrix * per_matrix;
+    const auto within = [&](std::size_t k) {
+      return std::clamp(k, first, first + per_matrix) - first;
+    };
+    begin = within(total * slot / kSlotCount);
+    end = within(total * (slot + 1) / kSlotCount);
+  }
+
+  /// Entries [0, extent) of y are all that these tiles add to: they reach down to their last row.
+  std::size_t extent() const { return begin == end ? 0 : (TilePosition(end - 1).row + 1) * kTile; }
+};
+
 template <typename Value>
 void apply_tiles(const TileKernels<Value>& kernels, const Value* tiles,
                  const DenseOperator::Storage& storage, const float* x, float* slots,
                  std::size_t stride) {
   const std::size_t per_matrix = DenseOperator::tile_count(storage.area.size());
-  const std::size_t total = per_matrix * storage.matrix_count;
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t slot = 0; slot < kSlotCount; ++slot) {
     float* y = slots + slot * kChannelCount * stride;
-    std::fill_n(y, kChannelCount * stride, 0.0F);
-    const std::size_t begin = total * slot / kSlotCount, end = total * (slot + 1) / kSlotCount;
-    if (begin == end) continue;
-    TilePosition at(begin % per_matrix);
-    for (std::size_t k = begin; k < end; ++k, at.advance()) {
-      if (k % per_matrix == 0) at = TilePosition(0);
-      apply_tile(kernels, tiles + k * kTileSize, at, storage.channel_matrix,
-                 static_cast<std::uint32_t>(k / per_matrix), x, y, stride);
+    for (std::uint32_t matrix = 0; matrix < storage.matrix_count; ++matrix) {
+      const SlotPart part(slot, matrix, per_matrix, storage.matrix_count);
+      if (part.begin == part.end) continue;
+      for (int channel = 0; channel < kChannelCount; ++channel) {
+        if (storage.channel_matrix[channel] == matrix) {
+          std::fill_n(y + channel * stride, part.extent(), 0.0F);
+        }
+      }
+      const Value* tile = tiles + (matrix * per_matrix + part.begin) * kTileSize;
+      TilePosition at(part.begin);
+      for (std::size_t k = part.begin; k < part.end; ++k, at.advance(), tile += kTileSize) {
+        apply_tile(kernels, tile, at, storage.channel_matrix, matrix, x, y, stride);
+      }
     }
+  }
+}
+
+/// Adds up what the slots hold of one channel, in their order, into sum [stride].
+void add_slots(const DenseOperator::Storage& storage, int channel, const float* slots,
+               std::size_t stride, float* sum) {
+  const std::size_t per_matrix = DenseOperator::tile_count(storage.area.size());
+  std::fill_n(sum, stride, 0.0F);
+  for (std::size_t slot = 0; slot < kSlotCount; ++slot) {
+    const SlotPart part(slot, storage.channel_matrix[channel], per_matrix, storage.matrix_count);
+    const float* y = slots + (slot * kChannelCount + channel) * stride;
+    const std::size_t extent = part.extent();
+    for (std::size_t i = 0; i < extent; ++i) sum[i] += y[i];
   }
 }
 
@@ -136,14 +170,11 @@ void DenseOperator::apply(std::span<const Float3> initial_exitance,
   }
 
   const float scale = half ? 1.0F / kHalfScale : 1.0F;
-#pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < n; ++i) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      float sum = 0;
-      for (std::size_t slot = 0; slot < kSlotCount; ++slot) {
-        sum += slots[(slot * kChannelCount + c) * stride + i];
-      }
-      indirect_irradiance[i][c] = sum * scale / sqrt_area_[i];
+  for (int c = 0; c < kChannelCount; ++c) {
+    float* const sum = x + c * stride;  // x has done its work
+    add_slots(storage_, c, slots, stride, sum);
+    for (std::size_t i = 0; i < n; ++i) {
+      indirect_irradiance[i][c] = sum[i] * scale / sqrt_area_[i];
     }
   }
 }

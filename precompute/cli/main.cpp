@@ -26,6 +26,18 @@ void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options
       });
 }
 
+/// What is wrong with the command line, in one line. CLI11 complains of the missing command first,
+/// and keeps a word that it does not know to itself.
+std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
+  const std::vector<std::string> unknown = app.remaining();
+  const std::string what = app.get_subcommands().empty() && !unknown.empty()
+                               ? fmt::format("unknown command \"{}\"", unknown.front())
+                               : error.what();
+  std::string command = "rebounce";
+  for (const CLI::App* chosen : app.get_subcommands()) command += " " + chosen->get_name();
+  return fmt::format("{}; see {} --help", what, command);
+}
+
 int run(int argc, char** argv) {
   rebounce::cli::CommonOptions options;
   CLI::App app("Rebounce: all bounces of moving lights in a static scene, in one product.",
@@ -41,7 +53,9 @@ int run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kUsage;
+    if (error.get_exit_code() == 0) return app.exit(error);
+    fmt::print(stderr, "rebounce: {}\n", usage_message(app, error));
+    return kUsage;
   }
   return 0;
 }

@@ -5,6 +5,7 @@
 
 #include "commands.h"
 #include "info_json.h"
+#include "output_check.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/transfer/transfer_file.h"
 
@@ -68,6 +69,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
+  check_can_write(chosen.output);
   BuildReport report;
   TransferData data;
   {
@@ -76,7 +78,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
         chosen.scene, settings, report,
         [&](std::string_view phase, double fraction) { return bar.update(phase, fraction); },
         [&](const CostEstimate& estimate) {
-          print_note(options, fmt::format("{} patches: about {:.0f} s and {:.1f} GiB",
+          print_note(options, fmt::format("{} patches: about {:.2g} s and {:.2g} GiB",
                                           estimate.patch_count, estimate.seconds,
                                           static_cast<double>(estimate.peak_bytes) / (1ULL << 30)));
         });

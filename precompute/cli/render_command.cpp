@@ -9,6 +9,7 @@
 
 #include "commands.h"
 #include "light_file.h"
+#include "output_check.h"
 #include "rebounce/demo/camera.h"
 #include "rebounce/demo/image_file.h"
 #include "rebounce/demo/picture.h"
@@ -108,6 +109,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   std::tie(settings.width, settings.height) = parse_size(chosen.size);
   settings.show = parse_show(chosen.show);
   settings.exposure = chosen.exposure;
+  check_can_write(chosen.output);
   const auto data = std::make_shared<const TransferData>(load_transfer_file(chosen.file));
   const bool needs_light = settings.show != Show::kPatches;
   const LightSetup setup = needs_light ? choose_lights(chosen.lights, *data) : LightSetup{};

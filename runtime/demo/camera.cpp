@@ -1,9 +1,10 @@
 #include "rebounce/demo/camera.h"
 
 #include <algorithm>
-#include <array>
+#include <cstdint>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <vector>
 
@@ -52,29 +53,30 @@ std::vector<Ray> probe_rays(const Camera& camera) {
   return rays;
 }
 
-// One minus the chance that two rays of the view meet surfaces of the same orientation.
-float variety(const std::array<int, 6>& count, int total) {
+// One minus the chance that two rays of the view meet surfaces of the same kind.
+float variety(const std::map<std::uint32_t, int>& count, int total) {
   float same = 0;
-  for (const int c : count) {
+  for (const auto& [kind, c] : count) {
     const float share = static_cast<float>(c) / static_cast<float>(total);
     same += share * share;
   }
   return 1 - same;
 }
 
-int orientation(const glm::vec3& normal) {
+std::uint32_t orientation(const glm::vec3& normal) {
   const glm::vec3 size = glm::abs(normal);
   const int axis = size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-  return 2 * axis + (normal[axis] > 0 ? 1 : 0);
+  return static_cast<std::uint32_t>(2 * axis + (normal[axis] > 0 ? 1 : 0));
 }
 
-// How good a view is: much surface, near nothing, in many orientations, through no culled face.
+// How good a view is: much surface, near nothing, of many orientations and materials, through no
+// culled face.
 float score(const Camera& camera, const TransferData& data, const RayTracer& tracer,
             float diagonal) {
   std::vector<Ray> rays = probe_rays(camera);
   std::vector<Hit> hits(rays.size());
   intersect_visible(tracer, data.mesh, rays, hits);
-  std::array<int, 6> oriented{};
+  std::map<std::uint32_t, int> kinds;
   int seen = 0, through_culled = 0, too_near = 0;
   float depth = 0;
   for (std::size_t k = 0; k < hits.size(); ++k) {
@@ -87,7 +89,8 @@ float score(const Camera& camera, const TransferData& data, const RayTracer& tra
     const glm::vec3 a = to_glm(data.mesh.position[corner[0]]);
     const glm::vec3 normal = glm::cross(to_glm(data.mesh.position[corner[1]]) - a,
                                         to_glm(data.mesh.position[corner[2]]) - a);
-    ++oriented[static_cast<std::size_t>(orientation(hits[k].front ? normal : -normal))];
+    ++kinds[6 * data.mesh.triangle_material[hits[k].triangle] +
+            orientation(hits[k].front ? normal : -normal)];
   }
   if (seen == 0) return 0;
   const auto share = [&](int count) {
@@ -95,7 +98,7 @@ float score(const Camera& camera, const TransferData& data, const RayTracer& tra
   };
   const float clear = (1 - share(through_culled)) * (1 - share(too_near));
   return share(seen) * clear * clear * (depth / static_cast<float>(seen)) *
-         (0.2F + variety(oriented, seen));
+         (0.2F + variety(kinds, seen));
 }
 
 std::vector<Camera> views_from_inside(const Box& box) {

@@ -1,18 +1,14 @@
 #include "rebounce/demo/image_file.h"
 
 #include <png.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <memory>
 #include <span>
 #include <string>
-#include <system_error>
 
 #include "glm_conversion.h"
+#include "rebounce/transfer/atomic_file.h"
 #include "rebounce/transfer/error.h"
 #include "srgb.h"
 
@@ -48,29 +44,6 @@ std::vector<std::uint8_t> encode_png(const ScreenImage& image) {
   return bytes;
 }
 
-[[noreturn]] void fail(const std::filesystem::path& path, int code) {
-  throw Error(path.string() + ": cannot be written: " + std::generic_category().message(code) +
-              "; check the folder and the space left");
-}
-
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-
-void write_flushed(const std::filesystem::path& path, std::span<const std::uint8_t> bytes) {
-  std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "wb"));
-  if (!file) fail(path, errno);
-  const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size() &&
-                       std::fflush(file.get()) == 0 && fsync(fileno(file.get())) == 0;
-  if (!written) {
-    const int code = errno;
-    file.reset();
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-    fail(path, code);
-  }
-}
-
 }  // namespace
 
 ScreenImage tone_map(const Picture& picture) {
@@ -87,15 +60,9 @@ ScreenImage tone_map(const Picture& picture) {
 
 void write_png(const std::filesystem::path& path, const ScreenImage& image) {
   const std::vector<std::uint8_t> bytes = encode_png(image);
-  std::filesystem::path temporary = path;
-  temporary += ".partial-" + std::to_string(getpid());
-  write_flushed(temporary, bytes);
-  std::error_code code;
-  std::filesystem::rename(temporary, path, code);
-  if (!code) return;
-  std::error_code ignored;
-  std::filesystem::remove(temporary, ignored);
-  fail(path, code.value());
+  AtomicFile file(path);
+  file.write(std::as_bytes(std::span(bytes)));
+  file.commit();
 }
 
 }  // namespace rebounce

@@ -132,7 +132,7 @@ class GltfBuilder {
   }
 
   std::filesystem::path write_glb(const TemporaryFolder& folder) const {
-    const auto path = folder.path() / "scene.glb";
+    auto path = folder.path() / "scene.glb";
     write_bytes(path, glb());
     return path;
   }
@@ -145,7 +145,7 @@ class GltfBuilder {
       complete["buffers"] = {{{"byteLength", binary.size()}, {"uri", buffer_name}}};
     }
     write_bytes(folder.path() / "scene.bin", binary);
-    const auto path = folder.path() / "scene.gltf";
+    auto path = folder.path() / "scene.gltf";
     write_bytes(path, complete.dump());
     return path;
   }

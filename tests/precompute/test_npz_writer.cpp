@@ -1,20 +1,21 @@
 #include "rebounce/precompute/npz_writer.h"
 
 #include <gtest/gtest.h>
-#include <zip.h>
 
 #include <cstdlib>
-#include <map>
-#include <memory>
 
 #include "expect_error.h"
 #include "file_size_limit.h"
+#include "precompute/npz_reader.h"
 #include "temporary_folder.h"
 
 namespace rebounce {
 namespace {
 
 using test::expect_error;
+using test::Npy;
+using test::parse_npy;
+using test::unzip;
 using Names = std::vector<std::string>;
 
 const std::vector<Float3> kTriples{{1, 2, 3}, {4, 5, 0.1F}};
@@ -28,50 +29,6 @@ std::vector<NumpyArray> sample_arrays() {
           numpy_array<std::uint32_t>("indices", {3}, kIndices),
           numpy_array<std::uint64_t>("count", {}, kCounts),
           numpy_array("nothing", std::span<const Float3>())};
-}
-
-/// The files of a zip, each checked against its CRC by libzip.
-std::map<std::string, std::string> unzip(const std::filesystem::path& path) {
-  std::map<std::string, std::string> files;
-  int error = 0;
-  const std::unique_ptr<zip_t, decltype(&zip_discard)> archive(
-      zip_open(path.c_str(), ZIP_RDONLY | ZIP_CHECKCONS, &error), &zip_discard);
-  EXPECT_NE(archive, nullptr) << error;
-  for (zip_int64_t i = 0; archive && i < zip_get_num_entries(archive.get(), 0); ++i) {
-    zip_stat_t stat;
-    EXPECT_EQ(zip_stat_index(archive.get(), i, 0, &stat), 0);
-    EXPECT_EQ(stat.comp_method, ZIP_CM_STORE);
-    std::string bytes(stat.size, '\0');
-    zip_file_t* file = zip_fopen_index(archive.get(), i, 0);
-    EXPECT_EQ(zip_fread(file, bytes.data(), bytes.size()), static_cast<zip_int64_t>(stat.size));
-    EXPECT_EQ(zip_fclose(file), 0);
-    files[stat.name] = bytes;
-  }
-  return files;
-}
-
-struct Npy {
-  int version = 0;
-  std::string header;
-  std::string data;
-};
-
-Npy parse_npy(const std::string& bytes) {
-  EXPECT_EQ(bytes.substr(0, 6), "\x93NUMPY");
-  Npy npy;
-  npy.version = bytes.at(6);
-  const int length_size = npy.version == 1 ? 2 : 4;
-  std::size_t length = 0;
-  for (int i = 0; i < length_size; ++i) {
-    length |= static_cast<std::size_t>(static_cast<unsigned char>(bytes.at(8 + i))) << (8 * i);
-  }
-  const std::size_t begin = 8 + length_size;
-  EXPECT_EQ((begin + length) % 64, 0U);
-  npy.header = bytes.substr(begin, length);
-  npy.data = bytes.substr(begin + length);
-  EXPECT_EQ(npy.header.back(), '\n');
-  npy.header.resize(npy.header.find_last_not_of(" \n") + 1);
-  return npy;
 }
 
 template <typename T>

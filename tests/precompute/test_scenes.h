@@ -2,8 +2,11 @@
 
 // Scenes made by hand for the tests of the offline stage.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/glm.hpp>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -60,6 +63,27 @@ inline void add_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high,
       // (u, v) turns counter-clockwise seen from +axis.
       const bool faces_up = inwards ? side == 0 : side == 1;
       if (!faces_up) std::swap(corner[1], corner[3]);
+      add_polygon(scene, corner, material);
+    }
+  }
+}
+
+/// A ball of radius 1 around the origin, of longitudes and latitudes; `inwards` makes a dome of it.
+inline void add_ball(Scene& scene, int longitudes, int latitudes, bool inwards,
+                     std::uint32_t material = 0) {
+  const auto point = [&](int i, int j) {
+    const double theta = std::numbers::pi * i / latitudes;
+    const double phi = 2 * std::numbers::pi * j / longitudes;
+    return glm::dvec3(std::sin(theta) * std::cos(phi), std::cos(theta),
+                      -std::sin(theta) * std::sin(phi));
+  };
+  for (int i = 0; i < latitudes; ++i) {
+    for (int j = 0; j < longitudes; ++j) {
+      std::vector<glm::dvec3> corner = {point(i, j), point(i + 1, j), point(i + 1, j + 1),
+                                        point(i, j + 1)};
+      if (i == 0) corner.erase(corner.begin() + 3);              // the pole
+      if (i == latitudes - 1) corner.erase(corner.begin() + 1);  // the other
+      if (inwards) std::reverse(corner.begin(), corner.end());
       add_polygon(scene, corner, material);
     }
   }

@@ -11,7 +11,7 @@ namespace rebounce {
 /// What a side of a triangle is to the exchange of light.
 enum class SideKind : std::uint8_t {
   kLit,      ///< it has a patch
-  kUnlit,    ///< it sees no other surface, or is the back of a one-sided triangle
+  kUnlit,    ///< it sees nothing that lights it, or is the back of a one-sided triangle
   kCovered,  ///< another triangle that faces the same way lies in the same place, and has the patch
 };
 
@@ -25,22 +25,27 @@ struct TriangleSides {
 
 /// Finds what each side of every triangle [t] is.
 ///
-/// A one-sided triangle has its front. Of a double-sided one, a side that sees no other surface
-/// (the outside of a room's wall) neither gives light to anything nor gets any back, so leaving it
-/// out of the system changes nothing. At least one side of every triangle is kept for that matter.
-/// Of copies that lie in one another (a box whose bottom is flush with the floor) only one can be
-/// seen, and shadow rays between points cannot tell which: a side that is covered all over by
-/// others gives way to them. `tracer` holds all triangles of the scene. Deterministic.
+/// - A one-sided triangle has its front.
+/// - Of a double-sided one, a side that sees no other surface (the outside of a room's wall)
+///   neither gives light to anything nor gets any back, so leaving it out of the system changes
+///   nothing. One side is kept for that matter.
+/// - A side that lies flat on the front of another surface (the bottom of a box on a floor) sees
+///   nothing either, and rays from it would begin beyond that surface.
+/// - Of copies that lie in one another (z-fighting) only one can be seen, and shadow rays between
+///   points cannot tell which: a side that is covered all over by others gives way to them.
+///
+/// `tracer` holds all triangles of the scene. Deterministic.
 std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer);
 
-/// Sides that lie where a point of a surface is and face the way it faces.
+/// A side that lies where a point of a surface is.
 struct CoincidentSide {
   std::uint32_t triangle;
   bool front;
+  bool same_way;  ///< it faces the way the surface faces; else it faces, and touches, the surface
 };
 
-/// Finds the sides of other triangles than `triangle` that lie at `point`, to within the precision
-/// of rays, and face along `normal` (unit) as it does. Backs of one-sided triangles do not count.
+/// Finds sides of other triangles than `triangle` that lie at `point`, to within the precision of
+/// rays: of double-sided ones the side that faces along `normal` (unit), of others their front.
 /// `is_double_sided`(t) tells which are; `hits` is scratch.
 template <typename IsDoubleSided>
 void find_coincident_sides(const RayTracer& tracer, const Float3& point, const Float3& normal,
@@ -55,8 +60,9 @@ void find_coincident_sides(const RayTracer& tracer, const Float3& point, const F
   sides.clear();
   tracer.intersect_all(ray, hits);
   for (const Hit& hit : hits) {
-    if (hit.triangle == triangle || !(hit.front || is_double_sided(hit.triangle))) continue;
-    sides.push_back({hit.triangle, hit.front});
+    if (hit.triangle == triangle) continue;
+    const bool same_way = hit.front || is_double_sided(hit.triangle);
+    sides.push_back({hit.triangle, hit.front || !same_way, same_way});
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -10,12 +11,16 @@ namespace rebounce {
 /// patches that meet at its position on the same side of any crease (normals within 40 degrees),
 /// weighted by the angle they take up there. Vertices of sides without patches get no weights.
 ///
-/// `shown_patch` [t] is the patch of each display triangle, or kNone.
-/// `absorbed` [n] is the part of each patch's view that meets back faces. Where that is not zero,
-/// the patch is partly covered (a box stands on that part of the floor) and its mean is too dark
-/// for the part that is seen, by just that factor: weights are such that the sum of weight x (1 -
-/// absorbed) is 1. Patches that are all but covered are left out.
+/// A patch of which only a part is in the open (the rim of a rug lies on it, a wall cuts through
+/// it) has a mean that belongs to neither part. Such patches are told by short rays above them;
+/// their vertices take their value from patches that lie in the open all over, if need be from the
+/// next ring, so that no dark or bright rim shows around what stands or hangs close to a surface.
+///
+/// `shown_patch` [t] is the patch of each display triangle, or kNone. `absorbed` [n] is the part of
+/// each patch's view that meets back faces; where nothing better is left, the weights make up for
+/// it: the sum of weight x (1 - absorbed) is 1. `tracer` holds the surface of `mesh`.
 void compute_reconstruction_weights(std::span<const std::uint32_t> shown_patch,
-                                    std::span<const float> absorbed, DisplayMesh& mesh);
+                                    std::span<const float> absorbed, const RayTracer& tracer,
+                                    DisplayMesh& mesh);
 
 }  // namespace rebounce

@@ -22,8 +22,8 @@ struct ScreenImage {
 /// compressed by one factor, so that hues stay, with highlights that fade to white.
 ScreenImage tone_map(const Picture& picture);
 
-/// Writes a PNG file whole or not at all (a temporary file beside `path`, flushed, then renamed).
-/// Throws Error if the folder is missing, not writable or full.
+/// Writes a PNG file whole or not at all (see AtomicFile). Throws Error if the folder is missing,
+/// not writable or full.
 void write_png(const std::filesystem::path& path, const ScreenImage& image);
 
 }  // namespace rebounce

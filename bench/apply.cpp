@@ -1,0 +1,251 @@
+// Relighting beside the bandwidth with which the same run merely reads as many bytes.
+
+#include <omp.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+
+#include "instruction_sets.h"
+#include "program.h"
+#include "read_buffer.h"
+#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/measured_error.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/runtime/direct_lighting.h"
+#include "rebounce/runtime/gauss_seidel.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "tile_product.h"
+#include "timing.h"
+
+namespace rebounce::bench {
+namespace {
+
+struct ApplyOptions {
+  std::vector<std::string> inputs;
+  BuildSettings settings;
+  CommonOptions common{.repeats = 51};
+};
+
+TransferData load_or_build(const std::string& input, const BuildSettings& settings) {
+  if (std::filesystem::path(input).extension() == ".safetensors") {
+    return load_transfer_file(input);
+  }
+  BuildReport report;
+  return build_transfer_data(input, settings, report);
+}
+
+/// The operator of `data` in f32, built anew if the data hold another.
+std::shared_ptr<const DenseOperator> operator_f32(const TransferData& data) {
+  auto dense = std::dynamic_pointer_cast<const DenseOperator>(data.transfer);
+  if (dense && dense->storage().precision == Precision::kF32) return dense;
+  return build_dense_transfer(data.exchange, data.patches, Precision::kF32);
+}
+
+std::shared_ptr<const DenseOperator> to_f16(const DenseOperator& dense) {
+  DenseOperator::Storage storage = dense.storage();
+  storage.precision = Precision::kF16;
+  storage.tiles_f16 = SharedArray(DenseOperator::encode_half(storage.tiles_f32.span()));
+  storage.tiles_f32 = {};
+  return std::make_shared<const DenseOperator>(std::move(storage));
+}
+
+/// The light that the patches send out first under one point light in the free space of the scene.
+std::vector<Float3> light_one_lamp(const TransferData& data) {
+  const RayTracer tracer(data.mesh.position,
+                         std::span(data.mesh.triangle).first(data.mesh.surface_count()));
+  const std::vector<Light> lamp = random_point_lights(data, tracer, 1, 1);
+  std::vector<Float3> exitance(data.patches.size());
+  DirectLighting(data, tracer).compute(lamp, {}, exitance);
+  for (std::size_t i = 0; i < exitance.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
+  }
+  if (area_norm(exitance, data.patches.area) == 0) {
+    throw Error("the test lamp lights nothing; the scene must have lit patches that reflect");
+  }
+  return exitance;
+}
+
+/// Something to time, with what the table says about it.
+struct Measure {
+  std::string name, instruction_set = {}, precision = {};
+  std::size_t bytes = 0;               ///< that one run must read or write at least
+  std::function<double()> error = {};  ///< of the last run's result; empty: it has none
+  TimedCase timed;
+};
+
+const char* name(Precision precision) {
+  return precision == Precision::kF16 ? "f16" : "f32";
+}
+
+class ApplyBenchmark {
+ public:
+  ApplyBenchmark(const TransferData& data, const CommonOptions& options)
+      : scene_(std::filesystem::path(data.record.scene_name).stem().string()),
+        patches_(data.patches),
+        options_(options),
+        f32_(operator_f32(data)),
+        f16_(to_f16(*f32_)),
+        rows_(data.exchange, data.patches.area),
+        initial_exitance_(light_one_lamp(data)),
+        truth_(ReferenceSolver(data.exchange, data.patches).indirect_irradiance(initial_exitance_)),
+        result_(patches_.size()),
+        workspace_(std::max(f32_->workspace_size(), f16_->workspace_size())),
+        read_f32_(f32_->bytes()),
+        read_f16_(f16_->bytes()),
+        read_rows_(gather_bytes()) {}
+
+  /// Measures everything with `threads` threads.
+  void run(int threads, Table& table) {
+    omp_set_num_threads(threads);
+    measures_.clear();
+    for (const auto& dense : {f32_, f16_}) add_apply(*dense);
+    add_gather();
+    if (threads == 1) add_gauss_seidel();
+
+    std::vector<TimedCase> cases;
+    for (const Measure& measure : measures_) cases.push_back(measure.timed);
+    const std::vector<Timing> timings = time_interleaved(cases, {.rounds = options_.repeats});
+    report(threads, timings, table);
+  }
+
+ private:
+  std::size_t gather_bytes() const { return rows_.bytes() + 2 * vector_bytes(); }
+  std::size_t vector_bytes() const { return patches_.size() * sizeof(Float3); }
+
+  double error_of(std::span<const Float3> indirect_irradiance) const {
+    return relative_difference(indirect_irradiance, truth_, patches_.area);
+  }
+
+  void add_read(ReadBuffer& buffer, std::size_t bytes) {
+    measures_.push_back(
+        {.name = "read", .bytes = bytes, .timed = {.work = [&buffer] { buffer.read(); }}});
+  }
+
+  void add_apply(const DenseOperator& dense) {
+    const Precision precision = dense.storage().precision;
+    add_read(precision == Precision::kF16 ? read_f16_ : read_f32_, dense.bytes());
+    const auto apply = [this, &dense] { dense.apply(initial_exitance_, result_, workspace_); };
+    const auto apply_error = [this, apply] {
+      apply();
+      return error_of(result_);
+    };
+    measures_.push_back({.name = "apply",
+                         .instruction_set = dense_kernels().instruction_set,
+                         .precision = name(precision),
+                         .bytes = dense.bytes(),
+                         .error = apply_error,
+                         .timed = {.work = apply}});
+    for (const DenseKernels* kernels : available_kernels()) add_tiles(dense, *kernels);
+  }
+
+  void add_tiles(const DenseOperator& dense, const DenseKernels& kernels) {
+    const auto product = std::make_shared<TileProduct>(dense, kernels, initial_exitance_);
+    const auto multiply = [product] { product->run(); };
+    const auto error = [this, product] { return error_of(product->indirect_irradiance()); };
+    measures_.push_back({.name = "tiles alone",
+                         .instruction_set = kernels.instruction_set,
+                         .precision = name(dense.storage().precision),
+                         .bytes = dense.bytes(),
+                         .error = error,
+                         .timed = {.work = multiply}});
+  }
+
+  void add_gather() {
+    add_read(read_rows_, gather_bytes());
+    const auto gather = [this] { rows_.gather(initial_exitance_, result_); };
+    const auto first_bounce_error = [this, gather] {
+      gather();
+      return error_of(result_);
+    };
+    measures_.push_back({.name = "gather",
+                         .precision = "f32",
+                         .bytes = gather_bytes(),
+                         .error = first_bounce_error,
+                         .timed = {.work = gather}});
+  }
+
+  void add_gauss_seidel() {
+    const GaussSeidelSettings one_sweep{.max_sweeps = 1, .residual = 0};
+    const auto start = [this] { std::ranges::fill(result_, Float3{0, 0, 0}); };
+    const auto sweep = [this, one_sweep] {
+      solve_gauss_seidel(rows_, patches_.reflectance, patches_.area, initial_exitance_, one_sweep,
+                         result_);
+    };
+    const auto error = [this, start, sweep] {
+      start();
+      sweep();
+      std::vector<Float3> gathered(patches_.size());
+      rows_.gather(result_, gathered);
+      return error_of(gathered);
+    };
+    measures_.push_back({.name = "Gauss-Seidel sweep",
+                         .precision = "f32",
+                         .bytes = rows_.bytes() + 4 * vector_bytes(),
+                         .error = error,
+                         .timed = {.work = sweep, .prepare = start}});
+  }
+
+  static Table::Cell text(const std::string& value) {
+    return value.empty() ? Table::Cell() : Table::Cell(value);
+  }
+
+  void report(int threads, const std::vector<Timing>& timings, Table& table) const {
+    double read_seconds = 0;
+    for (std::size_t k = 0; k < measures_.size(); ++k) {
+      const Measure& measure = measures_[k];
+      const Timing& time = timings[k];
+      const bool is_read = !measure.error;
+      if (is_read) read_seconds = time.median;  // each read comes before what is measured by it
+      table.add({scene_, patches_.size(), threads, measure.name, text(measure.instruction_set),
+                 text(measure.precision), time.median * 1e6, time.spread, measure.bytes,
+                 static_cast<double>(measure.bytes) / time.median / 1e9,
+                 is_read ? Table::Cell() : Table::Cell(read_seconds / time.median),
+                 is_read ? Table::Cell() : Table::Cell(measure.error())});
+    }
+  }
+
+  std::string scene_;
+  const PatchTable& patches_;
+  const CommonOptions& options_;
+  std::shared_ptr<const DenseOperator> f32_, f16_;
+  FormFactorRows rows_;
+  std::vector<Float3> initial_exitance_, truth_, result_;
+  std::vector<float> workspace_;
+  ReadBuffer read_f32_, read_f16_, read_rows_;
+  std::vector<Measure> measures_;
+};
+
+void run(const ApplyOptions& options) {
+  Table table({"scene", "patches", "threads", "measure", "instructions", "precision",
+               "microseconds", "spread", "bytes", "GB/s", "of read", "error"});
+  for (const std::string& input : options.inputs) {
+    const TransferData data = load_or_build(input, options.settings);
+    ApplyBenchmark benchmark(data, options.common);
+    benchmark.run(1, table);
+    const int all = thread_count(options.common);
+    if (all > 1) benchmark.run(all, table);
+    omp_set_num_threads(all);
+  }
+  publish("apply", table, options.common);
+}
+
+}  // namespace
+}  // namespace rebounce::bench
+
+int main(int argc, char** argv) {
+  rebounce::bench::ApplyOptions options;
+  CLI::App app("Times a relight beside the bandwidth of memory in the same run.", "bench_apply");
+  app.add_option("inputs", options.inputs, "Transfer files, or scenes to build them from")
+      ->required();
+  app.add_option("--patches", options.settings.subdivision.patch_count,
+                 "Patches of each scene, about")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  add_common_options(app, options.common);
+  return rebounce::bench::run_program(app, argc, argv, options.common,
+                                      [&] { rebounce::bench::run(options); });
+}

@@ -1,0 +1,76 @@
+#include "program.h"
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <exception>
+
+#include "machine.h"
+#include "rebounce/transfer/atomic_file.h"
+
+namespace rebounce::bench {
+namespace {
+
+constexpr int kBadInput = 1, kUsage = 2;
+
+void write_text(const std::string& path, const std::string& text) {
+  AtomicFile file(path);
+  file.write(std::as_bytes(std::span(text)));
+  file.commit();
+}
+
+}  // namespace
+
+void add_common_options(CLI::App& app, CommonOptions& options) {
+  app.add_option("--repeats", options.repeats, "Measurements of each thing")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  app.add_option("--threads", options.threads, "Threads to use; 0: one per processor")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+  app.add_option("--json", options.json, "Write the results to this file, as JSON");
+  app.add_option("--csv", options.csv, "Write the results to this file, as CSV");
+}
+
+int thread_count(const CommonOptions& options) {
+  return options.threads > 0 ? options.threads : omp_get_num_procs();
+}
+
+int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
+                const std::function<void()>& work) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsage;
+  }
+  try {
+    omp_set_num_threads(thread_count(options));
+    work();
+    return 0;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "{}: {}\n", app.get_name(), error.what());
+    return kBadInput;
+  }
+}
+
+void publish(const std::string& benchmark, const Table& table, const CommonOptions& options) {
+  const Machine machine = describe_machine();
+  const int threads = thread_count(options);
+  fmt::print("{}: {}, {} processors, {} threads; {}, {}; commit {}; medians of {}\n\n{}", benchmark,
+             machine.processor, machine.processor_count, threads, machine.compiler,
+             machine.build_type, machine.commit, options.repeats, table.text());
+  if (!options.csv.empty()) write_text(options.csv, table.csv());
+  if (options.json.empty()) return;
+  const nlohmann::ordered_json json = {{"benchmark", benchmark},
+                                       {"processor", machine.processor},
+                                       {"processors", machine.processor_count},
+                                       {"threads", threads},
+                                       {"compiler", machine.compiler},
+                                       {"build_type", machine.build_type},
+                                       {"commit", machine.commit},
+                                       {"repeats", options.repeats},
+                                       {"rows", table.json()}};
+  write_text(options.json, json.dump(2) + "\n");
+}
+
+}  // namespace rebounce::bench

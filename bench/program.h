@@ -1,0 +1,32 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "table.h"
+
+namespace rebounce::bench {
+
+/// Options that every benchmark has.
+struct CommonOptions {
+  int repeats = 0;            ///< measurements of each thing
+  int threads = 0;            ///< OpenMP threads; 0: one per processor
+  std::string json{}, csv{};  ///< files to write the results to; empty: none
+};
+
+/// Adds them; the default of `repeats` is what `options` holds.
+void add_common_options(CLI::App& app, CommonOptions& options);
+
+/// Number of threads that `options` asks for.
+int thread_count(const CommonOptions& options);
+
+/// Parses the command line, runs `work` with that many OpenMP threads, and returns the status to
+/// exit with: 0, or after a line on standard error 1 (bad input) or 2 (usage).
+int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
+                const std::function<void()>& work);
+
+/// Prints where the figures come from and the table, and writes the files that `options` names.
+void publish(const std::string& benchmark, const Table& table, const CommonOptions& options);
+
+}  // namespace rebounce::bench

@@ -1,0 +1,66 @@
+#pragma once
+
+// How far the indirect irradiance of a transfer file is from the path tracer's: what patches, form
+// factors, direct light at patches and reconstruction cost together.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/precompute/progress.h"
+#include "rebounce/transfer/transfer_data.h"
+#include "reference/path_tracer.h"
+
+namespace rebounce::reference {
+
+/// A relative difference in the area-weighted L2 norm over places and channels, both parts of the
+/// norm of the truth.
+struct RelativeError {
+  /// The noise of the path tracer is taken out: sqrt(max(0, measured² - noise²)).
+  double error = 0;
+  double noise = 0;                ///< what the path tracer's noise alone would measure
+  std::size_t count = 0;           ///< places compared
+  std::size_t left_out_count = 0;  ///< places that could not be
+};
+
+struct PatchComparisonSettings {
+  /// Patches to compare, chosen in proportion to their area; all of them if there are no more, or
+  /// if it is 0. More: less chance in the figure, time in proportion.
+  std::size_t patch_count = 2000;
+  /// Points on each patch, rounded up to a multiple of kReplicateCount. More: less noise.
+  std::uint32_t points_per_patch = 64;
+  /// Paths from each point, rounded up likewise.
+  std::uint32_t samples_per_point = 64;
+  std::uint64_t seed = 1;
+};
+
+struct PatchComparison {
+  RelativeError relative;
+  std::vector<std::uint32_t> patch;  ///< [m] the compared patches, ascending
+  std::vector<Float3> truth;         ///< [m] the path tracer's means of H over them, lx
+};
+
+/// Compares `indirect_irradiance` [n] of the patches of `data` with the path tracer's mean over
+/// each of them: over points spread evenly over the patch's display triangles. `data` must have
+/// been made of `lit_scene.scene`. Throws Error if the sizes do not agree or no patch has a
+/// triangle, Cancelled when `progress` says so.
+PatchComparison compare_patch_means(const TransferData& data,
+                                    std::span<const Float3> indirect_irradiance,
+                                    const LitScene& lit_scene,
+                                    const PatchComparisonSettings& settings,
+                                    const Progress& progress = {});
+
+/// Compares the smooth reconstruction of `indirect_irradiance` [n] with the path tracer's `truth`
+/// at `points` (sample_surface), each of equal weight. The value at a point is that of the display
+/// mesh: patch values brought to its vertices by the reconstruction weights, then interpolated.
+///
+/// `mesh_tracer` holds the first surface_count triangles of data.mesh. Left out are points whose
+/// view is all but back faces (the floor under a box: nobody sees them) and points that the mesh
+/// does not have. Throws Error if the sizes do not agree or the mesh has no weights.
+RelativeError compare_reconstruction(const TransferData& data, const RayTracer& mesh_tracer,
+                                     std::span<const Float3> indirect_irradiance,
+                                     std::span<const SurfacePoint> points,
+                                     const IrradianceEstimate& truth);
+
+}  // namespace rebounce::reference

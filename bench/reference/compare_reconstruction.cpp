@@ -1,0 +1,115 @@
+#include <optional>
+
+#include "rebounce/precompute/lit_sides.h"
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/transfer/error.h"
+#include "reference/compare.h"
+#include "reference/error_sum.h"
+#include "reference/scene_surface.h"
+
+namespace rebounce::reference {
+namespace {
+
+/// Of faces that meet or cross at a place, those are meant whose normal is nearly the point's.
+constexpr double kSameSideCosine = 0.99;
+
+/// A point whose view is back faces by more than this is hidden: the floor under a box, or a
+/// ceiling a hair's breadth above a lamp. What the mesh shows there, nobody sees.
+constexpr float kHidden = 0.98F;
+
+/// A point of the display mesh.
+struct MeshPoint {
+  std::uint32_t triangle;
+  glm::dvec3 weight;  ///< barycentric, of its three vertices
+};
+
+/// The weights of the vertices of `corners` at `p`, which lies on the triangle.
+glm::dvec3 barycentric_weights(const TriangleCorners& corners, const glm::dvec3& p) {
+  const glm::dvec3 ab = corners.b - corners.a, ac = corners.c - corners.a, ap = p - corners.a;
+  const glm::dvec3 normal = glm::cross(ab, ac);
+  const double squared = glm::dot(normal, normal);
+  const double v = glm::dot(glm::cross(ap, ac), normal) / squared;
+  const double w = glm::dot(glm::cross(ab, ap), normal) / squared;
+  return {1 - v - w, v, w};
+}
+
+/// Finds points of the scene on the display mesh.
+class MeshLocator {
+ public:
+  /// Both must outlive it.
+  MeshLocator(const DisplayMesh& mesh, const RayTracer& tracer) : mesh_(mesh), tracer_(tracer) {}
+
+  /// The place of `point`; nothing where the mesh has no such side. Of copies that lie in one
+  /// another one that has a patch, if any has.
+  std::optional<MeshPoint> locate(const SurfacePoint& point) {
+    find_coincident_sides(
+        tracer_, point.position, point.normal, kNone,
+        [&](std::uint32_t t) { return mesh_.back_triangle[t] != kNone; }, hits_, sides_);
+    std::uint32_t found = kNone;
+    for (const CoincidentSide& side : sides_) {
+      const std::uint32_t t = side.front ? side.triangle : mesh_.back_triangle[side.triangle];
+      const glm::dvec3 normal = corners(t).front_normal();
+      if (glm::dot(normal, to_dvec3(point.normal)) < kSameSideCosine) continue;
+      if (found == kNone || mesh_.triangle_patch[found] == kNone) found = t;
+    }
+    if (found == kNone) return {};
+    return MeshPoint{found, barycentric_weights(corners(found), to_dvec3(point.position))};
+  }
+
+ private:
+  TriangleCorners corners(std::uint32_t t) const { return {mesh_.position, mesh_.triangle[t]}; }
+
+  const DisplayMesh& mesh_;
+  const RayTracer& tracer_;
+  std::vector<Hit> hits_;
+  std::vector<CoincidentSide> sides_;
+};
+
+glm::dvec3 vertex_value(const DisplayMesh& mesh, std::span<const Float3> patch_value,
+                        std::uint32_t vertex) {
+  glm::dvec3 value(0);
+  for (std::uint32_t k = mesh.weight_begin[vertex]; k < mesh.weight_begin[vertex + 1]; ++k) {
+    value += static_cast<double>(mesh.weight[k]) * to_dvec3(patch_value[mesh.weight_patch[k]]);
+  }
+  return value;
+}
+
+Float3 reconstruct(const DisplayMesh& mesh, std::span<const Float3> patch_value,
+                   const MeshPoint& point) {
+  glm::dvec3 value(0);
+  for (int corner = 0; corner < 3; ++corner) {
+    value += point.weight[corner] *
+             vertex_value(mesh, patch_value,
+                          mesh.triangle[point.triangle][static_cast<std::size_t>(corner)]);
+  }
+  return to_float3(value);
+}
+
+}  // namespace
+
+RelativeError compare_reconstruction(const TransferData& data, const RayTracer& mesh_tracer,
+                                     std::span<const Float3> indirect_irradiance,
+                                     std::span<const SurfacePoint> points,
+                                     const IrradianceEstimate& truth) {
+  if (indirect_irradiance.size() != data.patches.size() || truth.mean.size() != points.size()) {
+    throw Error("comparison of the reconstruction: one entry per patch and point is needed");
+  }
+  if (data.mesh.weight_begin.size() != data.mesh.position.size() + 1) {
+    throw Error("comparison of the reconstruction: the mesh has no reconstruction weights");
+  }
+  MeshLocator locator(data.mesh, mesh_tracer);
+  ErrorSum sum;
+  std::size_t left_out = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const std::optional<MeshPoint> place = locator.locate(points[k]);
+    if (!place || truth.absorbed[k] > kHidden) {
+      ++left_out;
+      continue;
+    }
+    sum.add(1, reconstruct(data.mesh, indirect_irradiance, *place), truth.mean[k],
+            truth.standard_error[k]);
+  }
+  return sum.result(left_out);
+}
+
+}  // namespace rebounce::reference

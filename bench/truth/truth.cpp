@@ -1,0 +1,259 @@
+// bench_truth: how far the indirect light of the whole pipeline is from the path tracer's, for a
+// number of patches each.
+
+#include <fmt/format.h>
+#include <omp.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <memory>
+
+#include "console.h"
+#include "light_file.h"
+#include "rebounce/demo/camera.h"
+#include "rebounce/demo/image_file.h"
+#include "rebounce/demo/picture.h"
+#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/csv_writer.h"
+#include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/lit_sides.h"
+#include "rebounce/runtime/engine.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+#include "reference/compare.h"
+#include "reference/key_light.h"
+
+namespace rebounce {
+namespace {
+
+constexpr int kBadInput = 1, kUsage = 2;
+
+struct Options {
+  std::string scene, lights, csv, error_picture;
+  std::vector<std::size_t> patch_counts{1000, 4000};
+  bool key_light = false;
+  std::size_t point_count = 20000;
+  std::uint32_t samples = 512;
+  int direct_points = DirectLightingSettings{}.points_per_patch;
+  reference::PatchComparisonSettings patch_comparison;
+};
+
+/// One row of the result.
+struct Row {
+  std::size_t patch_count = 0;
+  reference::RelativeError patch_means, reconstruction;
+};
+
+/// The scene, its light, and the path tracer's truth at points of it: the same for every number of
+/// patches.
+class TruthBench {
+ public:
+  TruthBench(const Options& options, cli::ProgressBar& bar)
+      : options_(options),
+        bar_(bar),
+        scene_(import_gltf(options.scene)),
+        tracer_(reference::make_scene_tracer(scene_)),
+        sides_(find_lit_sides(scene_, tracer_)) {
+    choose_lights();
+    points_ = reference::sample_surface(scene_, sides_, options.point_count,
+                                        options.patch_comparison.seed);
+    truth_ =
+        reference::indirect_irradiance(lit_scene(), points_, options.samples,
+                                       options.patch_comparison.seed, progress("truth at points"));
+  }
+
+  Row run(std::size_t patch_count, const std::string& error_picture) {
+    const auto data = build(patch_count);
+    Engine engine(data, {.points_per_patch = options_.direct_points});
+    engine.relight(setup_.lights, setup_.sky);
+    reference::PatchComparisonSettings settings = options_.patch_comparison;
+    if (!error_picture.empty()) settings.patch_count = 0;  // a picture shows them all
+    const reference::PatchComparison patches = reference::compare_patch_means(
+        *data, engine.indirect_irradiance(), lit_scene(), settings, progress("truth on patches"));
+    if (!error_picture.empty()) draw_error(engine, patches, error_picture);
+    return {data->patches.size(), patches.relative,
+            reference::compare_reconstruction(*data, engine.tracer(), engine.indirect_irradiance(),
+                                              points_, truth_)};
+  }
+
+ private:
+  reference::LitScene lit_scene() const { return {scene_, tracer_, setup_.lights, setup_.sky}; }
+
+  Progress progress(const char* phase) {
+    return [this, phase](double fraction) { return bar_.update(phase, fraction); };
+  }
+
+  void choose_lights() {
+    if (!options_.lights.empty()) {
+      setup_ = cli::read_lights(options_.lights);
+    } else if (options_.key_light) {
+      setup_.lights = {reference::make_key_light(scene_, tracer_, sides_)};
+    } else {
+      setup_.lights = scene_.lights;
+    }
+    const bool emits = std::ranges::any_of(scene_.materials, [](const Material& m) {
+      return m.emitted_luminance != Float3{0, 0, 0};
+    });
+    if (setup_.lights.empty() && setup_.sky.luminance == 0 && !emits) {
+      throw Error(options_.scene + " has no light of its own; give --lights or --key-light");
+    }
+  }
+
+  std::shared_ptr<const TransferData> build(std::size_t patch_count) {
+    BuildSettings settings;
+    settings.subdivision.patch_count = patch_count;
+    BuildReport report;
+    return std::make_shared<const TransferData>(build_transfer_data(
+        options_.scene, settings, report,
+        [this](std::string_view phase, double part) { return bar_.update(phase, part); }));
+  }
+
+  /// |H - truth| of each patch, as a part of the truth's root mean square.
+  static std::vector<float> patch_errors(const Engine& engine,
+                                         const reference::PatchComparison& patches) {
+    const TransferData& data = engine.data();
+    double area = 0;
+    std::vector<Float3> truth(data.patches.size(), Float3{0, 0, 0});
+    for (std::size_t k = 0; k < patches.patch.size(); ++k) {
+      truth[patches.patch[k]] = patches.truth[k];
+    }
+    for (const float a : data.patches.area) area += a;
+    const double rms = area_norm(truth, data.patches.area) / std::sqrt(area);
+    std::vector<float> error(data.patches.size(), 0.0F);
+    for (const std::uint32_t i : patches.patch) {
+      const Float3& value = engine.indirect_irradiance()[i];
+      const double difference =
+          std::hypot(value[0] - truth[i][0], value[1] - truth[i][1], value[2] - truth[i][2]);
+      if (rms > 0) error[i] = static_cast<float>(difference / rms);
+    }
+    return error;
+  }
+
+  static void draw_error(const Engine& engine, const reference::PatchComparison& patches,
+                         const std::string& path) {
+    const TransferData& data = engine.data();
+    const std::vector<float> error = patch_errors(engine, patches);
+    PictureSettings settings;
+    settings.show = Show::kError;
+    settings.camera =
+        data.cameras.empty() ? fit_camera(data, engine.tracer()) : data.cameras.front();
+    PictureLight light;
+    light.error = error;
+    write_png(path, tone_map(render_picture(data, engine.tracer(), light, settings)));
+  }
+
+  const Options& options_;
+  cli::ProgressBar& bar_;
+  Scene scene_;
+  RayTracer tracer_;
+  std::vector<TriangleSides> sides_;
+  cli::LightSetup setup_;
+  std::vector<reference::SurfacePoint> points_;
+  reference::IrradianceEstimate truth_;
+};
+
+void print_row(const Row& row) {
+  const auto percent = [](double part) { return fmt::format("{:.2f} %", 100 * part); };
+  fmt::print("{:>8}  {:>9} {:>9} {:>7}  {:>9} {:>9} {:>7} {:>9}\n", row.patch_count,
+             percent(row.patch_means.error), percent(row.patch_means.noise), row.patch_means.count,
+             percent(row.reconstruction.error), percent(row.reconstruction.noise),
+             row.reconstruction.count, row.reconstruction.left_out_count);
+}
+
+void write_rows(const std::string& path, const std::vector<Row>& rows) {
+  std::vector<float> values;
+  for (const Row& row : rows) {
+    for (const double value :
+         {static_cast<double>(row.patch_count), row.patch_means.error, row.patch_means.noise,
+          static_cast<double>(row.patch_means.count), row.reconstruction.error,
+          row.reconstruction.noise, static_cast<double>(row.reconstruction.count),
+          static_cast<double>(row.reconstruction.left_out_count)}) {
+      values.push_back(static_cast<float>(value));
+    }
+  }
+  const CsvColumns columns{
+      {"patches", "patch_mean_error", "patch_mean_noise", "patches_compared",
+       "reconstruction_error", "reconstruction_noise", "points_compared", "points_left_out"},
+      values};
+  write_csv(path, {&columns, 1});
+}
+
+void run(const Options& options) {
+  std::vector<Row> rows;
+  {
+    cli::ProgressBar bar(true);
+    TruthBench bench(options, bar);
+    fmt::print("{:>8}  {:^27}  {:^37}\n", "", "patch means", "smooth reconstruction");
+    fmt::print("{:>8}  {:>9} {:>9} {:>7}  {:>9} {:>9} {:>7} {:>9}\n", "patches", "error", "noise",
+               "count", "error", "noise", "count", "left out");
+    for (const std::size_t patch_count : options.patch_counts) {
+      const bool last = patch_count == options.patch_counts.back();
+      rows.push_back(bench.run(patch_count, last ? options.error_picture : ""));
+      print_row(rows.back());
+      std::fflush(stdout);
+    }
+  }
+  if (!options.csv.empty()) write_rows(options.csv, rows);
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("scene", options.scene, "Scene: .glb or .gltf")->required();
+  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  auto* lights = app.add_option("--lights", options.lights,
+                                "Lights: .json, or a .glb that has some; by default the scene's");
+  app.add_flag("--key-light", options.key_light, "One point light at a place found for it")
+      ->excludes(lights);
+  app.add_option("--points", options.point_count, "Points at which the reconstruction is compared")
+      ->check(CLI::Range(1, 100000000))
+      ->capture_default_str();
+  app.add_option("--samples", options.samples, "Paths from each of these points")
+      ->check(CLI::Range(1, 100000000))
+      ->capture_default_str();
+  reference::PatchComparisonSettings& patches = options.patch_comparison;
+  app.add_option("--compared-patches", patches.patch_count, "Patches compared; 0: all of them")
+      ->capture_default_str();
+  app.add_option("--patch-points", patches.points_per_patch, "Points on each of these patches")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  app.add_option("--patch-samples", patches.samples_per_point, "Paths from each of these points")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  app.add_option("--direct-points", options.direct_points,
+                 "Points of a patch at which the pipeline looks at lamps")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+  app.add_option("--seed", patches.seed, "Of all that is random")->capture_default_str();
+  app.add_option("--csv", options.csv, "Table to write");
+  app.add_option("--error-picture", options.error_picture,
+                 "Picture (.png) of where the patch means err, for the last number of patches");
+  app.add_option_function<int>(
+         "--threads", [](int threads) { omp_set_num_threads(threads); },
+         "Threads to use; by default one per processor")
+      ->check(CLI::Range(1, 4096));
+}
+
+}  // namespace
+}  // namespace rebounce
+
+int main(int argc, char** argv) {
+  rebounce::cli::install_interrupt_handler();
+  rebounce::Options options;
+  CLI::App app("The pipeline's indirect light against a path tracer's.", "bench_truth");
+  rebounce::add_options(app, options);
+  try {
+    app.parse(argc, argv);
+    rebounce::run(options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : rebounce::kUsage;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "bench_truth: {}\n", error.what());
+    return rebounce::kBadInput;
+  }
+  return 0;
+}

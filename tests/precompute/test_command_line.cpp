@@ -1,0 +1,492 @@
+// The program `rebounce` as scripts see it: exit status, what it prints where, what it writes.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "precompute/npz_reader.h"
+#include "subprocess.h"
+#include "temporary_folder.h"
+
+namespace rebounce {
+namespace {
+
+using nlohmann::json;
+using test::Outcome;
+using Names = std::vector<std::string>;
+using Words = std::vector<std::string>;
+
+constexpr int kDone = 0, kBadInput = 1, kUsage = 2;
+constexpr int kPatchCount = 300;
+
+const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
+const std::string kScene = kScenes + "cornell_box.gltf";
+const std::string kLights = kScenes + "ceiling_point.lights.json";
+const Words kSetups = {"own_lamp", "ceiling_point", "coloured_pair", "spot_on_red_wall"};
+
+bool is_one_line(const std::string& text) {
+  return !text.empty() && text.find('\n') == text.size() - 1;
+}
+
+class CommandLine : public testing::Test {
+ protected:
+  Outcome run(Words words) {
+    words.insert(words.begin(), REBOUNCE_PROGRAM);
+    return test::Subprocess(words, printed_ / "out", printed_ / "err").finish();
+  }
+
+  /// Runs what must succeed with --json; its summary.
+  json summary_of(Words words) {
+    words.emplace_back("--json");
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    json summary = json::parse(outcome.out, nullptr, false);
+    EXPECT_TRUE(summary.is_object()) << outcome.out;
+    return summary;
+  }
+
+  /// Runs what must fail because of its input: status 1, one line that holds `part`, no file.
+  void expect_refused(Words words, const std::string& part) {
+    const Names before = folder_.names();
+    words.emplace_back("--quiet");
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kBadInput) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("rebounce: ")) << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err << "lacks " << part;
+    EXPECT_EQ(folder_.names(), before) << part;
+  }
+
+  /// Precomputes the Cornell box; its transfer file.
+  std::string precompute(const std::string& name, const Words& options = {}) {
+    Words words = {"precompute", kScene,     "--patches", std::to_string(kPatchCount),
+                   "-o",         path(name), "--quiet"};
+    words.insert(words.end(), options.begin(), options.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    EXPECT_EQ(outcome.out + outcome.err, "");
+    return path(name);
+  }
+
+  std::string write(const std::string& name, const std::string& text) {
+    test::write_bytes(folder_ / name, text);
+    return path(name);
+  }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  const test::TemporaryFolder folder_;               // what the program is asked to write
+  const test::TemporaryFolder printed_{"-printed"};  // what it prints
+};
+
+/// A table of numbers under a line of names.
+struct Table {
+  Words names;
+  std::vector<std::vector<double>> rows;
+};
+
+Table read_csv(const std::string& path) {
+  std::istringstream lines(test::read_bytes(path));
+  Table table;
+  std::string line, cell;
+  std::getline(lines, line);
+  for (std::istringstream cells(line); std::getline(cells, cell, ',');) table.names.push_back(cell);
+  while (std::getline(lines, line)) {
+    std::vector<double>& row = table.rows.emplace_back();
+    for (std::istringstream cells(line); std::getline(cells, cell, ',');) {
+      row.push_back(std::stod(cell));
+    }
+  }
+  return table;
+}
+
+/// Largest difference in columns [first, first + 3), as a part of the largest value there.
+double difference(const Table& a, const Table& b, std::size_t first) {
+  double largest = 0, apart = 0;
+  for (std::size_t i = 0; i < a.rows.size(); ++i) {
+    for (std::size_t c = first; c < first + 3; ++c) {
+      largest = std::max(largest, a.rows[i].at(c));
+      apart = std::max(apart, std::abs(a.rows[i].at(c) - b.rows[i].at(c)));
+    }
+  }
+  EXPECT_GT(largest, 0);
+  return apart / largest;
+}
+
+TEST_F(CommandLine, HelpsAndTellsItsVersion) {
+  EXPECT_TRUE(run({"--version"}).out.starts_with("rebounce "));
+  for (const Words& words : {Words{"--help"},
+                             {"precompute", "--help"},
+                             {"info", "--help"},
+                             {"solve", "--help"},
+                             {"export", "--help"},
+                             {"render", "--help"}}) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << words.front();
+    EXPECT_NE(outcome.out.find("Usage: "), std::string::npos) << words.front();
+    EXPECT_EQ(outcome.err, "") << words.front();
+  }
+}
+
+TEST_F(CommandLine, RefusesWrongUsageWithStatusTwo) {
+  const std::string out = path("out.safetensors");
+  const std::pair<Words, std::string> cases[] = {
+      {{}, "subcommand"},
+      {{"relight"}, "relight"},
+      {{"--frob"}, "--frob"},
+      {{"precompute"}, "required"},
+      {{"precompute", kScene}, "--output"},
+      {{"precompute", kScene, "-o", out, "--frob"}, "--frob"},
+      {{"precompute", kScene, "-o", out, "--patches", "0"}, "--patches"},
+      {{"precompute", kScene, "-o", out, "--patches", "many"}, "--patches"},
+      {{"precompute", kScene, "-o", out, "--patch-size", "-1"}, "--patch-size"},
+      {{"precompute", kScene, "-o", out, "--patches", "9", "--patch-size", "1"}, "--patch-size"},
+      {{"precompute", kScene, "-o", out, "--operator", "cubic"}, "--operator"},
+      {{"precompute", kScene, "-o", out, "--precision", "f8"}, "--precision"},
+      {{"precompute", kScene, "-o", out, "--memory-limit", "0"}, "--memory-limit"},
+      {{"precompute", kScene, "-o", out, "--threads", "-1"}, "--threads"},
+      {{"info"}, "required"},
+      {{"solve", out}, "--output"},
+      {{"solve", out, "-o", path("x.txt")}, ".npz"},
+      {{"solve", out, "-o", path("x.csv"), "--method", "guess"}, "--method"},
+      {{"solve", out, "-o", path("x.csv"), "--iterations", "0"}, "--iterations"},
+      {{"solve", out, "-o", path("x.csv"), "--residual", "-1"}, "--residual"},
+      {{"export", out, "-o", path("x.npz")}, "--what"},
+      {{"export", out, "-o", path("x.csv"), "--what", "mesh"}, ".npz"},
+      {{"render", out, "-o", path("x.jpg")}, ".png"},
+      {{"render", out, "-o", path("x.png"), "--show", "all"}, "--show"},
+  };
+  for (const auto& [words, part] : cases) {
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kUsage) << outcome.err;
+    EXPECT_EQ(outcome.out, "") << part;
+    EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("rebounce: ")) << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err << "lacks " << part;
+  }
+  EXPECT_EQ(folder_.names(), Names{});
+}
+
+TEST_F(CommandLine, RefusesBadInputInOneLine) {
+  const std::string file = precompute("box.safetensors");
+  const std::string nowhere = path("missing/x");
+  expect_refused({"precompute", path("no.glb"), "-o", path("x.safetensors")}, "no.glb");
+  expect_refused({"precompute", write("no.gltf", "{"), "-o", path("x.safetensors")}, "no.gltf");
+  expect_refused({"precompute", kScene, "-o", nowhere}, "create the folder");
+  expect_refused({"info", path("no.safetensors")}, "no.safetensors");
+  expect_refused({"info", kScene}, "cornell_box.gltf");
+  expect_refused({"solve", path("no.safetensors"), "-o", path("x.csv")}, "no.safetensors");
+  expect_refused({"solve", file, "--lights", path("no.json"), "-o", path("x.csv")}, "no.json");
+  expect_refused({"solve", file, "--lights", kScene, "-o", path("x.csv")}, "KHR_lights_punctual");
+  expect_refused({"solve", file, "-o", nowhere + ".csv"}, "create the folder");
+  expect_refused({"solve", file, "-o", nowhere + ".npz"}, "create the folder");
+  expect_refused({"export", file, "--what", "mesh", "-o", nowhere + ".npz"}, "create the folder");
+  expect_refused({"render", file, "-o", nowhere + ".png"}, "create the folder");
+  expect_refused({"render", file, "--size", "0x9", "-o", path("x.png")}, "WIDTHxHEIGHT");
+  expect_refused({"render", file, "--size", "640", "-o", path("x.png")}, "WIDTHxHEIGHT");
+  expect_refused({"render", file, "--camera", "7", "-o", path("x.png")}, "camera");
+  expect_refused({"render", file, "--camera", "1,2,3,4,5,x", "-o", path("x.png")}, "camera");
+}
+
+TEST_F(CommandLine, RefusesADamagedFile) {
+  std::string bytes = test::read_bytes(precompute("box.safetensors"));
+  bytes[bytes.size() / 2] ^= 1;
+  expect_refused({"info", write("box.safetensors", bytes)}, "checksum");
+  bytes.resize(bytes.size() / 2);
+  expect_refused({"info", write("box.safetensors", bytes)}, "box.safetensors");
+}
+
+TEST_F(CommandLine, SaysWhatScriptsRelyOn) {
+  const std::string file = path("box.safetensors");
+  const Words info_keys = {"format_version", "scene_hash",      "patch_count", "operator",
+                           "operator_bytes", "bytes_per_patch", "tolerance",   "error_mean",
+                           "error_max",      "error_bound"};
+  const json made = summary_of({"precompute", kScene, "--patches", "300", "-o", file});
+  const json info = summary_of({"info", file});
+  for (const std::string& key : info_keys) {
+    EXPECT_TRUE(info.contains(key)) << key;
+    EXPECT_EQ(made.value(key, json()), info.value(key, json(0))) << key;
+  }
+  for (const char* key : {"seconds", "rays", "peak_memory_bytes", "report"}) {
+    EXPECT_TRUE(made.contains(key)) << key;
+  }
+  EXPECT_NEAR(info["patch_count"].get<double>(), kPatchCount, 0.2 * kPatchCount);
+  EXPECT_EQ(info["operator"], "dense");
+  EXPECT_EQ(info["file_bytes"], test::read_bytes(file).size());
+  EXPECT_GT(made["seconds"]["total"].get<double>(), 0);
+  EXPECT_LT(info["error_max"].get<double>(), 1e-5);
+
+  const json solved = summary_of({"solve", file, "-o", path("x.csv"), "--method", "gauss-seidel"});
+  EXPECT_EQ(solved["method"], "gauss-seidel");
+  EXPECT_GT(solved["sweeps"].get<int>(), 1);
+  EXPECT_LT(solved["residual"].get<double>(), 1e-6);
+  EXPECT_GT(solved["microseconds"].get<double>(), 0);
+}
+
+TEST_F(CommandLine, MeetsThePatchSize) {
+  const json made = summary_of(
+      {"precompute", kScene, "--patch-size", "0.1", "-o", path("box.safetensors"), "--quiet"});
+  // The surfaces measure 2.1 m2, and the patches are right triangles, of 0.1 m at the longest side
+  // down to half of that.
+  EXPECT_GT(made["patch_count"].get<int>(), 2.1 / 0.0025);
+  EXPECT_LT(made["patch_count"].get<int>(), 2.1 / 0.000625);
+}
+
+TEST_F(CommandLine, SolvesTheSameByEitherMethod) {
+  const std::string file = precompute("box.safetensors");
+  const std::string exact = path("transfer.csv"), iterated = path("gauss-seidel.csv");
+  for (const std::string& setup : kSetups) {
+    const std::string lights = kScenes + setup + ".lights.json";
+    summary_of({"solve", file, "--lights", lights, "-o", exact});
+    summary_of({"solve", file, "--lights", lights, "-o", iterated, "--method", "gauss-seidel",
+                "--residual", "1e-7"});
+    const Table a = read_csv(exact), b = read_csv(iterated);
+    ASSERT_EQ(a.names,
+              (Words{"direct_irradiance_r", "direct_irradiance_g", "direct_irradiance_b",
+                     "indirect_irradiance_r", "indirect_irradiance_g", "indirect_irradiance_b",
+                     "radiosity_r", "radiosity_g", "radiosity_b"}));
+    ASSERT_EQ(a.names, b.names);
+    ASSERT_NEAR(static_cast<double>(a.rows.size()), kPatchCount, 0.2 * kPatchCount);
+    ASSERT_EQ(a.rows.size(), b.rows.size());
+    EXPECT_LT(difference(a, b, 3), 1e-4) << setup;
+    EXPECT_LT(difference(a, b, 6), 1e-4) << setup;
+  }
+}
+
+TEST_F(CommandLine, WritesTheSameSolutionAsCsvAndNpz) {
+  const std::string file = precompute("box.safetensors");
+  summary_of({"solve", file, "--lights", kLights, "-o", path("a.csv")});
+  summary_of({"solve", file, "--lights", kLights, "-o", path("a.npz")});
+  const Table table = read_csv(path("a.csv"));
+  const auto arrays = test::unzip(path("a.npz"));
+  ASSERT_EQ(arrays.size(), 3U);
+  const std::string names[] = {"direct_irradiance", "indirect_irradiance", "radiosity"};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto values = test::npz_values<float>(arrays, names[k], "<f4");
+    ASSERT_EQ(values.size(), 3 * table.rows.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      ASSERT_EQ(values[i], static_cast<float>(table.rows[i / 3][3 * k + i % 3]));
+    }
+  }
+}
+
+TEST_F(CommandLine, ExportsReciprocalFormFactors) {
+  summary_of(
+      {"export", precompute("box.safetensors"), "--what", "form-factors", "-o", path("f.npz")});
+  const auto arrays = test::unzip(path("f.npz"));
+  const auto form_factor = test::npz_values<double>(arrays, "form_factor", "<f8");
+  const auto area = test::npz_values<float>(arrays, "area", "<f4");
+  const std::size_t n = area.size();
+  ASSERT_EQ(form_factor.size(), n * n);
+  std::size_t seeing = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    double row_sum = 0;
+    for (std::size_t j = 0; j < n; ++j) {
+      const double there = area[i] * form_factor[i * n + j];
+      ASSERT_NEAR(there, area[j] * form_factor[j * n + i], 1e-15) << i << ' ' << j;
+      row_sum += form_factor[i * n + j];
+    }
+    ASSERT_LT(row_sum, 1 + 1e-5);
+    if (row_sum > 0.1) ++seeing;
+  }
+  EXPECT_GT(seeing, n / 2);  // a block stands on some of the others
+}
+
+TEST_F(CommandLine, ExportsTheTransferOfTheFormFactors) {
+  const std::string file = precompute("box.safetensors");
+  summary_of({"export", file, "--what", "form-factors", "-o", path("f.npz")});
+  summary_of({"export", file, "--what", "transfer", "-o", path("y.npz")});
+  const auto f = test::npz_values<double>(test::unzip(path("f.npz")), "form_factor", "<f8");
+  const auto arrays = test::unzip(path("y.npz"));
+  const auto y = test::npz_values<float>(arrays, "transfer", "<f4");
+  const auto reflectance = test::npz_values<float>(arrays, "reflectance", "<f4");
+  const std::size_t n = reflectance.size() / 3;
+  ASSERT_EQ(y.size(), 3 * n * n);
+  for (std::size_t c = 0; c < 3; ++c) {
+    double apart_squared = 0, norm_squared = 0;
+    std::vector<double> product(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const float* row = y.data() + (c * n + i) * n;
+      for (std::size_t j = 0; j < n; ++j) product[j] = row[j];
+      for (std::size_t k = 0; k < n; ++k) {
+        const double weight = static_cast<double>(row[k]) * reflectance[3 * k + c];
+        for (std::size_t j = 0; j < n; ++j) product[j] -= weight * f[k * n + j];
+      }
+      for (std::size_t j = 0; j < n; ++j) {
+        const double apart = product[j] - f[i * n + j];
+        apart_squared += apart * apart;
+        norm_squared += f[i * n + j] * f[i * n + j];
+      }
+    }
+    // Single precision, and the Cholesky factorisation of a well-conditioned matrix.
+    EXPECT_LT(std::sqrt(apart_squared / norm_squared), 1e-6) << "channel " << c;
+  }
+}
+
+TEST_F(CommandLine, ExportsPatchesAndMesh) {
+  const std::string file = precompute("box.safetensors");
+  const json patches = summary_of({"export", file, "--what", "patches", "-o", path("p.npz")});
+  for (const char* name : {"area", "centroid", "normal", "reflectance", "emitted_exitance"}) {
+    EXPECT_TRUE(patches["arrays"].contains(name)) << name;
+  }
+  const auto area = test::npz_values<float>(test::unzip(path("p.npz")), "area", "<f4");
+  EXPECT_EQ(patches["arrays"]["area"][0], area.size());
+  EXPECT_NEAR(static_cast<double>(area.size()), kPatchCount, 0.2 * kPatchCount);
+  const json mesh = summary_of({"export", file, "--what", "mesh", "-o", path("m.npz")});
+  EXPECT_EQ(mesh["arrays"]["triangle"][1], 3);
+}
+
+TEST_F(CommandLine, GivesTheSameBytesForAnyNumberOfThreads) {
+  const std::string one = test::read_bytes(precompute("1.safetensors", {"--threads", "1"}));
+  EXPECT_EQ(one, test::read_bytes(precompute("2.safetensors", {"--threads", "2"})));
+  EXPECT_EQ(one, test::read_bytes(precompute("5.safetensors", {"--threads", "5"})));
+}
+
+TEST_F(CommandLine, TheSeedDecides) {
+  const std::string seven = test::read_bytes(precompute("7.safetensors", {"--seed", "7"}));
+  EXPECT_EQ(seven, test::read_bytes(precompute("again.safetensors", {"--seed", "7"})));
+  EXPECT_NE(seven, test::read_bytes(precompute("8.safetensors", {"--seed", "8"})));
+}
+
+TEST_F(CommandLine, StoresHalfPrecisionInHalfTheBytes) {
+  const json full = summary_of({"info", precompute("f32.safetensors")});
+  const json half = summary_of({"info", precompute("f16.safetensors", {"--precision", "f16"})});
+  EXPECT_EQ(full["operator_bytes"], 2 * half["operator_bytes"].get<std::uint64_t>());
+  EXPECT_LT(half["error_max"].get<double>(), 1e-3);
+}
+
+TEST_F(CommandLine, RefusesWhatNeedsTooMuchMemoryBeforeItBegins) {
+  expect_refused({"precompute", kScene, "--patches", "300", "--memory-limit", "0.0001", "-o",
+                  path("x.safetensors")},
+                 "the limit is 0.0001 GiB");
+}
+
+TEST_F(CommandLine, StopsCleanlyWhenInterrupted) {
+  test::Subprocess program(
+      {REBOUNCE_PROGRAM, "precompute", kScene, "--patches", "4000", "-o", path("x.safetensors")},
+      printed_ / "out", printed_ / "err");
+  ASSERT_TRUE(program.has_said(" patches: about "));
+  program.send(SIGINT);
+  const Outcome outcome = program.finish();
+  EXPECT_GT(outcome.exit_code, 0) << "should end by itself, with an error";
+  EXPECT_NE(outcome.err.find("rebounce: "), std::string::npos) << outcome.err;
+  EXPECT_EQ(folder_.names(), Names{});
+}
+
+TEST_F(CommandLine, RefusesAMalformedLightFileWithTheField) {
+  const std::string file = precompute("box.safetensors");
+  const std::pair<std::string, std::string> cases[] = {
+      {"", "JSON"},
+      {"{", "JSON"},
+      {"[]", "\"lights\""},
+      {R"({"lamps": []})", "\"lamps\""},
+      {R"({"lights": {}})", "\"lights\""},
+      {R"({"lights": [7]})", "light 0"},
+      {R"({"lights": [{}, {"colour": [1, 1, 1]}]})", "light 1: unknown field \"colour\""},
+      {R"({"lights": [{"type": "area"}]})", "\"type\""},
+      {R"({"lights": [{"type": 3}]})", "\"type\""},
+      {R"({"lights": [{"name": 3}]})", "\"name\""},
+      {R"({"lights": [{"position": [1, 2]}]})", "\"position\""},
+      {R"({"lights": [{"position": [1, 2, "3"]}]})", "\"position\""},
+      {R"({"lights": [{"position": [1, 2, 1e300]}]})", "\"position\""},
+      {R"({"lights": [{"direction": [0, 0, 0]}]})", "\"direction\""},
+      {R"({"lights": [{"color": [1, -1, 1]}]})", "\"color\""},
+      {R"({"lights": [{"color": 1}]})", "\"color\""},
+      {R"({"lights": [{"intensity": -5}]})", "\"intensity\""},
+      {R"({"lights": [{"intensity": "bright"}]})", "\"intensity\""},
+      {R"({"lights": [{"range": -1}]})", "\"range\""},
+      {R"({"lights": [{"spot": 1}]})", "\"spot\""},
+      {R"({"lights": [{"spot": {"angle": 1}}]})", "\"angle\""},
+      {R"({"lights": [{"spot": {"outerConeAngle": 2}}]})", "\"outerConeAngle\""},
+      {R"({"lights": [{"spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.5}}]})",
+       "\"innerConeAngle\""},
+      {R"({"sky": 1})", "\"sky\""},
+      {R"({"sky": {"luminance": -1}})", "\"luminance\""},
+      {R"({"sky": {"color": [1]}})", "\"color\""},
+      {R"({"sky": {"intensity": 1}})", "\"intensity\""},
+  };
+  for (const auto& [text, field] : cases) {
+    const std::string lights = write("bad.lights.json", text);
+    expect_refused({"solve", file, "--lights", lights, "-o", path("x.csv")}, field);
+  }
+}
+
+/// The shipped scene with a point light of its own.
+json scene_with_light() {
+  json scene = json::parse(test::read_bytes(kScene));
+  scene["extensionsUsed"].push_back("KHR_lights_punctual");
+  scene["extensions"]["KHR_lights_punctual"]["lights"] = {
+      {{"type", "point"}, {"color", {1, 0.95, 0.88}}, {"intensity", 20}}};
+  const json reference = {{"light", 0}};
+  scene["scenes"][0]["nodes"].push_back(scene["nodes"].size());
+  scene["nodes"].push_back(
+      {{"translation", {0.278, 0.47, 0.28}}, {"extensions", {{"KHR_lights_punctual", reference}}}});
+  return scene;
+}
+
+/// A binary glTF file with one chunk, the JSON.
+std::string glb(const json& document) {
+  std::string text = document.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  const auto little_endian = [](std::uint32_t value) {
+    std::string bytes;
+    for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<char>(value >> (8 * i)));
+    return bytes;
+  };
+  const auto length = static_cast<std::uint32_t>(text.size());
+  return "glTF" + little_endian(2) + little_endian(20 + length) + little_endian(length) + "JSON" +
+         text;
+}
+
+TEST_F(CommandLine, TakesLightsFromAGlb) {
+  const std::string file = precompute("box.safetensors");
+  const std::string scene = write("lit.glb", glb(scene_with_light()));
+  summary_of({"solve", file, "--lights", scene, "-o", path("glb.csv")});
+  summary_of({"solve", file, "--lights", kLights, "-o", path("json.csv")});
+  EXPECT_EQ(test::read_bytes(path("glb.csv")), test::read_bytes(path("json.csv")));
+
+  summary_of({"precompute", scene, "--patches", "300", "-o", path("lit.safetensors")});
+  summary_of({"solve", path("lit.safetensors"), "-o", path("own.csv")});
+  EXPECT_EQ(test::read_bytes(path("own.csv")), test::read_bytes(path("json.csv")));
+}
+
+TEST_F(CommandLine, RefusesToRelightWithoutAnyLight) {
+  json dark = json::parse(test::read_bytes(kScene));
+  for (json& material : dark["materials"]) material.erase("emissiveFactor");
+  summary_of({"precompute", write("dark.gltf", dark.dump()), "--patches", "300", "-o",
+              path("dark.safetensors")});
+  expect_refused({"solve", path("dark.safetensors"), "-o", path("x.csv")}, "--lights");
+}
+
+TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
+  const std::string file = precompute("box.safetensors");
+  for (const char* show : {"direct", "indirect", "radiosity", "patches", "error"}) {
+    const json drawn = summary_of({"render", file, "--lights", kLights, "--size", "64x48", "--show",
+                                   show, "-o", path("x.png")});
+    EXPECT_EQ(drawn["width"], 64) << show;
+    const std::string png = test::read_bytes(path("x.png"));
+    ASSERT_GT(png.size(), 64U) << show;
+    EXPECT_EQ(png.substr(0, 8), "\x89PNG\r\n\x1a\n") << show;
+    EXPECT_EQ(png[19], 64) << show;
+    EXPECT_EQ(png[23], 48) << show;
+    std::filesystem::remove(folder_ / "x.png");
+  }
+}
+
+TEST_F(CommandLine, TheShippedSceneIsWhatItsScriptMakes) {
+  if (std::system("python3 --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "needs python3";
+  const std::string command =
+      "python3 '" + kScenes + "make_cornell_box.py' '" + path("box.gltf") + "'";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  EXPECT_EQ(test::read_bytes(path("box.gltf")), test::read_bytes(kScene));
+}
+
+}  // namespace
+}  // namespace rebounce

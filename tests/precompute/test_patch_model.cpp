@@ -1,0 +1,164 @@
+#include "rebounce/precompute/patch_model.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "rebounce/precompute/lit_sides.h"
+#include "rebounce/precompute/reconstruction_weights.h"
+#include "rebounce/transfer/error.h"
+#include "test_scenes.h"
+
+namespace rebounce {
+namespace {
+
+Scene double_sided(Scene scene) {
+  for (Material& material : scene.materials) material.double_sided = true;
+  return scene;
+}
+
+TEST(PatchModel, ConservesAreaAndReflectance) {
+  Scene scene = test::empty_scene({0.2F, 0.4F, 0.6F});
+  scene.materials.resize(2, scene.materials[0]);
+  scene.materials[1].base_color = {0.5F, 0.5F, 0.1F};
+  scene.materials[1].emitted_luminance = {1, 2, 3};
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
+  test::add_box(scene, {1, 1, 1}, {2, 2, 2}, false, 1);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 1000});
+  double area = 0, red = 0, emitted = 0;
+  for (std::size_t i = 0; i < model.patches.size(); ++i) {
+    area += model.patches.area[i];
+    red += model.patches.area[i] * model.patches.reflectance[i][0];
+    emitted += model.patches.area[i] * model.patches.emitted_exitance[i][2];
+  }
+  EXPECT_NEAR(area, 94 + 6, 1e-3);
+  EXPECT_NEAR(red, 94 * 0.2 + 6 * 0.5, 1e-3);
+  EXPECT_NEAR(emitted, 6 * 3 * std::numbers::pi, 1e-3);
+}
+
+TEST(PatchModel, ClampsReflectanceWithAWarning) {
+  Scene scene = test::empty_scene({1, 1, 0.5F});
+  test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 50});
+  ASSERT_EQ(model.warnings.size(), 1U);
+  EXPECT_NE(model.warnings[0].find("0.99"), std::string::npos);
+  for (const Float3& rho : model.patches.reflectance) EXPECT_EQ(rho[0], kMaxReflectance);
+}
+
+TEST(PatchModel, RoomOfDoubleSidedWallsHasPatchesInside) {
+  // Outside of the walls nothing is seen; of a partition inside both sides are.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  const std::vector<glm::dvec3> partition = {{1, 0, 2}, {3, 0, 2}, {3, 2, 2}, {1, 2, 2}};
+  test::add_polygon(scene, partition);
+  const PatchModel model = make_patch_model(double_sided(scene), {.patch_count = 400});
+  double area = 0;
+  for (const float a : model.patches.area) area += a;
+  EXPECT_NEAR(area, 94 + 2 * 4, 1e-3);
+  EXPECT_GT(model.unlit_side_count, 0U);
+  for (std::size_t i = 0; i < model.patches.size(); ++i) {
+    const glm::dvec3 inwards = glm::dvec3(2, 1.5, 2.5) - to_dvec3(model.patches.centroid[i]);
+    const bool on_partition = std::abs(model.patches.centroid[i][2] - 2) < 1e-5 &&
+                              std::abs(model.patches.normal[i][2]) > 0.9;
+    if (!on_partition) {
+      EXPECT_GT(glm::dot(inwards, to_dvec3(model.patches.normal[i])), 0);
+    }
+  }
+}
+
+TEST(PatchModel, BottomOfABoxOnTheFloorHasNoPatch) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  test::add_box(scene, {1, 0, 1}, {2, 1, 2}, false);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 300});
+  double down = 0;
+  for (std::size_t i = 0; i < model.patches.size(); ++i) {
+    if (model.patches.normal[i][1] < -0.9F) down += model.patches.area[i];
+  }
+  EXPECT_NEAR(down, 20, 1e-4) << "the ceiling only";
+}
+
+TEST(PatchModel, DropsSliversBelowThePrecisionOfRays) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  const std::vector<glm::dvec3> sliver = {{1, 1, 1}, {2, 1, 1}, {1.5, 1 + 1e-6, 1}};
+  test::add_polygon(scene, sliver);
+  EXPECT_EQ(make_patch_model(scene, {.patch_count = 100}).sliver_count, 1U);
+  Scene nothing = test::empty_scene();
+  test::add_polygon(nothing, sliver);
+  EXPECT_THROW(make_patch_model(nothing, {}), Error);
+}
+
+TEST(ReconstructionWeights, TakeNothingFromUnderARug) {
+  // A rug just above part of the floor: the floor outside must not show the light under it.
+  Scene scene = test::empty_scene();
+  const std::vector<glm::dvec3> floor = {{-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
+  const std::vector<glm::dvec3> rug = {
+      {-0.77, 0.01, -0.63}, {-0.77, 0.01, 0.71}, {0.69, 0.01, 0.71}, {0.69, 0.01, -0.63}};
+  test::add_polygon(scene, floor);
+  test::add_polygon(scene, rug);
+  PatchModel model = make_patch_model(scene, {.patch_count = 800});
+  const std::vector<float> absorbed(model.patches.size(), 0.0F);
+  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
+  const auto under_the_rug = [&](const Float3& p, float margin) {
+    return p[1] == 0 && p[0] > -0.77F - margin && p[0] < 0.69F + margin && p[2] > -0.63F - margin &&
+           p[2] < 0.71F + margin;
+  };
+  int outside = 0, excluded = 0;
+  for (std::size_t v = 0; v < model.mesh.position.size(); ++v) {
+    if (model.mesh.position[v][1] != 0 || under_the_rug(model.mesh.position[v], 0)) continue;
+    ++outside;
+    for (std::uint32_t k = model.mesh.weight_begin[v]; k < model.mesh.weight_begin[v + 1]; ++k) {
+      const Float3& c = model.patches.centroid[model.mesh.weight_patch[k]];
+      EXPECT_FALSE(under_the_rug(c, 0));
+    }
+    excluded += under_the_rug(model.mesh.position[v], 0.2F) ? 1 : 0;
+  }
+  EXPECT_GT(outside, 100);
+  EXPECT_GT(excluded, 5) << "some vertices beside the rug were put to the test";
+}
+
+TEST(ReconstructionWeights, ReproduceAConstantAndRespectCreases) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  PatchModel model = make_patch_model(scene, {.patch_count = 600});
+  const std::vector<float> absorbed(model.patches.size(), 0.0F);
+  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
+  const DisplayMesh& mesh = model.mesh;
+  ASSERT_EQ(mesh.weight_begin.size(), mesh.position.size() + 1);
+  for (std::size_t v = 0; v < mesh.position.size(); ++v) {
+    double sum = 0;
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      sum += mesh.weight[k];
+      // In a box all faces are at right angles: a vertex takes from patches of its own face only.
+      EXPECT_GT(
+          glm::dot(to_dvec3(mesh.normal[v]), to_dvec3(model.patches.normal[mesh.weight_patch[k]])),
+          0.99);
+    }
+    EXPECT_NEAR(sum, 1, 1e-5);
+  }
+}
+
+TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
+  Scene scene = test::empty_scene();
+  const std::vector<glm::dvec3> floor = {{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}};
+  test::add_polygon(scene, floor);
+  PatchModel model = make_patch_model(scene, {.patch_count = 200});
+  // Light of 1 everywhere; some patches are covered in part and their mean is less by that much.
+  std::vector<float> absorbed(model.patches.size()), value(model.patches.size());
+  for (std::size_t i = 0; i < absorbed.size(); ++i) {
+    absorbed[i] = i % 3 == 0 ? 0.6F : 0.0F;
+    value[i] = 1 - absorbed[i];
+  }
+  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
+  for (std::size_t v = 0; v + 1 < model.mesh.weight_begin.size(); ++v) {
+    double shown = 0;
+    for (std::uint32_t k = model.mesh.weight_begin[v]; k < model.mesh.weight_begin[v + 1]; ++k) {
+      shown += model.mesh.weight[k] * value[model.mesh.weight_patch[k]];
+    }
+    EXPECT_NEAR(shown, 1, 1e-5);
+  }
+}
+
+}  // namespace
+}  // namespace rebounce

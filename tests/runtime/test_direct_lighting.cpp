@@ -1,0 +1,122 @@
+#include "rebounce/runtime/direct_lighting.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <numbers>
+
+#include "rebounce/transfer/error.h"
+#include "test_scene_data.h"
+
+namespace rebounce {
+namespace {
+
+RayTracer tracer_of(const TransferData& data) {
+  return {data.mesh.position, std::span(data.mesh.triangle).first(data.mesh.surface_count())};
+}
+
+std::vector<Float3> direct(const TransferData& data, const std::vector<Light>& lights,
+                           const Sky& sky = {}) {
+  const RayTracer tracer = tracer_of(data);
+  DirectLighting lighting(data, tracer);
+  std::vector<Float3> irradiance(data.patches.size());
+  lighting.compute(lights, sky, irradiance);
+  return irradiance;
+}
+
+TEST(DirectLighting, PointOverAPlane) {
+  // E = I cos / h², cos = h / distance (radiosity_analytic.tsv, POINT_LIGHT_PLANE: h = 2).
+  TransferData data;
+  test::add_square(data, 4, 0, 80, true, {0.5F, 0.5F, 0.5F});
+  Light lamp;
+  lamp.position = {0, 2, 0};
+  lamp.color = {1, 0.5F, 0};
+  const std::vector<Float3> e = direct(data, {lamp});
+  double total = 0, total_truth = 0;
+  for (std::size_t i = 0; i < e.size(); ++i) {
+    const glm::dvec3 c = to_dvec3(data.patches.centroid[i]);
+    const double r2 = c.x * c.x + 4 + c.z * c.z;
+    const double truth = 2 / (r2 * std::sqrt(r2));
+    EXPECT_NEAR(e[i][0] / truth, 1, 2e-2);  // the mean of eight points is not quite in the middle
+    EXPECT_FLOAT_EQ(e[i][1], 0.5F * e[i][0]);
+    EXPECT_EQ(e[i][2], 0);
+    total += e[i][0];
+    total_truth += truth;
+  }
+  EXPECT_NEAR(total / total_truth, 1, 5e-4);
+}
+
+TEST(DirectLighting, ShadowsFallWhereTheyMust) {
+  TransferData data;
+  test::add_square(data, 2, 0, 40, true, {0.5F, 0.5F, 0.5F});
+  test::add_square(data, 0.5F, 1, 1, true, {0.5F, 0.5F, 0.5F});
+  Light lamp;
+  lamp.position = {0, 2, 0};
+  const std::vector<Float3> e = direct(data, {lamp});
+  int dark = 0, lit = 0;
+  for (std::size_t i = 0; i + 2 < e.size(); ++i) {
+    const Float3& c = data.patches.centroid[i];
+    const float reach = std::max(std::abs(c[0]), std::abs(c[2]));
+    if (reach < 0.9F) {  // the shadow of the small square is twice its size
+      EXPECT_EQ(e[i][0], 0);
+      ++dark;
+    } else if (reach > 1.1F) {
+      EXPECT_GT(e[i][0], 0);
+      ++lit;
+    }
+  }
+  EXPECT_GT(dark, 300);
+  EXPECT_GT(lit, 1000);
+}
+
+TEST(DirectLighting, DirectionalAndSky) {
+  TransferData data;
+  test::add_square(data, 1, 0, 10, true, {0.5F, 0.5F, 0.5F});
+  Light sun;
+  sun.type = LightType::kDirectional;
+  sun.direction = {0.6F, -0.8F, 0};
+  sun.intensity = 1000;
+  Sky sky;
+  sky.luminance = 10;
+  sky.color = {0, 0, 1};
+  for (const Float3& e : direct(data, {sun}, sky)) {
+    EXPECT_NEAR(e[0], 800, 1e-2);
+    EXPECT_NEAR(e[2], 800 + 10 * std::numbers::pi, 1e-2);
+  }
+}
+
+TEST(DirectLighting, BacksAreDarkAndLightsAdd) {
+  TransferData data;
+  test::add_square(data, 1, 0, 10, false, {0.5F, 0.5F, 0.5F});
+  Light above, below;
+  above.position = {0, 2, 0};
+  below.position = {0.3F, -2, 0.1F};
+  for (const Float3& e : direct(data, {above})) EXPECT_EQ(e[0], 0);
+  const std::vector<Float3> one = direct(data, {below}), two = direct(data, {above, below, below});
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_NEAR(two[i][0], 2 * one[i][0], 1e-5);
+}
+
+TEST(DirectLighting, SameBitsForAnyNumberOfThreads) {
+  TransferData data;
+  test::add_square(data, 2, 0, 30, true, {0.5F, 0.5F, 0.5F});
+  test::add_square(data, 0.5F, 1, 4, true, {0.5F, 0.5F, 0.5F});
+  Light lamp;
+  lamp.position = {0.2F, 2, 0.1F};
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const std::vector<Float3> one = direct(data, {lamp});
+  omp_set_num_threads(4);
+  const std::vector<Float3> four = direct(data, {lamp});
+  omp_set_num_threads(before);
+  EXPECT_EQ(one, four);
+}
+
+TEST(DirectLighting, NeedsAPoint) {
+  TransferData data;
+  test::add_square(data, 1, 0, 1, true, {0.5F, 0.5F, 0.5F});
+  const RayTracer tracer = tracer_of(data);
+  EXPECT_THROW(DirectLighting(data, tracer, {.points_per_patch = 0}), Error);
+}
+
+}  // namespace
+}  // namespace rebounce
