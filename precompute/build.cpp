@@ -13,6 +13,7 @@
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/reconstruction_weights.h"
+#include "rebounce/precompute/winding.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
 
@@ -103,6 +104,7 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
 std::string settings_json(const BuildSettings& settings) {
   const FormFactorSettings& f = settings.form_factors;
   return nlohmann::json{{"operator", "dense"},
+                        {"scale", settings.scale},
                         {"precision", settings.precision == Precision::kF16 ? "f16" : "f32"},
                         {"patches", settings.subdivision.patch_count},
                         {"patch_size", settings.subdivision.patch_size},
@@ -144,6 +146,14 @@ void check_residual(double residual, Precision precision) {
                   residual, largest));
 }
 
+// The scene of a file, with what is plainly seen from behind made double-sided.
+Scene import_usable(const std::filesystem::path& path, double scale) {
+  Scene scene = import_gltf(path, scale);
+  const RayTracer tracer(scene.position, scene.triangle);
+  make_double_sided(scene, find_inside_out(scene, tracer));
+  return scene;
+}
+
 }  // namespace
 
 TransferData build_transfer_data(const std::filesystem::path& scene_path,
@@ -153,7 +163,8 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   PhaseClock clock(report, progress);
   TransferData data;
 
-  Scene scene = clock.run("import", [&](const Progress&) { return import_gltf(scene_path); });
+  Scene scene = clock.run(
+      "import", [&](const Progress&) { return import_usable(scene_path, settings.scale); });
   report.triangle_count = scene.triangle.size();
   report.degenerate_triangle_count = scene.degenerate_triangle_count;
   report.warnings = scene.warnings;

@@ -18,6 +18,7 @@
 namespace rebounce {
 
 struct BuildSettings {
+  double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
   Precision precision = Precision::kF32;  ///< kF16: half the bytes, an error of some 1e-4
