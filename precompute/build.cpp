@@ -9,11 +9,13 @@
 #include <nlohmann/json.hpp>
 
 #include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/reconstruction_weights.h"
 #include "rebounce/precompute/winding.h"
+#include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
 
@@ -21,6 +23,10 @@ namespace rebounce {
 namespace {
 
 constexpr int kTestLightCount = 16;
+
+// Lights that the hierarchical operator is fitted to; a dense operator is their truth, so that they
+// cost little.
+constexpr int kFittingLightCount = 64;
 
 // A residual above this is not rounding but a mistake; f32 and f16 entries.
 constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
@@ -101,9 +107,23 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
   report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
 }
 
+/// The settings with what was left open decided.
+BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
+  if (settings.operator_kind == OperatorKind::kAutomatic) {
+    settings.operator_kind =
+        patch_count < kHierarchicalPatchCount ? OperatorKind::kDense : OperatorKind::kHierarchical;
+  }
+  const bool dense = settings.operator_kind == OperatorKind::kDense;
+  if (!settings.precision) settings.precision = dense ? Precision::kF32 : Precision::kF16;
+  if (dense) settings.tolerance = 0;
+  return settings;
+}
+
 std::string settings_json(const BuildSettings& settings) {
   const FormFactorSettings& f = settings.form_factors;
-  return nlohmann::json{{"operator", "dense"},
+  const bool dense = settings.operator_kind == OperatorKind::kDense;
+  return nlohmann::json{{"operator", dense ? "dense" : "hierarchical"},
+                        {"tolerance", settings.tolerance},
                         {"scale", settings.scale},
                         {"precision", settings.precision == Precision::kF16 ? "f16" : "f32"},
                         {"patches", settings.subdivision.patch_count},
@@ -200,18 +220,31 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.exchange = std::move(form_factors.exchange);
   compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh);
 
-  data.transfer = clock.run("operator", [&](const Progress& part) {
-    return build_dense_transfer(data.exchange, data.patches, settings.precision, part);
+  const BuildSettings decided = decide(settings, data.patches.size());
+  const bool compressed = decided.operator_kind == OperatorKind::kHierarchical;
+  const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
+  const auto dense = clock.run("operator", [&](const Progress& part) {
+    return build_dense_transfer(data.exchange, data.patches, dense_precision, part);
   });
+  check_residual(transfer_residual(*dense, data.exchange, data.patches), dense_precision);
+  data.transfer = dense;
+  if (compressed) {
+    data.transfer = clock.run("compression", [&](const Progress& part) {
+      const auto lights = random_initial_exitances(data, tracer, kFittingLightCount,
+                                                   mix_bits(settings.form_factors.seed));
+      return build_hierarchical_transfer(*dense, data.patches, lights,
+                                         {decided.tolerance, *decided.precision}, part);
+    });
+  }
   const MeasuredError error = clock.run("check", [&](const Progress& part) {
     data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
-    check_residual(data.record.solve_residual, settings.precision);
     return measure_error(data, tracer, kTestLightCount, settings.form_factors.seed, part);
   });
+  data.record.tolerance = decided.tolerance;
   data.record.error_mean = error.mean;
   data.record.error_max = error.max;
   data.record.error_bound = 2 * error.max;
-  data.record.settings_json = settings_json(settings);
+  data.record.settings_json = settings_json(decided);
   data.record.report_json = report_json(report);
   return data;
 }

@@ -54,26 +54,34 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
   return lights;
 }
 
+std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& data,
+                                                          const RayTracer& tracer, int count,
+                                                          std::uint64_t seed) {
+  DirectLighting direct_lighting(data, tracer);
+  std::vector<std::vector<Float3>> exitances;
+  for (const Light& light : random_point_lights(data, tracer, count, seed)) {
+    std::vector<Float3>& exitance = exitances.emplace_back(data.patches.size());
+    direct_lighting.compute({&light, 1}, {}, exitance);
+    for (std::size_t i = 0; i < exitance.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
+    }
+  }
+  return exitances;
+}
+
 MeasuredError measure_error(const TransferData& data, const RayTracer& tracer, int light_count,
                             std::uint64_t seed, const Progress& progress) {
-  const std::size_t n = data.patches.size();
   const ReferenceSolver reference(data.exchange, data.patches);
-  DirectLighting direct_lighting(data, tracer);
-  std::vector<Float3> initial_exitance(n), indirect_irradiance(n);
+  std::vector<Float3> indirect_irradiance(data.patches.size());
   std::vector<float> workspace(data.transfer->workspace_size());
   MeasuredError error;
-  int lit = 0;
-  const std::vector<Light> lights = random_point_lights(data, tracer, light_count, seed);
-  for (int k = 0; k < light_count; ++k) {
-    if (progress && !progress(static_cast<double>(k) / light_count)) throw Cancelled();
-    direct_lighting.compute({&lights[k], 1}, {}, initial_exitance);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (int c = 0; c < kChannelCount; ++c)
-        initial_exitance[i][c] *= data.patches.reflectance[i][c];
-    }
-    if (area_norm(initial_exitance, data.patches.area) == 0) continue;
-    data.transfer->apply(initial_exitance, indirect_irradiance, workspace);
-    const std::vector<Float3> truth = reference.indirect_irradiance(initial_exitance, 1e-9);
+  int done = 0, lit = 0;
+  for (const std::vector<Float3>& light :
+       random_initial_exitances(data, tracer, light_count, seed)) {
+    if (progress && !progress(static_cast<double>(done++) / light_count)) throw Cancelled();
+    if (area_norm(light, data.patches.area) == 0) continue;
+    data.transfer->apply(light, indirect_irradiance, workspace);
+    const std::vector<Float3> truth = reference.indirect_irradiance(light, 1e-9);
     const double e = relative_difference(indirect_irradiance, truth, data.patches.area);
     error.mean += e;
     error.max = std::max(error.max, e);

@@ -2,29 +2,16 @@
 #define EIGEN_DONT_PARALLELIZE
 #include "tiled_cholesky.h"
 
-#include <cblas.h>
-
 #include <Eigen/Cholesky>
 #include <Eigen/Dense>
 
 #include "rebounce/transfer/error.h"
+#include "single_threaded_blas.h"
 
 namespace rebounce {
 namespace {
 
 using Tile = TiledMatrix::Tile;
-
-/// Makes OpenBLAS run on the thread that calls it, for as long as this lives.
-class SingleThreadedBlas {
- public:
-  SingleThreadedBlas() : before_(openblas_get_num_threads()) { openblas_set_num_threads(1); }
-  ~SingleThreadedBlas() { openblas_set_num_threads(before_); }
-  SingleThreadedBlas(const SingleThreadedBlas&) = delete;
-  SingleThreadedBlas& operator=(const SingleThreadedBlas&) = delete;
-
- private:
-  int before_;
-};
 
 /// Reports progress over three stages of equal work, each cubic in the step.
 class StageProgress {

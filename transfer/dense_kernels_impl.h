@@ -1,26 +1,17 @@
 #pragma once
 
-// The tile kernels, written once over a vector type `V` with kWidth floats: load, load_half, store,
-// zero, broadcast, multiply_add, sum. Included by one file per instruction set; everything is in an
-// unnamed namespace so that no two sets share an instantiation.
+// The tile kernels, written once over a vector type `V` (vector_load.h). Included by one file per
+// instruction set; everything is in an unnamed namespace so that no two sets share an
+// instantiation.
 
 #include <cstddef>
 #include <cstdint>
 
 #include "rebounce/transfer/dense_operator.h"
+#include "vector_load.h"
 
 namespace rebounce {
 namespace {
-
-template <typename V>
-inline V load_values(const float* p) {
-  return V::load(p);
-}
-
-template <typename V>
-inline V load_values(const std::uint16_t* p) {
-  return V::load_half(p);
-}
 
 template <typename V, typename Value>
 void multiply_diagonal(const Value* tile, const float* x_column, float* y_row) {

@@ -33,7 +33,15 @@ inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
+inline constexpr char kHierarchicalPatch[] = "transfer.hierarchical.patch";
+inline constexpr char kHierarchicalBlocks[] = "transfer.hierarchical.blocks";
+inline constexpr char kHierarchicalValues[] = "transfer.hierarchical.values";
+inline constexpr char kHierarchicalChannelMatrix[] = "transfer.hierarchical.channel_matrix";
 }  // namespace tensor
+
+/// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
+/// order, less the offset.
+using StoredBlock = std::array<std::uint32_t, 7>;
 
 inline std::string texture_tensor(std::size_t texture) {
   return "texture." + std::to_string(texture);

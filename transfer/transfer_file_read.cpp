@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -6,6 +7,7 @@
 #include "checked_json.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "transfer_data_check.h"
 #include "transfer_file_format.h"
@@ -192,6 +194,21 @@ BuildRecord read_record(const SafetensorsFile& file) {
   return record;
 }
 
+/// Which of `matrix_count` matrices each channel uses.
+std::array<std::uint32_t, kChannelCount> read_channel_matrix(const SafetensorsFile& file,
+                                                             const char* name,
+                                                             std::uint32_t matrix_count) {
+  const auto stored = file.tensor<std::uint32_t>(name, {kChannelCount});
+  std::array<std::uint32_t, kChannelCount> channel_matrix{};
+  for (std::size_t channel = 0; channel < stored.size(); ++channel) {
+    if (stored[channel] >= matrix_count) {
+      refuse(file, std::string("tensor ") + name + ": no such matrix");
+    }
+    channel_matrix[channel] = stored[channel];
+  }
+  return channel_matrix;
+}
+
 std::shared_ptr<const DenseOperator> read_dense_operator(const SafetensorsFile& file,
                                                          const std::vector<float>& area) {
   DenseOperator::Storage storage;
@@ -209,22 +226,51 @@ std::shared_ptr<const DenseOperator> read_dense_operator(const SafetensorsFile& 
     refuse(file, std::string("tensor ") + tensor::kDenseTiles + ": not 1, 2 or 3 matrices");
   }
   storage.matrix_count = static_cast<std::uint32_t>(tiles.shape[0]);
-  const auto channels =
-      file.tensor<std::uint32_t>(tensor::kDenseChannelMatrix, {storage.channel_matrix.size()});
-  for (std::size_t channel = 0; channel < channels.size(); ++channel) {
-    if (channels[channel] >= storage.matrix_count) {
-      refuse(file, std::string("tensor ") + tensor::kDenseChannelMatrix + ": no such matrix");
-    }
-    storage.channel_matrix[channel] = channels[channel];
-  }
+  storage.channel_matrix =
+      read_channel_matrix(file, tensor::kDenseChannelMatrix, storage.matrix_count);
   return std::make_shared<const DenseOperator>(std::move(storage));
+}
+
+std::vector<TransferBlock> read_blocks(const SafetensorsFile& file) {
+  std::vector<StoredBlock> stored;
+  TensorReader{file}(tensor::kHierarchicalBlocks, stored);
+  std::vector<TransferBlock> blocks;
+  blocks.reserve(stored.size());
+  for (const StoredBlock& b : stored) {
+    blocks.push_back({b[0], b[1], b[2], b[3], static_cast<TransferBlock::Kind>(b[4]), b[5], b[6]});
+  }
+  return blocks;
+}
+
+std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
+    const SafetensorsFile& file, const std::vector<float>& area) {
+  HierarchicalOperator::Storage storage;
+  storage.area = area;
+  TensorReader{file}(tensor::kHierarchicalPatch, storage.patch);
+  storage.blocks = read_blocks(file);
+  storage.channel_matrix =
+      read_channel_matrix(file, tensor::kHierarchicalChannelMatrix, kChannelCount);
+  storage.matrix_count = 1 + std::ranges::max(storage.channel_matrix);
+  if (file.info(tensor::kHierarchicalValues).type == TensorType::kF16) {
+    storage.precision = Precision::kF16;
+    storage.values_f16 =
+        file.tensor<std::uint16_t>(tensor::kHierarchicalValues, {kAnySize}, TensorType::kF16);
+  } else {
+    storage.values_f32 = file.tensor<float>(tensor::kHierarchicalValues, {kAnySize});
+  }
+  try {
+    return std::make_shared<const HierarchicalOperator>(std::move(storage));
+  } catch (const Error& error) {
+    refuse(file, error.what());
+  }
 }
 
 std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& file,
                                                       const std::vector<float>& area) {
   const std::string& kind = metadata(file, key::kOperator);
-  if (kind != "dense") refuse(file, "the operator is of a kind that this program does not know");
-  return read_dense_operator(file, area);
+  if (kind == "dense") return read_dense_operator(file, area);
+  if (kind == "hierarchical") return read_hierarchical_operator(file, area);
+  refuse(file, "the operator is of a kind that this program does not know");
 }
 
 }  // namespace

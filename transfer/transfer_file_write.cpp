@@ -4,6 +4,7 @@
 
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "shortest_decimal.h"
 #include "transfer_file_format.h"
@@ -34,6 +35,15 @@ class TensorCollector {
     }
     tensors_.push_back(
         {name, tensor_type<typename Stored<T>::Scalar>(), stored_shape<T>(items.size()), column});
+  }
+
+  /// Copies an array that was made for the file.
+  template <typename T>
+  void add_made(const char* name, std::span<const T> values) {
+    const auto bytes = std::as_bytes(values);
+    const std::vector<std::byte>& copy = columns_.emplace_back(bytes.begin(), bytes.end());
+    tensors_.push_back(
+        {name, tensor_type<typename Stored<T>::Scalar>(), stored_shape<T>(values.size()), copy});
   }
 
   const std::vector<TensorView>& tensors() const { return tensors_; }
@@ -69,12 +79,35 @@ void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollect
                                storage.channel_matrix);
 }
 
-void collect_operator(const TransferOperator* transfer, TensorCollector& collector) {
-  const auto* dense = dynamic_cast<const DenseOperator*>(transfer);
-  if (dense == nullptr) {
-    throw Error("a transfer file cannot hold this kind of operator; give it a dense one");
+void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
+                                   TensorCollector& collector) {
+  std::vector<StoredBlock> blocks;
+  for (const TransferBlock& b : storage.blocks) {
+    blocks.push_back({b.row_begin, b.row_count, b.column_begin, b.column_count,
+                      static_cast<std::uint32_t>(b.kind), b.row_rank, b.column_rank});
   }
-  collect_dense_operator(dense->storage(), collector);
+  collector.add_made<StoredBlock>(tensor::kHierarchicalBlocks, blocks);
+  collector(tensor::kHierarchicalPatch, storage.patch);
+  collector.add<std::uint32_t>(tensor::kHierarchicalChannelMatrix, {storage.channel_matrix.size()},
+                               storage.channel_matrix);
+  if (storage.precision == Precision::kF16) {
+    collector.add(tensor::kHierarchicalValues, {storage.values_f16.size()},
+                  storage.values_f16.span(), TensorType::kF16);
+  } else {
+    collector.add(tensor::kHierarchicalValues, {storage.values_f32.size()},
+                  storage.values_f32.span());
+  }
+}
+
+void collect_operator(const TransferOperator* transfer, TensorCollector& collector) {
+  if (const auto* dense = dynamic_cast<const DenseOperator*>(transfer)) {
+    collect_dense_operator(dense->storage(), collector);
+  } else if (const auto* blocks = dynamic_cast<const HierarchicalOperator*>(transfer)) {
+    collect_hierarchical_operator(blocks->storage(), collector);
+  } else {
+    throw Error(
+        "a transfer file cannot hold this kind of operator; give it a dense or hierarchical one");
+  }
 }
 
 std::string names_text(const TransferData& data) {

@@ -4,8 +4,6 @@
 
 #include "commands.h"
 #include "rebounce/precompute/npz_writer.h"
-#include "rebounce/transfer/dense_operator.h"
-#include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
@@ -56,12 +54,10 @@ void add_form_factors(const TransferData& data, Export& out) {
 }
 
 void add_transfer(const TransferData& data, Export& out) {
-  const auto* dense = dynamic_cast<const DenseOperator*>(data.transfer.get());
-  if (dense == nullptr) throw Error("only a dense operator can be exported as an array");
   const std::size_t n = data.patches.size();
   out.transfer.resize(kChannelCount * n * n);
   for (int c = 0; c < kChannelCount; ++c) {
-    dense->expand(c, std::span(out.transfer).subspan(c * n * n, n * n));
+    data.transfer->expand(c, std::span(out.transfer).subspan(c * n * n, n * n));
   }
   out.arrays.push_back(numpy_array("transfer", {kChannelCount, n, n}, view(out.transfer)));
   out.arrays.push_back(numpy_array("area", {n}, view(data.patches.area)));

@@ -7,13 +7,14 @@
 #include "info_json.h"
 #include "output_check.h"
 #include "rebounce/precompute/build.h"
+#include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {
 
 struct PrecomputeOptions {
-  std::string scene, output, operator_kind = "dense", precision = "f32";
+  std::string scene, output, operator_kind, precision;
   BuildSettings settings;
   double memory_limit_gib = 0;
 };
@@ -64,9 +65,22 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
 }
 
+/// The file is written all the same, with the error that it has.
+void check_tolerance(const BuildRecord& record) {
+  if (record.tolerance == 0 || record.error_mean <= record.tolerance) return;
+  throw Error(fmt::format(
+      "the operator misses its tolerance: the mean error is {:.2g} and {:.2g} was asked for; "
+      "ask for less, or for --precision f32 or --operator dense",
+      record.error_mean, record.tolerance));
+}
+
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
-  settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
+  if (!chosen.precision.empty()) {
+    settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
+  }
+  if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
+  if (chosen.operator_kind == "hierarchical") settings.operator_kind = OperatorKind::kHierarchical;
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
   check_can_write(chosen.output);
@@ -91,6 +105,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   } else if (!options.quiet) {
     print_summary(data, report, file_bytes);
   }
+  check_tolerance(data.record);
 }
 
 }  // namespace
@@ -118,14 +133,21 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--scale", chosen->settings.scale, "Metres in one unit of the scene file")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  command->add_option("--operator", chosen->operator_kind, "Kind of the operator")
-      ->check(CLI::IsMember({"dense"}))
+  command
+      ->add_option("--operator", chosen->operator_kind,
+                   "Kind of the operator; by default hierarchical from 1000 patches on")
+      ->check(CLI::IsMember({"hierarchical", "dense"}));
+  command
+      ->add_option(
+          "--tolerance", chosen->settings.tolerance,
+          "Error of the indirect light that the hierarchical operator may have in the mean")
+      ->check(CLI::Range(1e-5, 0.5))
       ->capture_default_str();
   command
       ->add_option("--precision", chosen->precision,
-                   "Numbers of the operator: f32, or f16 for half the bytes")
-      ->check(CLI::IsMember({"f16", "f32"}))
-      ->capture_default_str();
+                   "Numbers of the operator: f32, or f16 for half the bytes; by default f16 for a "
+                   "hierarchical operator, f32 for a dense one")
+      ->check(CLI::IsMember({"f16", "f32"}));
   command
       ->add_option("--memory-limit", chosen->memory_limit_gib,
                    "Refuse to start what needs more GiB; by default half of the machine's memory")

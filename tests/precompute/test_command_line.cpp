@@ -149,6 +149,7 @@ TEST_F(CommandLine, RefusesWrongUsageWithStatusTwo) {
       {{"precompute", kScene, "-o", out, "--patch-size", "-1"}, "--patch-size"},
       {{"precompute", kScene, "-o", out, "--patches", "9", "--patch-size", "1"}, "--patch-size"},
       {{"precompute", kScene, "-o", out, "--operator", "cubic"}, "--operator"},
+      {{"precompute", kScene, "-o", out, "--tolerance", "2"}, "--tolerance"},
       {{"precompute", kScene, "-o", out, "--precision", "f8"}, "--precision"},
       {{"precompute", kScene, "-o", out, "--memory-limit", "0"}, "--memory-limit"},
       {{"precompute", kScene, "-o", out, "--threads", "-1"}, "--threads"},

@@ -15,11 +15,15 @@
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/safetensors.h"
 #include "temporary_folder.h"
+#include "transfer_file_tampering.h"
 
 namespace rebounce {
 namespace {
 
 using test::expect_error;
+using test::prefix_size;
+using test::reseal;
+using test::use;
 using Names = std::vector<std::string>;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
@@ -228,23 +232,6 @@ void expect_equal(const TransferData& a, const TransferData& b) {
   expect_equal(a.exchange, b.exchange);
   expect_equal(*a.transfer, *b.transfer);
   expect_equal(a.record, b.record);
-}
-
-std::size_t prefix_size(const std::string& file) {
-  std::uint64_t length = 0;
-  std::memcpy(&length, file.data(), sizeof(length));
-  return sizeof(length) + length;
-}
-
-/// Gives a file that was tampered with the checksum that notes/file_format.md prescribes.
-void reseal(std::string& file) {
-  const std::string entry = "\"checksum\":\"xxh3:";
-  const std::size_t digits = file.find(entry);
-  if (digits == std::string::npos || digits + entry.size() + 32 > file.size()) return;
-  file.replace(digits + entry.size(), 32, 32, '0');
-  ContentHash hash;
-  hash.update(std::as_bytes(std::span(file)));
-  file.replace(digits + entry.size(), 32, hash.text().substr(5));
 }
 
 void replace_in_file(const std::filesystem::path& path, const std::string& from,
@@ -606,20 +593,6 @@ TEST(TransferFile, AFileMayBeReplacedWhileItIsInUse) {
   const TransferData loaded = load_transfer_file(folder / "file");
   save_transfer_file(folder / "file", sample_data(Precision::kF16));
   expect_equal(loaded, data);
-}
-
-/// Uses what was loaded as the runtime does, so that a sanitizer sees an index that got through.
-void use(const TransferData& data) {
-  const FormFactorRows rows(data.exchange, data.patches.area);
-  const std::size_t n = data.patches.size();
-  std::vector<Float3> result(n);
-  std::vector<float> workspace(data.transfer->workspace_size());
-  rows.gather(data.patches.reflectance, result);
-  data.transfer->apply(data.patches.reflectance, result, workspace);
-  for (const Uint3& triangle : data.mesh.triangle) {
-    for (const std::uint32_t vertex : triangle) ASSERT_LT(vertex, data.mesh.position.size());
-  }
-  for (const std::uint32_t patch : data.mesh.weight_patch) ASSERT_LT(patch, n);
 }
 
 // With the checksum made good after each mutation, nothing but the checks themselves protects.

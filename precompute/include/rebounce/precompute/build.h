@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -17,11 +18,24 @@
 
 namespace rebounce {
 
+enum class OperatorKind : std::uint8_t {
+  kAutomatic,  ///< hierarchical from kHierarchicalPatchCount patches on, dense below
+  kDense,
+  kHierarchical,
+};
+
+/// Fewer patches than this are as well off with the dense operator.
+inline constexpr std::size_t kHierarchicalPatchCount = 1000;
+
 struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
-  Precision precision = Precision::kF32;  ///< kF16: half the bytes, an error of some 1e-4
+  OperatorKind operator_kind = OperatorKind::kAutomatic;
+  double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
+  /// kF16: half the bytes, an error of some 1e-4. By default that for the hierarchical operator,
+  /// and f32 for the dense one.
+  std::optional<Precision> precision;
   std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
 };
 

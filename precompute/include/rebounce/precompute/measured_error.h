@@ -21,6 +21,12 @@ struct MeasuredError {
 std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
                                        std::uint64_t seed);
 
+/// What such lights, one at a time, make the patches give off for the first time: initial exitances
+/// [count][n] in lx.
+std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& data,
+                                                          const RayTracer& tracer, int count,
+                                                          std::uint64_t seed);
+
 /// Measures data.transfer under `light_count` such lights.
 MeasuredError measure_error(const TransferData& data, const RayTracer& tracer, int light_count,
                             std::uint64_t seed, const Progress& progress = {});

@@ -53,13 +53,12 @@ class DenseOperator final : public TransferOperator {
   std::size_t workspace_size() const override;
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
              std::span<float> workspace) const override;
+  void expand(int channel, std::span<float> transfer) const override;
 
-  /// Writes Y itself, row-major [n][n], for one channel: dense, unscaled, for export and tests.
-  void expand(int channel, std::span<float> transfer) const;
-
- private:
+  /// Yhat(row, column) of one matrix.
   float symmetric_entry(std::uint32_t matrix, std::size_t row, std::size_t column) const;
 
+ private:
   Storage storage_;
   std::vector<float> sqrt_area_;
 };

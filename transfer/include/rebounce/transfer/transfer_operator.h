@@ -22,7 +22,7 @@ class TransferOperator {
   /// Bytes of the stored operator, all three channels.
   virtual std::size_t bytes() const = 0;
 
-  /// The kind as the command line names it: "dense".
+  /// The kind as the command line names it: "dense", "hierarchical".
   virtual std::string kind() const = 0;
 
   /// Floats of workspace that `apply` needs.
@@ -33,6 +33,9 @@ class TransferOperator {
   /// overwritten. Neither allocates nor locks; the same bits for any number of OpenMP threads.
   virtual void apply(std::span<const Float3> initial_exitance,
                      std::span<Float3> indirect_irradiance, std::span<float> workspace) const = 0;
+
+  /// Writes Y itself, row-major [n][n], for one channel: dense, unscaled, for export and tests.
+  virtual void expand(int channel, std::span<float> transfer) const = 0;
 };
 
 }  // namespace rebounce

@@ -1,0 +1,176 @@
+#define EIGEN_USE_BLAS
+#define EIGEN_DONT_PARALLELIZE
+#include "block_compression.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <random>
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+// Columns of a sketch beyond the rank that is wanted; Halko et al. advise 5 to 10.
+constexpr Index kOversampling = 8;
+
+// Of a block with more rows than this, ranks above a quarter of them are not tried.
+constexpr Index kLargeBlock = 128;
+
+/// Orthonormal directions in descending order of the energy that they carry.
+struct Spectrum {
+  MatrixXd directions;          ///< one to a column
+  std::vector<double> missing;  ///< [k] energy of the whole less that of the first k
+};
+
+/// From eigenvectors in ascending order; `lost` is energy outside of their span.
+Spectrum descending(MatrixXd vectors, const Eigen::VectorXd& energies, double lost) {
+  Spectrum spectrum;
+  const Index count = energies.size();
+  spectrum.directions = vectors.rowwise().reverse();
+  spectrum.missing.assign(static_cast<std::size_t>(count) + 1, lost);
+  for (Index k = count; k-- > 0;) {
+    spectrum.missing[k] = spectrum.missing[k + 1] + std::max(0.0, energies[count - 1 - k]);
+  }
+  return spectrum;
+}
+
+Spectrum gram_spectrum(const MatrixXd& a) {
+  MatrixXd gram = MatrixXd::Zero(a.rows(), a.rows());
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(a);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
+  return descending(solver.eigenvectors(), solver.eigenvalues(), 0);
+}
+
+MatrixXd random_matrix(Index rows, Index columns, std::uint64_t seed) {
+  std::mt19937_64 engine(seed);
+  MatrixXd random(rows, columns);
+  for (Index j = 0; j < columns; ++j) {
+    for (Index i = 0; i < rows; ++i) {
+      random(i, j) = static_cast<double>(engine() >> 11) * 0x1p-52 - 1;
+    }
+  }
+  return random;
+}
+
+Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t seed) {
+  const MatrixXd sample = a * random_matrix(a.cols(), sketch_size, seed);
+  const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
+                         MatrixXd::Identity(a.rows(), sketch_size);
+  const MatrixXd projected = range.transpose() * a;
+  Spectrum inner = gram_spectrum(projected);
+  const double lost = std::max(0.0, a.squaredNorm() - projected.squaredNorm());
+  for (double& missing : inner.missing) missing += lost;
+  inner.directions = range * inner.directions;
+  return inner;
+}
+
+/// Leading left singular vectors of `a`, of which no more than `largest_rank` are wanted.
+Spectrum left_spectrum(const MatrixXd& a, Index largest_rank, std::uint64_t seed) {
+  const Index sketch_size = largest_rank + kOversampling;
+  return 2 * sketch_size < a.rows() ? sketched_spectrum(a, sketch_size, seed) : gram_spectrum(a);
+}
+
+/// The same of the rows of `a`: right singular vectors, exact.
+Spectrum right_spectrum(const MatrixXd& a) {
+  if (a.cols() <= a.rows()) return gram_spectrum(a.transpose());
+  Spectrum left = gram_spectrum(a);
+  MatrixXd right = a.transpose() * left.directions;
+  right.colwise().normalize();
+  left.directions = std::move(right);
+  return left;
+}
+
+/// The number of directions, at most `largest`, with the least total cost if rank k takes
+/// `value_count(k)` values and each unit of missing energy counts `weight` times.
+template <typename ValueCount>
+Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCost& cost,
+                    double weight, const ValueCount& value_count) {
+  Index best = 0;
+  double least = cost.total(weight * spectrum.missing[0], 0);
+  const Index end = std::min<Index>(largest, spectrum.directions.cols());
+  for (Index k = 1; k <= end; ++k) {
+    const double total =
+        cost.total(weight * spectrum.missing[k], static_cast<double>(value_count(k)));
+    if (total < least) {
+      least = total;
+      best = k;
+    }
+  }
+  return best;
+}
+
+Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cost, double limit) {
+  const Index per_rank = block.on_diagonal ? block.rows() : block.rows() + block.columns();
+  const double affordable = limit / (cost.price * static_cast<double>(per_rank));
+  const Index largest = block.rows() > kLargeBlock ? block.rows() / 4 : block.rows();
+  return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
+}
+
+void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index largest,
+                       const CompressionCost& cost, LowRankBlock& result) {
+  const Index m = block.rows(), matrices = block.matrix_count;
+  // What is missing from the rows is missing from the columns too.
+  const Index rank =
+      cheapest_rank(rows, largest, cost, 2, [&](Index k) { return m * k + matrices * k * k; });
+  result.row_basis = rows.directions.leftCols(rank);
+  double kept = 0;
+  for (Index c = 0; c < matrices; ++c) {
+    result.cores.push_back(result.row_basis.transpose() * block.matrix(c) * result.row_basis);
+    kept += result.cores.back().squaredNorm();
+  }
+  result.error_squared = std::max(0.0, block.entries.squaredNorm() - kept);
+}
+
+void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
+              const CompressionCost& cost, LowRankBlock& result) {
+  const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
+  // Half of a core for the rows and half for the columns.
+  const Index row_rank =
+      cheapest_rank(rows, largest, cost, 1, [&](Index k) { return m * k + matrices * k * k / 2; });
+  result.row_basis = rows.directions.leftCols(row_rank);
+  result.error_squared = rows.missing[row_rank];
+  MatrixXd projected(matrices * row_rank, n);
+  for (Index c = 0; c < matrices; ++c) {
+    projected.middleRows(c * row_rank, row_rank) = result.row_basis.transpose() * block.matrix(c);
+  }
+  Index column_rank = 0;
+  if (row_rank > 0) {
+    const Spectrum columns = right_spectrum(projected);
+    column_rank = cheapest_rank(columns, largest, cost, 1,
+                                [&](Index k) { return n * k + matrices * row_rank * k / 2; });
+    result.column_basis = columns.directions.leftCols(column_rank);
+    result.error_squared += columns.missing[column_rank];
+  } else {
+    result.column_basis.resize(n, 0);
+  }
+  for (Index c = 0; c < matrices; ++c) {
+    result.cores.push_back(projected.middleRows(c * row_rank, row_rank) * result.column_basis);
+  }
+}
+
+double value_count(const LowRankBlock& block) {
+  Index count = block.row_basis.size() + block.column_basis.size();
+  for (const MatrixXd& core : block.cores) count += core.size();
+  return static_cast<double>(count);
+}
+
+}  // namespace
+
+std::optional<LowRankBlock> compress_block(const WideBlock& block, const CompressionCost& cost,
+                                           double limit, std::uint64_t seed) {
+  const Index largest = largest_worthwhile_rank(block, cost, limit);
+  const Spectrum rows = left_spectrum(block.entries, largest, seed);
+  LowRankBlock result;
+  if (block.on_diagonal) {
+    truncate_diagonal(block, rows, largest, cost, result);
+  } else {
+    truncate(block, rows, largest, cost, result);
+  }
+  if (cost.total(result.error_squared, value_count(result)) >= limit) return std::nullopt;
+  return result;
+}
+
+}  // namespace rebounce

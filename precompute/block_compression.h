@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace rebounce {
+
+/// One block of each distinct channel side by side, [rows][matrices x columns].
+struct WideBlock {
+  Eigen::MatrixXd entries;
+  Eigen::Index matrix_count = 1;
+  bool on_diagonal = false;
+
+  Eigen::Index rows() const { return entries.rows(); }
+  Eigen::Index columns() const { return entries.cols() / matrix_count; }
+  auto matrix(Eigen::Index m) const { return entries.middleCols(m * columns(), columns()); }
+};
+
+/// B_m ~ row_basis core_m column_basis^T; the column basis is empty on the diagonal, where it is
+/// the row basis.
+struct LowRankBlock {
+  Eigen::MatrixXd row_basis;           ///< [rows][row rank], orthonormal columns
+  Eigen::MatrixXd column_basis;        ///< [columns][column rank], likewise
+  std::vector<Eigen::MatrixXd> cores;  ///< [matrices], [row rank][column rank]
+  double error_squared = 0;            ///< Frobenius, of all matrices together
+};
+
+/// What the construction minimises: error² + price x values, summed over the blocks. For every
+/// price this is the smallest operator of its error (and the most exact one of its size) that the
+/// cluster tree admits.
+struct CompressionCost {
+  double price = 0;         ///< squared error that one stored value is worth
+  double multiplicity = 1;  ///< 2 for a block that stands for its mirror image as well
+
+  double total(double error_squared, double value_count) const {
+    return multiplicity * error_squared + price * value_count;
+  }
+};
+
+/// The approximation of `block` that costs the least, with bases that all matrices share. Nothing
+/// if none costs less than `limit`.
+///
+/// The bases are leading singular vectors, from the Gram matrix of a small block and from a random
+/// sketch of a large one: N. Halko, P. G. Martinsson and J. A. Tropp, "Finding structure with
+/// randomness", 2011, algorithm 4.1, whose error is then known exactly, as the bases are
+/// orthonormal. `limit` bounds the rank that is worth having and so the sketch.
+std::optional<LowRankBlock> compress_block(const WideBlock& block, const CompressionCost& cost,
+                                           double limit, std::uint64_t seed);
+
+}  // namespace rebounce

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "rebounce/precompute/progress.h"
+#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+struct HierarchicalSettings {
+  /// Relative area-weighted L2 error of the indirect irradiance that lights may have in the mean;
+  /// twice the tolerance takes about 0.6 of the bytes.
+  double tolerance = 0.005;
+  Precision precision = Precision::kF16;  ///< kF32: twice the bytes, no less error worth mention
+};
+
+/// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
+/// Frobenius norm of Yhat is worth 1 / `price` stored values. Throws Cancelled if asked to stop.
+HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
+                                                const PatchTable& patches, double price,
+                                                const Progress& progress = {});
+
+/// The smallest such operator whose errors under `test_lights`, each an initial exitance [n] in lx,
+/// are well within the tolerance in the mean, and within three times of it at most, found in a few
+/// rounds. If none of them is, the most exact one: measure it. Without lights that reach the
+/// patches, uniform ones are taken.
+std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
+    const DenseOperator& dense, const PatchTable& patches,
+    std::span<const std::vector<Float3>> test_lights, const HierarchicalSettings& settings,
+    const Progress& progress = {});
+
+}  // namespace rebounce

@@ -1,0 +1,107 @@
+#pragma once
+
+// Hierarchical operators with random values, for tests that need no scene.
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "rebounce/transfer/hierarchical_operator.h"
+
+namespace rebounce::test {
+
+/// Blocks of all kinds over `patch_count` patches in a random order; f32.
+class RandomHierarchicalStorage {
+ public:
+  RandomHierarchicalStorage(std::size_t patch_count, std::uint32_t matrix_count, std::uint64_t seed)
+      : engine_(seed) {
+    storage.matrix_count = matrix_count;
+    storage.channel_matrix = {0, matrix_count > 1 ? 1U : 0U, matrix_count - 1};
+    for (std::size_t i = 0; i < patch_count; ++i) storage.area.push_back(0.1F + uniform());
+    storage.patch.resize(patch_count);
+    std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+    std::shuffle(storage.patch.begin(), storage.patch.end(), engine_);
+    add_diagonal(0, static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count)));
+    values_.resize(values_.size() + HierarchicalOperator::kPadding, 0.0F);
+    storage.values_f32 = SharedArray(std::move(values_));
+  }
+
+  HierarchicalOperator::Storage storage;
+
+ private:
+  static constexpr std::uint32_t kLeaf = 32, kAlignment = HierarchicalOperator::kAlignment;
+
+  float uniform() { return std::uniform_real_distribution<float>(0, 1)(engine_); }
+
+  static std::uint32_t half(std::uint32_t count) {
+    return (count / 2 + kAlignment - 1) / kAlignment * kAlignment;
+  }
+
+  void add_diagonal(std::uint32_t begin, std::uint32_t count) {
+    if (count <= kLeaf || uniform() < 0.1F) return add(begin, count, begin, count);
+    const std::uint32_t first = half(count);
+    add_diagonal(begin, first);
+    add_below(begin + first, count - first, begin, first);
+    add_diagonal(begin + first, count - first);
+  }
+
+  void add_below(std::uint32_t row, std::uint32_t rows, std::uint32_t column,
+                 std::uint32_t columns) {
+    if (rows <= kLeaf || columns <= kLeaf || uniform() < 0.2F) {
+      return add(row, rows, column, columns);
+    }
+    for (const std::uint32_t r : {0U, half(rows)}) {
+      for (const std::uint32_t c : {0U, half(columns)}) {
+        add_below(row + r, r == 0 ? half(rows) : rows - half(rows), column + c,
+                  c == 0 ? half(columns) : columns - half(columns));
+      }
+    }
+  }
+
+  void add(std::uint32_t row, std::uint32_t rows, std::uint32_t column, std::uint32_t columns) {
+    TransferBlock block{
+        .row_begin = row, .row_count = rows, .column_begin = column, .column_count = columns};
+    if (uniform() < 0.6F) {
+      block.kind = TransferBlock::Kind::kLowRank;
+      block.row_rank = random_rank(rows);
+      block.column_rank = block.on_diagonal() ? block.row_rank : random_rank(columns);
+    }
+    storage.blocks.push_back(block);
+    const std::size_t begin = values_.size();
+    const float scale = 1 / std::sqrt(static_cast<float>(storage.area.size()));
+    const std::uint64_t count = block.value_count(storage.matrix_count);
+    for (std::uint64_t k = 0; k < count; ++k) values_.push_back(scale * uniform());
+    make_symmetric(block, begin);
+  }
+
+  std::uint32_t random_rank(std::uint32_t size) {
+    return std::min(size, static_cast<std::uint32_t>(engine_() % 20));
+  }
+
+  /// Of a block on the diagonal: the entries or the cores, which end it.
+  void make_symmetric(const TransferBlock& block, std::size_t begin) {
+    if (!block.on_diagonal()) return;
+    const bool dense = block.kind == TransferBlock::Kind::kDense;
+    const std::size_t size = dense ? block.row_count : block.row_rank;
+    for (std::uint32_t m = 0; m < storage.matrix_count; ++m) {
+      float* entries =
+          values_.data() + begin + block.value_count(storage.matrix_count) - (m + 1) * size * size;
+      for (std::size_t i = 0; i < size; ++i) {
+        for (std::size_t j = 0; j < i; ++j) entries[j * size + i] = entries[i * size + j];
+      }
+    }
+  }
+
+  std::mt19937_64 engine_;
+  std::vector<float> values_;
+};
+
+inline HierarchicalOperator::Storage random_hierarchical_storage(std::size_t patch_count,
+                                                                 std::uint32_t matrix_count,
+                                                                 std::uint64_t seed) {
+  return RandomHierarchicalStorage(patch_count, matrix_count, seed).storage;
+}
+
+}  // namespace rebounce::test

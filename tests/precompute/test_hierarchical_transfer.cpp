@@ -1,0 +1,225 @@
+// The compressed operator against the dense one that it is made from.
+
+#include "rebounce/precompute/hierarchical_transfer.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/form_factors.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+#include "test_scenes.h"
+
+namespace rebounce {
+namespace {
+
+struct Room {
+  PatchTable patches;
+  std::shared_ptr<const DenseOperator> dense;
+};
+
+Room make_room(const Scene& scene, std::size_t patch_count) {
+  PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
+  const FormFactors f = compute_form_factors(model, test::make_tracer(model));
+  return {model.patches, build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
+}
+
+/// A room with a black, a coloured and a raised box.
+Scene furnished_scene(bool grey) {
+  Scene scene = test::empty_scene(grey ? Float3{0.6F, 0.6F, 0.6F} : Float3{0.7F, 0.5F, 0.2F});
+  scene.materials.resize(3, scene.materials[0]);
+  scene.materials[1].base_color = {0, 0, 0};
+  if (!grey) scene.materials[2].base_color = {0.1F, 0.3F, 0.9F};
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
+  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 1);
+  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false, 2);
+  return scene;
+}
+
+const Room& furnished_room() {
+  static const Room room = make_room(furnished_scene(false), 1500);
+  return room;
+}
+
+/// What point lights in the free upper part of the room give its patches, shadows aside.
+std::vector<std::vector<Float3>> lights_in(const PatchTable& patches, int count,
+                                           std::uint64_t seed) {
+  std::mt19937_64 engine(seed);
+  std::uniform_real_distribution<double> uniform(0.1, 0.9);
+  std::vector<std::vector<Float3>> lights;
+  for (int k = 0; k < count; ++k) {
+    const glm::dvec3 lamp(4 * uniform(engine), 2.2 + 0.7 * uniform(engine), 5 * uniform(engine));
+    std::vector<Float3>& light = lights.emplace_back();
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      const glm::dvec3 d = lamp - to_dvec3(patches.centroid[i]);
+      const double cosine = std::max(0.0, glm::dot(glm::normalize(d), to_dvec3(patches.normal[i])));
+      const auto e = static_cast<float>(cosine / glm::dot(d, d));
+      const Float3& rho = patches.reflectance[i];
+      light.push_back({e * rho[0], e * rho[1], e * rho[2]});
+    }
+  }
+  return lights;
+}
+
+std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
+  std::vector<Float3> result(light.size());
+  std::vector<float> workspace(transfer.workspace_size());
+  transfer.apply(light, result, workspace);
+  return result;
+}
+
+double mean_error(const Room& room, const TransferOperator& transfer,
+                  const std::vector<std::vector<Float3>>& lights) {
+  double sum = 0;
+  for (const std::vector<Float3>& light : lights) {
+    sum += relative_difference(product(transfer, light), product(*room.dense, light),
+                               room.patches.area);
+  }
+  return sum / static_cast<double>(lights.size());
+}
+
+double entry_error(const DenseOperator& dense, const TransferOperator& transfer) {
+  const std::size_t n = dense.patch_count();
+  std::vector<float> a(n * n), b(n * n);
+  double error = 0, norm = 0;
+  for (int c = 0; c < kChannelCount; ++c) {
+    dense.expand(c, a);
+    transfer.expand(c, b);
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      error += std::pow(static_cast<double>(a[k]) - b[k], 2);
+      norm += std::pow(static_cast<double>(a[k]), 2);
+    }
+  }
+  return std::sqrt(error / norm);
+}
+
+TEST(HierarchicalTransfer, KeepsEveryTolerance) {
+  const Room& room = furnished_room();
+  const auto probes = lights_in(room.patches, 12, 1), others = lights_in(room.patches, 24, 2);
+  double previous_error = 1;
+  std::size_t previous_bytes = 0;
+  for (const double tolerance : {0.04, 0.01, 0.002}) {
+    const auto transfer =
+        build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = tolerance});
+    const double error = mean_error(room, *transfer, others);
+    // Under lights that the build has not seen.
+    EXPECT_LT(error, tolerance);
+    EXPECT_GT(error, 0.2 * tolerance) << "bytes are wasted";
+    EXPECT_LT(error, previous_error);
+    EXPECT_GT(transfer->bytes(), previous_bytes);
+    EXPECT_LT(transfer->bytes(), room.dense->bytes() / 4);
+    previous_error = error;
+    previous_bytes = transfer->bytes();
+  }
+}
+
+TEST(HierarchicalTransfer, SaysWhatItMissesByItsError) {
+  // Half precision cannot do this: the best that it can must come back, not nothing.
+  const Room& room = furnished_room();
+  const auto probes = lights_in(room.patches, 4, 1);
+  const auto transfer =
+      build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = 1e-6});
+  const double error = mean_error(room, *transfer, probes);
+  EXPECT_GT(error, 1e-6);
+  EXPECT_LT(error, 1e-3);
+}
+
+TEST(HierarchicalTransfer, NearlyEverythingIsExactAtALowPrice) {
+  const Room& room = furnished_room();
+  const HierarchicalOperator transfer(compress_transfer(*room.dense, room.patches, 1e-16));
+  EXPECT_LT(entry_error(*room.dense, transfer), 1e-5);
+}
+
+TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
+  const Room& room = furnished_room();
+  for (const double price : {1e-5, 1e-9}) {
+    const HierarchicalOperator transfer(compress_transfer(*room.dense, room.patches, price));
+    const std::size_t positions = HierarchicalOperator::position_count(room.patches.size()) /
+                                  HierarchicalOperator::kAlignment;
+    std::vector<int> covered(positions * positions, 0);
+    for (const TransferBlock& block : transfer.storage().blocks) {
+      for (std::size_t i = 0; i < block.row_count / HierarchicalOperator::kAlignment; ++i) {
+        for (std::size_t j = 0; j < block.column_count / HierarchicalOperator::kAlignment; ++j) {
+          const std::size_t row = block.row_begin / HierarchicalOperator::kAlignment + i;
+          const std::size_t column = block.column_begin / HierarchicalOperator::kAlignment + j;
+          ++covered[row * positions + column];
+          if (!block.on_diagonal()) ++covered[column * positions + row];
+        }
+      }
+    }
+    EXPECT_TRUE(std::ranges::all_of(covered, [](int count) { return count == 1; }));
+  }
+}
+
+TEST(HierarchicalTransfer, SameBitsForAnyNumberOfThreads) {
+  const Room& room = furnished_room();
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const auto one = compress_transfer(*room.dense, room.patches, 1e-7);
+  omp_set_num_threads(4);
+  const auto four = compress_transfer(*room.dense, room.patches, 1e-7);
+  omp_set_num_threads(before);
+  EXPECT_TRUE(std::ranges::equal(one.values_f32, four.values_f32));
+  EXPECT_EQ(one.patch, four.patch);
+}
+
+TEST(HierarchicalTransfer, LightsOnBlackPatchesAreCarriedToo) {
+  // Black patches may emit: their columns are as good as the others'.
+  const Room& room = furnished_room();
+  const auto probes = lights_in(room.patches, 12, 1);
+  const auto transfer =
+      build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = 0.005});
+  std::vector<Float3> light(room.patches.size());
+  int black = 0;
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    if (room.patches.reflectance[i] != Float3{0, 0, 0}) continue;
+    light[i] = {1, 1, 1};
+    ++black;
+  }
+  ASSERT_GT(black, 20);
+  EXPECT_LT(mean_error(room, *transfer, {light}), 0.01);
+}
+
+TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
+  const Room room = make_room(furnished_scene(true), 800);
+  const HierarchicalOperator grey(compress_transfer(*room.dense, room.patches, 1e-7));
+  EXPECT_EQ(grey.storage().matrix_count, 1U);
+  // The same matrix three times over has the same bases, thrice the cores and dense blocks.
+  DenseOperator::Storage thrice = room.dense->storage();
+  std::vector<float> tiles;
+  for (int c = 0; c < kChannelCount; ++c) {
+    tiles.insert(tiles.end(), thrice.tiles_f32.begin(), thrice.tiles_f32.end());
+  }
+  thrice.tiles_f32 = SharedArray(std::move(tiles));
+  thrice.matrix_count = 3;
+  thrice.channel_matrix = {0, 1, 2};
+  const HierarchicalOperator rgb(compress_transfer(DenseOperator(thrice), room.patches, 3 * 1e-7));
+  EXPECT_EQ(rgb.storage().matrix_count, 3U);
+  EXPECT_LT(grey.bytes(), rgb.bytes());
+}
+
+TEST(HierarchicalTransfer, TakesOnePatchAndNoLights) {
+  PatchTable patches;
+  patches.area = {2};
+  patches.centroid = {{0, 0, 0}};
+  patches.normal = {{0, 1, 0}};
+  patches.reflectance = {{0.5F, 0.5F, 0.5F}};
+  const ExchangeMatrix exchange{SharedArray(std::vector<std::uint64_t>(2)), {}, {}};
+  const auto dense = build_dense_transfer(exchange, patches, Precision::kF32);
+  const auto transfer = build_hierarchical_transfer(*dense, patches, {}, {});
+  EXPECT_EQ(product(*transfer, {{1, 1, 1}})[0], (Float3{0, 0, 0}));
+}
+
+TEST(HierarchicalTransfer, StopsWhenAsked) {
+  const Room& room = furnished_room();
+  EXPECT_THROW(compress_transfer(*room.dense, room.patches, 1e-7, [](double) { return false; }),
+               Cancelled);
+}
+
+}  // namespace
+}  // namespace rebounce

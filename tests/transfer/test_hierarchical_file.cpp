@@ -1,0 +1,168 @@
+// The hierarchical operator in a transfer file.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <functional>
+#include <random>
+
+#include "expect_error.h"
+#include "hierarchical_samples.h"
+#include "rebounce/transfer/safetensors.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "temporary_folder.h"
+#include "transfer_file_tampering.h"
+
+namespace rebounce {
+namespace {
+
+using test::expect_error;
+
+constexpr std::size_t kPatchCount = 100;
+
+TransferData sample_data(Precision precision) {
+  TransferData data;
+  HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
+  if (precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
+  data.patches.area = storage.area;
+  data.patches.centroid.assign(kPatchCount, {0, 0, 0});
+  data.patches.normal.assign(kPatchCount, {0, 1, 0});
+  data.patches.reflectance.assign(kPatchCount, {0.5F, 0.25F, 0.5F});
+  data.patches.emitted_exitance.assign(kPatchCount, {0, 0, 0});
+  data.patches.sky_visibility.assign(kPatchCount, 0.0F);
+  data.patches.absorbed.assign(kPatchCount, 0.0F);
+  data.mesh.weight_begin = {0};
+  data.exchange = {SharedArray(std::vector<std::uint64_t>(kPatchCount + 1)), {}, {}};
+  data.transfer = std::make_shared<const HierarchicalOperator>(std::move(storage));
+  return data;
+}
+
+const HierarchicalOperator::Storage& storage_of(const TransferData& data) {
+  return dynamic_cast<const HierarchicalOperator&>(*data.transfer).storage();
+}
+
+TEST(HierarchicalFile, RoundTrips) {
+  for (const Precision precision : {Precision::kF16, Precision::kF32}) {
+    const test::TemporaryFolder folder;
+    const TransferData data = sample_data(precision);
+    save_transfer_file(folder / "file", data);
+    const TransferData loaded = load_transfer_file(folder / "file");
+    const auto &a = storage_of(data), &b = storage_of(loaded);
+    EXPECT_EQ(a.area, b.area);
+    EXPECT_EQ(a.patch, b.patch);
+    EXPECT_EQ(a.channel_matrix, b.channel_matrix);
+    EXPECT_EQ(a.matrix_count, b.matrix_count);
+    EXPECT_EQ(a.precision, b.precision);
+    EXPECT_TRUE(std::ranges::equal(a.values_f32, b.values_f32));
+    EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
+    std::vector<float> expanded_a(kPatchCount * kPatchCount), expanded_b(expanded_a);
+    data.transfer->expand(1, expanded_a);
+    loaded.transfer->expand(1, expanded_b);
+    EXPECT_EQ(expanded_a, expanded_b);
+    save_transfer_file(folder / "again", loaded);
+    EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
+  }
+}
+
+TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kF16));
+  const TransferData data = load_transfer_file(folder / "file");
+  EXPECT_EQ(storage_of(data).values_f16.owner(), data.exchange.row_begin.owner());
+}
+
+/// The file's tensors with one of them changed by hand, under a good checksum.
+class Tampering {
+ public:
+  explicit Tampering(const std::filesystem::path& path) : path_(path), file_(path) {
+    for (const auto& [name, info] : file_.tensors()) {
+      const auto bytes = file_.data().subspan(info.begin, info.end - info.begin);
+      tensors_.push_back({name, info.type, info.shape, bytes});
+    }
+  }
+
+  void set(const std::string& name, std::size_t entry, std::uint32_t value) {
+    for (TensorView& tensor : tensors_) {
+      if (tensor.name != "transfer.hierarchical." + name) continue;
+      changed_.assign(tensor.bytes.begin(), tensor.bytes.end());
+      ASSERT_LE((entry + 1) * sizeof(value), changed_.size());
+      std::memcpy(changed_.data() + entry * sizeof(value), &value, sizeof(value));
+      tensor.bytes = changed_;
+    }
+    ASSERT_FALSE(changed_.empty()) << name;
+    write_safetensors(path_, lay_out_safetensors(tensors_, file_.metadata()));
+    std::string bytes = test::read_bytes(path_);
+    test::reseal(bytes);
+    test::write_bytes(path_, bytes);
+  }
+
+ private:
+  std::filesystem::path path_;
+  SafetensorsFile file_;
+  std::vector<TensorView> tensors_;
+  std::vector<std::byte> changed_;
+};
+
+TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
+  struct Fault {
+    const char* tensor;
+    std::size_t entry;
+    std::uint32_t value;
+    const char* message;
+  };
+  const Fault faults[] = {
+      {"blocks", 0, 16, "nor below"},
+      {"blocks", 0, 0xFFFFFFF0, "reaches outside"},
+      {"blocks", 1, 0, "empty"},
+      {"blocks", 1, 8, "not aligned"},
+      {"blocks", 3, 0xFFFFFFF0, "reaches outside"},
+      {"blocks", 4, 2, "unknown kind"},
+      {"blocks", 4, 0xFFFFFFFF, "unknown kind"},
+      {"blocks", 5, 1000, "rank"},
+      {"blocks", 6, 0xFFFFFFFF, "rank"},
+      {"channel_matrix", 2, 3, "no such matrix"},
+      {"channel_matrix", 2, 2, "number of values"},
+      {"patch", 0, kPatchCount, "not a permutation"},
+      {"patch", 0, 0xFFFFFFFF, "not a permutation"},
+  };
+  for (const Fault& fault : faults) {
+    SCOPED_TRACE(std::string(fault.tensor) + ": " + fault.message);
+    const test::TemporaryFolder folder;
+    save_transfer_file(folder / "file", sample_data(Precision::kF16));
+    Tampering(folder / "file").set(fault.tensor, fault.entry, fault.value);
+    expect_error([&] { load_transfer_file(folder / "file"); }, fault.message);
+  }
+}
+
+TEST(HierarchicalFile, SurvivesRandomMutationsUnderAGoodChecksum) {
+  constexpr std::uint64_t kSeed = 20240609;
+  constexpr int kCount = 1'000;
+  std::printf("seed %llu\n", static_cast<unsigned long long>(kSeed));
+  std::mt19937_64 random(kSeed);
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kF16));
+  const std::string whole = test::read_bytes(folder / "file");
+  const SafetensorsFile file(folder / "file");
+  const TensorInfo& blocks = file.info("transfer.hierarchical.blocks");
+  const std::size_t begin = test::prefix_size(whole) + blocks.begin;
+  int loaded = 0;
+  for (int i = 0; i < kCount; ++i) {
+    std::string bytes = whole;
+    const std::size_t at = begin + random() % (blocks.end - blocks.begin);
+    bytes[at] = static_cast<char>(random() % 2 ? bytes[at] ^ (1 << random() % 8) : random());
+    test::reseal(bytes);
+    test::write_bytes(folder / "mutant", bytes);
+    try {
+      test::use(load_transfer_file(folder / "mutant"));
+      ++loaded;
+    } catch (const Error&) {
+    }
+  }
+  EXPECT_GT(loaded, 0);
+  EXPECT_LT(loaded, kCount * 9 / 10);
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,35 @@
+#pragma once
+
+// The vector type of the AVX2 kernels; see vector_load.h. Needs AVX2, FMA and F16C.
+
+#include <immintrin.h>
+
+#include <cstddef>
+#include <cstdint>
+
+namespace rebounce {
+namespace {
+
+struct Vector8 {
+  static constexpr std::size_t kWidth = 8;
+  __m256 v;
+
+  static Vector8 load(const float* p) { return {_mm256_loadu_ps(p)}; }
+  static Vector8 load_half(const std::uint16_t* p) {
+    return {_mm256_cvtph_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
+  }
+  static Vector8 zero() { return {_mm256_setzero_ps()}; }
+  static Vector8 broadcast(float x) { return {_mm256_set1_ps(x)}; }
+  void store(float* p) const { _mm256_storeu_ps(p, v); }
+  float sum() const {
+    const __m128 half = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+    const __m128 pair = _mm_add_ps(half, _mm_movehl_ps(half, half));
+    return _mm_cvtss_f32(_mm_add_ss(pair, _mm_movehdup_ps(pair)));
+  }
+  friend Vector8 multiply_add(Vector8 a, Vector8 b, Vector8 c) {
+    return {_mm256_fmadd_ps(a.v, b.v, c.v)};
+  }
+};
+
+}  // namespace
+}  // namespace rebounce
