@@ -14,6 +14,7 @@
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/reconstruction_weights.h"
+#include "rebounce/precompute/winding.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
@@ -123,6 +124,7 @@ std::string settings_json(const BuildSettings& settings) {
   const bool dense = settings.operator_kind == OperatorKind::kDense;
   return nlohmann::json{{"operator", dense ? "dense" : "hierarchical"},
                         {"tolerance", settings.tolerance},
+                        {"scale", settings.scale},
                         {"precision", settings.precision == Precision::kF16 ? "f16" : "f32"},
                         {"patches", settings.subdivision.patch_count},
                         {"patch_size", settings.subdivision.patch_size},
@@ -164,6 +166,14 @@ void check_residual(double residual, Precision precision) {
                   residual, largest));
 }
 
+// The scene of a file, with what is plainly seen from behind made double-sided.
+Scene import_usable(const std::filesystem::path& path, double scale) {
+  Scene scene = import_gltf(path, scale);
+  const RayTracer tracer(scene.position, scene.triangle);
+  make_double_sided(scene, find_inside_out(scene, tracer));
+  return scene;
+}
+
 }  // namespace
 
 TransferData build_transfer_data(const std::filesystem::path& scene_path,
@@ -173,7 +183,8 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   PhaseClock clock(report, progress);
   TransferData data;
 
-  Scene scene = clock.run("import", [&](const Progress&) { return import_gltf(scene_path); });
+  Scene scene = clock.run(
+      "import", [&](const Progress&) { return import_usable(scene_path, settings.scale); });
   report.triangle_count = scene.triangle.size();
   report.degenerate_triangle_count = scene.degenerate_triangle_count;
   report.warnings = scene.warnings;

@@ -41,21 +41,6 @@ std::size_t component_bytes(int component_type) {
   }
 }
 
-std::size_t component_count(int type) {
-  switch (type) {
-    case TINYGLTF_TYPE_SCALAR:
-      return 1;
-    case TINYGLTF_TYPE_VEC2:
-      return 2;
-    case TINYGLTF_TYPE_VEC3:
-      return 3;
-    case TINYGLTF_TYPE_VEC4:
-      return 4;
-    default:
-      throw Error("a matrix stands where a scalar or vector is needed");
-  }
-}
-
 // `count` elements of `element_bytes` each, from `byte_offset` in a view, or Error.
 Strided checked_elements(const Document& document, int buffer_view, std::size_t byte_offset,
                          std::size_t count, std::size_t element_bytes, std::size_t stride) {
@@ -184,13 +169,33 @@ const tinygltf::Accessor& find(const Document& document, int accessor) {
 
 }  // namespace
 
+std::size_t component_count(int type) {
+  switch (type) {
+    case TINYGLTF_TYPE_SCALAR:
+      return 1;
+    case TINYGLTF_TYPE_VEC2:
+      return 2;
+    case TINYGLTF_TYPE_VEC3:
+      return 3;
+    case TINYGLTF_TYPE_VEC4:
+      return 4;
+    default:
+      throw Error("a matrix stands where a scalar or vector is needed");
+  }
+}
+
+FloatElements unpack_floats(const tinygltf::Accessor& accessor,
+                            const std::vector<std::uint8_t>& packed) {
+  const bool is_float = accessor.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT;
+  const std::size_t components = component_count(accessor.type);
+  return {packed.size() / (components * component_bytes(accessor.componentType)), components,
+          !is_float && !accessor.normalized, to_floats(packed, accessor)};
+}
+
 FloatElements read_floats(const Document& document, int accessor) {
   return with_name(accessor, [&] {
     const auto& source = find(document, accessor);
-    const auto packed = RawElements(document, source).read();
-    const bool is_float = source.componentType == TINYGLTF_COMPONENT_TYPE_FLOAT;
-    return FloatElements{source.count, component_count(source.type),
-                         !is_float && !source.normalized, to_floats(packed, source)};
+    return unpack_floats(source, RawElements(document, source).read());
   });
 }
 

@@ -27,6 +27,14 @@ struct FloatElements {
 /// other component type and where any byte would lie outside its buffer view.
 FloatElements read_floats(const Document& document, int accessor);
 
+/// The number of components of an accessor's type. Throws Error for a matrix.
+std::size_t component_count(int type);
+
+/// Converts elements, tightly packed, of the type, component type and normalisation of `accessor`,
+/// likewise.
+FloatElements unpack_floats(const tinygltf::Accessor& accessor,
+                            const std::vector<std::uint8_t>& packed);
+
 /// Reads an accessor of unsigned scalars, likewise.
 std::vector<std::uint32_t> read_indices(const Document& document, int accessor);
 

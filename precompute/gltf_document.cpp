@@ -6,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "gltf_meshopt.h"
 #include "gltf_resources.h"
 #include "gltf_validation.h"
 #include "rebounce/transfer/error.h"
@@ -47,39 +48,87 @@ Bytes store_resource(Document& document, Hash& hash, const std::filesystem::path
   return document.storage.emplace_back(std::move(resource.bytes));
 }
 
+Bytes first_bytes(Bytes bytes, std::size_t length) {
+  if (bytes.size() >= length) return bytes.first(length);
+  throw Error(fmt::format("byteLength is {}, but only {} bytes are there; get a complete copy",
+                          length, bytes.size()));
+}
+
+Bytes read_buffer(Document& document, Hash& hash, const json& buffer,
+                  const std::filesystem::path& folder) {
+  const auto length = buffer.at("byteLength").get<std::size_t>();
+  const Bytes bytes =
+      store_resource(document, hash, folder, buffer.at("uri").get_ref<const std::string&>());
+  return first_bytes(bytes, length);
+}
+
 void read_buffers(Document& document, Hash& hash, const json& root, const Container& container,
                   const std::filesystem::path& folder) {
   if (!root.contains("buffers")) return;
   const json& buffers = root.at("buffers");
   for (std::size_t i = 0; i < buffers.size(); ++i) {
-    const auto length = buffers[i].at("byteLength").get<std::size_t>();
     Bytes bytes;
-    if (buffers[i].contains("uri")) {
-      try {
-        bytes = store_resource(document, hash, folder,
-                               buffers[i].at("uri").get_ref<const std::string&>());
-      } catch (const Error& failure) {
+    try {
+      if (buffers[i].contains("uri")) {
+        bytes = read_buffer(document, hash, buffers[i], folder);
+      } else if (i == 0 && container.binary) {
+        bytes = first_bytes(*container.binary, buffers[i].at("byteLength").get<std::size_t>());
+      }
+    } catch (const Error& failure) {
+      if (!is_meshopt_fallback(buffers[i])) {
         throw Error(fmt::format("buffers[{}]: {}", i, failure.what()));
       }
-    } else if (i == 0 && container.binary) {
-      bytes = *container.binary;
-    } else {
-      document.buffers.emplace_back();
-      continue;
     }
-    if (bytes.size() < length) {
-      throw Error(
-          fmt::format("buffers[{}]: byteLength is {}, but only {} bytes are there; get a complete "
-                      "copy",
-                      i, length, bytes.size()));
-    }
-    document.buffers.push_back(bytes.first(length));
+    document.buffers.push_back(bytes);
   }
 }
 
+const json* draco_extension(const json& primitive) {
+  const auto extensions = primitive.find("extensions");
+  if (extensions == primitive.end() || !extensions->is_object()) return nullptr;
+  const auto found = extensions->find("KHR_draco_mesh_compression");
+  return found != extensions->end() && found->is_object() ? &*found : nullptr;
+}
+
+// The accessor that `holder` names as `key`, null where it names none.
+const json* accessor_of(const json& root, const json& holder, const char* key) {
+  const auto index = holder.find(key);
+  if (index == holder.end()) return nullptr;
+  return &root.at("accessors").at(index->get<std::size_t>());
+}
+
+bool lacks_data(const json* accessor) {
+  return accessor && !accessor->contains("bufferView");
+}
+
+DracoSource draco_source(const json& root, const json& primitive, const json& extension) {
+  DracoSource source;
+  source.buffer_view = extension.at("bufferView").get<int>();
+  source.unique_id = extension.at("attributes").get<std::map<std::string, std::uint32_t>>();
+  const json* indices = accessor_of(root, primitive, "indices");
+  if (indices) source.index_count = indices->at("count").get<std::size_t>();
+  source.has_fallback = !lacks_data(indices) &&
+                        !lacks_data(accessor_of(root, primitive.at("attributes"), "POSITION"));
+  return source;
+}
+
+std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco_sources(json& root) {
+  std::map<std::pair<std::size_t, std::size_t>, DracoSource> sources;
+  const json& meshes = elements(root, "meshes");
+  for (std::size_t mesh = 0; mesh < meshes.size(); ++mesh) {
+    const json primitives = meshes[mesh].value("primitives", json::array());
+    for (std::size_t i = 0; i < primitives.size(); ++i) {
+      const json* extension = draco_extension(primitives[i]);
+      if (extension) sources[{mesh, i}] = draco_source(root, primitives[i], *extension);
+    }
+  }
+  return sources;
+}
+
 // What the asset's structure is read from: without the data, which was read above, without what a
-// static diffuse scene has no use for, and without Draco's extension, whose decoder (where tinygltf
-// was built with it) would look for the data.
+// static diffuse scene has no use for, and without Draco's extension, which is taken separately:
+// tinygltf's decoder (where it was built with it) would look for the data, and its check of indices
+// refuses those that are nowhere else.
 std::string structure_text(json root) {
   for (const char* key : {"buffers", "images", "animations", "skins", "extras"}) root.erase(key);
   for (json& material : elements(root, "materials")) {
@@ -91,6 +140,9 @@ std::string structure_text(json root) {
   }
   for (json& mesh : elements(root, "meshes")) {
     for (json& primitive : elements(mesh, "primitives")) {
+      if (draco_extension(primitive) && lacks_data(accessor_of(root, primitive, "indices"))) {
+        primitive.erase("indices");
+      }
       primitive.erase("extensions");
     }
   }
@@ -143,7 +195,7 @@ void read_images(Document& document, Hash& hash, const json& root,
 
 }  // namespace
 
-Document read_document(const std::filesystem::path& path) {
+Document read_document(const std::filesystem::path& path, Warnings& warnings) {
   const auto folder = std::filesystem::absolute(path).parent_path();
   Document document;
   const Bytes file = document.storage.emplace_back(read_file(path));
@@ -155,14 +207,20 @@ Document read_document(const std::filesystem::path& path) {
   check_version_and_extensions(root);
   check_structure(root);
   document.model = parse_structure(root);
+  document.draco = draco_sources(root);
   read_buffers(document, hash, root, container, folder);
+  decode_meshopt_views(root, document, warnings);
   read_images(document, hash, root, folder);
   document.hash = hash.text();
   return document;
 }
 
 Bytes view_bytes(const Document& document, int buffer_view) {
-  const auto& view = document.model.bufferViews.at(static_cast<std::size_t>(buffer_view));
+  const auto index = static_cast<std::size_t>(buffer_view);
+  if (index < document.decoded_views.size() && !document.decoded_views[index].empty()) {
+    return document.decoded_views[index];
+  }
+  const auto& view = document.model.bufferViews.at(index);
   const Bytes buffer = document.buffers.at(static_cast<std::size_t>(view.buffer));
   if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset) {
     throw Error(

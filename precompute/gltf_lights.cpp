@@ -40,7 +40,7 @@ void take_cone(const tinygltf::SpotLight& source, Light& light) {
 
 // The light in its place; empty, with the reason, where it cannot be used.
 std::optional<Light> place_light(const tinygltf::Light& source, const tinygltf::Node& node,
-                                 const glm::dmat4& world, std::string& problem) {
+                                 const glm::dmat4& world, double scale, std::string& problem) {
   const auto type = light_type(source.type);
   if (!type) {
     problem = fmt::format("its type \"{}\" is unknown", source.type);
@@ -54,7 +54,7 @@ std::optional<Light> place_light(const tinygltf::Light& source, const tinygltf::
     light.color = to_float3(glm::dvec3(source.color[0], source.color[1], source.color[2]));
   }
   light.intensity = static_cast<float>(source.intensity);
-  light.range = static_cast<float>(std::max(source.range, 0.0));
+  light.range = static_cast<float>(std::max(source.range, 0.0) * scale);
   if (*type == LightType::kSpot) take_cone(source.spot, light);
 
   const auto direction = direction_of(-glm::dvec3(world[2]));
@@ -111,14 +111,14 @@ int light_of(const tinygltf::Node& node) {
 }  // namespace
 
 void import_lights_and_cameras(const Document& document, std::span<const PlacedNode> nodes,
-                               Scene& scene, Warnings& warnings) {
+                               double scale, Scene& scene, Warnings& warnings) {
   const tinygltf::Model& model = document.model;
   for (const PlacedNode& placed : nodes) {
     const tinygltf::Node& node = model.nodes[placed.node];
     if (const int index = light_of(node); index >= 0) {
       std::string problem;
       const auto light = place_light(model.lights.at(static_cast<std::size_t>(index)), node,
-                                     placed.world, problem);
+                                     placed.world, scale, problem);
       if (light) scene.lights.push_back(*light);
       if (!light) warnings.add(fmt::format("lights[{}] is left out: {}", index, problem));
     }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <tuple>
@@ -63,6 +64,17 @@ TextureWrap to_wrap(int code) {
   }
 }
 
+// The asset's images that may serve a texture, the preferred one first.
+std::vector<int> sources_of(const tinygltf::Texture& texture) {
+  std::vector<int> sources;
+  const auto webp = texture.extensions.find("EXT_texture_webp");
+  if (webp != texture.extensions.end() && webp->second.Has("source")) {
+    sources.push_back(webp->second.Get("source").GetNumberAsInt());
+  }
+  if (texture.source >= 0) sources.push_back(texture.source);
+  return sources;
+}
+
 // Adds textures to the scene on first use; the same image wrapped the same way is one texture.
 class TextureImport {
  public:
@@ -72,9 +84,10 @@ class TextureImport {
   // The scene's texture for the asset's, or kNone (white) where there is no picture.
   std::uint32_t operator()(int index) {
     const auto& texture = document_.model.textures.at(static_cast<std::size_t>(index));
-    if (texture.source < 0) {
-      warnings_.add(fmt::format("textures[{}] has no PNG or JPEG image; white instead", index));
-      return kNone;
+    const std::vector<int> sources = sources_of(texture);
+    if (sources.empty()) {
+      warnings_.add(
+          fmt::format("textures[{}] has no PNG, JPEG or WebP image; white instead", index));
     }
     TextureWrap wrap_s = TextureWrap::kRepeat;
     TextureWrap wrap_t = TextureWrap::kRepeat;
@@ -83,27 +96,31 @@ class TextureImport {
       wrap_s = to_wrap(sampler.wrapS);
       wrap_t = to_wrap(sampler.wrapT);
     }
-    const auto [known, is_new] = known_.try_emplace({texture.source, wrap_s, wrap_t}, kNone);
-    if (is_new) known->second = add(texture.source, wrap_s, wrap_t);
-    return known->second;
+    for (const int source : sources) {
+      const auto [known, is_new] = known_.try_emplace({source, wrap_s, wrap_t}, kNone);
+      if (is_new) known->second = add(source, wrap_s, wrap_t, source == sources.back());
+      if (known->second != kNone) return known->second;
+    }
+    return kNone;
   }
 
  private:
-  std::uint32_t add(int source, TextureWrap wrap_s, TextureWrap wrap_t) {
+  std::uint32_t add(int source, TextureWrap wrap_s, TextureWrap wrap_t, bool is_last) {
     const EncodedImage& encoded = document_.images.at(static_cast<std::size_t>(source));
-    std::optional<Image> image = decode(encoded, source);
+    std::optional<DecodedImage> image = decode(encoded, source);
     if (!image) {
       const std::string problem =
-          encoded.problem.empty() ? "it cannot be decoded as PNG or JPEG" : encoded.problem;
-      warnings_.add(fmt::format("images[{}] is not used, white instead: {}", source, problem));
+          encoded.problem.empty() ? "it cannot be decoded as PNG, JPEG or WebP" : encoded.problem;
+      warnings_.add(fmt::format("images[{}] is not used, {} instead: {}", source,
+                                is_last ? "white" : "its fallback", problem));
       return kNone;
     }
-    scene_.textures.push_back({{encoded.bytes.begin(), encoded.bytes.end()}, wrap_s, wrap_t});
-    scene_.images.push_back(std::move(*image));
+    scene_.textures.push_back({std::move(image->stored), wrap_s, wrap_t});
+    scene_.images.push_back(std::move(image->image));
     return static_cast<std::uint32_t>(scene_.textures.size() - 1);
   }
 
-  static std::optional<Image> decode(const EncodedImage& encoded, int source) {
+  static std::optional<DecodedImage> decode(const EncodedImage& encoded, int source) {
     try {
       return decode_image(encoded.bytes);
     } catch (const Error& failure) {
@@ -131,27 +148,54 @@ Float3 to_color(const std::vector<double>& factor, Warnings& warnings) {
 
 struct BaseColor {
   Float3 factor{1, 1, 1};
+  float alpha = 1;
   TextureReference texture;
 };
+
+// A number that stands for a fraction, in [0, 1].
+float to_fraction(double value) {
+  if (!std::isfinite(value)) throw Error("a factor is not a finite number");
+  return static_cast<float>(std::clamp(value, 0.0, 1.0));
+}
 
 BaseColor base_color(const tinygltf::Material& source, Warnings& warnings) {
   const auto gloss = source.extensions.find("KHR_materials_pbrSpecularGlossiness");
   if (gloss == source.extensions.end()) {
     const auto& surface = source.pbrMetallicRoughness;
-    return {to_color(surface.baseColorFactor, warnings), reference(surface.baseColorTexture)};
+    return {to_color(surface.baseColorFactor, warnings), to_fraction(surface.baseColorFactor[3]),
+            reference(surface.baseColorTexture)};
   }
   BaseColor color;
   if (gloss->second.Has("diffuseFactor")) {
     std::vector<double> factor;
-    for (int channel = 0; channel < kChannelCount; ++channel) {
+    for (int channel = 0; channel < 4; ++channel) {
       factor.push_back(gloss->second.Get("diffuseFactor").Get(channel).GetNumberAsDouble());
     }
     color.factor = to_color(factor, warnings);
+    color.alpha = to_fraction(factor[3]);
   }
   if (gloss->second.Has("diffuseTexture")) {
     color.texture = reference(gloss->second.Get("diffuseTexture"));
   }
   return color;
+}
+
+AlphaMode alpha_mode(const tinygltf::Material& source) {
+  if (source.alphaMode == "MASK") return AlphaMode::kMask;
+  if (source.alphaMode == "BLEND") return AlphaMode::kBlend;
+  return AlphaMode::kOpaque;
+}
+
+float alpha_cutoff(const tinygltf::Material& source) {
+  const auto cutoff = static_cast<float>(source.alphaCutoff);
+  if (!std::isfinite(cutoff)) throw Error("alphaCutoff is not a finite number");
+  return std::max(cutoff, 0.0F);
+}
+
+float transmission(const tinygltf::Material& source) {
+  const auto glass = source.extensions.find("KHR_materials_transmission");
+  if (glass == source.extensions.end() || !glass->second.Has("transmissionFactor")) return 0;
+  return to_fraction(glass->second.Get("transmissionFactor").GetNumberAsDouble());
 }
 
 Float3 emitted_luminance(const tinygltf::Material& source, Warnings& warnings) {
@@ -180,8 +224,13 @@ class MaterialImport {
     const BaseColor color = base_color(source, warnings_);
     material.base_color = color.factor;
     material.base_color_texture = resolve(color.texture, texcoords.base_color);
+    material.alpha_mode = alpha_mode(source);
+    material.alpha_cutoff = alpha_cutoff(source);
+    material.base_alpha = color.alpha;
+    material.transmission = transmission(source);
+    texcoords.uses_alpha = material.alpha_mode != AlphaMode::kOpaque;
     take_emission(source, material, texcoords.emissive);
-    warn_of_what_enters_as_opaque(source);
+    warn_of_what_enters_as_opaque(source, material);
     return material;
   }
 
@@ -206,11 +255,11 @@ class MaterialImport {
     material.emissive_texture = resolve(reference(source.emissiveTexture), texcoord);
   }
 
-  void warn_of_what_enters_as_opaque(const tinygltf::Material& source) {
-    if (source.alphaMode == "MASK" || source.alphaMode == "BLEND") {
-      warnings_.count("{} materials with alphaMode MASK or BLEND are taken as opaque");
+  void warn_of_what_enters_as_opaque(const tinygltf::Material& source, const Material& material) {
+    if (material.alpha_mode == AlphaMode::kBlend) {
+      warnings_.count("{} materials with alphaMode BLEND are taken as opaque");
     }
-    if (source.extensions.contains("KHR_materials_transmission") ||
+    if (material.transmission > 0 ||
         source.extensions.contains("KHR_materials_diffuse_transmission")) {
       warnings_.count("{} materials that transmit light are taken as opaque");
     }

@@ -23,6 +23,7 @@ struct TexcoordSource {
 struct MaterialTexcoords {
   TexcoordSource base_color;
   TexcoordSource emissive;
+  bool uses_alpha = false;  ///< the material is not opaque
 };
 
 /// Adds the asset's materials to `scene`, in order, then glTF's default material; and the textures

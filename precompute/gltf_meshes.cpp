@@ -9,15 +9,13 @@
 #include <glm/matrix.hpp>
 #include <optional>
 
+#include "gltf_instances.h"
 #include "gltf_primitives.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce::gltf {
 namespace {
-
-// More than can be precomputed; a small file could otherwise fill the memory by using a mesh often.
-constexpr std::size_t kMaxTriangles = std::size_t{1} << 26;
 
 // A triangle without area: its height is 1e-12 of its longest side, far below what positions in
 // single precision can express.
@@ -124,34 +122,88 @@ class Placement {
   std::vector<Float3> position_;             // [v] in the world
 };
 
-void warn_of_node(const tinygltf::Node& node, Warnings& warnings) {
-  if (node.skin >= 0) warnings.count("{} skinned meshes are taken in their bind pose");
-  if (node.extensions.contains("EXT_mesh_gpu_instancing")) {
-    warnings.count("{} nodes use EXT_mesh_gpu_instancing: their mesh is taken once");
+// The meshes of an asset, each read when it is first asked for.
+class Meshes {
+ public:
+  Meshes(const Document& document, std::span<const MaterialTexcoords> texcoords, Warnings& warnings)
+      : document_(document),
+        texcoords_(texcoords),
+        warnings_(warnings),
+        primitives_(document.model.meshes.size()) {}
+
+  const std::vector<Primitive>& operator[](int mesh) {
+    const auto index = static_cast<std::size_t>(mesh);
+    auto& primitives = primitives_[index];
+    if (!primitives) primitives = read_primitives(document_, index, texcoords_, warnings_);
+    return *primitives;
   }
+
+ private:
+  const Document& document_;
+  std::span<const MaterialTexcoords> texcoords_;
+  Warnings& warnings_;
+  std::vector<std::optional<std::vector<Primitive>>> primitives_;
+};
+
+// Runs visit(primitive, world, instances) for each use of a primitive that has triangles. Instances
+// are read again on every call: kept for all nodes they could fill the memory.
+template <typename Visit>
+void for_each_use(const Document& document, std::span<const PlacedNode> nodes, Meshes& meshes,
+                  const Visit& visit) {
+  for (const PlacedNode& placed : nodes) {
+    const int mesh = document.model.nodes[placed.node].mesh;
+    if (mesh < 0) continue;
+    std::optional<Instances> instances;
+    for (const Primitive& primitive : meshes[mesh]) {
+      if (primitive.triangle.empty()) continue;
+      if (!instances) instances = read_instances(document, placed.node);
+      visit(primitive, placed.world, *instances);
+    }
+  }
+}
+
+// Reserves room for all triangles, so that the scene never exists twice while it grows.
+void reserve(const Document& document, std::span<const PlacedNode> nodes, Meshes& meshes,
+             Scene& scene) {
+  std::size_t triangles = 0;
+  std::size_t vertices = 0;
+  for_each_use(document, nodes, meshes,
+               [&](const Primitive& primitive, const glm::dmat4&, const Instances& instances) {
+                 const std::size_t corners = 3 * primitive.triangle.size();
+                 const std::size_t used = primitive.normal.empty()
+                                              ? corners
+                                              : std::min(corners, primitive.position.size());
+                 add_triangles(triangles, instances.count * primitive.triangle.size());
+                 vertices += instances.count * used;
+               });
+  scene.triangle.reserve(triangles);
+  scene.triangle_material.reserve(triangles);
+  scene.position.reserve(vertices);
+  scene.normal.reserve(vertices);
+  scene.base_color_texcoord.reserve(vertices);
+  scene.emissive_texcoord.reserve(vertices);
+  scene.vertex_color.reserve(vertices);
 }
 
 }  // namespace
 
 void import_meshes(const Document& document, std::span<const PlacedNode> nodes,
                    std::span<const MaterialTexcoords> texcoords, Scene& scene, Warnings& warnings) {
-  const tinygltf::Model& model = document.model;
-  std::vector<std::optional<std::vector<Primitive>>> meshes(model.meshes.size());
-  std::size_t triangle_count = 0;
   for (const PlacedNode& placed : nodes) {
-    const tinygltf::Node& node = model.nodes[placed.node];
-    if (node.mesh < 0) continue;
-    warn_of_node(node, warnings);
-    const auto index = static_cast<std::size_t>(node.mesh);
-    if (!meshes[index]) meshes[index] = read_primitives(document, index, texcoords, warnings);
-    for (const Primitive& primitive : *meshes[index]) {
-      triangle_count += primitive.triangle.size();
-      if (triangle_count > kMaxTriangles) {
-        throw Error(fmt::format("more than {} triangles; simplify the scene", kMaxTriangles));
-      }
-      Placement(primitive, placed.world, scene).append();
+    const tinygltf::Node& node = document.model.nodes[placed.node];
+    if (node.mesh >= 0 && node.skin >= 0) {
+      warnings.count("{} skinned meshes are taken in their bind pose");
     }
   }
+  Meshes meshes(document, texcoords, warnings);
+  reserve(document, nodes, meshes, scene);
+  for_each_use(
+      document, nodes, meshes,
+      [&](const Primitive& primitive, const glm::dmat4& world, const Instances& instances) {
+        for (std::size_t i = 0; i < instances.count; ++i) {
+          Placement(primitive, world * instances.transform(i), scene).append();
+        }
+      });
 }
 
 }  // namespace rebounce::gltf

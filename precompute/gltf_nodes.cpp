@@ -18,21 +18,11 @@ constexpr std::size_t kMaxPlacedNodes = std::size_t{1} << 20;
 
 glm::dmat4 local_transform(const tinygltf::Node& node) {
   if (!node.matrix.empty()) return glm::make_mat4(node.matrix.data());
-  glm::dmat4 transform(1.0);
-  if (!node.translation.empty()) {
-    transform = glm::translate(transform, glm::make_vec3(node.translation.data()));
-  }
-  if (!node.rotation.empty()) {
-    const auto& r = node.rotation;
-    const glm::dquat rotation(r[3], r[0], r[1], r[2]);
-    // Exporters round: without this a rotation would scale. A zero one is no rotation.
-    const double length = glm::length(rotation);
-    if (length > 0) transform *= glm::mat4_cast(rotation / length);
-  }
-  if (!node.scale.empty()) {
-    transform = glm::scale(transform, glm::make_vec3(node.scale.data()));
-  }
-  return transform;
+  Trs trs;
+  if (!node.translation.empty()) trs.translation = glm::make_vec3(node.translation.data());
+  if (!node.rotation.empty()) trs.rotation = glm::make_vec4(node.rotation.data());
+  if (!node.scale.empty()) trs.scale = glm::make_vec3(node.scale.data());
+  return trs.matrix();
 }
 
 std::vector<int> root_nodes(const tinygltf::Model& model) {
@@ -56,10 +46,10 @@ class Traversal {
   explicit Traversal(const tinygltf::Model& model)
       : model_(model), is_root_(model.nodes.size(), false), is_open_(model.nodes.size(), false) {}
 
-  std::vector<PlacedNode> run() {
+  std::vector<PlacedNode> run(const glm::dmat4& world) {
     const std::vector<int> roots = root_nodes(model_);
     for (const int root : roots) mark_root(static_cast<std::size_t>(root));
-    push(roots, glm::dmat4(1.0));
+    push(roots, world);
     while (!pending_.empty()) {
       Step step = pending_.back();
       pending_.pop_back();
@@ -122,8 +112,17 @@ class Traversal {
 
 }  // namespace
 
-std::vector<PlacedNode> place_nodes(const tinygltf::Model& model) {
-  return Traversal(model).run();
+glm::dmat4 Trs::matrix() const {
+  glm::dmat4 transform = glm::translate(glm::dmat4(1.0), translation);
+  const glm::dquat quaternion(rotation.w, rotation.x, rotation.y, rotation.z);
+  // Exporters round: without this a rotation would scale. A zero one is no rotation.
+  const double length = glm::length(quaternion);
+  if (length > 0) transform *= glm::mat4_cast(quaternion / length);
+  return glm::scale(transform, scale);
+}
+
+std::vector<PlacedNode> place_nodes(const tinygltf::Model& model, double scale) {
+  return Traversal(model).run(glm::scale(glm::dmat4(1.0), glm::dvec3(scale)));
 }
 
 }  // namespace rebounce::gltf

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numeric>
 
 #include "gltf_accessors.h"
+#include "gltf_draco.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce::gltf {
@@ -48,10 +50,39 @@ std::vector<Uint3> assemble_triangles(int mode, std::span<const std::uint32_t> i
 
 class PrimitiveReader {
  public:
-  PrimitiveReader(const Document& document, const tinygltf::Primitive& source, Warnings& warnings)
-      : document_(document), source_(source), warnings_(warnings) {}
+  // `compressed` is null where the primitive has no Draco data.
+  PrimitiveReader(const Document& document, const tinygltf::Primitive& source,
+                  const DracoSource* compressed, Warnings& warnings)
+      : document_(document), source_(source), compressed_(compressed), warnings_(warnings) {}
 
   void read(const MaterialTexcoords& texcoords, Primitive& primitive) {
+    if (!compressed_) return read_geometry(texcoords, primitive);
+    try {
+      decode_draco();
+      read_geometry(texcoords, primitive);
+    } catch (const Error&) {
+      if (!compressed_->has_fallback) throw;
+      warnings_.count("{} Draco primitives cannot be decoded; their fallback is used");
+      draco_.reset();
+      read_geometry(texcoords, primitive);
+    }
+  }
+
+ private:
+  void decode_draco() {
+    if (source_.mode != TINYGLTF_MODE_TRIANGLES) {
+      throw Error("only triangle lists are read from Draco data; export it as one");
+    }
+    const std::size_t expected = compressed_->index_count.value_or(3 * kMaxTriangles) / 3;
+    draco_ = std::make_unique<DracoMesh>(view_bytes(document_, compressed_->buffer_view),
+                                         std::min(expected, kMaxTriangles));
+  }
+
+  const tinygltf::Accessor& accessor_of(int index) const {
+    return document_.model.accessors.at(static_cast<std::size_t>(index));
+  }
+
+  void read_geometry(const MaterialTexcoords& texcoords, Primitive& primitive) {
     read_positions(primitive);
     read_triangles(primitive);
     if (const int accessor = attribute("NORMAL"); accessor >= 0) {
@@ -59,10 +90,9 @@ class PrimitiveReader {
     }
     primitive.base_color_texcoord = read_texcoords(texcoords.base_color);
     primitive.emissive_texcoord = read_texcoords(texcoords.emissive);
-    read_colors(primitive);
+    read_colors(texcoords.uses_alpha, primitive);
   }
 
- private:
   int attribute(const std::string& name) const {
     const auto found = source_.attributes.find(name);
     return found == source_.attributes.end() ? -1 : found->second;
@@ -71,7 +101,7 @@ class PrimitiveReader {
   // An attribute with one of the allowed numbers of components and one element for each vertex.
   FloatElements read(int accessor, const std::string& name,
                      std::initializer_list<std::size_t> allowed_components) const {
-    FloatElements elements = read_floats(document_, accessor);
+    FloatElements elements = read_elements(accessor, name);
     if (std::find(allowed_components.begin(), allowed_components.end(), elements.component_count) ==
         allowed_components.end()) {
       throw Error(fmt::format("{} (accessors[{}]) has {} components", name, accessor,
@@ -82,6 +112,15 @@ class PrimitiveReader {
                               accessor, elements.count, vertex_count_));
     }
     return elements;
+  }
+
+  FloatElements read_elements(int accessor, const std::string& name) const {
+    if (!draco_ || !compressed_->unique_id.contains(name)) return read_floats(document_, accessor);
+    try {
+      return draco_->read_floats(compressed_->unique_id.at(name), accessor_of(accessor));
+    } catch (const Error& failure) {
+      throw Error(fmt::format("{} (accessors[{}]): {}", name, accessor, failure.what()));
+    }
   }
 
   template <std::size_t N>
@@ -108,14 +147,25 @@ class PrimitiveReader {
     }
   }
 
-  void read_triangles(Primitive& primitive) {
-    std::vector<std::uint32_t> index;
-    if (source_.indices >= 0) {
-      index = read_indices(document_, source_.indices);
-    } else {
-      index.resize(vertex_count_);
-      std::iota(index.begin(), index.end(), 0U);
+  std::vector<std::uint32_t> indices() const {
+    if (draco_) return draco_indices();
+    if (source_.indices >= 0) return read_indices(document_, source_.indices);
+    std::vector<std::uint32_t> index(vertex_count_);
+    std::iota(index.begin(), index.end(), 0U);
+    return index;
+  }
+
+  std::vector<std::uint32_t> draco_indices() const {
+    auto index = draco_->indices();
+    if (index.size() != compressed_->index_count.value_or(index.size())) {
+      throw Error(fmt::format("its Draco data have {} indices, but the accessor {} elements",
+                              index.size(), *compressed_->index_count));
     }
+    return index;
+  }
+
+  void read_triangles(Primitive& primitive) {
+    const std::vector<std::uint32_t> index = indices();
     const auto bad = std::find_if(index.begin(), index.end(),
                                   [&](std::uint32_t vertex) { return vertex >= vertex_count_; });
     if (bad != index.end()) {
@@ -145,7 +195,7 @@ class PrimitiveReader {
     return texcoords;
   }
 
-  void read_colors(Primitive& primitive) {
+  void read_colors(bool uses_alpha, Primitive& primitive) {
     const int accessor = attribute("COLOR_0");
     if (accessor < 0) {
       primitive.vertex_color.assign(vertex_count_, Float3{1, 1, 1});
@@ -154,6 +204,9 @@ class PrimitiveReader {
     const FloatElements elements = read(accessor, "COLOR_0", {3, 4});
     if (elements.was_integer) {
       throw Error(fmt::format("COLOR_0 (accessors[{}]) is not normalized", accessor));
+    }
+    if (uses_alpha && elements.component_count == 4 && has_alpha(elements)) {
+      warnings_.count("the alpha of the vertex colours of {} primitives is ignored");
     }
     primitive.vertex_color = vectors<3>(elements);
     for (Float3& color : primitive.vertex_color) {
@@ -165,8 +218,17 @@ class PrimitiveReader {
     }
   }
 
+  static bool has_alpha(const FloatElements& colors) {
+    for (std::size_t i = 0; i < colors.count; ++i) {
+      if (colors.at(i, 3) < 1) return true;
+    }
+    return false;
+  }
+
   const Document& document_;
   const tinygltf::Primitive& source_;
+  const DracoSource* compressed_;
+  std::unique_ptr<DracoMesh> draco_;
   Warnings& warnings_;
   std::size_t vertex_count_ = 0;
 };
@@ -190,13 +252,53 @@ bool is_wanted(const tinygltf::Primitive& source, Warnings& warnings) {
   return true;
 }
 
+// Keeps the vertices that a triangle uses, in order. A primitive costs as much to place as it has
+// vertices, however often it is placed.
+void drop_unused_vertices(Primitive& primitive) {
+  std::vector<std::uint32_t> kept(primitive.position.size(), kNone);
+  for (const Uint3& triangle : primitive.triangle) {
+    for (const std::uint32_t vertex : triangle) kept[vertex] = 0;
+  }
+  std::uint32_t count = 0;
+  for (std::uint32_t& vertex : kept) {
+    if (vertex != kNone) vertex = count++;
+  }
+  const auto compact = [&](auto& values) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (kept[i] != kNone) values[kept[i]] = values[i];
+    }
+    if (!values.empty()) values.resize(count);
+    values.shrink_to_fit();
+  };
+  compact(primitive.position);
+  compact(primitive.normal);
+  compact(primitive.base_color_texcoord);
+  compact(primitive.emissive_texcoord);
+  compact(primitive.vertex_color);
+  for (Uint3& triangle : primitive.triangle) {
+    for (std::uint32_t& vertex : triangle) vertex = kept[vertex];
+  }
+}
+
+const DracoSource* draco_source(const Document& document, std::size_t mesh, std::size_t primitive) {
+  const auto found = document.draco.find({mesh, primitive});
+  return found == document.draco.end() ? nullptr : &found->second;
+}
+
 }  // namespace
+
+void add_triangles(std::size_t& total, std::size_t more) {
+  total += more;
+  if (total <= kMaxTriangles) return;
+  throw Error(fmt::format("more than {} triangles; simplify the scene", kMaxTriangles));
+}
 
 std::vector<Primitive> read_primitives(const Document& document, std::size_t mesh,
                                        std::span<const MaterialTexcoords> texcoords,
                                        Warnings& warnings) {
   const tinygltf::Mesh& source = document.model.meshes[mesh];
   std::vector<Primitive> primitives;
+  std::size_t triangle_count = 0;
   for (std::size_t i = 0; i < source.primitives.size(); ++i) {
     Primitive primitive;
     primitive.place = fmt::format("meshes[{}] \"{}\", primitives[{}]", mesh, source.name, i);
@@ -206,8 +308,12 @@ std::vector<Primitive> read_primitives(const Document& document, std::size_t mes
       const std::size_t default_material = texcoords.size() - 1;
       primitive.material = static_cast<std::uint32_t>(
           material < 0 ? default_material : static_cast<std::size_t>(material));
-      PrimitiveReader(document, source.primitives[i], warnings)
+      PrimitiveReader(document, source.primitives[i], draco_source(document, mesh, i), warnings)
           .read(texcoords[primitive.material], primitive);
+      if (primitive.position.size() > 3 * primitive.triangle.size()) {
+        drop_unused_vertices(primitive);
+      }
+      add_triangles(triangle_count, primitive.triangle.size());
     } catch (const Error& failure) {
       throw Error(fmt::format("{}: {}", primitive.place, failure.what()));
     }

@@ -10,6 +10,13 @@
 
 namespace rebounce::gltf {
 
+/// More than can be precomputed; a small file could otherwise fill the memory by using a mesh
+/// often.
+inline constexpr std::size_t kMaxTriangles = std::size_t{1} << 26;
+
+/// Adds `more` triangles to `total`, or throws Error where that makes more than kMaxTriangles.
+void add_triangles(std::size_t& total, std::size_t more);
+
 /// A primitive's triangles in its mesh's own space, checked.
 struct Primitive {
   std::string place;                        ///< for messages: meshes[2] "Chair", primitives[0]

@@ -21,6 +21,11 @@ using nlohmann::json;
 constexpr std::array kSupportedExtensions{
     std::string_view{"KHR_lights_punctual"},
     std::string_view{"KHR_mesh_quantization"},
+    std::string_view{"KHR_draco_mesh_compression"},
+    std::string_view{"KHR_meshopt_compression"},
+    std::string_view{"EXT_meshopt_compression"},
+    std::string_view{"EXT_mesh_gpu_instancing"},
+    std::string_view{"EXT_texture_webp"},
     std::string_view{"KHR_texture_transform"},
     std::string_view{"KHR_materials_emissive_strength"},
     std::string_view{"KHR_materials_pbrSpecularGlossiness"},
@@ -93,6 +98,9 @@ class StructureCheck {
       size(view, "byteOffset", at);
       size(view, "byteLength", at, kRequired);
       size(view, "byteStride", at);
+      for (const char* name : {"KHR_meshopt_compression", "EXT_meshopt_compression"}) {
+        if (json* compressed = extension(view, name)) compressed_view(*compressed, at, name);
+      }
     });
     for_each(root_, "accessors", "",
              [&](json& item, const std::string& at) { accessor(item, at); });
@@ -178,12 +186,13 @@ class StructureCheck {
   }
 
   // Sizes and codes. tinygltf keeps some of them as int, and no real asset has more.
+  static void check_size(json& value, const std::string& place) {
+    if (whole_number(value, place) <= std::numeric_limits<int>::max()) return;
+    throw Error(fmt::format("{} is {}, above the limit of 2147483647", place, value.dump()));
+  }
+
   static void size(json& parent, const char* key, const std::string& at, bool required = false) {
-    json* value = member(parent, key, at, required);
-    if (value && whole_number(*value, join(at, key)) > std::numeric_limits<int>::max()) {
-      throw Error(
-          fmt::format("{} is {}, above the limit of 2147483647", join(at, key), value->dump()));
-    }
+    if (json* value = member(parent, key, at, required)) check_size(*value, join(at, key));
   }
 
   void check_index(json& value, const char* target, const std::string& place) {
@@ -261,19 +270,24 @@ class StructureCheck {
     for (auto& [name, value] : attributes->items()) {
       check_index(value, "accessors", at + ".attributes." + name);
     }
-    if (extension(item, "KHR_draco_mesh_compression")) draco_fallback(item, at);
+    if (json* draco = extension(item, "KHR_draco_mesh_compression")) {
+      const std::string place = at + ".extensions.KHR_draco_mesh_compression";
+      index(*draco, "bufferView", "bufferViews", place, kRequired);
+      for (auto& [name, value] : object(*draco, "attributes", place, kRequired)->items()) {
+        check_size(value, place + ".attributes." + name);
+      }
+    }
   }
 
-  // An asset that uses Draco without requiring it must hold the geometry uncompressed as well.
-  void draco_fallback(const json& item, const std::string& at) {
-    const auto has_data = [&](const json& holder, const char* key) {
-      return !holder.contains(key) ||
-             root_.at("accessors").at(holder.at(key).get<std::size_t>()).contains("bufferView");
-    };
-    if (has_data(item, "indices") && has_data(item.at("attributes"), "POSITION")) return;
-    throw Error(at +
-                " holds its geometry compressed with KHR_draco_mesh_compression only, which is "
-                "not supported; export it without that extension");
+  void compressed_view(json& compressed, const std::string& at, const char* name) {
+    const std::string place = fmt::format("{}.extensions.{}", at, name);
+    index(compressed, "buffer", "buffers", place, kRequired);
+    size(compressed, "byteOffset", place);
+    for (const char* key : {"byteLength", "byteStride", "count"}) {
+      size(compressed, key, place, kRequired);
+    }
+    text(compressed, "mode", place, kRequired);
+    text(compressed, "filter", place);
   }
 
   void node(json& item, const std::string& at) {
@@ -289,6 +303,12 @@ class StructureCheck {
       json* value = member(*light, "light", place, kRequired);
       check_index(*value, light_count(), "lights", place + ".light");
     }
+    if (json* instancing = extension(item, "EXT_mesh_gpu_instancing")) {
+      const std::string place = at + ".extensions.EXT_mesh_gpu_instancing";
+      for (auto& [name, value] : object(*instancing, "attributes", place, kRequired)->items()) {
+        check_index(value, "accessors", place + ".attributes." + name);
+      }
+    }
   }
 
   void images_and_textures() {
@@ -299,6 +319,9 @@ class StructureCheck {
     for_each(root_, "textures", "", [&](json& texture, const std::string& at) {
       index(texture, "source", "images", at);
       index(texture, "sampler", "samplers", at);
+      if (json* webp = extension(texture, "EXT_texture_webp")) {
+        index(*webp, "source", "images", at + ".extensions.EXT_texture_webp", kRequired);
+      }
     });
     for_each(root_, "samplers", "", [&](json& sampler, const std::string& at) {
       size(sampler, "wrapS", at);
@@ -326,10 +349,15 @@ class StructureCheck {
       reals(*surface, "baseColorFactor", 4, at + ".pbrMetallicRoughness");
       texture_info(*surface, "baseColorTexture", at + ".pbrMetallicRoughness");
     }
+    text(item, "alphaMode", at);
+    real(item, "alphaCutoff", at);
     reals(item, "emissiveFactor", 3, at);
     texture_info(item, "emissiveTexture", at);
     if (json* strength = extension(item, "KHR_materials_emissive_strength")) {
       real(*strength, "emissiveStrength", at + ".extensions.KHR_materials_emissive_strength");
+    }
+    if (json* glass = extension(item, "KHR_materials_transmission")) {
+      real(*glass, "transmissionFactor", at + ".extensions.KHR_materials_transmission");
     }
     if (json* gloss = extension(item, "KHR_materials_pbrSpecularGlossiness")) {
       const std::string place = at + ".extensions.KHR_materials_pbrSpecularGlossiness";

@@ -62,17 +62,40 @@ TexelPair texel_pair(double coordinate, int size, TextureWrap wrap) {
   return {neighbour(first), neighbour(first + 1), static_cast<float>(place - below)};
 }
 
-Float3 texel(const Image& image, int column, int row) {
-  const auto pixel = 4 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
-                          static_cast<std::size_t>(column));
-  return {srgb_to_linear(image.rgba[pixel]), srgb_to_linear(image.rgba[pixel + 1]),
-          srgb_to_linear(image.rgba[pixel + 2])};
+const std::uint8_t* pixel(const Image& image, int column, int row) {
+  return &image.rgba[4 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(image.width) +
+                          static_cast<std::size_t>(column))];
+}
+
+Float3 linear_color(const std::uint8_t* rgba) {
+  return {srgb_to_linear(rgba[0]), srgb_to_linear(rgba[1]), srgb_to_linear(rgba[2])};
+}
+
+// Alpha is not sRGB-encoded.
+float alpha(const std::uint8_t* rgba) {
+  return static_cast<float>(rgba[3]) / 255;
+}
+
+float mixed(float a, float b, float weight) {
+  return a + (b - a) * weight;
 }
 
 Float3 mixed(const Float3& a, const Float3& b, float weight) {
   Float3 result{};
-  for (std::size_t i = 0; i < result.size(); ++i) result[i] = a[i] + (b[i] - a[i]) * weight;
+  for (std::size_t i = 0; i < result.size(); ++i) result[i] = mixed(a[i], b[i], weight);
   return result;
+}
+
+// What `value` makes of the pixels around `texcoord`, mixed.
+template <typename Value>
+auto bilinear(const Texture& texture, const Image& image, Float2 texcoord, const Value& value) {
+  const TexelPair column = texel_pair(texcoord[0], image.width, texture.wrap_s);
+  const TexelPair row = texel_pair(texcoord[1], image.height, texture.wrap_t);
+  const auto across = [&](int y) {
+    return mixed(value(pixel(image, column.first, y)), value(pixel(image, column.second, y)),
+                 column.weight);
+  };
+  return mixed(across(row.first), across(row.second), row.weight);
 }
 
 template <std::size_t N>
@@ -107,9 +130,9 @@ int subdivision(const Image& image, const std::array<Float2, 3>& texcoord) {
 // Averages value(barycentric) over the triangle: one sample in each of n² congruent parts, its
 // place in the part from the R2 sequence, so that no texture that repeats with the parts can hide
 // between the samples. The same samples every time.
-template <typename Value>
-Float3 stratified_mean(int n, const Value& value) {
-  glm::dvec3 sum(0.0);
+template <typename Sum, typename Value>
+Sum stratified_mean(int n, const Value& value) {
+  Sum sum{0.0};
   std::uint32_t sample = 0;
   for (int row = 0; row < n; ++row) {
     // Row `row` has 2 (n - row) - 1 parts, upright ones and between them inverted ones.
@@ -118,10 +141,16 @@ Float3 stratified_mean(int n, const Value& value) {
       const bool inverted = part % 2 == 1;
       const glm::dvec2 place =
           (glm::dvec2(part / 2, row) + (inverted ? 1.0 - inside : inside)) / static_cast<double>(n);
-      sum += to_dvec3(value(std::array<double, 3>{1 - place.x - place.y, place.x, place.y}));
+      sum += value(std::array<double, 3>{1 - place.x - place.y, place.x, place.y});
     }
   }
-  return to_float3(sum / (static_cast<double>(n) * n));
+  return sum / (static_cast<double>(n) * n);
+}
+
+template <typename Value>
+Float3 mean_color(int n, const Value& value) {
+  return to_float3(stratified_mean<glm::dvec3>(
+      n, [&](const std::array<double, 3>& place) { return to_dvec3(value(place)); }));
 }
 
 Float3 product(const Float3& a, const Float3& b) {
@@ -138,13 +167,7 @@ float srgb_to_linear(std::uint8_t value) {
 }
 
 Float3 sample_texture(const Texture& texture, const Image& image, Float2 texcoord) {
-  const TexelPair column = texel_pair(texcoord[0], image.width, texture.wrap_s);
-  const TexelPair row = texel_pair(texcoord[1], image.height, texture.wrap_t);
-  const Float3 upper = mixed(texel(image, column.first, row.first),
-                             texel(image, column.second, row.first), column.weight);
-  const Float3 lower = mixed(texel(image, column.first, row.second),
-                             texel(image, column.second, row.second), column.weight);
-  return mixed(upper, lower, row.weight);
+  return bilinear(texture, image, texcoord, linear_color);
 }
 
 Float3 mean_base_color(const Scene& scene, const Material& material,
@@ -156,7 +179,7 @@ Float3 mean_base_color(const Scene& scene, const Material& material,
   const Texture& texture = scene.textures.at(material.base_color_texture);
   const Image& image = scene.images.at(material.base_color_texture);
   const Float3 mean =
-      stratified_mean(subdivision(image, texcoord), [&](const std::array<double, 3>& place) {
+      mean_color(subdivision(image, texcoord), [&](const std::array<double, 3>& place) {
         return product(sample_texture(texture, image, interpolated(texcoord, place)),
                        interpolated(vertex_color, place));
       });
@@ -169,10 +192,33 @@ Float3 mean_emitted_luminance(const Scene& scene, const Material& material,
   const Texture& texture = scene.textures.at(material.emissive_texture);
   const Image& image = scene.images.at(material.emissive_texture);
   const Float3 mean =
-      stratified_mean(subdivision(image, texcoord), [&](const std::array<double, 3>& place) {
+      mean_color(subdivision(image, texcoord), [&](const std::array<double, 3>& place) {
         return sample_texture(texture, image, interpolated(texcoord, place));
       });
   return product(material.emitted_luminance, mean);
+}
+
+float opacity_at(const Scene& scene, const Material& material, Float2 texcoord) {
+  if (material.alpha_mode == AlphaMode::kOpaque) return 1;
+  float opacity = material.base_alpha;
+  if (material.base_color_texture != kNone) {
+    opacity *= bilinear(scene.textures.at(material.base_color_texture),
+                        scene.images.at(material.base_color_texture), texcoord, alpha);
+  }
+  if (material.alpha_mode == AlphaMode::kBlend) return opacity;
+  return opacity >= material.alpha_cutoff ? 1.0F : 0.0F;
+}
+
+float mean_opacity(const Scene& scene, const Material& material,
+                   const std::array<Float2, 3>& texcoord) {
+  const bool is_uniform =
+      material.alpha_mode == AlphaMode::kOpaque || material.base_color_texture == kNone;
+  if (is_uniform) return opacity_at(scene, material, texcoord[0]);
+  const Image& image = scene.images.at(material.base_color_texture);
+  return static_cast<float>(stratified_mean<double>(
+      subdivision(image, texcoord), [&](const std::array<double, 3>& place) {
+        return opacity_at(scene, material, interpolated(texcoord, place));
+      }));
 }
 
 }  // namespace rebounce

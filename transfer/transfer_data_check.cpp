@@ -177,6 +177,9 @@ class Checker {
     const std::size_t textures = data_.textures.size();
     numbers("material.base_color", materials, &Material::base_color, kNotNegative);
     numbers("material.emitted_luminance", materials, &Material::emitted_luminance, kNotNegative);
+    numbers("material.alpha_cutoff", materials, &Material::alpha_cutoff, kNotNegative);
+    numbers("material.base_alpha", materials, &Material::base_alpha, kFraction);
+    numbers("material.transmission", materials, &Material::transmission, kFraction);
     for (std::size_t i = 0; i < materials.size(); ++i) {
       const Material& material = materials[i];
       index_or_none("material.base_color_texture", i, material.base_color_texture, textures);

@@ -104,6 +104,10 @@ void visit_tensors_of_scene(Data& data, Visit&& visit) {
   visit("material.base_color_texture", data.materials, &Material::base_color_texture);
   visit("material.emissive_texture", data.materials, &Material::emissive_texture);
   visit("material.double_sided", data.materials, &Material::double_sided);
+  visit("material.alpha_mode", data.materials, &Material::alpha_mode);
+  visit("material.alpha_cutoff", data.materials, &Material::alpha_cutoff);
+  visit("material.base_alpha", data.materials, &Material::base_alpha);
+  visit("material.transmission", data.materials, &Material::transmission);
   visit("texture.wrap_s", data.textures, &Texture::wrap_s);
   visit("texture.wrap_t", data.textures, &Texture::wrap_t);
   visit("camera.position", data.cameras, &Camera::position);

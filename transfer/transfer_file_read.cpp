@@ -75,6 +75,8 @@ constexpr std::uint8_t kLastByte<bool> = 1;
 template <>
 constexpr std::uint8_t kLastByte<LightType> = static_cast<std::uint8_t>(LightType::kDirectional);
 template <>
+constexpr std::uint8_t kLastByte<AlphaMode> = static_cast<std::uint8_t>(AlphaMode::kBlend);
+template <>
 constexpr std::uint8_t kLastByte<TextureWrap> =
     static_cast<std::uint8_t>(TextureWrap::kMirroredRepeat);
 

@@ -130,6 +130,10 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->excludes(patches)
       ->each([&subdivision](const std::string&) { subdivision.patch_count = 0; });
   command
+      ->add_option("--scale", chosen->settings.scale, "Metres in one unit of the scene file")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
       ->add_option("--operator", chosen->operator_kind,
                    "Kind of the operator; by default hierarchical from 1000 patches on")
       ->check(CLI::IsMember({"hierarchical", "dense"}));

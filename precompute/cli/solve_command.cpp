@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "commands.h"
 #include "light_file.h"
 #include "rebounce/precompute/csv_writer.h"
 #include "rebounce/precompute/npz_writer.h"
 #include "rebounce/runtime/engine.h"
-#include "rebounce/runtime/gauss_seidel.h"
+#include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
@@ -17,28 +19,29 @@
 namespace rebounce::cli {
 namespace {
 
+constexpr const char* kTransfer = "transfer";  // the product with the operator, no iteration
+
 struct SolveOptions {
-  std::string file, lights, method = "transfer", output;
-  GaussSeidelSettings gauss_seidel;
+  std::string file, lights, method = kTransfer, output;
+  SolveSettings settings;
 };
 
 struct Solution {
   std::vector<Float3> indirect_irradiance, radiosity;
   int sweeps = 0;
+  bool diverged = false;
   double microseconds = 0;
 };
 
-/// Median time of `work`, repeated for about half a second but at least three times.
+/// Median of the microseconds that `work` says it took, repeated for about half a second but at
+/// least three times.
 template <typename Work>
 double median_microseconds(const Work& work) {
   std::vector<double> times;
   double total = 0;
   while (times.size() < 3 || (total < 5e5 && times.size() < 1000)) {
-    const auto begin = std::chrono::steady_clock::now();
-    work();
-    const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
-    times.push_back(time.count());
-    total += time.count();
+    times.push_back(work());
+    total += times.back();
   }
   std::ranges::nth_element(times, times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2));
   return times[times.size() / 2];
@@ -46,7 +49,12 @@ double median_microseconds(const Work& work) {
 
 Solution solve_by_transfer(Engine& engine) {
   Solution solution;
-  solution.microseconds = median_microseconds([&] { engine.apply_transfer(); });
+  solution.microseconds = median_microseconds([&] {
+    const auto begin = std::chrono::steady_clock::now();
+    engine.apply_transfer();
+    const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
+    return time.count();
+  });
   engine.compute_radiosity();
   solution.indirect_irradiance.assign(engine.indirect_irradiance().begin(),
                                       engine.indirect_irradiance().end());
@@ -54,28 +62,32 @@ Solution solve_by_transfer(Engine& engine) {
   return solution;
 }
 
-Solution solve_by_gauss_seidel(const Engine& engine, const FormFactorRows& form_factors,
-                               const GaussSeidelSettings& settings) {
-  const PatchTable& patches = engine.data().patches;
+Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
+                            const FormFactorOperator& form_factors, const SolveSettings& settings) {
+  const std::size_t n = engine.data().patches.size();
   Solution solution;
-  solution.radiosity.resize(patches.size());
-  solution.indirect_irradiance.resize(patches.size());
+  SolveResult result;
   solution.microseconds = median_microseconds([&] {
-    std::ranges::fill(solution.radiosity, Float3{0, 0, 0});
-    solution.sweeps = solve_gauss_seidel(form_factors, patches.reflectance, patches.area,
-                                         engine.initial_exitance(), settings, solution.radiosity)
-                          .sweeps;
+    solver.forget();
+    result = solver.solve(engine.initial_exitance(), settings);
+    return result.microseconds;
   });
-  form_factors.gather(solution.radiosity, solution.indirect_irradiance);
+  solution.sweeps = result.sweeps;
+  solution.diverged = result.diverged;
+  solution.radiosity.assign(solver.radiosity().begin(), solver.radiosity().end());
+  solution.indirect_irradiance.resize(n);
+  std::vector<float> workspace(form_factors.workspace_size());
+  form_factors.gather(solution.radiosity, solution.indirect_irradiance, workspace);
   return solution;
 }
 
 /// |M0 + rho F B - B| / |M0| in the area-weighted norm.
-double radiosity_residual(const Engine& engine, const FormFactorRows& form_factors,
+double radiosity_residual(const Engine& engine, const FormFactorOperator& form_factors,
                           const std::vector<Float3>& radiosity) {
   const PatchTable& patches = engine.data().patches;
   std::vector<Float3> rest(patches.size());
-  form_factors.gather(radiosity, rest);
+  std::vector<float> workspace(form_factors.workspace_size());
+  form_factors.gather(radiosity, rest, workspace);
   for (std::size_t i = 0; i < rest.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
       rest[i][c] = engine.initial_exitance()[i][c] + patches.reflectance[i][c] * rest[i][c] -
@@ -109,16 +121,35 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
   write_csv(path, columns);
 }
 
+Solution find_solution(const SolveOptions& chosen, Engine& engine,
+                       const FormFactorBlocks& form_factors) {
+  if (chosen.method == kTransfer) return solve_by_transfer(engine);
+  const TransferData& data = engine.data();
+  const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
+  const auto solver = make_solver(named->method, form_factors,
+                                  {data.patches.area, data.patches.reflectance}, data.transfer);
+  return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
+}
+
+/// The names that --method takes.
+std::vector<std::string> method_names() {
+  std::vector<std::string> names = {kTransfer};
+  for (const NamedSolveMethod& method : kSolveMethods) names.emplace_back(method.name);
+  return names;
+}
+
 void run(const SolveOptions& chosen, const CommonOptions& options) {
   const auto data = std::make_shared<const TransferData>(load_transfer_file(chosen.file));
   const LightSetup setup = choose_lights(chosen.lights, *data);
   Engine engine(data);
   engine.compute_direct(setup.lights, setup.sky);
   engine.compute_initial_exitance();
-  const FormFactorRows form_factors(data->exchange, data->patches.area);
-  const Solution solution = chosen.method == "transfer"
-                                ? solve_by_transfer(engine)
-                                : solve_by_gauss_seidel(engine, form_factors, chosen.gauss_seidel);
+  const FormFactorBlocks form_factors(data->exchange, data->patches.area);
+  const Solution solution = find_solution(chosen, engine, form_factors);
+  if (solution.diverged) {
+    throw Error(chosen.method + " diverges: the operator of " + chosen.file +
+                " does not fit its form factors; use another method");
+  }
   const double residual = radiosity_residual(engine, form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);
   if (options.json) {
@@ -142,16 +173,21 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
   command->add_option("--method", chosen->method, "How to find the indirect light")
-      ->check(CLI::IsMember({"transfer", "gauss-seidel"}))
+      ->check(CLI::IsMember(method_names()))
       ->capture_default_str();
   command
-      ->add_option("--iterations", chosen->gauss_seidel.max_sweeps,
+      ->add_option("--iterations", chosen->settings.max_sweeps,
                    "Sweeps at most, for iterative methods")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command
-      ->add_option("--residual", chosen->gauss_seidel.residual,
+      ->add_option("--residual", chosen->settings.residual,
                    "Stop an iterative method at this part of the initial exitance")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--time-budget", chosen->settings.time_budget_microseconds,
+                   "No new sweep of an iterative method after this many microseconds; 0: no limit")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("-o,--output", chosen->output, "Result: .npz or .csv, each array [n,3]")

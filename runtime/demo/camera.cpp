@@ -1,8 +1,8 @@
 #include "rebounce/demo/camera.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <numbers>

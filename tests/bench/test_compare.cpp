@@ -24,7 +24,8 @@ struct Furnace {
     data.patches = std::move(model.patches);
     data.patches.absorbed.assign(data.patches.size(), 0.0F);
     data.mesh = std::move(model.mesh);
-    compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, data.mesh);
+    compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, mesh_tracer(),
+                                   data.mesh);
   }
 
   void add_box_without_underside() {

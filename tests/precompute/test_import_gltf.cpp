@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <limits>
 #include <numbers>
 
 #include "gltf_builder.h"
@@ -440,14 +441,57 @@ TEST_F(ImportGltf, NegativeFactorsAreClampedWithAWarning) {
   EXPECT_EQ(scene.warnings.size(), 1U);
 }
 
-TEST_F(ImportGltf, OpaqueStandsForAlphaAndTransmission) {
-  triangle_.add("materials", {{"alphaMode", "MASK"}});
-  triangle_.add("materials", {{"alphaMode", "BLEND"}});
-  triangle_.add("materials", {{"extensions", {{"KHR_materials_transmission", json::object()}}}});
+TEST_F(ImportGltf, AlphaAndTransmissionAreTaken) {
+  triangle_.add("materials", {{"alphaMode", "MASK"},
+                              {"alphaCutoff", 0.25},
+                              {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0.75}}}}});
+  triangle_.add("materials",
+                {{"alphaMode", "BLEND"},
+                 {"extensions",
+                  {{"KHR_materials_pbrSpecularGlossiness", {{"diffuseFactor", {1, 1, 1, 0.5}}}}}}});
+  triangle_.add("materials",
+                {{"extensions", {{"KHR_materials_transmission", {{"transmissionFactor", 0.9}}}}}});
+  triangle_.add("materials", {{"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 7}}}},
+                              {"alphaCutoff", -1},
+                              {"extensions", {{"KHR_materials_transmission", json::object()}}}});
+  const Scene scene = import(triangle_);
+  const Material& mask = scene.materials[0];
+  EXPECT_EQ(mask.alpha_mode, AlphaMode::kMask);
+  EXPECT_EQ(mask.alpha_cutoff, 0.25F);
+  EXPECT_EQ(mask.base_alpha, 0.75F);
+  EXPECT_EQ(mask.transmission, 0);
+  EXPECT_EQ(scene.materials[1].alpha_mode, AlphaMode::kBlend);
+  EXPECT_EQ(scene.materials[1].alpha_cutoff, 0.5F);
+  EXPECT_EQ(scene.materials[1].base_alpha, 0.5F);
+  EXPECT_EQ(scene.materials[2].alpha_mode, AlphaMode::kOpaque);
+  EXPECT_EQ(scene.materials[2].transmission, 0.9F);
+  EXPECT_EQ(scene.materials[3].base_alpha, 1);
+  EXPECT_EQ(scene.materials[3].alpha_cutoff, 0);
+  EXPECT_EQ(scene.materials[3].transmission, 0);
+  ASSERT_EQ(scene.warnings.size(), 2U);
+  EXPECT_TRUE(scene.warnings[0].starts_with("1 materials with alphaMode BLEND"));
+  EXPECT_TRUE(scene.warnings[1].starts_with("1 materials that transmit"));
+}
+
+TEST_F(ImportGltf, AlphaOfVertexColoursIsIgnoredWithAWarningWhereItWouldCount) {
+  triangle_.primitive()["attributes"]["COLOR_0"] =
+      triangle_.add_accessor<float>({1, 1, 1, 1, 1, 1, 1, 0.5, 1, 1, 1, 1}, "VEC4", 4);
+  triangle_.add("materials", {{"alphaMode", "OPAQUE"}});
+  triangle_.primitive()["material"] = 0;
+  EXPECT_TRUE(import(triangle_).warnings.empty());
+  triangle_.root["materials"][0]["alphaMode"] = "MASK";
   const auto warnings = import(triangle_).warnings;
-  ASSERT_EQ(warnings.size(), 2U);
-  EXPECT_TRUE(warnings[0].starts_with("2 materials with alphaMode")) << warnings[0];
-  EXPECT_TRUE(warnings[1].starts_with("1 materials that transmit")) << warnings[1];
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_NE(warnings[0].find("alpha of the vertex colours"), std::string::npos) << warnings[0];
+}
+
+TEST_F(ImportGltf, VerticesThatNoTriangleUsesAreNotPlaced) {
+  std::vector<float> position(300, std::numeric_limits<float>::max());
+  for (std::size_t i = 0; i < 9; ++i) position[150 + i] = i == 3 || i == 7 ? 1.0F : 0.0F;
+  triangle_.primitive()["attributes"]["POSITION"] = triangle_.add_accessor(position, "VEC3", 3);
+  triangle_.primitive()["indices"] = triangle_.add_indices<std::uint8_t>({50, 51, 52});
+  triangle_.root["nodes"][0]["scale"] = {2, 2, 2};
+  EXPECT_EQ(corners(import(triangle_)), (std::vector<Float3>{{0, 0, 0}, {2, 0, 0}, {0, 2, 0}}));
 }
 
 /// A triangle with one texture: black on the left, mid-grey (sRGB 188, linear 0.5029) on the right.

@@ -92,8 +92,10 @@ TransferData sample_data(Precision precision = Precision::kF16) {
   TransferData data;
   data.patches = sample_patches();
   data.mesh = sample_mesh();
-  data.materials = {{"white \"paint\"\n", {1, 0.5F, 0}, {0, 0, 100}, 1, kNone, true},
-                    {"Lampenschirm für Züge", {0, 0, 0}, {1, 2, 3}, kNone, 0, false}};
+  data.materials = {{"white \"paint\"\n", {1, 0.5F, 0}, {0, 0, 100}, 1, kNone, true, AlphaMode::kMask,
+                     0.25F, 0.75F, 0},
+                    {"Lampenschirm für Züge", {0, 0, 0}, {1, 2, 3}, kNone, 0, false,
+                     AlphaMode::kBlend, 0.5F, 1, 0.9F}};
   data.textures = {{{1, 2, 3}, TextureWrap::kRepeat, TextureWrap::kClampToEdge},
                    {{0x89, 'P', 'N', 'G', 0}, TextureWrap::kMirroredRepeat, TextureWrap::kRepeat}};
   data.cameras = {{"front", {1, 2, 3}, {0, 0, 1}, {0, 1, 0}, {-1, 0, 0}, 1.2F}};
@@ -151,6 +153,10 @@ void expect_equal(const Material& a, const Material& b) {
   EXPECT_EQ(a.base_color_texture, b.base_color_texture);
   EXPECT_EQ(a.emissive_texture, b.emissive_texture);
   EXPECT_EQ(a.double_sided, b.double_sided);
+  EXPECT_EQ(a.alpha_mode, b.alpha_mode);
+  EXPECT_EQ(a.alpha_cutoff, b.alpha_cutoff);
+  EXPECT_EQ(a.base_alpha, b.base_alpha);
+  EXPECT_EQ(a.transmission, b.transmission);
 }
 
 void expect_equal(const Texture& a, const Texture& b) {
@@ -439,6 +445,11 @@ TEST(TransferFile, RefusesAnImpossibleScene) {
       {"material.emitted_luminance", [](auto& d) { d.materials[0].emitted_luminance[0] = -1; }},
       {"material.base_color_texture", [](auto& d) { d.materials[1].base_color_texture = 2; }},
       {"material.emissive_texture", [](auto& d) { d.materials[1].emissive_texture = 2; }},
+      {"material.alpha_mode: entry 1 is 3",
+       [](auto& d) { d.materials[1].alpha_mode = static_cast<AlphaMode>(3); }},
+      {"material.alpha_cutoff", [](auto& d) { d.materials[0].alpha_cutoff = -1; }},
+      {"material.base_alpha", [](auto& d) { d.materials[0].base_alpha = 1.5F; }},
+      {"material.transmission", [](auto& d) { d.materials[1].transmission = kNan; }},
       {"texture.wrap_s: entry 1 is 3",
        [](auto& d) { d.textures[1].wrap_s = static_cast<TextureWrap>(3); }},
       {"texture.wrap_t", [](auto& d) { d.textures[0].wrap_t = static_cast<TextureWrap>(255); }},

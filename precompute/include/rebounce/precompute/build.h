@@ -28,6 +28,7 @@ enum class OperatorKind : std::uint8_t {
 inline constexpr std::size_t kHierarchicalPatchCount = 1000;
 
 struct BuildSettings {
+  double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
   OperatorKind operator_kind = OperatorKind::kAutomatic;

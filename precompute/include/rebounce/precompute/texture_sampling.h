@@ -21,4 +21,13 @@ Float3 mean_base_color(const Scene& scene, const Material& material,
 Float3 mean_emitted_luminance(const Scene& scene, const Material& material,
                               const std::array<Float2, 3>& texcoord);
 
+/// How much of the light that meets the surface where its base colour's texture coordinate is
+/// `texcoord` does not pass through, in [0, 1]: 1 for opaque materials; 0 or 1 by the cutoff for
+/// masks; the alpha for blended ones. Transmission is not in it.
+float opacity_at(const Scene& scene, const Material& material, Float2 texcoord);
+
+/// The same averaged over the triangle with these texture coordinates, likewise.
+float mean_opacity(const Scene& scene, const Material& material,
+                   const std::array<Float2, 3>& texcoord);
+
 }  // namespace rebounce

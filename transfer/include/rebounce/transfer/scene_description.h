@@ -44,11 +44,18 @@ struct Camera {
 
 enum class TextureWrap : std::uint8_t { kRepeat, kClampToEdge, kMirroredRepeat };
 
-/// An image in its encoded form (PNG or JPEG bytes), as the asset carries it.
+/// An image in its encoded form (PNG or JPEG bytes), as the asset carries it where it can be.
 struct Texture {
   std::vector<std::uint8_t> encoded;
   TextureWrap wrap_s = TextureWrap::kRepeat;
   TextureWrap wrap_t = TextureWrap::kRepeat;
+};
+
+/// What a material's opacity means, as glTF's alphaMode.
+enum class AlphaMode : std::uint8_t {
+  kOpaque,  ///< the opacity is not looked at
+  kMask,    ///< there where the opacity is at least the cutoff, a hole elsewhere
+  kBlend,   ///< lets 1 - opacity through
 };
 
 struct Material {
@@ -58,6 +65,10 @@ struct Material {
   std::uint32_t base_color_texture = kNone;
   std::uint32_t emissive_texture = kNone;
   bool double_sided = false;
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  float alpha_cutoff = 0.5F;  ///< >= 0; used by kMask
+  float base_alpha = 1;       ///< [0, 1]; multiplies the alpha of the base colour's texture
+  float transmission = 0;     ///< [0, 1], KHR_materials_transmission: passes through unscattered
 };
 
 }  // namespace rebounce

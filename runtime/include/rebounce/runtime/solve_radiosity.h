@@ -1,0 +1,58 @@
+#pragma once
+
+// Every iterative method by name, and solves in one call.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string_view>
+
+#include "rebounce/runtime/radiosity_solver.h"
+#include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/transfer_operator.h"
+
+namespace rebounce {
+
+enum class SolveMethod : std::uint8_t {
+  kGathering,
+  kJacobi,  ///< the same iteration as gathering, see gathering_solver.h
+  kGaussSeidel,
+  kSymmetricGaussSeidel,
+  kConjugateGradient,
+  kSouthwell,
+  kRefine,                           ///< needs the stored operator
+  kPreconditionedConjugateGradient,  ///< needs the stored operator
+};
+
+struct NamedSolveMethod {
+  std::string_view name;  ///< as on the command line
+  SolveMethod method;
+};
+
+inline constexpr std::array<NamedSolveMethod, 8> kSolveMethods = {{
+    {"gathering", SolveMethod::kGathering},
+    {"jacobi", SolveMethod::kJacobi},
+    {"gauss-seidel", SolveMethod::kGaussSeidel},
+    {"symmetric-gauss-seidel", SolveMethod::kSymmetricGaussSeidel},
+    {"conjugate-gradient", SolveMethod::kConjugateGradient},
+    {"southwell", SolveMethod::kSouthwell},
+    {"refine", SolveMethod::kRefine},
+    {"preconditioned-conjugate-gradient", SolveMethod::kPreconditionedConjugateGradient},
+}};
+
+/// A solver of its own for `method`. `form_factors` must outlive it; `transfer` may be null for the
+/// methods that do not need it. Throws Error if sizes differ or the operator is needed and missing.
+std::unique_ptr<RadiositySolver> make_solver(
+    SolveMethod method, const FormFactorBlocks& form_factors, const RadiosityProblem& problem,
+    std::shared_ptr<const TransferOperator> transfer = nullptr);
+
+/// Solves once, from nothing, and writes the solution [n] in lx to `radiosity`. Allocates what the
+/// method needs; keep a solver for more than one solve. Throws Error as make_solver and
+/// RadiositySolver::solve do.
+SolveResult solve_radiosity(SolveMethod method, const FormFactorBlocks& form_factors,
+                            const RadiosityProblem& problem,
+                            std::span<const Float3> initial_exitance, const SolveSettings& settings,
+                            std::span<Float3> radiosity,
+                            std::shared_ptr<const TransferOperator> transfer = nullptr);
+
+}  // namespace rebounce

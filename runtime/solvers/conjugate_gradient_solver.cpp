@@ -1,0 +1,147 @@
+#include "rebounce/runtime/conjugate_gradient_solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+/// out = r in, patch by patch and channel by channel.
+void scale(std::span<const Float3> r, std::span<const Float3> in, std::span<Float3> out) {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) out[i][c] = r[i][c] * in[i][c];
+  }
+}
+
+/// y += factor x, each channel with its own factor.
+void add_scaled(const std::array<double, kChannelCount>& factor, std::span<const Float3> x,
+                std::span<Float3> y) {
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      y[i][c] = static_cast<float>(y[i][c] + factor[c] * x[i][c]);
+    }
+  }
+}
+
+}  // namespace
+
+ConjugateGradientSolver::ConjugateGradientSolver(
+    const FormFactorOperator& form_factors, const RadiosityProblem& problem,
+    std::shared_ptr<const TransferOperator> preconditioner)
+    : RadiositySolver(form_factors, problem), preconditioner_(std::move(preconditioner)) {
+  const std::size_t n = patch_count();
+  for (auto* vector : {&sqrt_reflectance_, &unknown_, &rest_, &direction_, &preconditioned_,
+                       &product_, &scaled_}) {
+    vector->resize(n);
+  }
+  if (!preconditioner_) return;
+  if (preconditioner_->patch_count() != n) {
+    throw Error("solver: form factors and operator differ in their number of patches");
+  }
+  transfer_workspace_.resize(preconditioner_->workspace_size());
+}
+
+void ConjugateGradientSolver::begin(bool cold) {
+  for (std::size_t i = 0; i < patch_count(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) sqrt_reflectance_[i][c] = std::sqrt(reflectance_[i][c]);
+  }
+  // U = R H with H = F B of the start: no division, whatever B and rho were before.
+  if (cold) {
+    std::ranges::fill(unknown_, Float3{0, 0, 0});
+  } else {
+    form_factors_.gather(radiosity_, scaled_, gather_workspace_);
+    scale(sqrt_reflectance_, scaled_, unknown_);
+    finish();
+  }
+  form_factors_.gather(radiosity_, scaled_, gather_workspace_);
+  scale(sqrt_reflectance_, scaled_, rest_);
+  add_scaled({-1, -1, -1}, unknown_, rest_);
+  precondition();
+  direction_ = preconditioned_;
+  rest_square_ = inner_product(rest_, preconditioned_);
+}
+
+RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
+  multiply_direction();
+  const Scalars curvature = inner_product(direction_, product_);
+  Scalars step{}, back_step{};
+  for (int c = 0; c < kChannelCount; ++c) {
+    if (rest_square_[c] == 0) continue;  // this channel is solved
+    if (!(curvature[c] > 0 && rest_square_[c] > 0 && std::isfinite(rest_square_[c]))) {
+      return {.residual = radiosity_residual_norm(), .diverged = true};
+    }
+    step[c] = rest_square_[c] / curvature[c];
+    back_step[c] = -step[c];
+  }
+  add_scaled(step, direction_, unknown_);
+  add_scaled(back_step, product_, rest_);
+  precondition();
+  const Scalars next = inner_product(rest_, preconditioned_);
+  Scalars turn{};
+  for (int c = 0; c < kChannelCount; ++c) {
+    turn[c] = rest_square_[c] > 0 ? next[c] / rest_square_[c] : 0;
+  }
+  rest_square_ = next;
+  for (std::size_t i = 0; i < patch_count(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      direction_[i][c] = static_cast<float>(preconditioned_[i][c] + turn[c] * direction_[i][c]);
+    }
+  }
+  return {.residual = radiosity_residual_norm()};
+}
+
+void ConjugateGradientSolver::finish() {
+  for (std::size_t i = 0; i < patch_count(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      radiosity_[i][c] = initial_exitance_[i][c] + sqrt_reflectance_[i][c] * unknown_[i][c];
+    }
+  }
+}
+
+void ConjugateGradientSolver::multiply_direction() {
+  scale(sqrt_reflectance_, direction_, scaled_);
+  form_factors_.gather(scaled_, product_, gather_workspace_);
+  for (std::size_t i = 0; i < patch_count(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      product_[i][c] = direction_[i][c] - sqrt_reflectance_[i][c] * product_[i][c];
+    }
+  }
+}
+
+void ConjugateGradientSolver::precondition() {
+  if (!preconditioner_) {
+    std::ranges::copy(rest_, preconditioned_.begin());
+    return;
+  }
+  scale(sqrt_reflectance_, rest_, scaled_);
+  preconditioner_->apply(scaled_, preconditioned_, transfer_workspace_);
+  scale(sqrt_reflectance_, preconditioned_, preconditioned_);
+  add_scaled({1, 1, 1}, rest_, preconditioned_);
+}
+
+double ConjugateGradientSolver::radiosity_residual_norm() const {
+  // M0 + rho F B - B = R (R F B - U) = R rest.
+  double sum = 0;
+  for (std::size_t i = 0; i < patch_count(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      const double rest = rest_[i][c];
+      sum += static_cast<double>(area_[i]) * reflectance_[i][c] * rest * rest;
+    }
+  }
+  return std::sqrt(sum);
+}
+
+ConjugateGradientSolver::Scalars ConjugateGradientSolver::inner_product(
+    std::span<const Float3> a, std::span<const Float3> b) const {
+  Scalars sum{};
+  for (std::size_t i = 0; i < patch_count(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      sum[c] += static_cast<double>(area_[i]) * a[i][c] * b[i][c];
+    }
+  }
+  return sum;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,158 @@
+#include "rebounce/runtime/radiosity_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+/// A method that finds nothing better for this many sweeps has met the limit of single precision.
+constexpr int kPatience = 8;
+
+/// A restart from the measured residual that gains less than this is not worth another.
+constexpr double kWorthwhileRestart = 0.5;
+
+}  // namespace
+
+RadiositySolver::RadiositySolver(const FormFactorOperator& form_factors,
+                                 const RadiosityProblem& problem)
+    : form_factors_(form_factors), area_(problem.area.begin(), problem.area.end()) {
+  const std::size_t n = form_factors.patch_count();
+  if (area_.size() != n) throw Error("solver: form factors and patch areas differ in number");
+  set_reflectance(problem.reflectance);
+  radiosity_.resize(n);
+  residual_.resize(n);
+  gather_workspace_.resize(form_factors.workspace_size());
+}
+
+void RadiositySolver::set_reflectance(std::span<const Float3> reflectance) {
+  if (reflectance.size() != area_.size()) {
+    throw Error("solver: reflectances and patches differ in number");
+  }
+  float largest = 0;
+  for (const Float3& rho : reflectance) {
+    for (const float x : rho) {
+      if (!(x >= 0 && x < 1)) throw Error("solver: a reflectance is not in [0, 1)");
+      largest = std::max(largest, x);
+    }
+  }
+  reflectance_.assign(reflectance.begin(), reflectance.end());
+  max_reflectance_ = largest;
+}
+
+void RadiositySolver::start_from(std::span<const Float3> radiosity) {
+  if (radiosity.size() != radiosity_.size()) {
+    throw Error("solver: the radiosity to start from must have one entry per patch");
+  }
+  std::ranges::copy(radiosity, radiosity_.begin());
+  cold_ = false;
+}
+
+void RadiositySolver::forget() {
+  std::ranges::fill(radiosity_, Float3{0, 0, 0});
+  cold_ = true;
+}
+
+double RadiositySolver::compute_residual() {
+  form_factors_.gather(radiosity_, residual_, gather_workspace_);
+  for (std::size_t i = 0; i < residual_.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      residual_[i][c] =
+          (initial_exitance_[i][c] - radiosity_[i][c]) + reflectance_[i][c] * residual_[i][c];
+    }
+  }
+  return area_norm(residual_, area_);
+}
+
+void RadiositySolver::check(std::span<const Float3> initial_exitance,
+                            const SolveSettings& settings) const {
+  if (initial_exitance.size() != area_.size()) {
+    throw Error("solver: the initial exitance must have one entry per patch");
+  }
+  if (settings.max_sweeps < 1) throw Error("solver: max_sweeps must be at least 1");
+  if (!(settings.residual >= 0)) throw Error("solver: the residual must not be negative");
+  if (!(settings.time_budget_microseconds >= 0)) {
+    throw Error("solver: the time budget must not be negative");
+  }
+}
+
+SolveResult RadiositySolver::solve(std::span<const Float3> initial_exitance,
+                                   const SolveSettings& settings) {
+  const Clock::time_point start = Clock::now();
+  check(initial_exitance, settings);
+  initial_exitance_ = initial_exitance;
+  deadline_ = Clock::time_point::max();
+  if (settings.time_budget_microseconds > 0) {
+    const std::chrono::duration<double, std::micro> budget(settings.time_budget_microseconds);
+    // A budget of an hour and more is none.
+    if (budget < std::chrono::hours(1)) {
+      deadline_ = start + std::chrono::duration_cast<Clock::duration>(budget);
+    }
+  }
+  const SolveResult result = iterate(settings, start);
+  initial_exitance_ = {};
+  return result;
+}
+
+SolveResult RadiositySolver::solve(std::span<const Float3> initial_exitance,
+                                   const SolveSettings& settings, std::span<Float3> radiosity) {
+  if (radiosity.size() != radiosity_.size()) {
+    throw Error("solver: the radiosity must have one entry per patch");
+  }
+  const SolveResult result = solve(initial_exitance, settings);
+  std::ranges::copy(radiosity_, radiosity.begin());
+  return result;
+}
+
+SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_point start) {
+  SolveResult result;
+  const double norm = area_norm(initial_exitance_, area_);
+  if (norm == 0) {
+    forget();
+    result.converged = true;
+    return result;
+  }
+  if (!std::isfinite(norm)) throw Error("solver: the initial exitance is not finite");
+  if (cold_) std::ranges::copy(initial_exitance_, radiosity_.begin());
+  begin(std::exchange(cold_, false));
+
+  const auto stop_clock = [&] {
+    finish();
+    const std::chrono::duration<double, std::micro> time = Clock::now() - start;
+    result.microseconds = time.count();
+  };
+  double best = std::numeric_limits<double>::infinity(), confirmed = best;
+  int since_best = 0;
+  while (true) {
+    const SweepReport report = sweep();
+    ++result.sweeps;
+    result.residual = report.residual / norm;
+    result.diverged = report.diverged;
+    since_best = result.residual < best ? 0 : since_best + 1;
+    best = std::min(best, result.residual);
+    const bool there = settings.residual > 0 && result.residual <= settings.residual;
+    const bool last = report.stuck || report.diverged || result.sweeps >= settings.max_sweeps ||
+                      out_of_time() || (settings.residual > 0 && since_best >= kPatience);
+    if (!there && !last) continue;
+
+    stop_clock();
+    if (report.measured || !settings.measure_residual) break;
+    result.residual = compute_residual() / norm;
+    if (last || result.residual <= settings.residual ||
+        result.residual > kWorthwhileRestart * confirmed) {
+      break;
+    }
+    // The bound said that it was there, and it was not: go on from what was measured.
+    confirmed = result.residual;
+    begin(false);
+  }
+  result.converged =
+      !result.diverged && settings.residual > 0 && result.residual <= settings.residual;
+  return result;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,46 @@
+#include "rebounce/runtime/solve_radiosity.h"
+
+#include "rebounce/runtime/conjugate_gradient_solver.h"
+#include "rebounce/runtime/gathering_solver.h"
+#include "rebounce/runtime/gauss_seidel_solver.h"
+#include "rebounce/runtime/refinement_solver.h"
+#include "rebounce/runtime/southwell_solver.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+
+std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
+                                             const FormFactorBlocks& form_factors,
+                                             const RadiosityProblem& problem,
+                                             std::shared_ptr<const TransferOperator> transfer) {
+  switch (method) {
+    case SolveMethod::kGathering:
+    case SolveMethod::kJacobi:
+      return std::make_unique<GatheringSolver>(form_factors, problem);
+    case SolveMethod::kGaussSeidel:
+      return std::make_unique<GaussSeidelSolver>(form_factors, problem, SweepOrder::kForward);
+    case SolveMethod::kSymmetricGaussSeidel:
+      return std::make_unique<GaussSeidelSolver>(form_factors, problem, SweepOrder::kSymmetric);
+    case SolveMethod::kConjugateGradient:
+      return std::make_unique<ConjugateGradientSolver>(form_factors, problem);
+    case SolveMethod::kSouthwell:
+      return std::make_unique<SouthwellSolver>(form_factors, problem);
+    case SolveMethod::kRefine:
+      return std::make_unique<RefinementSolver>(form_factors, problem, std::move(transfer));
+    case SolveMethod::kPreconditionedConjugateGradient:
+      if (!transfer) throw Error("solver: preconditioning needs an operator, and there is none");
+      return std::make_unique<ConjugateGradientSolver>(form_factors, problem, std::move(transfer));
+  }
+  throw Error("solver: no such method");
+}
+
+SolveResult solve_radiosity(SolveMethod method, const FormFactorBlocks& form_factors,
+                            const RadiosityProblem& problem,
+                            std::span<const Float3> initial_exitance, const SolveSettings& settings,
+                            std::span<Float3> radiosity,
+                            std::shared_ptr<const TransferOperator> transfer) {
+  return make_solver(method, form_factors, problem, std::move(transfer))
+      ->solve(initial_exitance, settings, radiosity);
+}
+
+}  // namespace rebounce

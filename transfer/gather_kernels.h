@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "rebounce/transfer/form_factor_blocks.h"
+
+namespace rebounce {
+
+/// Products with one row of F in blocks, for one instruction set. The row's `count` blocks begin at
+/// `values`; block k stands for the columns from kFormFactorBlock x position[k] on. Vectors are
+/// three planes, `stride` floats apart.
+struct GatherKernels {
+  const char* instruction_set;
+
+  /// sum[c] = sum over the columns j of F(j) x_c(j).
+  void (*gather)(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
+                 const float* x, std::size_t stride, float* sum);
+
+  /// y_c(j) += weight[c] scale_c(j) F(j) for the columns j.
+  void (*shoot)(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
+                const float* weight, const float* scale, float* y, std::size_t stride);
+
+  /// The lowest of those indices below `stride` at which |x_0| + |x_1| + |x_2| is largest.
+  std::size_t (*largest)(const float* x, std::size_t stride);
+};
+
+extern const GatherKernels kGatherKernelsPortable;
+extern const GatherKernels kGatherKernelsAvx2;
+
+/// The widest kernels that this processor runs.
+const GatherKernels& gather_kernels();
+
+}  // namespace rebounce
