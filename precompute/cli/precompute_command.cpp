@@ -129,8 +129,7 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->check(CLI::PositiveNumber)
       ->excludes(patches)
       ->each([&subdivision](const std::string&) { subdivision.patch_count = 0; });
-  command
-      ->add_option("--scale", chosen->settings.scale, "Metres in one unit of the scene file")
+  command->add_option("--scale", chosen->settings.scale, "Metres in one unit of the scene file")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
