@@ -34,8 +34,9 @@ class TransferOperator {
   virtual void apply(std::span<const Float3> initial_exitance,
                      std::span<Float3> indirect_irradiance, std::span<float> workspace) const = 0;
 
-  /// Writes Y itself, row-major [n][n], for one channel: dense, unscaled, for export and tests.
-  virtual void expand(int channel, std::span<float> transfer) const = 0;
+  /// Writes Y itself, row-major [n][n], for one channel: dense, unscaled, for export and tests. By
+  /// default n products with unit vectors.
+  virtual void expand(int channel, std::span<float> transfer) const;
 };
 
 }  // namespace rebounce

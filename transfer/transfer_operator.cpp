@@ -1,0 +1,21 @@
+#include "rebounce/transfer/transfer_operator.h"
+
+#include <cassert>
+#include <vector>
+
+namespace rebounce {
+
+void TransferOperator::expand(int channel, std::span<float> transfer) const {
+  const std::size_t n = patch_count();
+  assert(transfer.size() == n * n);
+  std::vector<Float3> unit(n, {0, 0, 0}), column(n);
+  std::vector<float> workspace(workspace_size());
+  for (std::size_t j = 0; j < n; ++j) {
+    unit[j][channel] = 1;
+    apply(unit, column, workspace);
+    unit[j][channel] = 0;
+    for (std::size_t i = 0; i < n; ++i) transfer[i * n + j] = column[i][channel];
+  }
+}
+
+}  // namespace rebounce
