@@ -92,10 +92,26 @@ TransferData sample_data(Precision precision = Precision::kF16) {
   TransferData data;
   data.patches = sample_patches();
   data.mesh = sample_mesh();
-  data.materials = {{"white \"paint\"\n", {1, 0.5F, 0}, {0, 0, 100}, 1, kNone, true, AlphaMode::kMask,
-                     0.25F, 0.75F, 0},
-                    {"Lampenschirm für Züge", {0, 0, 0}, {1, 2, 3}, kNone, 0, false,
-                     AlphaMode::kBlend, 0.5F, 1, 0.9F}};
+  data.materials = {{"white \"paint\"\n",
+                     {1, 0.5F, 0},
+                     {0, 0, 100},
+                     1,
+                     kNone,
+                     true,
+                     AlphaMode::kMask,
+                     0.25F,
+                     0.75F,
+                     0},
+                    {"Lampenschirm für Züge",
+                     {0, 0, 0},
+                     {1, 2, 3},
+                     kNone,
+                     0,
+                     false,
+                     AlphaMode::kBlend,
+                     0.5F,
+                     1,
+                     0.9F}};
   data.textures = {{{1, 2, 3}, TextureWrap::kRepeat, TextureWrap::kClampToEdge},
                    {{0x89, 'P', 'N', 'G', 0}, TextureWrap::kMirroredRepeat, TextureWrap::kRepeat}};
   data.cameras = {{"front", {1, 2, 3}, {0, 0, 1}, {0, 1, 0}, {-1, 0, 0}, 1.2F}};
