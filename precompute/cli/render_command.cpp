@@ -43,8 +43,12 @@ std::vector<float> parse_numbers(const std::string& text) {
   return {};
 }
 
-Camera choose_camera(const std::string& wanted, const TransferData& data, const RayTracer& tracer) {
-  if (wanted.empty()) return data.cameras.empty() ? fit_camera(data, tracer) : data.cameras.front();
+Camera choose_camera(const std::string& wanted, const Engine& engine) {
+  const TransferData& data = engine.data();
+  if (wanted.empty()) {
+    return data.cameras.empty() ? fit_camera(data, engine.tracer(), engine.radiosity())
+                                : data.cameras.front();
+  }
   for (const Camera& camera : data.cameras) {
     if (camera.name == wanted) return camera;
   }
@@ -116,7 +120,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
 
   Engine engine(data);
   engine.relight(setup.lights, setup.sky);
-  settings.camera = choose_camera(chosen.camera, *data, engine.tracer());
+  settings.camera = choose_camera(chosen.camera, engine);
   std::vector<Float3> emitted_irradiance(data->patches.size());
   FormFactorRows(data->exchange, data->patches.area)
       .gather(data->patches.emitted_exitance, emitted_irradiance);

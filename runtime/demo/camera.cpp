@@ -69,20 +69,39 @@ std::uint32_t orientation(const glm::vec3& normal) {
   return static_cast<std::uint32_t>(2 * axis + (normal[axis] > 0 ? 1 : 0));
 }
 
+// Which patches are lit: those with at least a twentieth of the mean radiosity. All, if there is
+// none.
+std::vector<bool> lit_patches(const TransferData& data, std::span<const Float3> radiosity) {
+  double power = 0, area = 0;
+  for (std::size_t i = 0; i < radiosity.size(); ++i) {
+    power += data.patches.area[i] * (radiosity[i][0] + radiosity[i][1] + radiosity[i][2]);
+    area += data.patches.area[i];
+  }
+  std::vector<bool> lit(data.patches.size(), true);
+  for (std::size_t i = 0; i < radiosity.size(); ++i) {
+    lit[i] = (radiosity[i][0] + radiosity[i][1] + radiosity[i][2]) * area >= 0.05 * power;
+  }
+  return lit;
+}
+
 // How good a view is: much surface, near nothing, of many orientations and materials, through no
-// culled face.
+// culled face, and lit.
 float score(const Camera& camera, const TransferData& data, const RayTracer& tracer,
-            float diagonal) {
+            const std::vector<bool>& lit, float diagonal) {
   std::vector<Ray> rays = probe_rays(camera);
   std::vector<Hit> hits(rays.size());
   intersect_visible(tracer, data.mesh, rays, hits);
   std::map<std::uint32_t, int> kinds;
-  int seen = 0, through_culled = 0, too_near = 0;
+  int seen = 0, seen_lit = 0, through_culled = 0, too_near = 0;
   float depth = 0;
   for (std::size_t k = 0; k < hits.size(); ++k) {
     through_culled += rays[k].t_near > 0;
     if (hits[k].triangle == kNone) continue;
     ++seen;
+    const std::uint32_t side =
+        hits[k].front ? hits[k].triangle : data.mesh.back_triangle[hits[k].triangle];
+    const std::uint32_t patch = side == kNone ? kNone : data.mesh.triangle_patch[side];
+    seen_lit += patch == kNone || lit[patch];
     too_near += hits[k].t < 0.04F * diagonal;
     depth += std::log1p(20 * hits[k].t / diagonal);
     const Uint3& corner = data.mesh.triangle[hits[k].triangle];
@@ -97,7 +116,8 @@ float score(const Camera& camera, const TransferData& data, const RayTracer& tra
     return static_cast<float>(count) / static_cast<float>(hits.size());
   };
   const float clear = (1 - share(through_culled)) * (1 - share(too_near));
-  return share(seen) * clear * clear * (depth / static_cast<float>(seen)) *
+  const float lit_share = static_cast<float>(seen_lit) / static_cast<float>(seen);
+  return share(seen) * lit_share * lit_share * clear * clear * (depth / static_cast<float>(seen)) *
          (0.2F + variety(kinds, seen));
 }
 
@@ -161,15 +181,17 @@ Camera look_at(const Float3& position, const Float3& target, float vertical_fov)
   return camera;
 }
 
-Camera fit_camera(const TransferData& data, const RayTracer& tracer) {
+Camera fit_camera(const TransferData& data, const RayTracer& tracer,
+                  std::span<const Float3> radiosity) {
   if (data.mesh.position.empty()) return look_at({0, 0, 1}, {0, 0, 0}, kRoomFov);
   const Box box = bounds_of(data.mesh);
   std::vector<Camera> views = views_from_outside(box);
   for (const Camera& view : views_from_inside(box)) views.push_back(view);
+  const std::vector<bool> lit = lit_patches(data, radiosity);
   const Camera* best = &views.front();
   float best_score = -1;
   for (const Camera& view : views) {
-    const float value = score(view, data, tracer, box.diagonal());
+    const float value = score(view, data, tracer, lit, box.diagonal());
     if (value > best_score) {
       best_score = value;
       best = &view;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <span>
+
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -12,8 +14,10 @@ Camera look_at(const Float3& position, const Float3& target, float vertical_fov)
 
 /// A sensible view of a scene that has no camera: level with the horizon, from inside a room or
 /// from its open side. Of a few hundred candidates it takes the one that sees the most surface, in
-/// the most directions, through the fewest culled faces. `tracer` holds the scene's surface. The
-/// same scene gives the same view.
-Camera fit_camera(const TransferData& data, const RayTracer& tracer);
+/// the most directions, through the fewest culled faces, and of which most is lit: `radiosity` [n]
+/// in lx, or nothing if there is no light yet. `tracer` holds the scene's surface. The same scene
+/// and light give the same view.
+Camera fit_camera(const TransferData& data, const RayTracer& tracer,
+                  std::span<const Float3> radiosity = {});
 
 }  // namespace rebounce
