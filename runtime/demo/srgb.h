@@ -21,9 +21,11 @@ inline glm::vec3 srgb_to_linear(const glm::vec3& c) {
   return {srgb_to_linear(c.x), srgb_to_linear(c.y), srgb_to_linear(c.z)};
 }
 
-inline std::uint8_t to_srgb_byte(float linear) {
-  return static_cast<std::uint8_t>(
-      std::lround(255 * linear_to_srgb(std::clamp(linear, 0.0F, 1.0F))));
+/// `threshold` in [0, 1) is where between two bytes the upper one begins: 1/2 rounds, a pattern of
+/// thresholds dithers.
+inline std::uint8_t to_srgb_byte(float linear, float threshold = 0.5F) {
+  const float value = 255 * linear_to_srgb(std::clamp(linear, 0.0F, 1.0F));
+  return static_cast<std::uint8_t>(std::min(255.0F, std::floor(value + 1 - threshold)));
 }
 
 /// Relative luminance of linear Rec.709.

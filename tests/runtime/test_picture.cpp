@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 #include <stb_image.h>
+#include <algorithm>
 
 #include <cmath>
 #include <cstring>
@@ -424,13 +425,34 @@ TEST(ToneMap, KeepsMidtonesAndHue) {
 }
 
 TEST(ToneMap, BrighterStaysBrighter) {
-  Picture picture{.width = 400, .height = 1};
-  for (int k = 0; k < 400; ++k) {
+  // At one and the same place: neighbours are dithered apart by up to one step.
+  ScreenImage before = tone_map({.width = 4, .height = 4, .pixel = std::vector<Float3>(16)});
+  for (int k = 1; k < 400; ++k) {
     const float y = 0.01F * static_cast<float>(k);
-    picture.pixel.push_back({y, 0.5F * y, 0.25F * y});
+    const Float3 pixel{y, 0.5F * y, 0.25F * y};
+    const ScreenImage image =
+        tone_map({.width = 4, .height = 4, .pixel = std::vector<Float3>(16, pixel)});
+    for (std::size_t b = 0; b < image.rgb.size(); ++b) ASSERT_GE(image.rgb[b], before.rgb[b]);
+    before = image;
   }
-  const ScreenImage image = tone_map(picture);
-  for (std::size_t k = 3; k < image.rgb.size(); ++k) EXPECT_GE(image.rgb[k], image.rgb[k - 3]);
+}
+
+TEST(ToneMap, DitheringKeepsTheMeanAndExactBlack) {
+  constexpr int kSide = 64;
+  constexpr float kLight = 0.2F;
+  const auto flat = [](float y) {
+    return tone_map(
+        {.width = kSide, .height = kSide, .pixel = std::vector<Float3>(kSide * kSide, {y, y, y})});
+  };
+  const ScreenImage image = flat(kLight);
+  double sum = 0;
+  for (const std::uint8_t byte : image.rgb) sum += byte;
+  const double mean = sum / static_cast<double>(image.rgb.size());
+  const auto [low, high] = std::ranges::minmax(image.rgb);
+  EXPECT_LE(high - low, 1);
+  EXPECT_GT(mean, low);
+  EXPECT_LT(mean, high);
+  for (const std::uint8_t byte : flat(0).rgb) EXPECT_EQ(byte, 0);
 }
 
 TEST(Png, IsWrittenAndReadBack) {
