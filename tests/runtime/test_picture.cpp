@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 #include <stb_image.h>
-#include <algorithm>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
