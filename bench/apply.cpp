@@ -14,7 +14,7 @@
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/direct_lighting.h"
-#include "rebounce/runtime/gauss_seidel.h"
+#include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
@@ -89,14 +89,16 @@ class ApplyBenchmark {
         options_(options),
         f32_(operator_f32(data)),
         f16_(to_f16(*f32_)),
-        rows_(data.exchange, data.patches.area),
+        form_factors_(data.exchange, data.patches.area),
+        gauss_seidel_(form_factors_, {patches_.area, patches_.reflectance}),
         initial_exitance_(light_one_lamp(data)),
         truth_(ReferenceSolver(data.exchange, data.patches).indirect_irradiance(initial_exitance_)),
         result_(patches_.size()),
-        workspace_(std::max(f32_->workspace_size(), f16_->workspace_size())),
+        workspace_(std::max(
+            {f32_->workspace_size(), f16_->workspace_size(), form_factors_.workspace_size()})),
         read_f32_(f32_->bytes()),
         read_f16_(f16_->bytes()),
-        read_rows_(gather_bytes()) {}
+        read_form_factors_(gather_bytes()) {}
 
   /// Measures everything with `threads` threads.
   void run(int threads, Table& table) {
@@ -104,7 +106,7 @@ class ApplyBenchmark {
     measures_.clear();
     for (const auto& dense : {f32_, f16_}) add_apply(*dense);
     add_gather();
-    if (threads == 1) add_gauss_seidel();
+    add_gauss_seidel();
 
     std::vector<TimedCase> cases;
     for (const Measure& measure : measures_) cases.push_back(measure.timed);
@@ -113,7 +115,7 @@ class ApplyBenchmark {
   }
 
  private:
-  std::size_t gather_bytes() const { return rows_.bytes() + 2 * vector_bytes(); }
+  std::size_t gather_bytes() const { return form_factors_.bytes() + 2 * vector_bytes(); }
   std::size_t vector_bytes() const { return patches_.size() * sizeof(Float3); }
 
   double error_of(std::span<const Float3> indirect_irradiance) const {
@@ -155,8 +157,8 @@ class ApplyBenchmark {
   }
 
   void add_gather() {
-    add_read(read_rows_, gather_bytes());
-    const auto gather = [this] { rows_.gather(initial_exitance_, result_); };
+    add_read(read_form_factors_, gather_bytes());
+    const auto gather = [this] { form_factors_.gather(initial_exitance_, result_, workspace_); };
     const auto first_bounce_error = [this, gather] {
       gather();
       return error_of(result_);
@@ -169,22 +171,19 @@ class ApplyBenchmark {
   }
 
   void add_gauss_seidel() {
-    const GaussSeidelSettings one_sweep{.max_sweeps = 1, .residual = 0};
-    const auto start = [this] { std::ranges::fill(result_, Float3{0, 0, 0}); };
-    const auto sweep = [this, one_sweep] {
-      solve_gauss_seidel(rows_, patches_.reflectance, patches_.area, initial_exitance_, one_sweep,
-                         result_);
-    };
+    const SolveSettings one_sweep{.max_sweeps = 1, .residual = 0, .measure_residual = false};
+    const auto start = [this] { gauss_seidel_.forget(); };
+    const auto sweep = [this, one_sweep] { gauss_seidel_.solve(initial_exitance_, one_sweep); };
     const auto error = [this, start, sweep] {
       start();
       sweep();
       std::vector<Float3> gathered(patches_.size());
-      rows_.gather(result_, gathered);
+      form_factors_.gather(gauss_seidel_.radiosity(), gathered, workspace_);
       return error_of(gathered);
     };
     measures_.push_back({.name = "Gauss-Seidel sweep",
                          .precision = "f32",
-                         .bytes = rows_.bytes() + 4 * vector_bytes(),
+                         .bytes = form_factors_.bytes() + 4 * vector_bytes(),
                          .error = error,
                          .timed = {.work = sweep, .prepare = start}});
   }
@@ -212,10 +211,11 @@ class ApplyBenchmark {
   const PatchTable& patches_;
   const CommonOptions& options_;
   std::shared_ptr<const DenseOperator> f32_, f16_;
-  FormFactorRows rows_;
+  FormFactorBlocks form_factors_;
+  GaussSeidelSolver gauss_seidel_;
   std::vector<Float3> initial_exitance_, truth_, result_;
   std::vector<float> workspace_;
-  ReadBuffer read_f32_, read_f16_, read_rows_;
+  ReadBuffer read_f32_, read_f16_, read_form_factors_;
   std::vector<Measure> measures_;
 };
 

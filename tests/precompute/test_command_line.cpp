@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "precompute/npz_reader.h"
+#include "rebounce/runtime/solve_radiosity.h"
 #include "subprocess.h"
 #include "temporary_folder.h"
 
@@ -284,6 +285,22 @@ TEST_F(CommandLine, SolvesTheSameByEitherMethod) {
     ASSERT_EQ(a.rows.size(), b.rows.size());
     EXPECT_LT(difference(a, b, 3), 1e-4) << setup;
     EXPECT_LT(difference(a, b, 6), 1e-4) << setup;
+  }
+}
+
+TEST_F(CommandLine, EveryMethodReachesTheResidualItWasAsked) {
+  const std::string file = precompute("box.safetensors");
+  for (const NamedSolveMethod& method : kSolveMethods) {
+    const std::string name(method.name);
+    const json solved = summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"),
+                                    "--method", name, "--residual", "1e-5"});
+    EXPECT_EQ(solved["method"], name);
+    EXPECT_GE(solved["sweeps"].get<int>(), 1) << name;
+    EXPECT_LE(solved["residual"].get<double>(), 1e-5) << name;
+    const json hurried =
+        summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"), "--method", name,
+                    "--residual", "0", "--iterations", "1000000", "--time-budget", "500"});
+    EXPECT_LT(hurried["sweeps"].get<int>(), 1000000) << name;
   }
 }
 

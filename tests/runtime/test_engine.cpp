@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <new>
 
-#include "rebounce/runtime/gauss_seidel.h"
 #include "rebounce/transfer/error.h"
 #include "test_scene_data.h"
 
@@ -125,55 +124,6 @@ TEST(Engine, NeedsAnOperator) {
   const auto data = std::make_shared<TransferData>(*two_squares());
   data->transfer = nullptr;
   EXPECT_THROW(Engine{data}, Error);
-}
-
-struct GaussSeidelCase {
-  std::shared_ptr<const TransferData> data = two_squares();
-  FormFactorRows rows{data->exchange, data->patches.area};
-  std::vector<Float3> m0 = std::vector<Float3>(data->patches.size(), {1, 2, 3});
-
-  GaussSeidelResult solve(const GaussSeidelSettings& settings, std::vector<Float3>& b) const {
-    return solve_gauss_seidel(rows, data->patches.reflectance, data->patches.area, m0, settings, b);
-  }
-};
-
-TEST(GaussSeidel, SolvesTheEquation) {
-  const GaussSeidelCase c;
-  std::vector<Float3> b(c.m0.size()), h(c.m0.size());
-  const GaussSeidelResult result = c.solve({.residual = 1e-6}, b);
-  EXPECT_LE(result.residual, 1e-6);
-  EXPECT_GT(result.sweeps, 3);
-  c.rows.gather(b, h);
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    for (int k = 0; k < kChannelCount; ++k) {
-      EXPECT_NEAR(b[i][k], c.m0[i][k] + c.data->patches.reflectance[i][k] * h[i][k], 1e-5);
-    }
-  }
-}
-
-TEST(GaussSeidel, WarmStartIsCheaperAndSweepsContract) {
-  const GaussSeidelCase c;
-  std::vector<Float3> b(c.m0.size());
-  const int cold = c.solve({.residual = 1e-5}, b).sweeps;
-  EXPECT_EQ(c.solve({.residual = 1e-5}, b).sweeps, 1);
-  EXPECT_GT(cold, 1);
-  // Contraction per sweep is no worse than the largest reflectance.
-  std::vector<Float3> fresh(c.m0.size());
-  const double first = c.solve({.max_sweeps = 1, .residual = 0}, fresh).residual;
-  const double second = c.solve({.max_sweeps = 1, .residual = 0}, fresh).residual;
-  EXPECT_LE(second, 0.9 * first);
-}
-
-TEST(GaussSeidel, DoesNotAllocateAndChecksSizes) {
-  const GaussSeidelCase c;
-  std::vector<Float3> b(c.m0.size());
-  allocation_count = 0;
-  counting = true;
-  c.solve({}, b);
-  counting = false;
-  EXPECT_EQ(allocation_count, 0);
-  b.pop_back();
-  EXPECT_THROW(c.solve({}, b), Error);
 }
 
 }  // namespace

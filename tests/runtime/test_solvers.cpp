@@ -145,7 +145,7 @@ class SeriesOperator final : public TransferOperator {
     const std::size_t n = patch_count();
     const std::span<Float3> b(reinterpret_cast<Float3*>(workspace.data()), n);
     std::ranges::copy(initial_exitance, b.begin());
-    for (int bounce = 0; bounce < 90; ++bounce) {
+    for (int bounce = 0; bounce < 40; ++bounce) {
       form_factors_.gather(b, indirect_irradiance, workspace.subspan(kChannelCount * n));
       for (std::size_t i = 0; i < n; ++i) {
         for (int c = 0; c < kChannelCount; ++c) {
