@@ -89,22 +89,28 @@ class ApplyBenchmark {
         options_(options),
         f32_(operator_f32(data)),
         f16_(to_f16(*f32_)),
+        stored_(data.transfer),
         form_factors_(data.exchange, data.patches.area),
         gauss_seidel_(form_factors_, {patches_.area, patches_.reflectance}),
         initial_exitance_(light_one_lamp(data)),
         truth_(ReferenceSolver(data.exchange, data.patches).indirect_irradiance(initial_exitance_)),
         result_(patches_.size()),
-        workspace_(std::max(
-            {f32_->workspace_size(), f16_->workspace_size(), form_factors_.workspace_size()})),
+        workspace_(std::max({f32_->workspace_size(), f16_->workspace_size(),
+                             stored_->workspace_size(), form_factors_.workspace_size()})),
         read_f32_(f32_->bytes()),
         read_f16_(f16_->bytes()),
+        read_stored_(stored_->bytes()),
         read_form_factors_(gather_bytes()) {}
 
   /// Measures everything with `threads` threads.
   void run(int threads, Table& table) {
     omp_set_num_threads(threads);
     measures_.clear();
-    for (const auto& dense : {f32_, f16_}) add_apply(*dense);
+    if (stored_->kind() != "dense") {
+      add_read(read_stored_, stored_->bytes());
+      add_product("apply " + stored_->kind(), {}, *stored_);
+    }
+    for (const auto& dense : {f32_, f16_}) add_dense(*dense);
     add_gather();
     add_gauss_seidel();
 
@@ -127,20 +133,27 @@ class ApplyBenchmark {
         {.name = "read", .bytes = bytes, .timed = {.work = [&buffer] { buffer.read(); }}});
   }
 
-  void add_apply(const DenseOperator& dense) {
-    const Precision precision = dense.storage().precision;
-    add_read(precision == Precision::kF16 ? read_f16_ : read_f32_, dense.bytes());
-    const auto apply = [this, &dense] { dense.apply(initial_exitance_, result_, workspace_); };
+  void add_product(const std::string& what, const std::string& precision,
+                   const TransferOperator& transfer) {
+    const auto apply = [this, &transfer] {
+      transfer.apply(initial_exitance_, result_, workspace_);
+    };
     const auto apply_error = [this, apply] {
       apply();
       return error_of(result_);
     };
-    measures_.push_back({.name = "apply",
+    measures_.push_back({.name = what,
                          .instruction_set = dense_kernels().instruction_set,
-                         .precision = name(precision),
-                         .bytes = dense.bytes(),
+                         .precision = precision,
+                         .bytes = transfer.bytes(),
                          .error = apply_error,
                          .timed = {.work = apply}});
+  }
+
+  void add_dense(const DenseOperator& dense) {
+    const Precision precision = dense.storage().precision;
+    add_read(precision == Precision::kF16 ? read_f16_ : read_f32_, dense.bytes());
+    add_product("apply dense", name(precision), dense);
     for (const DenseKernels* kernels : available_kernels()) add_tiles(dense, *kernels);
   }
 
@@ -211,11 +224,12 @@ class ApplyBenchmark {
   const PatchTable& patches_;
   const CommonOptions& options_;
   std::shared_ptr<const DenseOperator> f32_, f16_;
+  std::shared_ptr<const TransferOperator> stored_;  ///< the file's own, of any kind
   FormFactorBlocks form_factors_;
   GaussSeidelSolver gauss_seidel_;
   std::vector<Float3> initial_exitance_, truth_, result_;
   std::vector<float> workspace_;
-  ReadBuffer read_f32_, read_f16_, read_form_factors_;
+  ReadBuffer read_f32_, read_f16_, read_stored_, read_form_factors_;
   std::vector<Measure> measures_;
 };
 
