@@ -111,7 +111,7 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
 BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
   if (settings.operator_kind == OperatorKind::kAutomatic) {
     settings.operator_kind =
-        patch_count < kHierarchicalPatchCount ? OperatorKind::kDense : OperatorKind::kHierarchical;
+        patch_count <= kDensePatchCount ? OperatorKind::kDense : OperatorKind::kHierarchical;
   }
   const bool dense = settings.operator_kind == OperatorKind::kDense;
   if (!settings.precision) settings.precision = dense ? Precision::kF32 : Precision::kF16;

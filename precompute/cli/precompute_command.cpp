@@ -15,6 +15,7 @@ namespace {
 
 struct PrecomputeOptions {
   std::string scene, output, operator_kind, precision;
+  bool tolerance_given = false;
   BuildSettings settings;
   double memory_limit_gib = 0;
 };
@@ -80,7 +81,10 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
     settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
-  if (chosen.operator_kind == "hierarchical") settings.operator_kind = OperatorKind::kHierarchical;
+  if (chosen.operator_kind == "hierarchical" ||
+      (chosen.operator_kind.empty() && chosen.tolerance_given)) {
+    settings.operator_kind = OperatorKind::kHierarchical;
+  }
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
   check_can_write(chosen.output);
@@ -133,14 +137,17 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   command
-      ->add_option("--operator", chosen->operator_kind,
-                   "Kind of the operator; by default hierarchical from 1000 patches on")
+      ->add_option(
+          "--operator", chosen->operator_kind,
+          "Kind of the operator; by default hierarchical if a tolerance is given or there are "
+          "more than 5000 patches, otherwise dense")
       ->check(CLI::IsMember({"hierarchical", "dense"}));
   command
       ->add_option(
           "--tolerance", chosen->settings.tolerance,
           "Error of the indirect light that the hierarchical operator may have in the mean")
       ->check(CLI::Range(1e-5, 0.5))
+      ->each([chosen](const std::string&) { chosen->tolerance_given = true; })
       ->capture_default_str();
   command
       ->add_option("--precision", chosen->precision,

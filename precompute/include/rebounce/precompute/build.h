@@ -19,13 +19,14 @@
 namespace rebounce {
 
 enum class OperatorKind : std::uint8_t {
-  kAutomatic,  ///< hierarchical from kHierarchicalPatchCount patches on, dense below
+  kAutomatic,  ///< dense up to kDensePatchCount patches, hierarchical above
   kDense,
   kHierarchical,
 };
 
-/// Fewer patches than this are as well off with the dense operator.
-inline constexpr std::size_t kHierarchicalPatchCount = 1000;
+/// Up to this many patches the dense operator, which is exact to rounding, is small enough to have
+/// (at 5,000: 150 MB) for who has not said what error may be.
+inline constexpr std::size_t kDensePatchCount = 5000;
 
 struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
