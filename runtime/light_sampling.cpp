@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "glm_conversion.h"
+#include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
 namespace {

@@ -1,43 +1,12 @@
-// Compiled with AVX2 and FMA; called only on processors that have them. Per block a gather loads
-// 32 bytes of F and 96 of the vector: at two loads a cycle that is 16 bytes of F a cycle, several
-// times what memory delivers, so that wider registers would gain nothing.
-
-#include <immintrin.h>
+// Compiled with AVX2, FMA and F16C; called only on processors that have them. Per block a gather
+// loads 32 bytes of F and 96 of the vector: at two loads a cycle that is 16 bytes of F a cycle,
+// several times what memory delivers, so that wider registers would gain nothing.
 
 #include "gather_kernels.h"
 #include "gather_kernels_impl.h"
+#include "vector_avx2.h"
 
 namespace rebounce {
-namespace {
-
-struct Vector8 {
-  static constexpr std::size_t kWidth = 8;
-  __m256 v;
-
-  static Vector8 load(const float* p) { return {_mm256_loadu_ps(p)}; }
-  static Vector8 zero() { return {_mm256_setzero_ps()}; }
-  static Vector8 broadcast(float x) { return {_mm256_set1_ps(x)}; }
-  void store(float* p) const { _mm256_storeu_ps(p, v); }
-  float sum() const {
-    const __m128 half = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
-    const __m128 pair = _mm_add_ps(half, _mm_movehl_ps(half, half));
-    return _mm_cvtss_f32(_mm_add_ss(pair, _mm_movehdup_ps(pair)));
-  }
-  float largest() const {
-    const __m128 half = _mm_max_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
-    const __m128 pair = _mm_max_ps(half, _mm_movehl_ps(half, half));
-    return _mm_cvtss_f32(_mm_max_ss(pair, _mm_movehdup_ps(pair)));
-  }
-  friend Vector8 add(Vector8 a, Vector8 b) { return {_mm256_add_ps(a.v, b.v)}; }
-  friend Vector8 multiply(Vector8 a, Vector8 b) { return {_mm256_mul_ps(a.v, b.v)}; }
-  friend Vector8 multiply_add(Vector8 a, Vector8 b, Vector8 c) {
-    return {_mm256_fmadd_ps(a.v, b.v, c.v)};
-  }
-  friend Vector8 absolute(Vector8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0F), a.v)}; }
-  friend Vector8 maximum(Vector8 a, Vector8 b) { return {_mm256_max_ps(a.v, b.v)}; }
-};
-
-}  // namespace
 
 const GatherKernels kGatherKernelsAvx2 = make_gather_kernels<Vector8>("avx2");
 

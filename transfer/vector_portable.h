@@ -2,6 +2,8 @@
 
 // The portable vector type of the kernels; see vector_load.h.
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -24,9 +26,26 @@ struct Vector4 {
   static Vector4 broadcast(float x) { return {{x, x, x, x}}; }
   void store(float* p) const { std::memcpy(p, v, sizeof v); }
   float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
+  float largest() const { return std::max(std::max(v[0], v[1]), std::max(v[2], v[3])); }
+
+  template <typename Operation>
+  static Vector4 each(const Operation& operation) {
+    return {{operation(0), operation(1), operation(2), operation(3)}};
+  }
+  friend Vector4 add(const Vector4& a, const Vector4& b) {
+    return each([&](int k) { return a.v[k] + b.v[k]; });
+  }
+  friend Vector4 multiply(const Vector4& a, const Vector4& b) {
+    return each([&](int k) { return a.v[k] * b.v[k]; });
+  }
   friend Vector4 multiply_add(const Vector4& a, const Vector4& b, const Vector4& c) {
-    return {{a.v[0] * b.v[0] + c.v[0], a.v[1] * b.v[1] + c.v[1], a.v[2] * b.v[2] + c.v[2],
-             a.v[3] * b.v[3] + c.v[3]}};
+    return each([&](int k) { return a.v[k] * b.v[k] + c.v[k]; });
+  }
+  friend Vector4 absolute(const Vector4& a) {
+    return each([&](int k) { return std::abs(a.v[k]); });
+  }
+  friend Vector4 maximum(const Vector4& a, const Vector4& b) {
+    return each([&](int k) { return std::max(a.v[k], b.v[k]); });
   }
 };
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "display_surface.h"
-#include "glm_conversion.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {

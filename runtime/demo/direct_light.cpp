@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "glm_conversion.h"
 #include "polygon_form_factor.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "sample_sequence.h"
 

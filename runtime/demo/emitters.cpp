@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "glm_conversion.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "srgb.h"
 
 namespace rebounce {

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "glm_conversion.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/atomic_file.h"
 #include "rebounce/transfer/error.h"
 #include "srgb.h"

@@ -11,7 +11,7 @@
 #include "display_surface.h"
 #include "emitters.h"
 #include "exposure.h"
-#include "glm_conversion.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 #include "sample_sequence.h"
 #include "srgb.h"

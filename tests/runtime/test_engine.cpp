@@ -2,45 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
+#include "allocation_counter.h"
 #include "rebounce/transfer/error.h"
 #include "test_scene_data.h"
-
-namespace {
-
-std::atomic<bool> counting = false;
-std::atomic<int> allocation_count = 0;
-
-void* allocate(std::size_t size, std::size_t alignment) {
-  if (counting) ++allocation_count;
-  void* memory = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return allocate(size, alignof(std::max_align_t));
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return allocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace rebounce {
 namespace {
@@ -91,11 +55,8 @@ TEST(Engine, AFrameDoesNotAllocate) {
   Engine engine(two_squares());
   const std::vector<Light> lights = {lamp_at(0.1F), lamp_at(-0.4F)};
   engine.relight(lights, {});  // threads and their buffers are made once
-  allocation_count = 0;
-  counting = true;
-  engine.relight(lights, {});
-  counting = false;
-  EXPECT_EQ(allocation_count, 0);
+  const int count = test::count_allocations([&] { engine.relight(lights, {}); });
+  EXPECT_EQ(count, 0);
 }
 
 TEST(Engine, ALightMovedAndMovedBackGivesTheSameBits) {

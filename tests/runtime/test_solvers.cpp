@@ -4,51 +4,16 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <new>
 #include <random>
 
+#include "allocation_counter.h"
 #include "rebounce/runtime/conjugate_gradient_solver.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scene_data.h"
-
-namespace {
-
-std::atomic<bool> counting = false;
-std::atomic<int> allocation_count = 0;
-
-void* allocate(std::size_t size, std::size_t alignment) {
-  if (counting) ++allocation_count;
-  void* memory = std::aligned_alloc(alignment, (size + alignment - 1) / alignment * alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return allocate(size, alignof(std::max_align_t));
-}
-void* operator new(std::size_t size, std::align_val_t alignment) {
-  return allocate(size, static_cast<std::size_t>(alignment));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace rebounce {
 namespace {
@@ -317,13 +282,12 @@ TEST_P(EveryMethod, ASolveDoesNotAllocate) {
   std::vector<Float3> radiosity(kPatchCount);
   solver->solve(c.system.initial_exitance);  // threads and their buffers are made once
   solver->forget();
-  allocation_count = 0;
-  counting = true;
-  solver->solve(c.system.initial_exitance, {}, radiosity);
-  solver->set_reflectance(c.system.reflectance);
-  solver->solve(c.system.initial_exitance, kTight);
-  counting = false;
-  EXPECT_EQ(allocation_count, 0);
+  const int count = test::count_allocations([&] {
+    solver->solve(c.system.initial_exitance, {}, radiosity);
+    solver->set_reflectance(c.system.reflectance);
+    solver->solve(c.system.initial_exitance, kTight);
+  });
+  EXPECT_EQ(count, 0);
 }
 
 TEST_P(EveryMethod, OneOffIsTheColdSolve) {

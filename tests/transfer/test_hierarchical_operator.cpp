@@ -4,39 +4,18 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <functional>
-#include <new>
 #include <numeric>
 #include <random>
 
 #include "../../transfer/block_kernels.h"
 #include "../../transfer/half_float.h"
+#include "allocation_counter.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
-
-namespace {
-
-std::atomic<std::size_t> allocation_count = 0;
-
-}  // namespace
-
-// Not inlined: the compiler would take free() for the wrong match of new.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  ++allocation_count;
-  if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
 
 namespace rebounce {
 namespace {
@@ -144,10 +123,9 @@ TEST(HierarchicalOperator, AllocatesNothing) {
   std::vector<Float3> h(m0.size());
   std::vector<float> workspace(op.workspace_size());
   op.apply(m0, h, workspace);
-  const std::size_t before = allocation_count;
-  op.apply(m0, h, workspace);
-  EXPECT_EQ(allocation_count, before);
-  EXPECT_GT(before, 0U) << "allocations are counted";
+  EXPECT_EQ(test::count_allocations([&] { op.apply(m0, h, workspace); }), 0);
+  EXPECT_GT(test::count_allocations([&] { h.reserve(2 * h.size()); }), 0)
+      << "allocations are counted";
 }
 
 TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {

@@ -1,11 +1,16 @@
 #pragma once
 
+// Between the plain arrays of the public headers and the vectors used inside.
+
 #include <glm/glm.hpp>
 
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
 
+inline glm::vec2 to_glm(const Float2& v) {
+  return {v[0], v[1]};
+}
 inline glm::vec3 to_glm(const Float3& v) {
   return {v[0], v[1], v[2]};
 }
