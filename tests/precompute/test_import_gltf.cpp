@@ -222,7 +222,8 @@ class SquareWays : public ImportGltf {
     std::vector<float> values;
     for (const int corner : order) {
       for (int i = 0; i < 3; ++i) {
-        values.push_back(kCorner[static_cast<std::size_t>(3 * corner + i)]);
+        values.push_back(
+            kCorner[3 * static_cast<std::size_t>(corner) + static_cast<std::size_t>(i)]);
       }
     }
     return values;

@@ -45,9 +45,8 @@ GltfBuilder balls(int rings, int segments, int instances, bool with_normals) {
   }
   std::vector<float> place;
   for (int i = 0; i < instances; ++i) {
-    place.insert(place.end(),
-                 {3.0F * static_cast<float>(i % 10), 3.0F * static_cast<float>(i / 100),
-                  3.0F * static_cast<float>(i / 10 % 10)});
+    const int x = i % 10, y = i / 100, z = i / 10 % 10;
+    for (const int step : {x, y, z}) place.push_back(3.0F * static_cast<float>(step));
   }
   GltfBuilder builder;
   const int positions = builder.add_accessor(position, "VEC3", 3);

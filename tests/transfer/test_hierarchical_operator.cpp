@@ -11,6 +11,7 @@
 
 #include "../../transfer/block_kernels.h"
 #include "../../transfer/half_float.h"
+#include "../../transfer/instruction_set.h"
 #include "allocation_counter.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
@@ -301,11 +302,9 @@ void check_kernels(const BlockKernelSet& kernels) {
 TEST(BlockKernels, EveryInstructionSetAgrees) {
   check_kernels(kBlockKernelsPortable);
 #if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-      __builtin_cpu_supports("f16c")) {
-    check_kernels(kBlockKernelsAvx2);
-  }
-  if (__builtin_cpu_supports("avx512f")) check_kernels(kBlockKernelsAvx512);
+  const InstructionSet widest = widest_instruction_set();
+  if (widest >= InstructionSet::kAvx2) check_kernels(kBlockKernelsAvx2);
+  if (widest >= InstructionSet::kAvx512) check_kernels(kBlockKernelsAvx512);
 #endif
 }
 

@@ -486,13 +486,13 @@ TEST(TransferFile, RefusesAnImpossibleScene) {
 }
 
 TEST(TransferFile, RefusesImpossibleFormFactors) {
-  const auto begins = [](std::vector<std::uint64_t> values) {
+  const auto begins = [](const std::vector<std::uint64_t>& values) {
     return [values](TransferData& data) { data.exchange.row_begin = SharedArray(values); };
   };
-  const auto columns = [](std::vector<std::uint32_t> values) {
+  const auto columns = [](const std::vector<std::uint32_t>& values) {
     return [values](TransferData& data) { data.exchange.column = SharedArray(values); };
   };
-  const auto areas = [](std::vector<float> values) {
+  const auto areas = [](const std::vector<float>& values) {
     return [values](TransferData& data) { data.exchange.exchange_area = SharedArray(values); };
   };
   expect_refused({
