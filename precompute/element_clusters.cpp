@@ -21,14 +21,15 @@ constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0;
 // Each element's nearest others that may join it without an edge between.
 constexpr std::size_t kNearCount = 8;
 
-// Rounds in which patches that lie near each other become neighbours; the reach doubles each time.
-constexpr int kNearRounds = 8;
+// Where there are still too many patches, rounds in which those that lie near each other become
+// neighbours and the leak test is left to larger ones; both lengths double each time.
+constexpr int kRounds = 6;
 
 // Elements of a patch between which lines of sight are drawn.
 constexpr std::size_t kWitnessCount = 4;
 
 // A patch longer than this part of the mean size must pass the leak test.
-constexpr double kSmallPatch = 0.5;
+constexpr double kSmall = 0.5;
 
 struct Cluster {
   double area = 0;
@@ -57,6 +58,7 @@ class Merging {
     const double area = std::accumulate(elements.area.begin(), elements.area.end(), 0.0);
     size_ = settings.patch_count > 0 ? std::sqrt(area / static_cast<double>(settings.patch_count))
                                      : settings.largest;
+    small_ = kSmall * size_;
     clusters_.reserve(2 * elements.size());
     for (std::uint32_t e = 0; e < elements.size(); ++e) clusters_.push_back(cluster_of(e));
   }
@@ -65,7 +67,9 @@ class Merging {
     connect(find_edge_neighbours(elements_.corner));
     connect_in_sight(find_near_pairs(elements_.centroid, kNearCount, static_cast<float>(size_)));
     merge_cheapest();
-    for (int round = 0; round < kNearRounds && alive_ > settings_.patch_count; ++round) {
+    for (int round = 0; round < kRounds && alive_ > settings_.patch_count; ++round) {
+      small_ *= 2;
+      queue_neighbours();
       connect_near_clusters(size_ * std::exp2(round));
       merge_cheapest();
     }
@@ -123,6 +127,16 @@ class Merging {
     connect(seen);
   }
 
+  /// Gives pairs that were refused another chance.
+  void queue_neighbours() {
+    for (std::uint32_t c = 0; c < clusters_.size(); ++c) {
+      if (!is_alive(c)) continue;
+      for (const std::uint32_t n : clusters_[c].neighbours) {
+        if (n > c && is_alive(n)) queue_.push({cost(clusters_[c], clusters_[n]), c, n});
+      }
+    }
+  }
+
   void connect_near_clusters(double reach) {
     std::vector<std::uint32_t> cluster;
     std::vector<Float3> centroid;
@@ -156,7 +170,7 @@ class Merging {
     const double length = glm::distance(glm::min(clusters_[a].low, clusters_[b].low),
                                         glm::max(clusters_[a].high, clusters_[b].high));
     if (settings_.largest > 0 && length > settings_.largest) return false;
-    return length <= kSmallPatch * size_ || mostly_in_sight(a, b);
+    return length <= small_ || mostly_in_sight(a, b);
   }
 
   bool mostly_in_sight(std::uint32_t a, std::uint32_t b) const {
@@ -233,7 +247,8 @@ class Merging {
   const Elements& elements_;
   const RayTracer& tracer_;
   const ClusterSettings& settings_;
-  double size_;  ///< the mean patch's, metres
+  double size_;   ///< the mean patch's, metres
+  double small_;  ///< what is no longer may merge unseen, metres
   std::size_t alive_;
   std::vector<Cluster> clusters_;
   std::priority_queue<Candidate> queue_;

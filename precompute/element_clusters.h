@@ -50,8 +50,10 @@ struct ClusterSettings {
 /// (leaves, slats), if the line of sight between them is free; and once none of those is left,
 /// patches that lie near each other. Emitting and other elements are never merged.
 ///
-/// The leak test: patches larger than half of a mean patch merge only if most lines of sight
-/// between their elements are free, so that no patch lies on two sides of a wall or in two rooms.
+/// The leak test: what is longer than half of a mean patch merges only if most lines of sight
+/// between its elements are free, so that no patch lies on two sides of a wall or in two rooms.
+/// Where that leaves more patches than are wanted, it is waived for lengths that grow until there
+/// are few enough.
 ///
 /// `tracer` holds the surface. Patches are numbered in the order of their first elements.
 /// Deterministic.
