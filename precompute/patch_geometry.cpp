@@ -28,10 +28,10 @@ constexpr std::array<int, 3> kPartLevel = {0, 2, 4};
 constexpr double kAboutFlat = 0.85;
 
 // A part nearer than this many times the radii of both is looked at triangle by triangle.
-constexpr double kNearPart = 2;
+constexpr double kNearPart = 1.5;
 
 // A triangle this small for its distance is taken as a point.
-constexpr double kPointLike = 0.1;
+constexpr double kPointLike = 0.25;
 
 std::size_t part_offset(int level) {
   return (std::size_t{1} << level) - 1;
