@@ -8,9 +8,21 @@
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
+namespace {
+
+/// F by rows: a shot goes from one patch to all that it sees.
+const FormFactorBlocks& rows_of(const FormFactorOperator& form_factors) {
+  const auto* blocks = dynamic_cast<const FormFactorBlocks*>(&form_factors);
+  if (blocks == nullptr) {
+    throw Error("solver: southwell needs form factors by rows; give it FormFactorBlocks");
+  }
+  return *blocks;
+}
+
+}  // namespace
 
 std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
-                                             const FormFactorBlocks& form_factors,
+                                             const FormFactorOperator& form_factors,
                                              const RadiosityProblem& problem,
                                              std::shared_ptr<const TransferOperator> transfer) {
   switch (method) {
@@ -24,7 +36,7 @@ std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
     case SolveMethod::kConjugateGradient:
       return std::make_unique<ConjugateGradientSolver>(form_factors, problem);
     case SolveMethod::kSouthwell:
-      return std::make_unique<SouthwellSolver>(form_factors, problem);
+      return std::make_unique<SouthwellSolver>(rows_of(form_factors), problem);
     case SolveMethod::kRefine:
       return std::make_unique<RefinementSolver>(form_factors, problem, std::move(transfer));
     case SolveMethod::kPreconditionedConjugateGradient:
@@ -34,7 +46,7 @@ std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
   throw Error("solver: no such method");
 }
 
-SolveResult solve_radiosity(SolveMethod method, const FormFactorBlocks& form_factors,
+SolveResult solve_radiosity(SolveMethod method, const FormFactorOperator& form_factors,
                             const RadiosityProblem& problem,
                             std::span<const Float3> initial_exitance, const SolveSettings& settings,
                             std::span<Float3> radiosity,

@@ -42,6 +42,12 @@ class FormFactorBlocks final : public FormFactorOperator {
   void gather(std::span<const Float3> in, std::span<Float3> out,
               std::span<float> workspace) const override;
 
+  /// Sequential Gauss-Seidel in the order of the patches, to the letter, on any number of threads:
+  /// rows are taken in groups of kGroup; what they gather from outside the group is found in
+  /// parallel, what they gather from each other one after another. That costs two synchronisations
+  /// and a serial part of kGroup² form factors per group, and nothing in convergence.
+  std::unique_ptr<Relaxation> make_relaxation() const override;
+
   /// The part of the values that is not zero: 1 when every block is full.
   double fill() const;
 
