@@ -1,5 +1,8 @@
 #include "rebounce/precompute/form_factor_compression.h"
 
+#include <algorithm>
+
+#include "rebounce/transfer/area_norm.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {
@@ -10,6 +13,23 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const Progress& progress) {
   return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, test_radiosities,
                                settings, progress);
+}
+
+MeasuredError form_factor_error(const HierarchicalOperator& compressed,
+                                const ExchangeMatrix& exchange, const PatchTable& patches,
+                                std::span<const std::vector<Float3>> radiosities) {
+  const FormFactorRows rows(exchange, patches.area);
+  std::vector<float> workspace(compressed.workspace_size());
+  std::vector<Float3> truth(patches.size()), gathered(patches.size());
+  MeasuredError error;
+  for (const std::vector<Float3>& radiosity : radiosities) {
+    rows.gather(radiosity, truth);
+    compressed.apply(radiosity, gathered, workspace);
+    const double e = relative_difference(gathered, truth, patches.area);
+    error.mean += e / static_cast<double>(radiosities.size());
+    error.max = std::max(error.max, e);
+  }
+  return error;
 }
 
 std::vector<std::vector<Float3>> radiosities_of(

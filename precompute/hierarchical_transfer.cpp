@@ -113,8 +113,8 @@ class PieceCompressor {
  private:
   /// Those of a cluster's positions that hold one.
   std::span<const std::uint32_t> patches_of(const Cluster& cluster) const {
-    const std::size_t end = std::min<std::size_t>(cluster.begin + cluster.count,
-                                                  tree_.patch.size());
+    const std::size_t end =
+        std::min<std::size_t>(cluster.begin + cluster.count, tree_.patch.size());
     return {tree_.patch.data() + cluster.begin, tree_.patch.data() + end};
   }
 

@@ -46,7 +46,8 @@ void FormFactorMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::ui
                                std::span<const std::uint32_t> columns,
                                Eigen::Ref<Eigen::MatrixXf> entries) const {
   std::vector<std::uint32_t> place(root_area_.size(), kNone);  // of a patch among the columns
-  for (std::size_t j = 0; j < columns.size(); ++j) place[columns[j]] = static_cast<std::uint32_t>(j);
+  for (std::size_t j = 0; j < columns.size(); ++j)
+    place[columns[j]] = static_cast<std::uint32_t>(j);
   entries.setZero();
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const std::uint32_t row = rows[i];

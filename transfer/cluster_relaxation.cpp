@@ -25,8 +25,8 @@ std::size_t round_up(std::size_t size) {
 
 /// For each kAlignment positions, where the diagonal block that they are in begins.
 std::vector<std::uint32_t> diagonal_begins(const HierarchicalOperator::Storage& exchange) {
-  std::vector<std::uint32_t> begins(
-      HierarchicalOperator::position_count(exchange.area.size()) / kAlignment);
+  std::vector<std::uint32_t> begins(HierarchicalOperator::position_count(exchange.area.size()) /
+                                    kAlignment);
   for (std::size_t k = 0; k < begins.size(); ++k) {
     begins[k] = static_cast<std::uint32_t>(k * kAlignment);
   }
@@ -231,8 +231,7 @@ class ClusterRelaxation final : public Relaxation {
     for (int c = 0; c < kChannelCount; ++c) {
       const std::size_t at = c * stride_ + position;
       float& x = *radiosity_.at(at);
-      const float next =
-          *light_.at(at) + *reflectance_.at(at) * (*received_.at(at) + inside[c]);
+      const float next = *light_.at(at) + *reflectance_.at(at) * (*received_.at(at) + inside[c]);
       const double change = static_cast<double>(next) - x;
       changed_squared += change * change;
       x = next;
@@ -292,9 +291,9 @@ class ClusterRelaxation final : public Relaxation {
 
 std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::Storage& exchange) {
   if (exchange.precision == Precision::kF16) {
-    return std::make_unique<ClusterRelaxation<std::uint16_t>>(
-        exchange, block_kernels().f16, exchange.values_f16.data(),
-        1 / HierarchicalOperator::kHalfScale);
+    return std::make_unique<ClusterRelaxation<std::uint16_t>>(exchange, block_kernels().f16,
+                                                              exchange.values_f16.data(),
+                                                              1 / HierarchicalOperator::kHalfScale);
   }
   return std::make_unique<ClusterRelaxation<float>>(exchange, block_kernels().f32,
                                                     exchange.values_f32.data(), 1.0F);

@@ -32,9 +32,13 @@ class BlockRowRelaxation final : public Relaxation {
     return changed_squared;
   }
 
-  void end(std::span<Float3> radiosity) const override { blocks_.from_planes(planes_, radiosity); }
+  void end(std::span<Float3> radiosity) const override {
+    blocks_.from_planes(planes_, radiosity);
+  }
 
-  int reads_per_sweep(SweepOrder /*order*/) const override { return 1; }
+  int reads_per_sweep(SweepOrder /*order*/) const override {
+    return 1;
+  }
 
  private:
   void gather_from_outside(std::size_t group_begin, std::size_t group_end) {

@@ -18,8 +18,8 @@ void GaussSeidelSolver::begin(bool /*cold*/) {
 RadiositySolver::SweepReport GaussSeidelSolver::sweep() {
   const double changed_squared = relaxation_->sweep(next_);
   if (order_ == SweepOrder::kSymmetric) {
-    next_ = next_ == SweepDirection::kForward ? SweepDirection::kBackward
-                                              : SweepDirection::kForward;
+    next_ =
+        next_ == SweepDirection::kForward ? SweepDirection::kBackward : SweepDirection::kForward;
   }
   // A row's change is its residual when it is reached; what is left after the sweep is rho times
   // one triangle of F times the change.

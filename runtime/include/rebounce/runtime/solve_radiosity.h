@@ -41,8 +41,8 @@ inline constexpr std::array<NamedSolveMethod, 8> kSolveMethods = {{
 }};
 
 /// A solver of its own for `method`. `form_factors` must outlive it; `transfer` may be null for the
-/// methods that do not need it. Throws Error if sizes differ, the operator is needed and missing, or
-/// the method needs another form of F.
+/// methods that do not need it. Throws Error if sizes differ, the operator is needed and missing,
+/// or the method needs another form of F.
 std::unique_ptr<RadiositySolver> make_solver(
     SolveMethod method, const FormFactorOperator& form_factors, const RadiosityProblem& problem,
     std::shared_ptr<const TransferOperator> transfer = nullptr);

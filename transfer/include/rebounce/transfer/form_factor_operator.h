@@ -9,8 +9,8 @@
 
 namespace rebounce {
 
-/// F as solvers see it, whatever it is stored as: it gathers, which is all that gathering, conjugate
-/// gradients and refinement need, and it makes the sweeps of Gauss-Seidel.
+/// F as solvers see it, whatever it is stored as: it gathers, which is all that gathering,
+/// conjugate gradients and refinement need, and it makes the sweeps of Gauss-Seidel.
 ///
 /// An operator is immutable: any number of threads may use one at the same time, each with a
 /// workspace of its own.
