@@ -67,7 +67,7 @@ double FormFactorMatrix::norm_squared() const {
     for (std::uint64_t k = exchange_.row_begin[i]; k < exchange_.row_begin[i + 1]; ++k) {
       const double entry =
           exchange_.exchange_area[k] / (root_area_[i] * root_area_[exchange_.column[k]]);
-      sum += 2 * entry * entry;
+      sum += (exchange_.column[k] == i ? 1 : 2) * entry * entry;
     }
   }
   return sum;

@@ -8,6 +8,7 @@
 #include "output_check.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {

@@ -251,8 +251,8 @@ TEST(RefinementOnScenes, AThreePerCentOperatorNeedsAHandfulOfSteps) {
     const auto dense = build_dense_transfer(room->exchange, room->patches, Precision::kF32);
     std::vector<std::vector<Float3>> lights;
     for (std::uint64_t seed = 20; seed < 28; ++seed) lights.push_back(lamp_light(n, seed));
-    const auto transfer =
-        build_hierarchical_transfer(*dense, room->patches, lights, {.tolerance = 0.03});
+    const auto transfer = build_hierarchical_transfer(
+        *dense, room->patches, lights, {.tolerance = 0.03, .precision = Precision::kF32});
     for (std::uint64_t seed = 30; seed < 34; ++seed) {
       const std::vector<Float3> m0 = lamp_light(n, seed);
       const auto solver = make_solver(SolveMethod::kRefine, *room->blocks,
@@ -337,20 +337,19 @@ TEST(CompressedFormFactorsOnScenes, KeepTheTolerance) {
   }
 }
 
-TEST_P(SolversOnScenes, SolveTheCompressedSystem) {
-  if (GetParam().method == SolveMethod::kSouthwell) return;  // it needs rows
+TEST(CompressedFormFactorsOnScenes, AreSolvedByEveryMethod) {
+  const std::vector<Float3> m0 = lamp_light(furnished().patches.size(), 12);
   for (const Precision precision : {Precision::kF32, Precision::kF16}) {
-    static const std::array<CompressedRoom, 2> rooms = {
-        CompressedRoom(furnished(), 0.002, Precision::kF32),
-        CompressedRoom(furnished(), 0.002, Precision::kF16)};
-    const CompressedRoom& compressed = rooms[precision == Precision::kF16 ? 1 : 0];
-    const std::vector<Float3> m0 = lamp_light(furnished().patches.size(), 12);
-    const auto solver = compressed.solver(GetParam().method);
-    const SolveResult result = solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
-    EXPECT_FALSE(result.diverged);
-    EXPECT_LE(compressed.error(solver->radiosity(), m0), 1e-6) << result.sweeps;
-    // Against the exact form factors: about the tolerance, times what bounces add up to.
-    EXPECT_LE(furnished().error(solver->radiosity(), m0), 0.01);
+    const CompressedRoom compressed(furnished(), 0.002, precision);
+    for (const NamedSolveMethod& named : kSolveMethods) {
+      if (named.method == SolveMethod::kSouthwell) continue;  // it needs rows
+      const auto solver = compressed.solver(named.method);
+      const SolveResult result = solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
+      EXPECT_FALSE(result.diverged) << named.name;
+      EXPECT_LE(compressed.error(solver->radiosity(), m0), 1e-6) << named.name;
+      // Against the exact form factors: about the tolerance, times what bounces add up to.
+      EXPECT_LE(furnished().error(solver->radiosity(), m0), 0.01) << named.name;
+    }
   }
 }
 
@@ -381,17 +380,18 @@ TEST(CompressedFormFactorsOnScenes, RelaxInAboutAsManySweepsAsRows) {
   }
 }
 
-TEST_P(SolversOnScenes, EmissionChangesInTheNextSolve) {
+TEST(RelaxationOnScenes, EmissionChangesInTheNextSolve) {
   const Room& room = furnished();
-  std::vector<Float3> m0 = lamp_light(room.patches.size(), 15);
-  const auto solver = room.solver(GetParam().method);
-  solver->solve(m0);
-  for (std::size_t i = 0; i < m0.size(); i += 100) m0[i] = {7, 300, 0};  // panels go on
-  solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
-  EXPECT_LE(room.error(solver->radiosity(), m0), 1e-6);
-  for (std::size_t i = 0; i < m0.size(); i += 100) m0[i] = {0, 0, 0};  // and off
-  solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
-  EXPECT_LE(room.error(solver->radiosity(), m0), 1e-6);
+  for (const NamedSolveMethod& named : kSolveMethods) {
+    std::vector<Float3> m0 = lamp_light(room.patches.size(), 15);
+    const auto solver = room.solver(named.method);
+    solver->solve(m0);
+    for (const Float3& panel : {Float3{7, 300, 0}, Float3{0, 0, 0}}) {  // on, and off
+      for (std::size_t i = 0; i < m0.size(); i += 100) m0[i] = panel;
+      solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
+      EXPECT_LE(room.error(solver->radiosity(), m0), 1e-6) << named.name;
+    }
+  }
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "test_scene_data.h"
 
@@ -131,7 +132,7 @@ class SeriesOperator final : public TransferOperator {
   float scale_;
 };
 
-enum class Form : std::uint8_t { kRows, kBlocks, kCompressed };
+enum class Form : std::uint8_t { kRows, kBlocks, kExchange, kCompressed };
 
 std::unique_ptr<const FormFactorOperator> make_form(Form form, const System& system) {
   switch (form) {
@@ -139,6 +140,8 @@ std::unique_ptr<const FormFactorOperator> make_form(Form form, const System& sys
       return std::make_unique<FormFactorRows>(system.exchange, system.area);
     case Form::kBlocks:
       return std::make_unique<FormFactorBlocks>(system.exchange, system.area);
+    case Form::kExchange:
+      return std::make_unique<ExchangeBlocks>(system.exchange, system.area);
     case Form::kCompressed:
       return std::make_unique<CompressedFormFactors>(
           test::dense_blocks(system.exchange, system.area));
@@ -181,7 +184,7 @@ struct MethodAndForm {
 std::vector<MethodAndForm> methods_and_forms() {
   std::vector<MethodAndForm> all;
   for (const NamedSolveMethod& named : kSolveMethods) {
-    for (const Form form : {Form::kRows, Form::kBlocks, Form::kCompressed}) {
+    for (const Form form : {Form::kRows, Form::kBlocks, Form::kExchange, Form::kCompressed}) {
       if (named.method == SolveMethod::kSouthwell && form != Form::kBlocks) continue;
       all.push_back({named, form});
     }
@@ -198,7 +201,7 @@ class EveryMethod : public testing::TestWithParam<MethodAndForm> {
 };
 
 std::string name_of(const testing::TestParamInfo<MethodAndForm>& instance) {
-  constexpr std::array<const char*, 3> kForms = {"Rows", "Blocks", "Compressed"};
+  constexpr std::array<const char*, 4> kForms = {"Rows", "Blocks", "Exchange", "Compressed"};
   std::string name(instance.param.named.name);
   std::erase(name, '-');
   return name + kForms[static_cast<std::size_t>(instance.param.form)];

@@ -73,6 +73,39 @@ TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
   EXPECT_EQ(storage_of(data).values_f16.owner(), data.exchange.row_begin.owner());
 }
 
+std::shared_ptr<const HierarchicalOperator> sample_form_factors(std::uint32_t matrix_count) {
+  HierarchicalOperator::Storage storage =
+      test::random_hierarchical_storage(kPatchCount, matrix_count, 5);
+  return std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode_half(storage));
+}
+
+TEST(HierarchicalFile, HoldsCompressedFormFactorsBesideTheOperator) {
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data(Precision::kF32);
+  save_transfer_file(folder / "without", data);
+  EXPECT_EQ(load_transfer_file(folder / "without").compressed_form_factors, nullptr);
+  data.compressed_form_factors = sample_form_factors(1);
+  save_transfer_file(folder / "file", data);
+  const TransferData loaded = load_transfer_file(folder / "file");
+  ASSERT_NE(loaded.compressed_form_factors, nullptr);
+  const auto& a = data.compressed_form_factors->storage();
+  const auto& b = loaded.compressed_form_factors->storage();
+  EXPECT_EQ(a.patch, b.patch);
+  EXPECT_EQ(a.blocks.size(), b.blocks.size());
+  EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
+  EXPECT_EQ(b.values_f16.owner(), loaded.exchange.row_begin.owner());  // mapped, not copied
+  save_transfer_file(folder / "again", loaded);
+  EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
+}
+
+TEST(HierarchicalFile, RefusesFormFactorsThatDifferByChannel) {
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data(Precision::kF32);
+  data.compressed_form_factors = sample_form_factors(2);
+  save_transfer_file(folder / "file", data);
+  expect_error([&] { load_transfer_file(folder / "file"); }, "more than one matrix");
+}
+
 /// The file's tensors with one of them changed by hand, under a good checksum.
 class Tampering {
  public:
