@@ -246,6 +246,7 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
     const SafetensorsFile& file, const std::vector<float>& area) {
   HierarchicalOperator::Storage storage;
   storage.area = area;
+  storage.order = HierarchicalOperator::Order::kStreamed;
   TensorReader{file}(tensor::kHierarchicalPatch, storage.patch);
   storage.blocks = read_blocks(file);
   storage.channel_matrix =
