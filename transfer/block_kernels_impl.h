@@ -3,6 +3,10 @@
 // The block kernels, written once over a vector type `V` (vector_load.h). Included by one file per
 // instruction set; everything is in an unnamed namespace so that no two sets share an
 // instantiation.
+//
+// Twelve sums are kept in registers wherever possible: enough to hide the latency of the
+// multiply-adds, and as many as AVX2 has room for. A value that was loaded and widened serves the
+// three channels of a light, and of two lights where the registers suffice.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,145 +18,215 @@
 namespace rebounce {
 namespace {
 
-// Basis vectors that are worked on together: with three channels each, their sums fill the
-// registers of AVX2.
-constexpr std::size_t kGroup = 4;
+constexpr std::size_t kChannels = kChannelCount;
 
-template <typename V, std::size_t kCount, typename Value>
-void project_group(const Value* basis, std::size_t size, const float* x, std::size_t stride,
-                   float* coefficient, std::size_t rank_stride) {
-  V sum[kChannelCount][kCount];
-  for (auto& channel : sum) {
-    for (V& s : channel) s = V::zero();
+/// Calls work.template operator()<vectors>(first) for groups of vectors: the channels of two
+/// lights where V has room for their sums, else of one.
+template <typename V, typename Work>
+inline void for_each_group(std::size_t vector_count, const Work& work) {
+  std::size_t v = 0;
+  if constexpr (V::kLights == 2) {
+    for (; v + 2 * kChannels <= vector_count; v += 2 * kChannels) {
+      work.template operator()<2 * kChannels>(v);
+    }
+  }
+  for (; v < vector_count; v += kChannels) work.template operator()<kChannels>(v);
+}
+
+/// Stores the sums over the lanes of kCount vectors, four at most.
+template <std::size_t kCount, typename V>
+inline void store_sums(const V (&sum)[kCount], float* out) {
+  if constexpr (kCount == 4) {
+    V::store_sums(sum[0], sum[1], sum[2], sum[3], out);
+  } else if constexpr (kCount == 1) {
+    out[0] = sum[0].sum();
+  } else {
+    float four[4];
+    V::store_sums(sum[0], sum[1], sum[kCount - 1], V::zero(), four);
+    for (std::size_t r = 0; r < kCount; ++r) out[r] = four[r];
+  }
+}
+
+/// Calls work.template operator()<rows>(first) for groups of four rows, and for what is left.
+template <typename Work>
+inline void for_each_four(std::size_t rows, const Work& work) {
+  std::size_t r = 0;
+  for (; r + 4 <= rows; r += 4) work.template operator()<4>(r);
+  switch (rows - r) {
+    case 3:
+      return work.template operator()<3>(r);
+    case 2:
+      return work.template operator()<2>(r);
+    case 1:
+      return work.template operator()<1>(r);
+    default:
+      return;
+  }
+}
+
+template <typename V, std::size_t kRows, std::size_t kVectors, typename Value>
+inline void project_rows(const Value* basis, std::size_t size, const float* x, std::size_t x_stride,
+                         float* coefficient, std::size_t stride) {
+  V sum[kVectors][kRows];
+  for (auto& rows : sum) {
+    for (V& s : rows) s = V::zero();
   }
   for (std::size_t k = 0; k < size; k += V::kWidth) {
-    V xc[kChannelCount];
-    for (int c = 0; c < kChannelCount; ++c) xc[c] = V::load(x + c * stride + k);
-    for (std::size_t r = 0; r < kCount; ++r) {
-      const V b = load_values<V>(basis + r * size + k);
-      for (int c = 0; c < kChannelCount; ++c) sum[c][r] = multiply_add(b, xc[c], sum[c][r]);
+    V b[kRows];
+    for (std::size_t r = 0; r < kRows; ++r) b[r] = load_values<V>(basis + r * size + k);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      const V xv = V::load(x + v * x_stride + k);
+      for (std::size_t r = 0; r < kRows; ++r) sum[v][r] = multiply_add(b[r], xv, sum[v][r]);
     }
   }
-  for (int c = 0; c < kChannelCount; ++c) {
-    for (std::size_t r = 0; r < kCount; ++r) coefficient[c * rank_stride + r] = sum[c][r].sum();
-  }
-}
-
-template <typename V, std::size_t kCount, typename Value>
-void expand_group(const Value* basis, std::size_t size, const float* coefficient,
-                  std::size_t rank_stride, float* y, std::size_t stride) {
-  V scale[kChannelCount][kCount];
-  for (int c = 0; c < kChannelCount; ++c) {
-    for (std::size_t r = 0; r < kCount; ++r) {
-      scale[c][r] = V::broadcast(coefficient[c * rank_stride + r]);
-    }
-  }
-  for (std::size_t k = 0; k < size; k += V::kWidth) {
-    V yc[kChannelCount];
-    for (int c = 0; c < kChannelCount; ++c) yc[c] = V::load(y + c * stride + k);
-    for (std::size_t r = 0; r < kCount; ++r) {
-      const V b = load_values<V>(basis + r * size + k);
-      for (int c = 0; c < kChannelCount; ++c) yc[c] = multiply_add(b, scale[c][r], yc[c]);
-    }
-    for (int c = 0; c < kChannelCount; ++c) yc[c].store(y + c * stride + k);
-  }
+  for (std::size_t v = 0; v < kVectors; ++v) store_sums(sum[v], coefficient + v * stride);
 }
 
 template <typename V, typename Value>
-void project(const Value* basis, std::size_t rank, std::size_t size, const float* x,
-             std::size_t stride, float* coefficient, std::size_t rank_stride) {
+void project(const Value* basis, std::size_t rank, std::size_t size, PlanarVectors<const float> x,
+             PlanarVectors<float> coefficient) {
+  for_each_four(rank, [&]<std::size_t kRows>(std::size_t r) {
+    for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) {
+      project_rows<V, kRows, kVectors>(basis + r * size, size, x.data + v * x.stride, x.stride,
+                                       coefficient.data + v * coefficient.stride + r,
+                                       coefficient.stride);
+    });
+  });
+}
+
+/// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve or more.
+template <typename V, std::size_t kSize, std::size_t kVectors, typename Value>
+inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
+                         const float* coefficient, std::size_t stride, float* y,
+                         std::size_t y_stride) {
+  constexpr std::size_t kWide = kSize / V::kWidth;
+  constexpr std::size_t kSums = kVectors * kWide;
+  constexpr std::size_t kSplit = kSums < 12 ? 12 / kSums : 1;
+  V sum[kSplit][kVectors][kWide];
+  for (auto& part : sum) {
+    for (auto& vector : part) {
+      for (V& s : vector) s = V::zero();
+    }
+  }
+  const auto add_rank = [&](std::size_t r, V(&part)[kVectors][kWide]) {
+    V b[kWide];
+    for (std::size_t k = 0; k < kWide; ++k) {
+      b[k] = load_values<V>(basis + r * size + k * V::kWidth);
+    }
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      const V c = V::broadcast(coefficient[v * stride + r]);
+      for (std::size_t k = 0; k < kWide; ++k) part[v][k] = multiply_add(b[k], c, part[v][k]);
+    }
+  };
   std::size_t r = 0;
-  for (; r + kGroup <= rank; r += kGroup) {
-    project_group<V, kGroup>(basis + r * size, size, x, stride, coefficient + r, rank_stride);
+  for (; r + kSplit <= rank; r += kSplit) {
+    for (std::size_t s = 0; s < kSplit; ++s) add_rank(r + s, sum[s]);
   }
-  for (; r < rank; ++r) {
-    project_group<V, 1>(basis + r * size, size, x, stride, coefficient + r, rank_stride);
-  }
-}
-
-template <typename V, typename Value>
-void expand(const Value* basis, std::size_t rank, std::size_t size, const float* coefficient,
-            std::size_t rank_stride, float* y, std::size_t stride) {
-  std::size_t r = 0;
-  for (; r + kGroup <= rank; r += kGroup) {
-    expand_group<V, kGroup>(basis + r * size, size, coefficient + r, rank_stride, y, stride);
-  }
-  for (; r < rank; ++r) {
-    expand_group<V, 1>(basis + r * size, size, coefficient + r, rank_stride, y, stride);
-  }
-}
-
-// Whole vectors at the end of a row run on into the next one: there column_in is zero, and what
-// column_out gets is never read.
-template <typename V, typename Value>
-void multiply_core(const Value* core, std::size_t rows, std::size_t columns, const float* column_in,
-                   const float* row_in, float* row_out, float* column_out) {
-  for (std::size_t j = 0; j < columns; j += V::kWidth) V::zero().store(column_out + j);
-  for (std::size_t i = 0; i < rows; ++i) {
-    const V row = V::broadcast(row_in[i]);
-    V sum = V::zero();
-    for (std::size_t j = 0; j < columns; j += V::kWidth) {
-      const V s = load_values<V>(core + i * columns + j);
-      sum = multiply_add(s, V::load(column_in + j), sum);
-      multiply_add(s, row, V::load(column_out + j)).store(column_out + j);
+  for (; r < rank; ++r) add_rank(r, sum[0]);
+  for (std::size_t v = 0; v < kVectors; ++v) {
+    for (std::size_t k = 0; k < kWide; ++k) {
+      float* const out = y + v * y_stride + k * V::kWidth;
+      V total = V::load(out);
+      for (std::size_t s = 0; s < kSplit; ++s) total = add(total, sum[s][v][k]);
+      total.store(out);
     }
-    row_out[i] = sum.sum();
   }
 }
 
-template <typename V, std::size_t kStrip, typename Value>
-void multiply_strip(const Value* block, std::size_t rows, std::size_t columns,
-                    const float* x_column, const float* x_row, float* y_row, float* y_column) {
-  constexpr std::size_t kVectors = kStrip / V::kWidth;
-  V y[kVectors];
-  for (std::size_t k = 0; k < kVectors; ++k) y[k] = V::load(y_column + k * V::kWidth);
-  for (std::size_t i = 0; i < rows; ++i) {
-    const V x = V::broadcast(x_row[i]);
-    V sum = V::zero();
-    for (std::size_t k = 0; k < kVectors; ++k) {
-      const V b = load_values<V>(block + i * columns + k * V::kWidth);
-      sum = multiply_add(b, V::load(x_column + k * V::kWidth), sum);
-      y[k] = multiply_add(b, x, y[k]);
+template <typename V, typename Value>
+void expand(const Value* basis, std::size_t rank, std::size_t size, std::size_t count,
+            PlanarVectors<const float> coefficient, PlanarVectors<float> y) {
+  for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) {
+    const float* c = coefficient.data + v * coefficient.stride;
+    float* yv = y.data + v * y.stride;
+    std::size_t k = 0;
+    for (; k + V::kStrip <= count; k += V::kStrip) {
+      expand_strip<V, V::kStrip, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k,
+                                           y.stride);
     }
-    y_row[i] += sum.sum();
-  }
-  for (std::size_t k = 0; k < kVectors; ++k) y[k].store(y_column + k * V::kWidth);
-}
-
-template <typename V, typename Value>
-void multiply_dense(const Value* block, std::size_t rows, std::size_t columns,
-                    const float* x_column, const float* x_row, float* y_row, float* y_column) {
-  std::size_t j = 0;
-  for (; j + 32 <= columns; j += 32) {
-    multiply_strip<V, 32>(block + j, rows, columns, x_column + j, x_row, y_row, y_column + j);
-  }
-  for (; j < columns; j += 16) {
-    multiply_strip<V, 16>(block + j, rows, columns, x_column + j, x_row, y_row, y_column + j);
-  }
-}
-
-template <typename V, typename Value>
-void multiply_dense_diagonal(const Value* block, std::size_t size, const float* x_column,
-                             float* y_row) {
-  for (std::size_t i = 0; i < size; ++i) {
-    V sum = V::zero();
-    for (std::size_t j = 0; j < size; j += V::kWidth) {
-      sum = multiply_add(load_values<V>(block + i * size + j), V::load(x_column + j), sum);
+    for (; k < count; k += 16) {
+      expand_strip<V, 16, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k, y.stride);
     }
-    y_row[i] += sum.sum();
+  });
+}
+
+/// Columns [begin, begin + width) of S, width at most that of V, for kLights vectors. Lanes beyond
+/// them read on into the next row: column_in is zero there, and column_out is not stored.
+template <typename V, bool kToRows, bool kToColumns, std::size_t kLights, typename Value>
+inline void multiply_columns(const Value* s, std::size_t rows, std::size_t columns,
+                             std::size_t begin, const CoreVectors& vectors, std::size_t first) {
+  const std::size_t width = columns - begin < V::kWidth ? columns - begin : V::kWidth;
+  V column_in[kLights], column_out[kLights];
+  for (std::size_t l = 0; l < kLights; ++l) {
+    column_out[l] = V::zero();
+    if constexpr (kToRows) {
+      column_in[l] = V::load_some(
+          vectors.column_in.data + (first + l) * vectors.column_in.stride + begin, width);
+    }
+  }
+  for_each_four(rows, [&]<std::size_t kRows>(std::size_t i) {
+    V b[kRows];
+    for (std::size_t r = 0; r < kRows; ++r) {
+      b[r] = load_values<V>(s + (i + r) * columns + begin);
+    }
+    for (std::size_t l = 0; l < kLights; ++l) {
+      if constexpr (kToColumns) {
+        const float* in = vectors.row_in.data + (first + l) * vectors.row_in.stride + i;
+        for (std::size_t r = 0; r < kRows; ++r) {
+          column_out[l] = multiply_add(b[r], V::broadcast(in[r]), column_out[l]);
+        }
+      }
+      if constexpr (kToRows) {
+        V product[kRows];
+        for (std::size_t r = 0; r < kRows; ++r) product[r] = multiply(b[r], column_in[l]);
+        float sum[kRows];
+        store_sums(product, sum);
+        float* out = vectors.row_out.data + (first + l) * vectors.row_out.stride + i;
+        for (std::size_t r = 0; r < kRows; ++r) out[r] = begin == 0 ? sum[r] : out[r] + sum[r];
+      }
+    }
+  });
+  if constexpr (kToColumns) {
+    for (std::size_t l = 0; l < kLights; ++l) {
+      column_out[l].store_some(
+          vectors.column_out.data + (first + l) * vectors.column_out.stride + begin, width);
+    }
+  }
+}
+
+template <typename V, bool kToRows, bool kToColumns, typename Value>
+void multiply_core(const Value* s, std::size_t rows, std::size_t columns,
+                   const CoreVectors& vectors) {
+  for (std::size_t j = 0; j < columns; j += V::kWidth) {
+    std::size_t l = 0;
+    for (; l + 2 <= vectors.row_in.count; l += 2) {
+      multiply_columns<V, kToRows, kToColumns, 2>(s, rows, columns, j, vectors, l);
+    }
+    if (l < vectors.row_in.count) {
+      multiply_columns<V, kToRows, kToColumns, 1>(s, rows, columns, j, vectors, l);
+    }
   }
 }
 
 template <typename V, typename Value>
-constexpr BlockKernels<Value> make_block_kernels_of() {
-  return {project<V, Value>, expand<V, Value>, multiply_core<V, Value>, multiply_dense<V, Value>,
-          multiply_dense_diagonal<V, Value>};
+constexpr BasisKernels<Value> make_basis_kernels() {
+  return {project<V, Value>, expand<V, Value>};
+}
+
+template <typename V, typename Value>
+constexpr CoreKernels<Value> make_core_kernels() {
+  return {multiply_core<V, true, true, Value>, multiply_core<V, true, false, Value>,
+          multiply_core<V, false, true, Value>};
 }
 
 template <typename V>
 constexpr BlockKernelSet make_block_kernels(const char* instruction_set) {
-  return {instruction_set, make_block_kernels_of<V, float>(),
-          make_block_kernels_of<V, std::uint16_t>()};
+  return {instruction_set,
+          make_basis_kernels<V, float>(),
+          make_basis_kernels<V, std::uint16_t>(),
+          make_basis_kernels<V, std::int8_t>(),
+          make_core_kernels<V, float>(),
+          make_core_kernels<V, std::uint16_t>()};
 }
 
 }  // namespace

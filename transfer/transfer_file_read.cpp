@@ -246,6 +246,7 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
     const SafetensorsFile& file, const HierarchicalTensors& names, const std::vector<float>& area) {
   HierarchicalOperator::Storage storage;
   storage.area = area;
+  storage.order = HierarchicalOperator::Order::kStreamed;
   TensorReader{file}(names.patch, storage.patch);
   storage.blocks = read_blocks(file, names.blocks);
   storage.channel_matrix = read_channel_matrix(file, names.channel_matrix, kChannelCount);
