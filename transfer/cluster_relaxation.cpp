@@ -8,98 +8,76 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <tuple>
 #include <vector>
 
 #include "block_kernels.h"
+#include "cluster_sweep_plan.h"
 
 namespace rebounce {
 namespace {
 
 constexpr std::size_t kAlignment = HierarchicalOperator::kAlignment;
 
-std::size_t round_up(std::size_t size) {
-  return (size + kAlignment - 1) / kAlignment * kAlignment;
-}
+/// Three vectors, one to each channel, with room for whole vectors at the end.
+class Planes {
+ public:
+  explicit Planes(std::size_t size)
+      : stride_((size + kAlignment - 1) / kAlignment * kAlignment),
+        values_(kChannelCount * stride_) {}
 
-/// For each kAlignment positions, where the diagonal block that they are in begins.
-std::vector<std::uint32_t> diagonal_begins(const HierarchicalOperator::Storage& exchange) {
-  std::vector<std::uint32_t> begins(HierarchicalOperator::position_count(exchange.area.size()) /
-                                    kAlignment);
-  for (std::size_t k = 0; k < begins.size(); ++k) {
-    begins[k] = static_cast<std::uint32_t>(k * kAlignment);
+  float& at(int channel, std::size_t index) { return values_[channel * stride_ + index]; }
+  float at(int channel, std::size_t index) const { return values_[channel * stride_ + index]; }
+  void clear() { std::ranges::fill(values_, 0.0F); }
+
+  PlanarVectors<float> to(std::size_t begin) {
+    return {values_.data() + begin, stride_, kChannelCount};
   }
-  for (const TransferBlock& block : exchange.blocks) {
-    if (!block.on_diagonal()) continue;
-    std::fill_n(begins.begin() + block.row_begin / kAlignment, block.row_count / kAlignment,
-                block.row_begin);
+  PlanarVectors<const float> from(std::size_t begin) const {
+    return {values_.data() + begin, stride_, kChannelCount};
   }
-  return begins;
-}
 
-/// The blocks in the order in which a forward sweep takes them: before one on the diagonal come
-/// those to the left of it, whose columns are swept by then and whose rows are not.
-std::vector<TransferBlock> sweep_order(const HierarchicalOperator::Storage& exchange) {
-  const std::vector<std::uint32_t> begins = diagonal_begins(exchange);
-  std::vector<TransferBlock> blocks = exchange.blocks;
-  std::ranges::stable_sort(blocks, {}, [&](const TransferBlock& block) {
-    return std::tuple(begins[block.row_begin / kAlignment], block.on_diagonal());
-  });
-  return blocks;
-}
-
-/// Vectors over the positions of the clusters, channel after channel.
-struct Planes {
-  std::size_t stride;
-  std::vector<float> values;
-
-  explicit Planes(std::size_t positions) : stride(positions), values(kChannelCount * positions) {}
-
-  float* at(std::size_t position) { return values.data() + position; }
-  const float* at(std::size_t position) const { return values.data() + position; }
-  void clear() { std::ranges::fill(values, 0.0F); }
+ private:
+  std::size_t stride_;
+  std::vector<float> values_;
 };
+
+template <typename T>
+PlanarVectors<T> channel(const PlanarVectors<T>& vectors, int c) {
+  return {vectors.data + c * vectors.stride, vectors.stride, 1};
+}
 
 template <typename Value>
 class ClusterRelaxation final : public Relaxation {
  public:
-  ClusterRelaxation(const HierarchicalOperator::Storage& exchange,
-                    const BlockKernels<Value>& kernels, const Value* values, float value_scale)
+  ClusterRelaxation(const HierarchicalOperator::Storage& exchange, const BasisKernels<Value>& bases,
+                    const CoreKernels<Value>& cores, const Value* values, float value_scale)
       : exchange_(exchange),
-        kernels_(kernels),
+        bases_(bases),
+        cores_(cores),
         values_(values),
         value_scale_(value_scale),
-        blocks_(sweep_order(exchange)),
-        stride_(HierarchicalOperator::position_count(exchange.area.size())),
-        light_(stride_),
-        reflectance_(stride_),
-        radiosity_(stride_),
-        lower_(stride_),
-        upper_(stride_),
-        received_(stride_) {
-    std::uint32_t largest = 0;
-    for (const TransferBlock& block : blocks_) {
-      largest = std::max({largest, block.row_rank, block.column_rank});
-      if (block.kind == TransferBlock::Kind::kDense) largest = std::max(largest, block.row_count);
-    }
-    rank_stride_ = round_up(largest);
-    for (auto* buffer : {&row_in_, &column_in_, &row_out_, &column_out_}) {
-      buffer->resize(kChannelCount * rank_stride_);
-    }
-  }
+        plan_(exchange),
+        light_(positions()),
+        reflectance_(positions()),
+        radiosity_(positions()),
+        lower_(positions()),
+        upper_(positions()),
+        received_(positions()),
+        sent_(plan_.coefficient_count),
+        arrived_(plan_.coefficient_count),
+        product_(plan_.largest_side) {}
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
+    area_ = problem.area;
     for (std::size_t k = 0; k < exchange_.patch.size(); ++k) {
       const std::uint32_t p = exchange_.patch[k];
-      const float root = std::sqrt(problem.area[p]);
+      const float root = std::sqrt(area_[p]);
       for (int c = 0; c < kChannelCount; ++c) {
-        light_.at(k)[c * stride_] = root * problem.initial_exitance[p][c];
-        reflectance_.at(k)[c * stride_] = value_scale_ * problem.reflectance[p][c];
-        radiosity_.at(k)[c * stride_] = root * radiosity[p][c];
+        light_.at(c, k) = root * problem.initial_exitance[p][c];
+        reflectance_.at(c, k) = value_scale_ * problem.reflectance[p][c];
+        radiosity_.at(c, k) = root * radiosity[p][c];
       }
     }
-    area_ = problem.area;
     known_ = Known::kNothing;
   }
 
@@ -111,9 +89,7 @@ class ClusterRelaxation final : public Relaxation {
     for (std::size_t k = 0; k < exchange_.patch.size(); ++k) {
       const std::uint32_t p = exchange_.patch[k];
       const float root = std::sqrt(area_[p]);
-      for (int c = 0; c < kChannelCount; ++c) {
-        radiosity[p][c] = radiosity_.at(k)[c * stride_] / root;
-      }
+      for (int c = 0; c < kChannelCount; ++c) radiosity[p][c] = radiosity_.at(c, k) / root;
     }
   }
 
@@ -122,106 +98,170 @@ class ClusterRelaxation final : public Relaxation {
   }
 
  private:
+  using Plan = ClusterSweepPlan;
+
   /// Which product with the present radiosity there is.
   enum class Known : std::uint8_t { kNothing, kLower, kUpper };
 
+  std::size_t positions() const {
+    return HierarchicalOperator::position_count(exchange_.area.size());
+  }
+
   double sweep_forward() {
     if (known_ != Known::kUpper) {
-      upper_.clear();
-      for (const TransferBlock& block : blocks_) add_upper(block);
-    }
-    lower_.clear();
-    double changed_squared = 0;
-    for (const TransferBlock& block : blocks_) {
-      add_lower(block);
-      if (block.on_diagonal()) changed_squared += relax(block, SweepDirection::kForward);
+      pass_backward([](const Plan::Step&) { return 0.0; });
     }
     known_ = Known::kLower;
-    return changed_squared;
+    return pass_forward(
+        [this](const Plan::Step& step) { return relax(step, SweepDirection::kForward); });
   }
 
   double sweep_backward() {
     if (known_ != Known::kLower) {
-      lower_.clear();
-      for (const TransferBlock& block : blocks_) add_lower(block);
-    }
-    upper_.clear();
-    double changed_squared = 0;
-    for (auto block = blocks_.rbegin(); block != blocks_.rend(); ++block) {
-      if (block->on_diagonal()) changed_squared += relax(*block, SweepDirection::kBackward);
-      add_upper(*block);
+      pass_forward([](const Plan::Step&) { return 0.0; });
     }
     known_ = Known::kUpper;
-    return changed_squared;
+    return pass_backward(
+        [this](const Plan::Step& step) { return relax(step, SweepDirection::kBackward); });
   }
 
-  /// lower += B x for a block off the diagonal.
-  void add_lower(const TransferBlock& block) {
-    if (block.on_diagonal()) return;
-    const float* x = radiosity_.at(block.column_begin);
-    float* y = lower_.at(block.row_begin);
-    if (block.kind == TransferBlock::Kind::kDense) {
-      kernels_.project(values_ + block.offset, block.row_count, block.column_count, x, stride_,
-                       row_out_.data(), rank_stride_);
-      add_rows(block.row_count, y);
-    } else if (has_rank(block)) {
-      project_columns(block, x);
-      multiply_core(block);
-      kernels_.expand(row_basis(block), block.row_rank, block.row_count, row_out_.data(),
-                      rank_stride_, y, stride_);
-    }
-  }
-
-  /// upper += B^T x for a block off the diagonal.
-  void add_upper(const TransferBlock& block) {
-    if (block.on_diagonal()) return;
-    const float* x = radiosity_.at(block.row_begin);
-    float* y = upper_.at(block.column_begin);
-    if (block.kind == TransferBlock::Kind::kDense) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        std::copy_n(x + c * stride_, block.row_count, row_in_.data() + c * rank_stride_);
+  /// lower = L x, diagonal block after diagonal block; `visit` may change what a step holds of x
+  /// once all that it receives is there. Returns the sum of what it returns.
+  template <typename Visit>
+  double pass_forward(const Visit& visit) {
+    lower_.clear();
+    double sum = 0;
+    Plan::Step before;
+    for (const Plan::Step& step : plan_.steps) {
+      for (auto k = before.last_row_product; k < step.last_row_product; ++k) {
+        send_to_rows(plan_.row_products[k]);
       }
-      kernels_.expand(values_ + block.offset, block.row_count, block.column_count, row_in_.data(),
-                      rank_stride_, y, stride_);
-    } else if (has_rank(block)) {
-      kernels_.project(row_basis(block), block.row_rank, block.row_count, x, stride_,
-                       row_in_.data(), rank_stride_);
-      multiply_core(block);
-      kernels_.expand(column_basis(block), block.column_rank, block.column_count,
-                      column_out_.data(), rank_stride_, y, stride_);
+      for (auto k = before.last_row_bases; k < step.last_row_bases; ++k) {
+        expand(plan_.row_bases[k], lower_);
+      }
+      sum += visit(step);
+      for (auto k = before.last_column_bases; k < step.last_column_bases; ++k) {
+        project(plan_.column_bases[k]);
+      }
+      before = step;
     }
+    return sum;
   }
 
-  /// Relaxes the rows of a block on the diagonal.
-  double relax(const TransferBlock& block, SweepDirection direction) {
-    const std::size_t begin = block.row_begin, size = block.row_count;
+  /// upper = L^T x, from the last diagonal block to the first.
+  template <typename Visit>
+  double pass_backward(const Visit& visit) {
+    upper_.clear();
+    double sum = 0;
+    for (std::size_t s = plan_.steps.size(); s-- > 0;) {
+      const Plan::Step& step = plan_.steps[s];
+      const Plan::Step before = s > 0 ? plan_.steps[s - 1] : Plan::Step();
+      for (auto k = before.last_column_product; k < step.last_column_product; ++k) {
+        send_to_columns(plan_.column_products[k]);
+      }
+      for (auto k = before.last_column_bases; k < step.last_column_bases; ++k) {
+        expand(plan_.column_bases[k], upper_);
+      }
+      sum += visit(step);
+      for (auto k = before.last_row_bases; k < step.last_row_bases; ++k) {
+        project(plan_.row_bases[k]);
+      }
+    }
+    return sum;
+  }
+
+  void project(const Plan::Bases& bases) {
+    bases_.project(values_ + bases.values, bases.rank, bases.size, radiosity_.from(bases.begin),
+                   sent_.to(bases.coefficient));
+  }
+
+  void expand(const Plan::Bases& bases, Planes& arrived) {
+    bases_.expand(values_ + bases.values, bases.rank, bases.size, bases.size,
+                  arrived_.from(bases.coefficient), arrived.to(bases.begin));
+  }
+
+  void send_to_rows(const Plan::Product& product) {
+    if (!product.dense) {
+      to_rows(product.values, product.rows, product.columns, sent_.from(product.column),
+              arrived_.to(product.row));
+      return;
+    }
+    to_rows(product.values, product.rows, product.columns, radiosity_.from(product.column),
+            product_.to(0));
+    add_product(product.rows, lower_, product.row);
+  }
+
+  void send_to_columns(const Plan::Product& product) {
+    if (!product.dense) {
+      to_columns(product, sent_.from(product.row), arrived_.to(product.column));
+      return;
+    }
+    to_columns(product, radiosity_.from(product.row), product_.to(0));
+    add_product(product.columns, upper_, product.column);
+  }
+
+  /// out = S in
+  void to_rows(std::uint64_t values, std::size_t rows, std::size_t columns,
+               const PlanarVectors<const float>& in, const PlanarVectors<float>& out) const {
     for (int c = 0; c < kChannelCount; ++c) {
-      const std::size_t first = c * stride_ + begin;
-      for (std::size_t k = 0; k < size; ++k) {
-        received_.at(first)[k] = lower_.at(first)[k] + upper_.at(first)[k];
+      cores_.to_rows(values_ + values, rows, columns,
+                     {.row_in = channel(in, c),
+                      .column_in = channel(in, c),
+                      .row_out = channel(out, c),
+                      .column_out = channel(out, c)});
+    }
+  }
+
+  /// out = S^T in
+  void to_columns(const Plan::Product& product, const PlanarVectors<const float>& in,
+                  const PlanarVectors<float>& out) const {
+    for (int c = 0; c < kChannelCount; ++c) {
+      cores_.to_columns(values_ + product.values, product.rows, product.columns,
+                        {.row_in = channel(in, c),
+                         .column_in = channel(in, c),
+                         .row_out = channel(out, c),
+                         .column_out = channel(out, c)});
+    }
+  }
+
+  void add_product(std::size_t count, Planes& to, std::size_t begin) const {
+    for (int c = 0; c < kChannelCount; ++c) {
+      for (std::size_t k = 0; k < count; ++k) to.at(c, begin + k) += product_.at(c, k);
+    }
+  }
+
+  /// Relaxes the positions of a block on the diagonal.
+  double relax(const Plan::Step& step, SweepDirection direction) {
+    const TransferBlock& block = step.diagonal;
+    const std::size_t begin = block.row_begin, end = begin + block.row_count;
+    for (int c = 0; c < kChannelCount; ++c) {
+      for (std::size_t k = begin; k < end; ++k) {
+        received_.at(c, k) = lower_.at(c, k) + upper_.at(c, k);
       }
     }
-    if (block.kind == TransferBlock::Kind::kDense) return relax_rows(block, direction);
-    if (has_rank(block)) {
-      project_columns(block, radiosity_.at(begin));
-      multiply_core(block);
-      kernels_.expand(row_basis(block), block.row_rank, size, row_out_.data(), rank_stride_,
-                      received_.at(begin), stride_);
+    if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
+    if (block.row_rank > 0) {
+      const Plan::Bases bases{step.basis, block.row_rank, block.row_count, block.row_begin,
+                              step.coefficient};
+      project(bases);
+      to_rows(step.values, block.row_rank, block.row_rank, sent_.from(step.coefficient),
+              arrived_.to(step.coefficient));
+      expand(bases, received_);
     }
     double changed_squared = 0;
-    for (std::size_t k = begin; k < begin + size; ++k) changed_squared += relax_position(k, {});
+    for (std::size_t k = begin; k < end; ++k) changed_squared += relax_position(k, {0, 0, 0});
     return changed_squared;
   }
 
-  double relax_rows(const TransferBlock& block, SweepDirection direction) {
-    const std::size_t size = block.row_count;
+  double relax_rows(const Plan::Step& step, SweepDirection direction) {
+    const std::size_t begin = step.diagonal.row_begin, size = step.diagonal.row_count;
     double changed_squared = 0;
     for (std::size_t k = 0; k < size; ++k) {
       const std::size_t row = direction == SweepDirection::kForward ? k : size - 1 - k;
       Float3 inside;
-      kernels_.project(values_ + block.offset + row * size, 1, size,
-                       radiosity_.at(block.column_begin), stride_, inside.data(), 1);
-      changed_squared += relax_position(block.row_begin + row, inside);
+      to_rows(step.values + row * size, 1, size, radiosity_.from(begin),
+              {inside.data(), 1, kChannelCount});
+      changed_squared += relax_position(begin + row, inside);
     }
     return changed_squared;
   }
@@ -229,9 +269,9 @@ class ClusterRelaxation final : public Relaxation {
   double relax_position(std::size_t position, const Float3& inside) {
     double changed_squared = 0;
     for (int c = 0; c < kChannelCount; ++c) {
-      const std::size_t at = c * stride_ + position;
-      float& x = *radiosity_.at(at);
-      const float next = *light_.at(at) + *reflectance_.at(at) * (*received_.at(at) + inside[c]);
+      float& x = radiosity_.at(c, position);
+      const float next = light_.at(c, position) +
+                         reflectance_.at(c, position) * (received_.at(c, position) + inside[c]);
       const double change = static_cast<double>(next) - x;
       changed_squared += change * change;
       x = next;
@@ -239,50 +279,15 @@ class ClusterRelaxation final : public Relaxation {
     return changed_squared;
   }
 
-  static bool has_rank(const TransferBlock& block) {
-    return block.row_rank > 0 && block.column_rank > 0;
-  }
-
-  const Value* row_basis(const TransferBlock& block) const { return values_ + block.offset; }
-
-  const Value* column_basis(const TransferBlock& block) const {
-    if (block.on_diagonal()) return row_basis(block);
-    return row_basis(block) + std::size_t{block.row_rank} * block.row_count;
-  }
-
-  /// column_in = V^T x
-  void project_columns(const TransferBlock& block, const float* x) {
-    kernels_.project(column_basis(block), block.column_rank, block.column_count, x, stride_,
-                     column_in_.data(), rank_stride_);
-  }
-
-  /// row_out = S column_in and column_out = S^T row_in, of which one is wanted.
-  void multiply_core(const TransferBlock& block) {
-    const std::size_t rows = block.row_rank, columns = block.column_rank;
-    const Value* core = column_basis(block) + columns * block.column_count;
-    for (int c = 0; c < kChannelCount; ++c) {
-      const std::size_t at = c * rank_stride_;
-      std::fill(column_in_.data() + at + columns, column_in_.data() + at + round_up(columns), 0.0F);
-      kernels_.core(core, rows, columns, column_in_.data() + at, row_in_.data() + at,
-                    row_out_.data() + at, column_out_.data() + at);
-    }
-  }
-
-  void add_rows(std::size_t rows, float* y) const {
-    for (int c = 0; c < kChannelCount; ++c) {
-      for (std::size_t k = 0; k < rows; ++k) y[c * stride_ + k] += row_out_[c * rank_stride_ + k];
-    }
-  }
-
   const HierarchicalOperator::Storage& exchange_;
-  const BlockKernels<Value>& kernels_;
+  const BasisKernels<Value>& bases_;
+  const CoreKernels<Value>& cores_;
   const Value* values_;
   float value_scale_;  ///< what a product with stored values is to be multiplied by
-  std::vector<TransferBlock> blocks_;
-  std::size_t stride_, rank_stride_ = 0;
+  ClusterSweepPlan plan_;
   Planes light_, reflectance_, radiosity_;  ///< A^1/2 M0, rho x value_scale, A^1/2 B
   Planes lower_, upper_, received_;         ///< L x, L^T x, and both and D x
-  std::vector<float> row_in_, column_in_, row_out_, column_out_;  ///< of one block
+  Planes sent_, arrived_, product_;         ///< coefficients of x, of cores; of one dense block
   std::span<const float> area_;
   Known known_ = Known::kNothing;
 };
@@ -290,12 +295,13 @@ class ClusterRelaxation final : public Relaxation {
 }  // namespace
 
 std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::Storage& exchange) {
+  const BlockKernelSet& kernels = block_kernels();
   if (exchange.precision == Precision::kF16) {
-    return std::make_unique<ClusterRelaxation<std::uint16_t>>(exchange, block_kernels().f16,
-                                                              exchange.values_f16.data(),
-                                                              1 / HierarchicalOperator::kHalfScale);
+    return std::make_unique<ClusterRelaxation<std::uint16_t>>(
+        exchange, kernels.bases_f16, kernels.cores_f16, exchange.values_f16.data(),
+        1 / HierarchicalOperator::kHalfScale);
   }
-  return std::make_unique<ClusterRelaxation<float>>(exchange, block_kernels().f32,
+  return std::make_unique<ClusterRelaxation<float>>(exchange, kernels.bases_f32, kernels.cores_f32,
                                                     exchange.values_f32.data(), 1.0F);
 }
 
