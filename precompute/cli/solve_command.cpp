@@ -15,7 +15,6 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/error.h"
-#include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
@@ -124,20 +123,25 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
   write_csv(path, columns);
 }
 
+/// What --method names; for the product with the operator, the method that reads F least.
+SolveMethod method_of(const SolveOptions& chosen) {
+  const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
+  return named == kSolveMethods.end() ? SolveMethod::kGathering : named->method;
+}
+
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorOperator& form_factors) {
   if (chosen.method == kTransfer) return solve_by_transfer(engine);
   const TransferData& data = engine.data();
-  const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
-  const auto solver = make_solver(named->method, form_factors,
+  const auto solver = make_solver(method_of(chosen), form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
   return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
 }
 
-std::unique_ptr<const FormFactorOperator> make_form_factors(const SolveOptions& chosen,
-                                                            const TransferData& data) {
+std::unique_ptr<const FormFactorOperator> choose_form_factors(const SolveOptions& chosen,
+                                                              const TransferData& data) {
   if (chosen.form_factors == kExact) {
-    return std::make_unique<FormFactorBlocks>(data.exchange, data.patches.area);
+    return make_form_factors(method_of(chosen), data.exchange, data.patches.area);
   }
   if (!data.compressed_form_factors) {
     throw Error(chosen.file +
@@ -159,11 +163,12 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   engine.compute_direct(setup.lights, setup.sky);
   engine.compute_initial_exitance();
-  const auto form_factors = make_form_factors(chosen, *data);
+  const auto form_factors = choose_form_factors(chosen, *data);
   const Solution solution = find_solution(chosen, engine, *form_factors);
   if (solution.diverged) {
     throw Error(chosen.method + " diverges: the operator of " + chosen.file +
-                " does not fit its form factors; use another method");
+                " does not fit its form factors; use another method, such as "
+                "preconditioned-conjugate-gradient");
   }
   const double residual = radiosity_residual(engine, *form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);

@@ -6,6 +6,8 @@
 #include "rebounce/runtime/refinement_solver.h"
 #include "rebounce/runtime/southwell_solver.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/exchange_blocks.h"
+#include "rebounce/transfer/form_factor_blocks.h"
 
 namespace rebounce {
 namespace {
@@ -20,6 +22,15 @@ const FormFactorBlocks& rows_of(const FormFactorOperator& form_factors) {
 }
 
 }  // namespace
+
+std::unique_ptr<const FormFactorOperator> make_form_factors(SolveMethod method,
+                                                            const ExchangeMatrix& exchange,
+                                                            std::span<const float> area) {
+  if (method == SolveMethod::kGaussSeidel || method == SolveMethod::kSouthwell) {
+    return std::make_unique<FormFactorBlocks>(exchange, area);
+  }
+  return std::make_unique<ExchangeBlocks>(exchange, area);
+}
 
 std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
                                              const FormFactorOperator& form_factors,

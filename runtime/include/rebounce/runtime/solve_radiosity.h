@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "rebounce/runtime/radiosity_solver.h"
+#include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/form_factor_operator.h"
 #include "rebounce/transfer/transfer_operator.h"
 
@@ -39,6 +40,13 @@ inline constexpr std::array<NamedSolveMethod, 8> kSolveMethods = {{
     {"refine", SolveMethod::kRefine},
     {"preconditioned-conjugate-gradient", SolveMethod::kPreconditionedConjugateGradient},
 }};
+
+/// Sparse F in the form that `method` is fastest on: rows in blocks where it goes by rows in one
+/// direction, otherwise the symmetric half of them. `area` has n entries in m². Throws Error if the
+/// sizes do not agree.
+std::unique_ptr<const FormFactorOperator> make_form_factors(SolveMethod method,
+                                                            const ExchangeMatrix& exchange,
+                                                            std::span<const float> area);
 
 /// A solver of its own for `method`. `form_factors` must outlive it; `transfer` may be null for the
 /// methods that do not need it. Throws Error if sizes differ, the operator is needed and missing,
