@@ -7,6 +7,7 @@
 #include "cluster_relaxation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -235,9 +236,9 @@ class ClusterRelaxation final : public Relaxation {
     const TransferBlock& block = step.diagonal;
     const std::size_t begin = block.row_begin, end = begin + block.row_count;
     for (int c = 0; c < kChannelCount; ++c) {
-      for (std::size_t k = begin; k < end; ++k) {
-        received_.at(c, k) = lower_.at(c, k) + upper_.at(c, k);
-      }
+      const float *lower = &lower_.at(c, 0), *upper = &upper_.at(c, 0);
+      float* received = &received_.at(c, 0);
+      for (std::size_t k = begin; k < end; ++k) received[k] = lower[k] + upper[k];
     }
     if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
     if (block.row_rank > 0) {
@@ -248,8 +249,27 @@ class ClusterRelaxation final : public Relaxation {
               arrived_.to(step.coefficient));
       expand(bases, received_);
     }
+    return relax_at_once(begin, end);
+  }
+
+  /// Relaxes positions that see nothing of each other but what has been received.
+  double relax_at_once(std::size_t begin, std::size_t end) {
     double changed_squared = 0;
-    for (std::size_t k = begin; k < end; ++k) changed_squared += relax_position(k, {0, 0, 0});
+    for (int c = 0; c < kChannelCount; ++c) {
+      std::array<float, kAlignment> squares{};  // sums of their own, so that they are vectors
+      for (std::size_t k = begin; k < end; k += kAlignment) {
+        const float *light = &light_.at(c, k), *reflectance = &reflectance_.at(c, k);
+        const float* received = &received_.at(c, k);
+        float* x = &radiosity_.at(c, k);
+        for (std::size_t j = 0; j < kAlignment; ++j) {
+          const float next = light[j] + reflectance[j] * received[j];
+          const float change = next - x[j];
+          squares[j] += change * change;
+          x[j] = next;
+        }
+      }
+      for (const float square : squares) changed_squared += square;
+    }
     return changed_squared;
   }
 

@@ -81,11 +81,21 @@ TEST(ExchangeBlocks, InstructionSetsAgree) {
 }
 
 TEST(ExchangeBlocks, AreHalfTheBytesOfTheRows) {
-  const Pairs pairs(2000);
-  const ExchangeBlocks half(pairs.exchange, pairs.area);
-  const FormFactorBlocks rows(pairs.exchange, pairs.area);
+  constexpr std::size_t kCount = 512;  // each sees each
+  std::vector<std::uint64_t> begin = {0};
+  std::vector<std::uint32_t> column;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    for (std::uint32_t j = i + 1; j < kCount; ++j) column.push_back(j);
+    begin.push_back(column.size());
+  }
+  std::vector<float> value(column.size(), 1.0F / kCount);
+  const ExchangeMatrix exchange{SharedArray(std::move(begin)), SharedArray(std::move(column)),
+                                SharedArray(std::move(value))};
+  const std::vector<float> area(kCount, 1.0F);
+  const ExchangeBlocks half(exchange, area);
+  const FormFactorBlocks rows(exchange, area);
   EXPECT_LT(static_cast<double>(half.bytes()), 0.53 * static_cast<double>(rows.bytes()));
-  EXPECT_THROW(ExchangeBlocks(pairs.exchange, std::span(pairs.area).first(5)), Error);
+  EXPECT_THROW(ExchangeBlocks(exchange, std::span(area).first(5)), Error);
 }
 
 }  // namespace
