@@ -138,6 +138,7 @@ class HierarchicalOperator final : public TransferOperator {
 
   Storage storage_;
   std::vector<float> sqrt_area_;  ///< [n] by position
+  std::vector<float> inverse_;    ///< of it, times the scale of the products
   std::shared_ptr<const HierarchicalLayout> layout_;
   std::shared_ptr<const HierarchicalPlan> plan_;  ///< to all patches
 };
