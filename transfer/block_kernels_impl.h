@@ -97,7 +97,8 @@ void project(const Value* basis, std::size_t rank, std::size_t size, PlanarVecto
   });
 }
 
-/// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve or more.
+/// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve of them or
+/// more.
 template <typename V, std::size_t kSize, std::size_t kVectors, typename Value>
 REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
                                          const float* coefficient, std::size_t stride, float* y,
@@ -143,15 +144,15 @@ void expand(const Value* basis, std::size_t rank, std::size_t size, std::size_t 
     const float* c = coefficient.data + v * coefficient.stride;
     float* yv = y.data + v * y.stride;
     std::size_t k = 0;
-    if constexpr (V::kStrip > 16) {
-      for (; k + V::kStrip <= count; k += V::kStrip) {
-        expand_strip<V, V::kStrip, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k,
-                                             y.stride);
+    const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
+      for (; k + kSize <= count; k += kSize) {
+        expand_strip<V, kSize, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k,
+                                         y.stride);
       }
-    }
-    for (; k < count; k += 16) {
-      expand_strip<V, 16, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k, y.stride);
-    }
+    };
+    if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
+    if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
+    add_strips.template operator()<16>();
   });
 }
 

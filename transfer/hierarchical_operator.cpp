@@ -109,10 +109,13 @@ class Phases {
   }
 
   void add_products(const HierarchicalPlan::Expansion& e) const {
+    // Other light goes through two bases on its way.
+    constexpr float kByteScale = HierarchicalOperator::kByteScale;
+    constexpr float kScale = sizeof(Basis) == 1 ? kByteScale * kByteScale : 1;
     for (std::size_t v = 0; v < work_.y.count; ++v) {
       float* y = work_.y.data + v * work_.y.stride + e.begin;
       const float* product = work_.products.data + v * work_.products.stride + e.coefficient;
-      for (std::size_t k = 0; k < e.count; ++k) y[k] += product[k];
+      for (std::size_t k = 0; k < e.count; ++k) y[k] += kScale * product[k];
     }
   }
 
@@ -166,6 +169,21 @@ struct Exchange {
   }
 };
 
+/// What products of stored values must be multiplied by.
+float product_scale(Precision precision) {
+  constexpr float kHalfScale = HierarchicalOperator::kHalfScale;
+  constexpr float kByteScale = HierarchicalOperator::kByteScale;
+  switch (precision) {
+    case Precision::kF16:
+      return 1 / kHalfScale;
+    case Precision::kQ8:
+      return 1 / (kHalfScale * kByteScale * kByteScale);
+    case Precision::kF32:
+      break;
+  }
+  return 1;
+}
+
 template <typename Basis, typename Value>
 void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
               const Exchange& exchange, const WorkVectors& work,
@@ -217,7 +235,7 @@ HierarchicalOperator::HierarchicalOperator(Storage storage)
       layout_(std::make_shared<HierarchicalLayout>(storage_.blocks, storage_.matrix_count)) {
   sqrt_area_.reserve(patch_count());
   inverse_.reserve(patch_count());
-  const float scale = storage_.precision == Precision::kF16 ? 1.0F / kHalfScale : 1.0F;
+  const float scale = product_scale(storage_.precision);
   for (const std::uint32_t p : storage_.patch) {
     sqrt_area_.push_back(std::sqrt(storage_.area[p]));
     inverse_.push_back(scale / sqrt_area_.back());
@@ -229,7 +247,7 @@ HierarchicalOperator::HierarchicalOperator(Storage storage)
 
 std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
-         storage_.blocks.size() * sizeof(TransferBlock) +
+         storage_.bases_q8.size_bytes() + storage_.blocks.size() * sizeof(TransferBlock) +
          storage_.patch.size() * sizeof(std::uint32_t);
 }
 
@@ -250,14 +268,21 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const WorkVectors work(position_count(patch_count()), *layout_, light_count, aligned);
   const BlockKernelSet& kernels = block_kernels();
   const Exchange exchange{storage_.patch, sqrt_area_, inverse_, work};
-  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* values) {
-    const Phases phases(bases, cores, values, values, storage_.channel_matrix, work);
+  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
+                                const auto* core) {
+    const Phases phases(bases, cores, basis, core, storage_.channel_matrix, work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
-  if (storage_.precision == Precision::kF16) {
-    apply_phases(kernels.bases_f16, kernels.cores_f16, storage_.values_f16.data());
-  } else {
-    apply_phases(kernels.bases_f32, kernels.cores_f32, storage_.values_f32.data());
+  const std::uint16_t* const f16 = storage_.values_f16.data();
+  const float* const f32 = storage_.values_f32.data();
+  const std::uint64_t first_core = layout_->basis_value_count;
+  switch (storage_.precision) {
+    case Precision::kF16:
+      return apply_phases(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core);
+    case Precision::kF32:
+      return apply_phases(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
+    case Precision::kQ8:
+      return apply_phases(kernels.bases_q8, kernels.cores_f16, storage_.bases_q8.data(), f16);
   }
 }
 

@@ -35,12 +35,13 @@ inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 inline constexpr char kHierarchicalPatch[] = "transfer.hierarchical.patch";
 inline constexpr char kHierarchicalBlocks[] = "transfer.hierarchical.blocks";
+inline constexpr char kHierarchicalBases[] = "transfer.hierarchical.bases";
 inline constexpr char kHierarchicalValues[] = "transfer.hierarchical.values";
 inline constexpr char kHierarchicalChannelMatrix[] = "transfer.hierarchical.channel_matrix";
 }  // namespace tensor
 
 /// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
-/// order, less the offset.
+/// order.
 using StoredBlock = std::array<std::uint32_t, 7>;
 
 inline std::string texture_tensor(std::size_t texture) {

@@ -259,6 +259,11 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   } else {
     storage.values_f32 = file.tensor<float>(tensor::kHierarchicalValues, {kAnySize});
   }
+  if (file.tensors().contains(tensor::kHierarchicalBases)) {
+    storage.precision = Precision::kQ8;
+    storage.bases_q8 =
+        file.tensor<std::int8_t>(tensor::kHierarchicalBases, {kAnySize}, TensorType::kI8);
+  }
   try {
     return std::make_shared<const HierarchicalOperator>(std::move(storage));
   } catch (const Error& error) {

@@ -14,7 +14,7 @@ namespace {
 
 struct Vector16 {
   static constexpr std::size_t kWidth = 16;
-  static constexpr std::size_t kStrip = 32;
+  static constexpr std::size_t kStrip = 64;
   static constexpr std::size_t kLights = 2;
   __m512 v;
 
