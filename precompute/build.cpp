@@ -116,6 +116,9 @@ BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
   }
   const bool dense = settings.operator_kind == OperatorKind::kDense;
   if (!settings.precision) settings.precision = dense ? Precision::kF32 : Precision::kF16;
+  if (dense && settings.precision == Precision::kQ8) {
+    throw Error("8 bits are not precise enough for a dense operator; use f16 or f32");
+  }
   if (dense) settings.tolerance = 0;
   return settings;
 }
@@ -127,7 +130,7 @@ std::string settings_json(const BuildSettings& settings) {
                         {"tolerance", settings.tolerance},
                         {"form_factor_tolerance", settings.form_factor_tolerance},
                         {"scale", settings.scale},
-                        {"precision", settings.precision == Precision::kF16 ? "f16" : "f32"},
+                        {"precision", precision_name(*settings.precision)},
                         {"patches", settings.subdivision.patch_count},
                         {"patch_size", settings.subdivision.patch_size},
                         {"seed", f.seed},

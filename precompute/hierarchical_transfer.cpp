@@ -337,9 +337,9 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   for (int round = 0; round < kMostRounds; ++round) {
     Progress part;
     if (progress) part = [&](double done) { return progress((round + done) / kMostRounds); };
-    HierarchicalOperator::Storage storage = compress_matrix(matrix, patches, price, part);
-    if (settings.precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
-    auto candidate = std::make_shared<const HierarchicalOperator>(std::move(storage));
+    const HierarchicalOperator::Storage storage = compress_matrix(matrix, patches, price, part);
+    auto candidate = std::make_shared<const HierarchicalOperator>(
+        HierarchicalOperator::encode(storage, settings.precision));
     const double error = lights.error(*candidate);
     const bool within = error <= kMost * settings.tolerance;
     const bool best_within = best && best_error <= kMost * settings.tolerance;

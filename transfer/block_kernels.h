@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+
+#include "rebounce/transfer/types.h"
 
 namespace rebounce {
 
@@ -28,18 +31,25 @@ struct BasisKernels {
                  PlanarVectors<const float> coefficient, PlanarVectors<float> y);
 };
 
-/// What goes into a core and what comes out, for one channel of some lights.
+/// The cores or the entries of a block, S [matrix][rows][columns] of any size; whole vectors are
+/// read at the end of each.
+template <typename Value>
+struct CoreMatrices {
+  const Value* data;
+  std::size_t rows, columns;
+  std::array<std::uint32_t, kChannelCount> channel_matrix;
+};
+
+/// What goes into the cores and what comes out, in the same order of channels and lights.
 struct CoreVectors {
   PlanarVectors<const float> row_in, column_in;
   PlanarVectors<float> row_out, column_out;
 };
 
-/// Products with cores and dense blocks, S [rows][columns] of any size; whole vectors are read at
-/// the end of S. What came out before is overwritten.
+/// Products with cores and dense blocks; what was there before is overwritten.
 template <typename Value>
 struct CoreKernels {
-  using Product = void (*)(const Value* s, std::size_t rows, std::size_t columns,
-                           const CoreVectors& vectors);
+  using Product = void (*)(const CoreMatrices<Value>& s, const CoreVectors& vectors);
   Product both;        ///< row_out = S column_in and column_out = S^T row_in, S read once
   Product to_rows;     ///< row_out = S column_in
   Product to_columns;  ///< column_out = S^T row_in

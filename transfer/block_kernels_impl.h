@@ -23,7 +23,7 @@ constexpr std::size_t kChannels = kChannelCount;
 /// Calls work.template operator()<vectors>(first) for groups of vectors: the channels of two
 /// lights where V has room for their sums, else of one.
 template <typename V, typename Work>
-inline void for_each_group(std::size_t vector_count, const Work& work) {
+REBOUNCE_INLINE inline void for_each_group(std::size_t vector_count, const Work& work) {
   std::size_t v = 0;
   if constexpr (V::kLights == 2) {
     for (; v + 2 * kChannels <= vector_count; v += 2 * kChannels) {
@@ -33,23 +33,9 @@ inline void for_each_group(std::size_t vector_count, const Work& work) {
   for (; v < vector_count; v += kChannels) work.template operator()<kChannels>(v);
 }
 
-/// Stores the sums over the lanes of kCount vectors, four at most.
-template <std::size_t kCount, typename V>
-inline void store_sums(const V (&sum)[kCount], float* out) {
-  if constexpr (kCount == 4) {
-    V::store_sums(sum[0], sum[1], sum[2], sum[3], out);
-  } else if constexpr (kCount == 1) {
-    out[0] = sum[0].sum();
-  } else {
-    float four[4];
-    V::store_sums(sum[0], sum[1], sum[kCount - 1], V::zero(), four);
-    for (std::size_t r = 0; r < kCount; ++r) out[r] = four[r];
-  }
-}
-
 /// Calls work.template operator()<rows>(first) for groups of four rows, and for what is left.
 template <typename Work>
-inline void for_each_four(std::size_t rows, const Work& work) {
+REBOUNCE_INLINE inline void for_each_four(std::size_t rows, const Work& work) {
   std::size_t r = 0;
   for (; r + 4 <= rows; r += 4) work.template operator()<4>(r);
   switch (rows - r) {
@@ -64,29 +50,46 @@ inline void for_each_four(std::size_t rows, const Work& work) {
   }
 }
 
-template <typename V, std::size_t kRows, std::size_t kVectors, typename Value>
-inline void project_rows(const Value* basis, std::size_t size, const float* x, std::size_t x_stride,
-                         float* coefficient, std::size_t stride) {
-  V sum[kVectors][kRows];
-  for (auto& rows : sum) {
-    for (V& s : rows) s = V::zero();
+/// The sums over the lanes of kCount vectors, four at most, in the first lanes.
+template <std::size_t kCount, typename V>
+REBOUNCE_INLINE inline auto sums_of(const V (&sum)[kCount]) {
+  if constexpr (kCount == 4) {
+    return V::sums(sum[0], sum[1], sum[2], sum[3]);
+  } else if constexpr (kCount == 3) {
+    return V::sums(sum[0], sum[1], sum[2], V::zero());
+  } else if constexpr (kCount == 2) {
+    return V::sums(sum[0], sum[1], V::zero(), V::zero());
+  } else {
+    return V::sums(sum[0], V::zero(), V::zero(), V::zero());
   }
+}
+
+template <typename V, std::size_t kRows, std::size_t kVectors, typename Value>
+REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, const float* x,
+                                         std::size_t x_stride, float* coefficient,
+                                         std::size_t stride) {
+  V sum[kVectors][kRows];
+  unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
+    unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[v][r] = V::zero(); });
+  });
   for (std::size_t k = 0; k < size; k += V::kWidth) {
     V b[kRows];
-    for (std::size_t r = 0; r < kRows; ++r) b[r] = load_values<V>(basis + r * size + k);
-    for (std::size_t v = 0; v < kVectors; ++v) {
+    unroll<kRows>([&](auto r) REBOUNCE_INLINE { b[r] = load_values<V>(basis + r * size + k); });
+    unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
       const V xv = V::load(x + v * x_stride + k);
-      for (std::size_t r = 0; r < kRows; ++r) sum[v][r] = multiply_add(b[r], xv, sum[v][r]);
-    }
+      unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[v][r] = multiply_add(b[r], xv, sum[v][r]); });
+    });
   }
-  for (std::size_t v = 0; v < kVectors; ++v) store_sums(sum[v], coefficient + v * stride);
+  unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
+    store_first<kRows>(sums_of(sum[v]), coefficient + v * stride);
+  });
 }
 
 template <typename V, typename Value>
 void project(const Value* basis, std::size_t rank, std::size_t size, PlanarVectors<const float> x,
              PlanarVectors<float> coefficient) {
-  for_each_four(rank, [&]<std::size_t kRows>(std::size_t r) {
-    for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) {
+  for_each_four(rank, [&]<std::size_t kRows>(std::size_t r) REBOUNCE_INLINE {
+    for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
       project_rows<V, kRows, kVectors>(basis + r * size, size, x.data + v * x.stride, x.stride,
                                        coefficient.data + v * coefficient.stride + r,
                                        coefficient.stride);
@@ -94,116 +97,129 @@ void project(const Value* basis, std::size_t rank, std::size_t size, PlanarVecto
   });
 }
 
-/// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve or more.
+/// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve of them or
+/// more.
 template <typename V, std::size_t kSize, std::size_t kVectors, typename Value>
-inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
-                         const float* coefficient, std::size_t stride, float* y,
-                         std::size_t y_stride) {
+REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
+                                         const float* coefficient, std::size_t stride, float* y,
+                                         std::size_t y_stride) {
   constexpr std::size_t kWide = kSize / V::kWidth;
   constexpr std::size_t kSums = kVectors * kWide;
   constexpr std::size_t kSplit = kSums < 12 ? 12 / kSums : 1;
   V sum[kSplit][kVectors][kWide];
-  for (auto& part : sum) {
-    for (auto& vector : part) {
-      for (V& s : vector) s = V::zero();
-    }
-  }
-  const auto add_rank = [&](std::size_t r, V(&part)[kVectors][kWide]) {
+  unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
+    unroll<kWide>([&](auto k) REBOUNCE_INLINE {
+      sum[0][v][k] = V::load(y + v * y_stride + k * V::kWidth);
+      unroll<kSplit - 1>([&](auto s) REBOUNCE_INLINE { sum[s + 1][v][k] = V::zero(); });
+    });
+  });
+  const auto add_rank = [&](std::size_t r, auto s) REBOUNCE_INLINE {
     V b[kWide];
-    for (std::size_t k = 0; k < kWide; ++k) {
-      b[k] = load_values<V>(basis + r * size + k * V::kWidth);
-    }
-    for (std::size_t v = 0; v < kVectors; ++v) {
+    unroll<kWide>([&](auto k)
+                      REBOUNCE_INLINE { b[k] = load_values<V>(basis + r * size + k * V::kWidth); });
+    unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
       const V c = V::broadcast(coefficient[v * stride + r]);
-      for (std::size_t k = 0; k < kWide; ++k) part[v][k] = multiply_add(b[k], c, part[v][k]);
-    }
+      unroll<kWide>([&](auto k)
+                        REBOUNCE_INLINE { sum[s][v][k] = multiply_add(b[k], c, sum[s][v][k]); });
+    });
   };
   std::size_t r = 0;
   for (; r + kSplit <= rank; r += kSplit) {
-    for (std::size_t s = 0; s < kSplit; ++s) add_rank(r + s, sum[s]);
+    unroll<kSplit>([&](auto s) REBOUNCE_INLINE { add_rank(r + s, s); });
   }
-  for (; r < rank; ++r) add_rank(r, sum[0]);
-  for (std::size_t v = 0; v < kVectors; ++v) {
-    for (std::size_t k = 0; k < kWide; ++k) {
-      float* const out = y + v * y_stride + k * V::kWidth;
-      V total = V::load(out);
-      for (std::size_t s = 0; s < kSplit; ++s) total = add(total, sum[s][v][k]);
-      total.store(out);
-    }
-  }
+  for (; r < rank; ++r) add_rank(r, std::integral_constant<std::size_t, 0>{});
+  unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
+    unroll<kWide>([&](auto k) REBOUNCE_INLINE {
+      V total = sum[0][v][k];
+      unroll<kSplit - 1>([&](auto s) REBOUNCE_INLINE { total = add(total, sum[s + 1][v][k]); });
+      total.store(y + v * y_stride + k * V::kWidth);
+    });
+  });
 }
 
 template <typename V, typename Value>
 void expand(const Value* basis, std::size_t rank, std::size_t size, std::size_t count,
             PlanarVectors<const float> coefficient, PlanarVectors<float> y) {
-  for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) {
+  for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
     const float* c = coefficient.data + v * coefficient.stride;
     float* yv = y.data + v * y.stride;
     std::size_t k = 0;
-    for (; k + V::kStrip <= count; k += V::kStrip) {
-      expand_strip<V, V::kStrip, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k,
-                                           y.stride);
-    }
-    for (; k < count; k += 16) {
-      expand_strip<V, 16, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k, y.stride);
-    }
+    const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
+      for (; k + kSize <= count; k += kSize) {
+        expand_strip<V, kSize, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k,
+                                         y.stride);
+      }
+    };
+    if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
+    if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
+    add_strips.template operator()<16>();
   });
 }
 
-/// Columns [begin, begin + width) of S, width at most that of V, for kLights vectors. Lanes beyond
-/// them read on into the next row: column_in is zero there, and column_out is not stored.
+/// Columns [begin, begin + width) of S [rows][columns], width at most that of V, for kLights
+/// vectors. Lanes beyond them read on into the next row: column_in is zero there, and column_out is
+/// not stored.
 template <typename V, bool kToRows, bool kToColumns, std::size_t kLights, typename Value>
-inline void multiply_columns(const Value* s, std::size_t rows, std::size_t columns,
-                             std::size_t begin, const CoreVectors& vectors, std::size_t first) {
+REBOUNCE_INLINE inline void multiply_columns(const Value* s, std::size_t rows, std::size_t columns,
+                                             std::size_t begin, const CoreVectors& vectors,
+                                             std::size_t first) {
+  constexpr std::size_t kStep = kChannels;  // from a channel of one light to that of the next
   const std::size_t width = columns - begin < V::kWidth ? columns - begin : V::kWidth;
+  const std::size_t in_stride = vectors.row_in.stride, out_stride = vectors.row_out.stride;
+  const float* const row_in = vectors.row_in.data + first * in_stride;
+  float* const row_out = vectors.row_out.data + first * out_stride;
   V column_in[kLights], column_out[kLights];
-  for (std::size_t l = 0; l < kLights; ++l) {
+  unroll<kLights>([&](auto l) REBOUNCE_INLINE {
     column_out[l] = V::zero();
     if constexpr (kToRows) {
-      column_in[l] = V::load_some(
-          vectors.column_in.data + (first + l) * vectors.column_in.stride + begin, width);
+      column_in[l] =
+          V::load_some(vectors.column_in.data + (first + kStep * l) * in_stride + begin, width);
     }
-  }
-  for_each_four(rows, [&]<std::size_t kRows>(std::size_t i) {
+  });
+  for_each_four(rows, [&]<std::size_t kRows>(std::size_t i) REBOUNCE_INLINE {
     V b[kRows];
-    for (std::size_t r = 0; r < kRows; ++r) {
-      b[r] = load_values<V>(s + (i + r) * columns + begin);
-    }
-    for (std::size_t l = 0; l < kLights; ++l) {
+    unroll<kRows>([&](auto r)
+                      REBOUNCE_INLINE { b[r] = load_values<V>(s + (i + r) * columns + begin); });
+    unroll<kLights>([&](auto l) REBOUNCE_INLINE {
       if constexpr (kToColumns) {
-        const float* in = vectors.row_in.data + (first + l) * vectors.row_in.stride + i;
-        for (std::size_t r = 0; r < kRows; ++r) {
-          column_out[l] = multiply_add(b[r], V::broadcast(in[r]), column_out[l]);
-        }
+        unroll<kRows>([&](auto r) REBOUNCE_INLINE {
+          const V in = V::broadcast(row_in[kStep * l * in_stride + i + r]);
+          column_out[l] = multiply_add(b[r], in, column_out[l]);
+        });
       }
       if constexpr (kToRows) {
         V product[kRows];
-        for (std::size_t r = 0; r < kRows; ++r) product[r] = multiply(b[r], column_in[l]);
-        float sum[kRows];
-        store_sums(product, sum);
-        float* out = vectors.row_out.data + (first + l) * vectors.row_out.stride + i;
-        for (std::size_t r = 0; r < kRows; ++r) out[r] = begin == 0 ? sum[r] : out[r] + sum[r];
+        unroll<kRows>([&](auto r) REBOUNCE_INLINE { product[r] = multiply(b[r], column_in[l]); });
+        float* const out = row_out + kStep * l * out_stride + i;
+        if (begin == 0) {
+          store_first<kRows>(sums_of(product), out);
+        } else {
+          add_first<kRows>(sums_of(product), out);
+        }
       }
-    }
+    });
   });
   if constexpr (kToColumns) {
-    for (std::size_t l = 0; l < kLights; ++l) {
-      column_out[l].store_some(
-          vectors.column_out.data + (first + l) * vectors.column_out.stride + begin, width);
-    }
+    unroll<kLights>([&](auto l) REBOUNCE_INLINE {
+      column_out[l].store_some(vectors.column_out.data + (first + kStep * l) * out_stride + begin,
+                               width);
+    });
   }
 }
 
 template <typename V, bool kToRows, bool kToColumns, typename Value>
-void multiply_core(const Value* s, std::size_t rows, std::size_t columns,
-                   const CoreVectors& vectors) {
-  for (std::size_t j = 0; j < columns; j += V::kWidth) {
-    std::size_t l = 0;
-    for (; l + 2 <= vectors.row_in.count; l += 2) {
-      multiply_columns<V, kToRows, kToColumns, 2>(s, rows, columns, j, vectors, l);
-    }
-    if (l < vectors.row_in.count) {
-      multiply_columns<V, kToRows, kToColumns, 1>(s, rows, columns, j, vectors, l);
+void multiply_core(const CoreMatrices<Value>& s, const CoreVectors& vectors) {
+  const std::size_t rows = s.rows, columns = s.columns, count = vectors.row_in.count;
+  for (std::size_t c = 0; c < kChannels; ++c) {
+    const Value* values = s.data + s.channel_matrix[c] * rows * columns;
+    for (std::size_t j = 0; j < columns; j += V::kWidth) {
+      std::size_t v = c;
+      for (; v + kChannels < count; v += 2 * kChannels) {
+        multiply_columns<V, kToRows, kToColumns, 2>(values, rows, columns, j, vectors, v);
+      }
+      if (v < count) {
+        multiply_columns<V, kToRows, kToColumns, 1>(values, rows, columns, j, vectors, v);
+      }
     }
   }
 }

@@ -9,10 +9,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <type_traits>
 #include <vector>
 
 #include "block_kernels.h"
 #include "cluster_sweep_plan.h"
+#include "hierarchical_storage.h"
 
 namespace rebounce {
 namespace {
@@ -42,21 +44,18 @@ class Planes {
   std::vector<float> values_;
 };
 
-template <typename T>
-PlanarVectors<T> channel(const PlanarVectors<T>& vectors, int c) {
-  return {vectors.data + c * vectors.stride, vectors.stride, 1};
-}
-
-template <typename Value>
+template <typename Basis, typename Value>
 class ClusterRelaxation final : public Relaxation {
  public:
-  ClusterRelaxation(const HierarchicalOperator::Storage& exchange, const BasisKernels<Value>& bases,
-                    const CoreKernels<Value>& cores, const Value* values, float value_scale)
+  ClusterRelaxation(const HierarchicalOperator::Storage& exchange, const BasisKernels<Basis>& bases,
+                    const CoreKernels<Value>& cores, const Basis* basis_values,
+                    const Value* core_values)
       : exchange_(exchange),
         bases_(bases),
         cores_(cores),
-        values_(values),
-        value_scale_(value_scale),
+        basis_values_(basis_values),
+        core_values_(core_values),
+        value_scale_(product_scale(exchange.precision)),
         plan_(exchange),
         light_(positions()),
         reflectance_(positions()),
@@ -172,12 +171,12 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void project(const Plan::Bases& bases) {
-    bases_.project(values_ + bases.values, bases.rank, bases.size, radiosity_.from(bases.begin),
-                   sent_.to(bases.coefficient));
+    bases_.project(basis_values_ + bases.values, bases.rank, bases.size,
+                   radiosity_.from(bases.begin), sent_.to(bases.coefficient));
   }
 
   void expand(const Plan::Bases& bases, Planes& arrived) {
-    bases_.expand(values_ + bases.values, bases.rank, bases.size, bases.size,
+    bases_.expand(basis_values_ + bases.values, bases.rank, bases.size, bases.size,
                   arrived_.from(bases.coefficient), arrived.to(bases.begin));
   }
 
@@ -204,25 +203,14 @@ class ClusterRelaxation final : public Relaxation {
   /// out = S in
   void to_rows(std::uint64_t values, std::size_t rows, std::size_t columns,
                const PlanarVectors<const float>& in, const PlanarVectors<float>& out) const {
-    for (int c = 0; c < kChannelCount; ++c) {
-      cores_.to_rows(values_ + values, rows, columns,
-                     {.row_in = channel(in, c),
-                      .column_in = channel(in, c),
-                      .row_out = channel(out, c),
-                      .column_out = channel(out, c)});
-    }
+    cores_.to_rows({core_values_ + values, rows, columns, {0, 0, 0}}, {in, in, out, out});
   }
 
   /// out = S^T in
   void to_columns(const Plan::Product& product, const PlanarVectors<const float>& in,
                   const PlanarVectors<float>& out) const {
-    for (int c = 0; c < kChannelCount; ++c) {
-      cores_.to_columns(values_ + product.values, product.rows, product.columns,
-                        {.row_in = channel(in, c),
-                         .column_in = channel(in, c),
-                         .row_out = channel(out, c),
-                         .column_out = channel(out, c)});
-    }
+    cores_.to_columns({core_values_ + product.values, product.rows, product.columns, {0, 0, 0}},
+                      {in, in, out, out});
   }
 
   void add_product(std::size_t count, Planes& to, std::size_t begin) const {
@@ -300,9 +288,10 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   const HierarchicalOperator::Storage& exchange_;
-  const BasisKernels<Value>& bases_;
+  const BasisKernels<Basis>& bases_;
   const CoreKernels<Value>& cores_;
-  const Value* values_;
+  const Basis* basis_values_;
+  const Value* core_values_;
   float value_scale_;  ///< what a product with stored values is to be multiplied by
   ClusterSweepPlan plan_;
   Planes light_, reflectance_, radiosity_;  ///< A^1/2 M0, rho x value_scale, A^1/2 B
@@ -316,13 +305,25 @@ class ClusterRelaxation final : public Relaxation {
 
 std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::Storage& exchange) {
   const BlockKernelSet& kernels = block_kernels();
-  if (exchange.precision == Precision::kF16) {
-    return std::make_unique<ClusterRelaxation<std::uint16_t>>(
-        exchange, kernels.bases_f16, kernels.cores_f16, exchange.values_f16.data(),
-        1 / HierarchicalOperator::kHalfScale);
+  const std::uint64_t first_core =
+      HierarchicalLayout(exchange.blocks, exchange.matrix_count).basis_value_count;
+  const auto make = [&](const auto& bases, const auto& cores, const auto* basis_values,
+                        const auto* core_values) -> std::unique_ptr<Relaxation> {
+    return std::make_unique<ClusterRelaxation<std::remove_cvref_t<decltype(*basis_values)>,
+                                              std::remove_cvref_t<decltype(*core_values)>>>(
+        exchange, bases, cores, basis_values, core_values);
+  };
+  const std::uint16_t* const f16 = exchange.values_f16.data();
+  const float* const f32 = exchange.values_f32.data();
+  switch (exchange.precision) {
+    case Precision::kF16:
+      return make(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core);
+    case Precision::kF32:
+      return make(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
+    case Precision::kQ8:
+      return make(kernels.bases_q8, kernels.cores_f16, exchange.bases_q8.data(), f16);
   }
-  return std::make_unique<ClusterRelaxation<float>>(exchange, kernels.bases_f32, kernels.cores_f32,
-                                                    exchange.values_f32.data(), 1.0F);
+  return nullptr;
 }
 
 }  // namespace rebounce

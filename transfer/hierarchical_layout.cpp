@@ -108,7 +108,6 @@ void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks) {
 
 void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
                                      std::uint32_t matrix_count) {
-  value_count = basis_value_count;
   product_count = coefficient_count;
   const auto add_products = [&](End& end, std::uint32_t count) {
     end.coefficient = product_count;
@@ -117,19 +116,19 @@ void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
     Place& place = places[b];
-    place.values = value_count;
+    place.values = core_value_count;
     if (block.kind == TransferBlock::Kind::kDense) {
-      value_count += block.value_count(matrix_count);
+      core_value_count += block.value_count(matrix_count);
       add_products(place.row, block.row_count);
       if (!block.on_diagonal()) add_products(place.column, block.column_count);
     } else {
-      value_count +=
+      core_value_count +=
           std::uint64_t{matrix_count} * block.row_rank * std::uint64_t{block.column_rank};
     }
   }
 }
 
-std::uint64_t HierarchicalLayout::padded_count() const {
+std::uint64_t HierarchicalLayout::padded(std::uint64_t value_count) {
   constexpr std::uint64_t kMultiple = 64;
   return (value_count + HierarchicalOperator::kPadding + kMultiple - 1) / kMultiple * kMultiple;
 }

@@ -27,7 +27,7 @@ struct HierarchicalLayout {
   };
   struct Place {
     End row, column;           ///< the same on the diagonal
-    std::uint64_t values = 0;  ///< where S or the entries begin
+    std::uint64_t values = 0;  ///< where S or the entries begin, after the bases
   };
 
   /// The blocks must be checked. Throws Error if they hold more values than any memory.
@@ -36,12 +36,12 @@ struct HierarchicalLayout {
   std::vector<Cluster> clusters;  ///< by begin, then by size, the largest first
   std::vector<Place> places;      ///< by block
   std::uint64_t basis_value_count = 0;
-  std::uint64_t value_count = 0;        ///< with cores and dense entries, without padding
+  std::uint64_t core_value_count = 0;   ///< cores and dense entries
   std::uint32_t coefficient_count = 0;  ///< of the bases
   std::uint32_t product_count = 0;      ///< with the products of dense blocks, which follow them
 
-  /// Values with padding.
-  std::uint64_t padded_count() const;
+  /// `value_count` values with the zeros that follow them.
+  static std::uint64_t padded(std::uint64_t value_count);
 
  private:
   void find_clusters(std::span<const TransferBlock> blocks);

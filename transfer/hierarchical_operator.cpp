@@ -16,6 +16,9 @@ namespace {
 // Of the vectors in the workspace, in floats: a cache line.
 constexpr std::size_t kLine = 16;
 
+// Positions whose light a thread takes in at a time.
+constexpr std::size_t kGathered = 512;
+
 std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
@@ -57,13 +60,6 @@ PlanarVectors<float> to(const PlanarVectors<float>& vectors, std::size_t begin) 
   return {vectors.data + begin, vectors.stride, vectors.count};
 }
 
-/// The vectors of one channel of all lights.
-template <typename T>
-PlanarVectors<T> channel_of(const PlanarVectors<T>& vectors, std::size_t channel) {
-  return {vectors.data + channel * vectors.stride, kChannelCount * vectors.stride,
-          vectors.count / kChannelCount};
-}
-
 /// The phases of an apply, one entry of the plan at a time.
 template <typename Basis, typename Value>
 class Phases {
@@ -85,15 +81,12 @@ class Phases {
 
   void multiply(const HierarchicalPlan::Core& core) const {
     const PlanarVectors<float>& in = core.dense ? work_.x : work_.coefficients;
-    const std::size_t size = std::size_t{core.rows} * core.columns;
-    const auto product = kernel(core.direction);
-    for (std::size_t c = 0; c < kChannelCount; ++c) {
-      const CoreVectors vectors{.row_in = channel_of(from(in, core.row_in), c),
-                                .column_in = channel_of(from(in, core.column_in), c),
-                                .row_out = channel_of(to(work_.products, core.row_out), c),
-                                .column_out = channel_of(to(work_.products, core.column_out), c)};
-      product(value_ + core.values + channel_matrix_[c] * size, core.rows, core.columns, vectors);
-    }
+    const CoreMatrices<Value> matrices{value_ + core.values, core.rows, core.columns,
+                                       channel_matrix_};
+    kernel(core.direction)(matrices, {.row_in = from(in, core.row_in),
+                                      .column_in = from(in, core.column_in),
+                                      .row_out = to(work_.products, core.row_out),
+                                      .column_out = to(work_.products, core.column_out)});
   }
 
   void expand(const HierarchicalPlan::Expansion& e) const {
@@ -116,10 +109,13 @@ class Phases {
   }
 
   void add_products(const HierarchicalPlan::Expansion& e) const {
+    // Other light goes through two bases on its way.
+    constexpr float kByteScale = HierarchicalOperator::kByteScale;
+    constexpr float kScale = sizeof(Basis) == 1 ? kByteScale * kByteScale : 1;
     for (std::size_t v = 0; v < work_.y.count; ++v) {
       float* y = work_.y.data + v * work_.y.stride + e.begin;
       const float* product = work_.products.data + v * work_.products.stride + e.coefficient;
-      for (std::size_t k = 0; k < e.count; ++k) y[k] += product[k];
+      for (std::size_t k = 0; k < e.count; ++k) y[k] += kScale * product[k];
     }
   }
 
@@ -131,50 +127,47 @@ class Phases {
   const WorkVectors& work_;
 };
 
-/// Takes the light of the patches into x and what arrives out of y.
-class Exchange {
- public:
-  Exchange(std::span<const std::uint32_t> patch, std::span<const float> sqrt_area, float scale,
-           const WorkVectors& work)
-      : patch_(patch), sqrt_area_(sqrt_area), scale_(scale), work_(work) {}
-
-  void gather(std::span<const Float3> light, std::size_t position) const {
-    const std::size_t n = patch_.size();
-    for (std::size_t v = 0; v < work_.x.count; v += kChannelCount) {
-      const Float3* of_light = light.data() + v / kChannelCount * n;
-      float* x = work_.x.data + v * work_.x.stride + position;
-      for (int c = 0; c < kChannelCount; ++c) {
-        x[c * work_.x.stride] =
-            position < n ? sqrt_area_[position] * of_light[patch_[position]][c] : 0;
-      }
-    }
-  }
-
-  void scatter(std::size_t position, std::span<Float3> light) const {
-    const std::size_t n = patch_.size();
-    const float factor = scale_ / sqrt_area_[position];
-    for (std::size_t v = 0; v < work_.y.count; v += kChannelCount) {
-      Float3* of_light = light.data() + v / kChannelCount * n;
-      const float* y = work_.y.data + v * work_.y.stride + position;
-      for (int c = 0; c < kChannelCount; ++c) {
-        of_light[patch_[position]][c] = y[c * work_.y.stride] * factor;
-      }
-    }
-  }
-
- private:
-  std::span<const std::uint32_t> patch_;
-  std::span<const float> sqrt_area_;
-  float scale_;
-  const WorkVectors& work_;
-};
-
 void clear(const PlanarVectors<float>& vectors, std::size_t begin, std::size_t end) {
   for (std::size_t v = 0; v < vectors.count; ++v) {
     float* const data = vectors.data + v * vectors.stride;
     std::fill(data + begin, data + end, 0.0F);
   }
 }
+
+/// Takes the light of the patches into x and what arrives out of y.
+struct Exchange {
+  std::span<const std::uint32_t> patch;       ///< [n] at each position
+  std::span<const float> sqrt_area, inverse;  ///< [n] by position; `inverse` holds the scale
+  const WorkVectors& work;
+
+  void gather(std::span<const Float3> light, std::size_t begin, std::size_t end) const {
+    const std::size_t n = patch.size(), stride = work.x.stride, last = std::min(end, n);
+    for (std::size_t v = 0; v < work.x.count; v += kChannelCount) {
+      const Float3* const from_light = light.data() + v / kChannelCount * n;
+      float* const x = work.x.data + v * stride;
+      for (std::size_t k = begin; k < last; ++k) {
+        const Float3& m = from_light[patch[k]];
+        const float weight = sqrt_area[k];
+        for (int c = 0; c < kChannelCount; ++c) x[c * stride + k] = weight * m[c];
+      }
+    }
+    clear(work.x, std::max(begin, last), end);
+  }
+
+  /// At the positions `targets`.
+  void scatter(std::span<const std::uint32_t> targets, std::span<Float3> light) const {
+    const std::size_t n = patch.size(), stride = work.y.stride;
+    for (std::size_t v = 0; v < work.y.count; v += kChannelCount) {
+      Float3* const to_light = light.data() + v / kChannelCount * n;
+      const float* const y = work.y.data + v * stride;
+      for (const std::uint32_t k : targets) {
+        Float3& h = to_light[patch[k]];
+        const float weight = inverse[k];
+        for (int c = 0; c < kChannelCount; ++c) h[c] = weight * y[c * stride + k];
+      }
+    }
+  }
+};
 
 template <typename Basis, typename Value>
 void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
@@ -183,7 +176,9 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
 #pragma omp parallel
   {
 #pragma omp for schedule(static)
-    for (std::size_t k = 0; k < work.x.stride; ++k) exchange.gather(initial_exitance, k);
+    for (std::size_t k = 0; k < work.x.stride; k += kGathered) {
+      exchange.gather(initial_exitance, k, std::min(k + kGathered, work.x.stride));
+    }
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.projection_parts.size() - 1; ++part) {
       for (std::uint32_t k = plan.projection_parts[part]; k < plan.projection_parts[part + 1];
@@ -203,9 +198,9 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
       for (std::uint32_t k = arrival.first_expansion; k < arrival.last_expansion; ++k) {
         phases.expand(plan.expansions[k]);
       }
-      for (std::uint32_t k = arrival.first_target; k < arrival.last_target; ++k) {
-        exchange.scatter(plan.targets[k], indirect_irradiance);
-      }
+      const std::span targets(plan.targets);
+      exchange.scatter(targets.subspan(arrival.first_target, arrival.target_count()),
+                       indirect_irradiance);
     }
   }
 }
@@ -224,7 +219,12 @@ HierarchicalOperator::HierarchicalOperator(Storage storage)
     : storage_(stream(storage)),
       layout_(std::make_shared<HierarchicalLayout>(storage_.blocks, storage_.matrix_count)) {
   sqrt_area_.reserve(patch_count());
-  for (const std::uint32_t p : storage_.patch) sqrt_area_.push_back(std::sqrt(storage_.area[p]));
+  inverse_.reserve(patch_count());
+  const float scale = product_scale(storage_.precision);
+  for (const std::uint32_t p : storage_.patch) {
+    sqrt_area_.push_back(std::sqrt(storage_.area[p]));
+    inverse_.push_back(scale / sqrt_area_.back());
+  }
   std::vector<std::uint32_t> all(patch_count());
   std::iota(all.begin(), all.end(), 0U);
   plan_ = std::make_shared<HierarchicalPlan>(storage_, *layout_, std::move(all));
@@ -232,7 +232,7 @@ HierarchicalOperator::HierarchicalOperator(Storage storage)
 
 std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
-         storage_.blocks.size() * sizeof(TransferBlock) +
+         storage_.bases_q8.size_bytes() + storage_.blocks.size() * sizeof(TransferBlock) +
          storage_.patch.size() * sizeof(std::uint32_t);
 }
 
@@ -252,17 +252,22 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   float* const aligned = workspace.data() + (kLine - misplaced % kLine) % kLine;
   const WorkVectors work(position_count(patch_count()), *layout_, light_count, aligned);
   const BlockKernelSet& kernels = block_kernels();
-  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* values,
-                                float scale) {
-    const Phases phases(bases, cores, values, values, storage_.channel_matrix, work);
-    const Exchange exchange(storage_.patch, sqrt_area_, scale, work);
+  const Exchange exchange{storage_.patch, sqrt_area_, inverse_, work};
+  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
+                                const auto* core) {
+    const Phases phases(bases, cores, basis, core, storage_.channel_matrix, work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
-  if (storage_.precision == Precision::kF16) {
-    apply_phases(kernels.bases_f16, kernels.cores_f16, storage_.values_f16.data(),
-                 1.0F / kHalfScale);
-  } else {
-    apply_phases(kernels.bases_f32, kernels.cores_f32, storage_.values_f32.data(), 1.0F);
+  const std::uint16_t* const f16 = storage_.values_f16.data();
+  const float* const f32 = storage_.values_f32.data();
+  const std::uint64_t first_core = layout_->basis_value_count;
+  switch (storage_.precision) {
+    case Precision::kF16:
+      return apply_phases(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core);
+    case Precision::kF32:
+      return apply_phases(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
+    case Precision::kQ8:
+      return apply_phases(kernels.bases_q8, kernels.cores_f16, storage_.bases_q8.data(), f16);
   }
 }
 

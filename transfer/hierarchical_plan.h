@@ -44,6 +44,8 @@ class HierarchicalPlan {
     std::uint32_t begin, end;  ///< positions, multiples of kAlignment
     std::uint32_t first_expansion, last_expansion;
     std::uint32_t first_target, last_target;
+
+    std::uint32_t target_count() const { return last_target - first_target; }
   };
 
   /// Everything that it takes to write the positions `targets`, ascending.

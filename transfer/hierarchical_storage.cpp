@@ -1,6 +1,7 @@
 #include "hierarchical_storage.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "half_float.h"
 #include "rebounce/transfer/error.h"
@@ -83,7 +84,8 @@ std::uint64_t block_order_count(const Storage& storage) {
 /// Copies runs of values of one block from where it begins to where they belong.
 template <typename Value>
 void place_block(const TransferBlock& block, const HierarchicalLayout::Place& place,
-                 const Value* from, std::uint64_t count, std::vector<Value>& values) {
+                 std::uint64_t first_core, const Value* from, std::uint64_t count,
+                 std::vector<Value>& values) {
   const Value* const end = from + count;
   const auto copy = [&](std::uint64_t size, std::uint64_t to) {
     std::copy_n(from, size, values.begin() + static_cast<std::ptrdiff_t>(to));
@@ -95,42 +97,99 @@ void place_block(const TransferBlock& block, const HierarchicalLayout::Place& pl
       copy(std::uint64_t{block.column_rank} * block.column_count, place.column.basis);
     }
   }
-  copy(static_cast<std::uint64_t>(end - from), place.values);
+  copy(static_cast<std::uint64_t>(end - from), first_core + place.values);
 }
 
 template <typename Value>
 SharedArray<Value> stream_values(const Storage& storage, const std::vector<TransferBlock>& blocks,
                                  const SharedArray<Value>& values) {
   const HierarchicalLayout layout(blocks, storage.matrix_count);
-  std::vector<Value> streamed(layout.padded_count());
+  std::vector<Value> streamed(
+      HierarchicalLayout::padded(layout.basis_value_count + layout.core_value_count));
   const Value* from = values.data();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (has_values(blocks[b])) {
-      place_block(blocks[b], layout.places[b], from, blocks[b].value_count(storage.matrix_count),
-                  streamed);
+      place_block(blocks[b], layout.places[b], layout.basis_value_count, from,
+                  blocks[b].value_count(storage.matrix_count), streamed);
     }
     from += storage.blocks[b].value_count(storage.matrix_count);
   }
   return SharedArray(std::move(streamed));
 }
 
-/// Reads values of either precision as what they stand for.
+/// Reads values of any precision as what they stand for.
 class ValueReader {
  public:
-  explicit ValueReader(const Storage& storage) : storage_(storage) {}
+  ValueReader(const Storage& storage, const HierarchicalLayout& layout)
+      : storage_(storage), first_core_(layout.basis_value_count) {}
 
   double basis(std::uint64_t index) const {
-    return storage_.precision == Precision::kF16 ? half_to_float(storage_.values_f16[index])
-                                                 : storage_.values_f32[index];
+    switch (storage_.precision) {
+      case Precision::kF16:
+        return half_to_float(storage_.values_f16[index]);
+      case Precision::kQ8:
+        return storage_.bases_q8[index] / double{HierarchicalOperator::kByteScale};
+      case Precision::kF32:
+        break;
+    }
+    return storage_.values_f32[index];
   }
-  double scaled(std::uint64_t index) const {
-    const double value = basis(index);
-    return storage_.precision == Precision::kF16 ? value / HierarchicalOperator::kHalfScale : value;
+  /// Of a core or a dense entry.
+  double core(std::uint64_t index) const {
+    if (storage_.precision == Precision::kF32) return storage_.values_f32[first_core_ + index];
+    const std::uint64_t first = storage_.precision == Precision::kF16 ? first_core_ : 0;
+    return half_to_float(storage_.values_f16[first + index]) /
+           double{HierarchicalOperator::kHalfScale};
   }
 
  private:
   const Storage& storage_;
+  std::uint64_t first_core_;
 };
+
+/// Numbers of values that the arrays must have.
+struct ArraySizes {
+  std::uint64_t f32 = 0, f16 = 0, q8 = 0;
+  bool operator==(const ArraySizes&) const = default;
+};
+
+ArraySizes expected_sizes(const Storage& storage) {
+  const HierarchicalLayout layout(storage.blocks, storage.matrix_count);
+  const std::uint64_t bases = layout.basis_value_count, cores = layout.core_value_count;
+  if (storage.precision == Precision::kQ8) {
+    return {.f16 = HierarchicalLayout::padded(cores), .q8 = HierarchicalLayout::padded(bases)};
+  }
+  const std::uint64_t all = storage.order == HierarchicalOperator::Order::kStreamed
+                                ? HierarchicalLayout::padded(bases + cores)
+                                : block_order_count(storage);
+  if (storage.precision == Precision::kF16) return {.f16 = all};
+  return {.f32 = all};
+}
+
+std::uint16_t encoded(float value) {
+  const std::uint16_t half = float_to_half(value * HierarchicalOperator::kHalfScale);
+  if ((half & 0x7FFFU) >= 0x7C00U) {
+    throw Error("an entry of the operator is too large for f16; use --precision f32");
+  }
+  return half;
+}
+
+/// Rounds a basis [rank][size] to bytes; returns what each vector must be multiplied by, over
+/// kByteScale.
+std::vector<float> encode_basis(const float* basis, std::size_t rank, std::size_t size,
+                                std::int8_t* bytes) {
+  std::vector<float> scale(rank);
+  for (std::size_t r = 0; r < rank; ++r, basis += size, bytes += size) {
+    float largest = 0;
+    for (std::size_t k = 0; k < size; ++k) largest = std::max(largest, std::abs(basis[k]));
+    if (largest == 0) continue;
+    for (std::size_t k = 0; k < size; ++k) {
+      bytes[k] = static_cast<std::int8_t>(std::lround(basis[k] / largest * 127));
+    }
+    scale[r] = largest / 127 * HierarchicalOperator::kByteScale;
+  }
+  return scale;
+}
 
 }  // namespace
 
@@ -144,14 +203,13 @@ std::uint64_t TransferBlock::value_count(std::uint32_t matrix_count) const {
 
 void check_hierarchical_storage(const Storage& storage) {
   check_tables(storage);
-  const HierarchicalLayout layout(storage.blocks, storage.matrix_count);
-  const std::uint64_t expected = storage.order == HierarchicalOperator::Order::kStreamed
-                                     ? layout.padded_count()
-                                     : block_order_count(storage);
-  const bool half = storage.precision == Precision::kF16;
-  if ((half ? storage.values_f16.size() : storage.values_f32.size()) != expected) {
-    refuse("the number of values does not fit the blocks");
+  if (storage.precision == Precision::kQ8 &&
+      storage.order != HierarchicalOperator::Order::kStreamed) {
+    refuse("8 bits are for streamed values alone");
   }
+  const ArraySizes sizes{storage.values_f32.size(), storage.values_f16.size(),
+                         storage.bases_q8.size()};
+  if (sizes != expected_sizes(storage)) refuse("the number of values does not fit the blocks");
 }
 
 Storage HierarchicalOperator::stream(const Storage& storage) {
@@ -178,25 +236,71 @@ Storage HierarchicalOperator::encode_half(const Storage& storage) {
   const HierarchicalLayout layout(half.blocks, half.matrix_count);
   std::vector<std::uint16_t> values(exact.size());
   for (std::uint64_t k = 0; k < values.size(); ++k) {
-    values[k] = float_to_half(k < layout.basis_value_count ? exact[k] : exact[k] * kHalfScale);
-    if ((values[k] & 0x7FFFU) >= 0x7C00U) {
-      throw Error("an entry of the operator is too large for f16; use --precision f32");
-    }
+    values[k] = k < layout.basis_value_count ? float_to_half(exact[k]) : encoded(exact[k]);
   }
   half.values_f16 = SharedArray(std::move(values));
   return half;
 }
 
+Storage HierarchicalOperator::encode_bytes(const Storage& storage) {
+  Storage bytes = stream(storage);
+  const SharedArray<float> exact = std::move(bytes.values_f32);
+  bytes.precision = Precision::kQ8;
+  bytes.values_f32 = {};
+  const HierarchicalLayout layout(bytes.blocks, bytes.matrix_count);
+  std::vector<std::int8_t> bases(HierarchicalLayout::padded(layout.basis_value_count));
+  std::vector<std::uint16_t> cores(HierarchicalLayout::padded(layout.core_value_count));
+  const float* const core = exact.data() + layout.basis_value_count;
+  for (std::size_t b = 0; b < bytes.blocks.size(); ++b) {
+    const TransferBlock& block = bytes.blocks[b];
+    const HierarchicalLayout::Place& place = layout.places[b];
+    const auto encode_end = [&](const HierarchicalLayout::End& end, std::size_t rank,
+                                std::size_t size) {
+      return encode_basis(exact.data() + end.basis, rank, size, bases.data() + end.basis);
+    };
+    if (block.kind == TransferBlock::Kind::kDense) {
+      const std::uint64_t count = block.value_count(bytes.matrix_count);
+      std::transform(core + place.values, core + place.values + count, cores.data() + place.values,
+                     encoded);
+    } else if (has_values(block)) {
+      const std::vector<float> rows = encode_end(place.row, block.row_rank, block.row_count);
+      const std::vector<float> columns =
+          encode_end(place.column, block.column_rank, block.column_count);
+      std::uint64_t k = place.values;
+      for (std::uint32_t matrix = 0; matrix < bytes.matrix_count; ++matrix) {
+        for (const float row : rows) {
+          for (const float column : columns) cores[k] = encoded(core[k] * row * column), ++k;
+        }
+      }
+    }
+  }
+  bytes.bases_q8 = SharedArray(std::move(bases));
+  bytes.values_f16 = SharedArray(std::move(cores));
+  return bytes;
+}
+
+Storage HierarchicalOperator::encode(const Storage& storage, Precision precision) {
+  switch (precision) {
+    case Precision::kF16:
+      return encode_half(storage);
+    case Precision::kQ8:
+      return encode_bytes(storage);
+    case Precision::kF32:
+      break;
+  }
+  return stream(storage);
+}
+
 std::vector<double> block_entries(const Storage& storage, const HierarchicalLayout& layout,
                                   std::size_t index, std::uint32_t matrix) {
-  const ValueReader read(storage);
+  const ValueReader read(storage, layout);
   const TransferBlock& block = storage.blocks[index];
   const HierarchicalLayout::Place& place = layout.places[index];
   const std::size_t rows = block.row_count, columns = block.column_count;
   std::vector<double> entries(rows * columns, 0.0);
   if (block.kind == TransferBlock::Kind::kDense) {
     for (std::size_t k = 0; k < entries.size(); ++k) {
-      entries[k] = read.scaled(place.values + matrix * entries.size() + k);
+      entries[k] = read.core(place.values + matrix * entries.size() + k);
     }
     return entries;
   }
@@ -207,7 +311,7 @@ std::vector<double> block_entries(const Storage& storage, const HierarchicalLayo
   for (std::size_t r = 0; r < row_rank; ++r) {
     std::ranges::fill(right, 0.0);
     for (std::size_t k = 0; k < column_rank; ++k) {
-      const double core = read.scaled(s + r * column_rank + k);
+      const double core = read.core(s + r * column_rank + k);
       for (std::size_t j = 0; j < columns; ++j) right[j] += core * read.basis(v + k * columns + j);
     }
     for (std::size_t i = 0; i < rows; ++i) {
@@ -216,6 +320,20 @@ std::vector<double> block_entries(const Storage& storage, const HierarchicalLayo
     }
   }
   return entries;
+}
+
+float product_scale(Precision precision) {
+  constexpr float kHalfScale = HierarchicalOperator::kHalfScale;
+  constexpr float kByteScale = HierarchicalOperator::kByteScale;
+  switch (precision) {
+    case Precision::kF16:
+      return 1 / kHalfScale;
+    case Precision::kQ8:
+      return 1 / (kHalfScale * kByteScale * kByteScale);
+    case Precision::kF32:
+      break;
+  }
+  return 1;
 }
 
 }  // namespace rebounce

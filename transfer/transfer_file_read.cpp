@@ -257,6 +257,10 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   } else {
     storage.values_f32 = file.tensor<float>(names.values, {kAnySize});
   }
+  if (file.tensors().contains(names.bases)) {
+    storage.precision = Precision::kQ8;
+    storage.bases_q8 = file.tensor<std::int8_t>(names.bases, {kAnySize}, TensorType::kI8);
+  }
   try {
     return std::make_shared<const HierarchicalOperator>(std::move(storage));
   } catch (const Error& error) {

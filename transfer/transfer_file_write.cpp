@@ -90,7 +90,10 @@ void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
   collector(names.patch, storage.patch);
   collector.add<std::uint32_t>(names.channel_matrix, {storage.channel_matrix.size()},
                                storage.channel_matrix);
-  if (storage.precision == Precision::kF16) {
+  if (storage.precision == Precision::kQ8) {
+    collector.add(names.bases, {storage.bases_q8.size()}, storage.bases_q8.span(), TensorType::kI8);
+  }
+  if (storage.precision != Precision::kF32) {
     collector.add(names.values, {storage.values_f16.size()}, storage.values_f16.span(),
                   TensorType::kF16);
   } else {

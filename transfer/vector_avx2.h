@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "vector_x86.h"
+
 namespace rebounce {
 namespace {
 
@@ -31,9 +33,10 @@ struct Vector8 {
   static Vector8 broadcast(float x) { return {_mm256_set1_ps(x)}; }
   void store(float* p) const { _mm256_storeu_ps(p, v); }
   void store_some(float* p, std::size_t count) const { _mm256_maskstore_ps(p, first(count), v); }
-  static void store_sums(Vector8 a, Vector8 b, Vector8 c, Vector8 d, float* out) {
+  /// The sums over the lanes of four vectors.
+  static FourSums sums(Vector8 a, Vector8 b, Vector8 c, Vector8 d) {
     const __m256 four = _mm256_hadd_ps(_mm256_hadd_ps(a.v, b.v), _mm256_hadd_ps(c.v, d.v));
-    _mm_storeu_ps(out, _mm_add_ps(_mm256_castps256_ps128(four), _mm256_extractf128_ps(four, 1)));
+    return {_mm_add_ps(_mm256_castps256_ps128(four), _mm256_extractf128_ps(four, 1))};
   }
   float sum() const {
     const __m128 half = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));

@@ -7,12 +7,14 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "vector_x86.h"
+
 namespace rebounce {
 namespace {
 
 struct Vector16 {
   static constexpr std::size_t kWidth = 16;
-  static constexpr std::size_t kStrip = 32;
+  static constexpr std::size_t kStrip = 64;
   static constexpr std::size_t kLights = 2;
   __m512 v;
 
@@ -32,13 +34,16 @@ struct Vector16 {
   void store(float* p) const { _mm512_storeu_ps(p, v); }
   void store_some(float* p, std::size_t count) const { _mm512_mask_storeu_ps(p, first(count), v); }
   float sum() const { return _mm512_reduce_add_ps(v); }
-  static void store_sums(Vector16 a, Vector16 b, Vector16 c, Vector16 d, float* out) {
+  /// The sums over the lanes of four vectors.
+  static FourSums sums(Vector16 a, Vector16 b, Vector16 c, Vector16 d) {
     const __m512 ab = _mm512_add_ps(_mm512_unpacklo_ps(a.v, b.v), _mm512_unpackhi_ps(a.v, b.v));
     const __m512 cd = _mm512_add_ps(_mm512_unpacklo_ps(c.v, d.v), _mm512_unpackhi_ps(c.v, d.v));
     const __m512 four =
         _mm512_add_ps(_mm512_shuffle_ps(ab, cd, 0x44), _mm512_shuffle_ps(ab, cd, 0xEE));
-    const __m512 two = _mm512_add_ps(four, _mm512_shuffle_f32x4(four, four, 0x4E));
-    _mm_storeu_ps(out, _mm_add_ps(_mm512_castps512_ps128(two), _mm512_extractf32x4_ps(two, 1)));
+    const __m256 two =
+        _mm256_add_ps(_mm512_castps512_ps256(four),
+                      _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(four), 1)));
+    return {_mm_add_ps(_mm256_castps256_ps128(two), _mm256_extractf128_ps(two, 1))};
   }
   friend Vector16 add(Vector16 a, Vector16 b) { return {_mm512_add_ps(a.v, b.v)}; }
   friend Vector16 multiply(Vector16 a, Vector16 b) { return {_mm512_mul_ps(a.v, b.v)}; }

@@ -39,9 +39,9 @@ struct Vector4 {
   void store_some(float* p, std::size_t count) const {
     for (std::size_t k = 0; k < count; ++k) p[k] = v[k];
   }
-  static void store_sums(const Vector4& a, const Vector4& b, const Vector4& c, const Vector4& d,
-                         float* out) {
-    Vector4{{a.sum(), b.sum(), c.sum(), d.sum()}}.store(out);
+  /// The sums over the lanes of four vectors.
+  static Vector4 sums(const Vector4& a, const Vector4& b, const Vector4& c, const Vector4& d) {
+    return {{a.sum(), b.sum(), c.sum(), d.sum()}};
   }
   float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
   float largest() const { return std::max(std::max(v[0], v[1]), std::max(v[2], v[3])); }
@@ -66,6 +66,18 @@ struct Vector4 {
     return each([&](int k) { return std::max(a.v[k], b.v[k]); });
   }
 };
+
+/// Stores the first kCount lanes.
+template <std::size_t kCount>
+inline void store_first(const Vector4& v, float* p) {
+  for (std::size_t k = 0; k < kCount; ++k) p[k] = v.v[k];
+}
+
+/// Adds the first kCount lanes to what is there.
+template <std::size_t kCount>
+inline void add_first(const Vector4& v, float* p) {
+  for (std::size_t k = 0; k < kCount; ++k) p[k] += v.v[k];
+}
 
 }  // namespace
 }  // namespace rebounce

@@ -86,8 +86,8 @@ void check_tolerance(const BuildRecord& record) {
 
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
-  if (!chosen.precision.empty()) {
-    settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
+  for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
+    if (chosen.precision == precision_name(precision)) settings.precision = precision;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
   if (chosen.operator_kind == "hierarchical" ||
@@ -159,10 +159,12 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->each([chosen](const std::string&) { chosen->tolerance_given = true; })
       ->capture_default_str();
   command
-      ->add_option("--precision", chosen->precision,
-                   "Numbers of the operator: f32, or f16 for half the bytes; by default f16 for a "
-                   "hierarchical operator, f32 for a dense one")
-      ->check(CLI::IsMember({"f16", "f32"}));
+      ->add_option(
+          "--precision", chosen->precision,
+          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q8 "
+          "for two thirds of those; by default f16 for a hierarchical operator, f32 for a "
+          "dense one")
+      ->check(CLI::IsMember({"f16", "f32", "q8"}));
   command
       ->add_option(
           "--compress-form-factors", chosen->settings.form_factor_tolerance,

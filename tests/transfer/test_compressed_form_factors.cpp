@@ -32,7 +32,7 @@ struct System {
 
   System(std::size_t n, std::uint64_t seed, Precision precision) {
     HierarchicalOperator::Storage storage = test::random_hierarchical_storage(n, 1, seed);
-    if (precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
+    if (precision == Precision::kF16) storage = HierarchicalOperator::encode(storage, precision);
     exchange = std::make_shared<const HierarchicalOperator>(std::move(storage));
     matrix.resize(n * n);
     exchange->expand(0, matrix);
@@ -117,7 +117,7 @@ TEST(CompressedFormFactors, SweepsAreGaussSeidelInEveryOrderOfDirections) {
   constexpr auto kForward = SweepDirection::kForward, kBackward = SweepDirection::kBackward;
   int low_rank_on_diagonal = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
-    for (const Precision precision : {Precision::kF32, Precision::kF16}) {
+    for (const Precision precision : {Precision::kF32, Precision::kF16, Precision::kQ8}) {
       const System system(421, seed, precision);
       for (const TransferBlock& block : system.exchange->storage().blocks) {
         low_rank_on_diagonal += block.on_diagonal() && block.row_rank > 0 ? 1 : 0;

@@ -26,6 +26,7 @@ TransferData sample_data(Precision precision) {
   TransferData data;
   HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
   if (precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
+  if (precision == Precision::kQ8) storage = HierarchicalOperator::encode_bytes(storage);
   data.patches.area = storage.area;
   data.patches.centroid.assign(kPatchCount, {0, 0, 0});
   data.patches.normal.assign(kPatchCount, {0, 1, 0});
@@ -44,7 +45,7 @@ const HierarchicalOperator::Storage& storage_of(const TransferData& data) {
 }
 
 TEST(HierarchicalFile, RoundTrips) {
-  for (const Precision precision : {Precision::kF16, Precision::kF32}) {
+  for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
     const test::TemporaryFolder folder;
     const TransferData data = sample_data(precision);
     save_transfer_file(folder / "file", data);
@@ -57,6 +58,7 @@ TEST(HierarchicalFile, RoundTrips) {
     EXPECT_EQ(a.precision, b.precision);
     EXPECT_TRUE(std::ranges::equal(a.values_f32, b.values_f32));
     EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
+    EXPECT_TRUE(std::ranges::equal(a.bases_q8, b.bases_q8));
     std::vector<float> expanded_a(kPatchCount * kPatchCount), expanded_b(expanded_a);
     data.transfer->expand(1, expanded_a);
     loaded.transfer->expand(1, expanded_b);
@@ -67,10 +69,16 @@ TEST(HierarchicalFile, RoundTrips) {
 }
 
 TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
-  const test::TemporaryFolder folder;
-  save_transfer_file(folder / "file", sample_data(Precision::kF16));
-  const TransferData data = load_transfer_file(folder / "file");
-  EXPECT_EQ(storage_of(data).values_f16.owner(), data.exchange.row_begin.owner());
+  for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
+    const test::TemporaryFolder folder;
+    save_transfer_file(folder / "file", sample_data(precision));
+    const TransferData data = load_transfer_file(folder / "file");
+    const auto& owner = data.exchange.row_begin.owner();
+    EXPECT_EQ(storage_of(data).values_f16.owner(), owner);
+    if (precision == Precision::kQ8) {
+      EXPECT_EQ(storage_of(data).bases_q8.owner(), owner);
+    }
+  }
 }
 
 std::shared_ptr<const HierarchicalOperator> sample_form_factors(std::uint32_t matrix_count) {
@@ -154,6 +162,7 @@ TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
       {"blocks", 4, 2, "unknown kind"},
       {"blocks", 4, 0xFFFFFFFF, "unknown kind"},
       {"blocks", 5, 1000, "rank"},
+      {"blocks", 5, 0, "rank"},
       {"blocks", 6, 0xFFFFFFFF, "rank"},
       {"channel_matrix", 2, 3, "no such matrix"},
       {"channel_matrix", 2, 2, "number of values"},

@@ -57,12 +57,17 @@ class HierarchicalOperator final : public TransferOperator {
   /// normal numbers; bases are stored as they are.
   static constexpr float kHalfScale = DenseOperator::kHalfScale;
 
+  /// In 8 bits, a basis holds its vectors times numbers of their own such that their largest
+  /// entries are +-127; cores are divided by them, with this for 1 at each end.
+  static constexpr float kByteScale = 128;
+
   enum class Order : std::uint8_t {
     /// Block by block, U^T V^T S or the entries, without holes, then kPadding values not used.
     kByBlock,
     /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
     /// the order of their blocks, U^T before V^T; then cores and dense entries by block; zeros to
-    /// the next multiple of 64 values, at least kPadding of them.
+    /// the next multiple of 64 values, at least kPadding of them. Bases in an array of their own
+    /// are followed by zeros likewise.
     kStreamed,
   };
 
@@ -76,6 +81,7 @@ class HierarchicalOperator final : public TransferOperator {
     Precision precision = Precision::kF32;
     SharedArray<float> values_f32;          ///< if kF32
     SharedArray<std::uint16_t> values_f16;  ///< IEEE half-precision bits, if kF16
+    SharedArray<std::int8_t> bases_q8;      ///< if kQ8; values_f16 then holds the others alone
   };
 
   /// Some of the patches, as `receivers` prepares them for `apply_to`.
@@ -100,6 +106,13 @@ class HierarchicalOperator final : public TransferOperator {
   /// The same with half-precision numbers, in the order kStreamed. Throws Error if a value is
   /// beyond their range, and as the constructor does.
   static Storage encode_half(const Storage& storage);
+
+  /// The same with bases of 8 bits. Storage has values in f32. Throws Error as encode_half does.
+  static Storage encode_bytes(const Storage& storage);
+
+  /// Values in f32 as `precision` has them, in the order kStreamed. Throws Error as the constructor
+  /// and the encodings do.
+  static Storage encode(const Storage& storage, Precision precision);
 
   /// Takes over `storage`; values in the order kByBlock are copied into the order kStreamed. Throws
   /// Error if `patch` is not a permutation, a block reaches outside the matrix, is misplaced or has
@@ -138,6 +151,7 @@ class HierarchicalOperator final : public TransferOperator {
 
   Storage storage_;
   std::vector<float> sqrt_area_;  ///< [n] by position
+  std::vector<float> inverse_;    ///< of it, times the scale of the products
   std::shared_ptr<const HierarchicalLayout> layout_;
   std::shared_ptr<const HierarchicalPlan> plan_;  ///< to all patches
 };
