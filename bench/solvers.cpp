@@ -38,7 +38,7 @@ constexpr int kMostSweeps = 64;
 /// One form of F.
 struct Form {
   std::string name;
-  std::unique_ptr<const FormFactorOperator> form_factors;
+  std::unique_ptr<const SweepableFormFactors> form_factors;
 };
 
 std::shared_ptr<const HierarchicalOperator> compressed(const TransferData& data,

@@ -4,7 +4,7 @@
 
 namespace rebounce {
 
-GaussSeidelSolver::GaussSeidelSolver(const FormFactorOperator& form_factors,
+GaussSeidelSolver::GaussSeidelSolver(const SweepableFormFactors& form_factors,
                                      const RadiosityProblem& problem, SweepOrder order)
     : RadiositySolver(form_factors, problem),
       relaxation_(form_factors.make_relaxation()),

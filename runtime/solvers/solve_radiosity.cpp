@@ -12,13 +12,24 @@
 namespace rebounce {
 namespace {
 
-/// F by rows: a shot goes from one patch to all that it sees.
+/// `form_factors` as what a method needs it to be.
+template <typename Form>
+const Form& as(const FormFactorOperator& form_factors, const char* refusal) {
+  const auto* form = dynamic_cast<const Form*>(&form_factors);
+  if (form == nullptr) throw Error(refusal);
+  return *form;
+}
+
+const SweepableFormFactors& sweepable(const FormFactorOperator& form_factors) {
+  return as<SweepableFormFactors>(form_factors,
+                                  "solver: gauss-seidel cannot sweep over these form factors; "
+                                  "take gathering or conjugate-gradient");
+}
+
+/// A shot goes from one patch to all that it sees.
 const FormFactorBlocks& rows_of(const FormFactorOperator& form_factors) {
-  const auto* blocks = dynamic_cast<const FormFactorBlocks*>(&form_factors);
-  if (blocks == nullptr) {
-    throw Error("solver: southwell needs form factors by rows; give it FormFactorBlocks");
-  }
-  return *blocks;
+  return as<FormFactorBlocks>(
+      form_factors, "solver: southwell needs form factors by rows; give it FormFactorBlocks");
 }
 
 }  // namespace
@@ -41,9 +52,11 @@ std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
     case SolveMethod::kJacobi:
       return std::make_unique<GatheringSolver>(form_factors, problem);
     case SolveMethod::kGaussSeidel:
-      return std::make_unique<GaussSeidelSolver>(form_factors, problem, SweepOrder::kForward);
+      return std::make_unique<GaussSeidelSolver>(sweepable(form_factors), problem,
+                                                 SweepOrder::kForward);
     case SolveMethod::kSymmetricGaussSeidel:
-      return std::make_unique<GaussSeidelSolver>(form_factors, problem, SweepOrder::kSymmetric);
+      return std::make_unique<GaussSeidelSolver>(sweepable(form_factors), problem,
+                                                 SweepOrder::kSymmetric);
     case SolveMethod::kConjugateGradient:
       return std::make_unique<ConjugateGradientSolver>(form_factors, problem);
     case SolveMethod::kSouthwell:

@@ -434,6 +434,41 @@ TEST(Solvers, MissingOrOtherOperatorsAreRefused) {
   }
 }
 
+/// F that can only gather.
+class Gatherer final : public FormFactorOperator {
+ public:
+  explicit Gatherer(const FormFactorBlocks& blocks) : blocks_(blocks) {}
+  std::size_t patch_count() const override { return blocks_.patch_count(); }
+  std::size_t bytes() const override { return blocks_.bytes(); }
+  std::size_t workspace_size() const override { return blocks_.workspace_size(); }
+  void gather(std::span<const Float3> in, std::span<Float3> out,
+              std::span<float> workspace) const override {
+    blocks_.gather(in, out, workspace);
+  }
+
+ private:
+  const FormFactorBlocks& blocks_;
+};
+
+TEST(Solvers, FormsThatAMethodCannotUseAreRefused) {
+  const Case c(0.5F, Form::kExchange);
+  EXPECT_THROW(c.solver(SolveMethod::kSouthwell), Error);
+  const Gatherer gatherer(c.blocks);
+  for (const SolveMethod method : {SolveMethod::kGaussSeidel, SolveMethod::kSymmetricGaussSeidel}) {
+    EXPECT_THROW(make_solver(method, gatherer, c.system.problem()), Error);
+  }
+  EXPECT_NO_THROW(make_solver(SolveMethod::kConjugateGradient, gatherer, c.system.problem()));
+}
+
+TEST(Solvers, EveryMethodHasAFormOfItsOwn) {
+  const Case c(0.5F);
+  for (const NamedSolveMethod& named : kSolveMethods) {
+    const auto form = make_form_factors(named.method, c.system.exchange, c.system.area);
+    const auto solver = make_solver(named.method, *form, c.system.problem(), c.operator_);
+    EXPECT_TRUE(solver->solve(c.system.initial_exitance, {.residual = 1e-5}).converged);
+  }
+}
+
 TEST(Southwell, ShootsTheLargestPowerFirst) {
   // One lamp among dark patches: the first shot is the lamp's, the second that of the patch that
   // got most of it.

@@ -10,12 +10,12 @@ namespace rebounce {
 /// Gauss-Seidel relaxation (seed, chapter 8): patch after patch,
 /// B(i) = M0(i) + rho(i) sum over j of F(i,j) B(j), always with the newest values.
 ///
-/// The sweeps are those of the form factors (FormFactorOperator::make_relaxation), which know the
+/// The sweeps are those of the form factors (SweepableFormFactors::make_relaxation), which know the
 /// order in which they are read best. A symmetric solve turns around after every sweep; each
 /// direction counts as one. On compressed form factors it reads half as much.
 class GaussSeidelSolver final : public RadiositySolver {
  public:
-  GaussSeidelSolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem,
+  GaussSeidelSolver(const SweepableFormFactors& form_factors, const RadiosityProblem& problem,
                     SweepOrder order = SweepOrder::kForward);
 
  private:

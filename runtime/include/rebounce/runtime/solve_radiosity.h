@@ -16,9 +16,9 @@ namespace rebounce {
 
 enum class SolveMethod : std::uint8_t {
   kGathering,
-  kJacobi,  ///< the same iteration as gathering, see gathering_solver.h
-  kGaussSeidel,
-  kSymmetricGaussSeidel,
+  kJacobi,                ///< the same iteration as gathering, see gathering_solver.h
+  kGaussSeidel,           ///< needs SweepableFormFactors
+  kSymmetricGaussSeidel,  ///< likewise
   kConjugateGradient,
   kSouthwell,                        ///< needs FormFactorBlocks
   kRefine,                           ///< needs the stored operator

@@ -2,15 +2,15 @@
 
 #include <memory>
 
-#include "rebounce/transfer/form_factor_operator.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/relaxation.h"
 
 namespace rebounce {
 
 /// F as a hierarchical matrix: G = A^1/2 F A^-1/2, which is symmetric, in the blocks of
 /// HierarchicalOperator, one matrix for the three channels. Of a block and its mirror image one is
 /// stored; gathering applies both while it is in cache.
-class CompressedFormFactors final : public FormFactorOperator {
+class CompressedFormFactors final : public SweepableFormFactors {
  public:
   /// Refers to nothing but `exchange`, which it shares. Throws Error if that is null or its
   /// channels have different matrices.

@@ -7,7 +7,7 @@
 
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/form_factor_blocks.h"
-#include "rebounce/transfer/form_factor_operator.h"
+#include "rebounce/transfer/relaxation.h"
 
 namespace rebounce {
 
@@ -17,7 +17,7 @@ namespace rebounce {
 ///
 /// Rows are shared out among a fixed number of sums whatever the number of threads, and these are
 /// added up in order. Vectors are planes, [3][plane_size()], zero past patch n.
-class ExchangeBlocks final : public FormFactorOperator {
+class ExchangeBlocks final : public SweepableFormFactors {
  public:
   /// Gauss-Seidel takes this many rows at a time.
   static constexpr std::size_t kGroup = FormFactorBlocks::kGroup;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/transfer/form_factor_operator.h"
+#include "rebounce/transfer/relaxation.h"
 #include "rebounce/transfer/shared_array.h"
 #include "rebounce/transfer/types.h"
 
@@ -14,9 +14,9 @@ namespace rebounce {
 /// The form factors as exchange areas S(i,j) = area(i) F(i,j) in m².
 ///
 /// S is symmetric (reciprocity), so only the upper triangle is kept, by rows: one stored number
-/// serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. Pairs that do
-/// not see each other are absent, and so is the diagonal of patches that do not see themselves, as
-/// flat ones do not.
+/// serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. Pairs that
+/// do not see each other are absent, and so is the diagonal of patches that do not see themselves,
+/// as flat ones do not.
 struct ExchangeMatrix {
   SharedArray<std::uint64_t> row_begin;  ///< [n + 1], row_begin[n] = number of entries
   SharedArray<std::uint32_t> column;     ///< ascending in each row, row <= column < n
@@ -28,7 +28,7 @@ struct ExchangeMatrix {
 /// Form factors by full rows, ready for gathering: row i lists every j with F(i,j) > 0.
 ///
 /// Twice the entries of the ExchangeMatrix it is made from, in exchange for row access.
-class FormFactorRows final : public FormFactorOperator {
+class FormFactorRows final : public SweepableFormFactors {
  public:
   /// Expands `exchange`. `area` has n entries in m². Throws Error if the sizes do not agree.
   FormFactorRows(const ExchangeMatrix& exchange, std::span<const float> area);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rebounce/transfer/exchange_matrix.h"
-#include "rebounce/transfer/form_factor_operator.h"
+#include "rebounce/transfer/relaxation.h"
 
 namespace rebounce {
 
@@ -25,7 +25,7 @@ struct alignas(4 * kFormFactorBlock) FormFactorBlock {
 /// are one wide load instead of eight scattered ones.
 ///
 /// Vectors are "planes": [3][plane_size()], one channel after another, zero past patch n.
-class FormFactorBlocks final : public FormFactorOperator {
+class FormFactorBlocks final : public SweepableFormFactors {
  public:
   /// Gauss-Seidel takes this many rows at a time: a multiple of the block, so that a block is
   /// wholly inside or outside a group. More: fewer synchronisations, a longer serial part.

@@ -1,16 +1,14 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <span>
 
-#include "rebounce/transfer/relaxation.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
 
-/// F as solvers see it, whatever it is stored as: it gathers, which is all that gathering,
-/// conjugate gradients and refinement need, and it makes the sweeps of Gauss-Seidel.
+/// F as something that gathers, whatever it is stored as: all that gathering, conjugate gradients
+/// and refinement need to know of it.
 ///
 /// An operator is immutable: any number of threads may use one at the same time, each with a
 /// workspace of its own.
@@ -31,9 +29,6 @@ class FormFactorOperator {
   /// locks; the same bits for any number of OpenMP threads.
   virtual void gather(std::span<const Float3> in, std::span<Float3> out,
                       std::span<float> workspace) const = 0;
-
-  /// Sweeps over this F; they start with Relaxation::begin. Allocates what they need.
-  virtual std::unique_ptr<Relaxation> make_relaxation() const = 0;
 };
 
 }  // namespace rebounce

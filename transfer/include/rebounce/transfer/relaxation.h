@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
+#include "rebounce/transfer/form_factor_operator.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
@@ -41,6 +43,13 @@ class Relaxation {
 
   /// How often one sweep reads all of F, on average.
   virtual int reads_per_sweep(SweepOrder order) const = 0;
+};
+
+/// F that Gauss-Seidel can sweep over as well.
+class SweepableFormFactors : public FormFactorOperator {
+ public:
+  /// Sweeps over this F; they start with Relaxation::begin. Allocates what they need.
+  virtual std::unique_ptr<Relaxation> make_relaxation() const = 0;
 };
 
 }  // namespace rebounce
