@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/light_probes.h"
 #include "rebounce/transfer/scene_description.h"
 #include "rebounce/transfer/transfer_operator.h"
 #include "rebounce/transfer/types.h"
@@ -74,6 +75,7 @@ struct TransferData {
   std::vector<Texture> textures;
   std::vector<Camera> cameras;
   std::vector<Light> lights;
+  LightProbes probes;  ///< may be none
   ExchangeMatrix exchange;
   std::shared_ptr<const TransferOperator> transfer;
   BuildRecord record;
