@@ -3,46 +3,22 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/emitting_material.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {
 
-const TransferData& checked(const std::shared_ptr<const TransferData>& data) {
+std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> data) {
   if (!data || !data->transfer) throw Error("the transfer data have no operator");
-  return *data;
-}
-
-float area_of(const DisplayMesh& mesh, std::size_t t) {
-  const glm::vec3 a = to_glm(mesh.position[mesh.triangle[t][0]]);
-  const glm::vec3 ab = to_glm(mesh.position[mesh.triangle[t][1]]) - a;
-  const glm::vec3 ac = to_glm(mesh.position[mesh.triangle[t][2]]) - a;
-  return 0.5F * glm::length(glm::cross(ab, ac));
-}
-
-/// [n] the material of the largest triangle of each patch whose material emits, or kNone.
-std::vector<std::uint32_t> find_emitting_material(const TransferData& data) {
-  const DisplayMesh& mesh = data.mesh;
-  std::vector<std::uint32_t> material(data.patches.size(), kNone);
-  std::vector<float> largest(data.patches.size(), 0.0F);
-  for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
-    const std::uint32_t patch = mesh.triangle_patch[t], m = mesh.triangle_material[t];
-    if (patch == kNone || m >= data.materials.size()) continue;
-    if (data.materials[m].emitted_luminance == Float3{0, 0, 0}) continue;
-    const float area = area_of(mesh, t);
-    if (area <= largest[patch]) continue;
-    largest[patch] = area;
-    material[patch] = m;
-  }
-  return material;
+  return data;
 }
 
 }  // namespace
 
 #if REBOUNCE_WITH_EMBREE
 Engine::Engine(std::shared_ptr<const TransferData> data, const DirectLightingSettings& settings)
-    : data_((checked(data), std::move(data))),
+    : data_(checked(std::move(data))),
       tracer_(std::make_shared<const RayTracer>(
           data_->mesh.position,
           std::span(data_->mesh.triangle).first(data_->mesh.surface_count()))),
@@ -61,7 +37,7 @@ void Engine::compute_direct(std::span<const Light> lights, const Sky& sky) {
   direct_lighting_.compute(lights, sky, direct_irradiance_);
 }
 #else
-Engine::Engine(std::shared_ptr<const TransferData> data) : data_((checked(data), std::move(data))) {
+Engine::Engine(std::shared_ptr<const TransferData> data) : data_(checked(std::move(data))) {
   make_room();
 }
 #endif

@@ -9,8 +9,10 @@
 #include <numbers>
 
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/runtime/emitting_material.h"
 #include "rebounce/runtime/ies_profile.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {
@@ -188,6 +190,44 @@ Light read_light(const Field& field, const std::filesystem::path& folder) {
   return light;
 }
 
+std::vector<EmitterScale> read_emitters(const Field& root) {
+  std::vector<EmitterScale> emitters;
+  if (!root.object.contains("emitters")) return emitters;
+  const json& list = root.object.at("emitters");
+  if (!list.is_array()) root.fail("emitters", "an array");
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    const Field field{list[k], fmt::format("{}: emitter {}", root.where, k)};
+    if (!field.object.is_object()) throw Error(field.where + ": must be an object");
+    field.check_names({"material", "color", "scale"});
+    const json material = field.object.value("material", json());
+    if (!material.is_string()) field.fail("material", "the name of a material of the scene");
+    EmitterScale emitter{material.get<std::string>(), field.triple("color", 0, {1, 1, 1})};
+    for (float& x : emitter.scale) x *= field.number("scale", 0, 1);
+    emitters.push_back(emitter);
+  }
+  return emitters;
+}
+
+/// Scales what the surfaces of a material emit. Throws Error if there are none of that name.
+void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> patch_material,
+                   TransferData& data) {
+  bool found = false;
+  for (std::uint32_t m = 0; m < data.materials.size(); ++m) {
+    if (data.materials[m].name != emitter.material) continue;
+    found = true;
+    for (int c = 0; c < kChannelCount; ++c) {
+      data.materials[m].emitted_luminance[c] *= emitter.scale[c];
+      for (std::size_t i = 0; i < patch_material.size(); ++i) {
+        if (patch_material[i] == m) data.patches.emitted_exitance[i][c] *= emitter.scale[c];
+      }
+    }
+  }
+  if (!found) {
+    throw Error(fmt::format("the scene has no material \"{}\" to scale; check \"emitters\"",
+                            emitter.material));
+  }
+}
+
 LightSetup read_json(const std::filesystem::path& path) {
   std::ifstream stream(path);
   if (!stream) throw Error("cannot open " + path.string() + "; check the name");
@@ -199,7 +239,7 @@ LightSetup read_json(const std::filesystem::path& path) {
   }
   const Field root{document, path.string()};
   if (!document.is_object()) throw Error(path.string() + ": must hold an object with \"lights\"");
-  root.check_names({"lights", "sky"});
+  root.check_names({"lights", "sky", "emitters"});
   LightSetup setup;
   if (document.contains("lights")) {
     const json& lights = document.at("lights");
@@ -209,6 +249,7 @@ LightSetup read_json(const std::filesystem::path& path) {
                                         path.parent_path()));
     }
   }
+  setup.emitters = read_emitters(root);
   if (document.contains("sky")) {
     if (!document.at("sky").is_object()) root.fail("sky", "an object");
     const Field field{document.at("sky"), path.string() + ": sky"};
@@ -244,6 +285,18 @@ LightSetup choose_lights(const std::filesystem::path& path, const TransferData& 
     throw Error("there is no light: the scene has none of its own; give some with --lights");
   }
   return setup;
+}
+
+std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& file,
+                                                   const std::filesystem::path& lights,
+                                                   LightSetup& setup) {
+  TransferData data = load_transfer_file(file);
+  setup = choose_lights(lights, data);
+  const std::vector<std::uint32_t> patch_material = find_emitting_material(data);
+  for (const EmitterScale& emitter : setup.emitters) {
+    scale_emitter(emitter, patch_material, data);
+  }
+  return std::make_shared<const TransferData>(std::move(data));
 }
 
 }  // namespace rebounce::cli
