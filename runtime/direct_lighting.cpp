@@ -81,20 +81,18 @@ class ShadowBatch {
   std::array<float, kBatch> carried_;
 };
 
-/// Shadow rays to a lamp with a surface: what would arrive is known exactly, and the rays find
-/// which part of it does, each counting by what its place contributes (E. Heitz, S. Hill,
+/// Shadow rays to `places` of a lamp with a surface: what would arrive is known exactly, and the
+/// rays find which part of it does, each counting by what its place contributes (E. Heitz, S. Hill,
 /// M. McGuire, "Combining analytic direct illumination and stochastic shadows", 2018).
-/// `first` and `count`: which points of the sequence, shifted by `shift`, the places are.
 void add_area_rays(const PreparedLight& light, std::size_t patch, const PatchPoint& point,
-                   std::uint32_t first, std::uint32_t count, const glm::dvec2& shift, float weight,
-                   ShadowBatch& batch) {
+                   std::span<const glm::vec2> places, float weight, ShadowBatch& batch) {
   const float unoccluded = light.unoccluded_irradiance(point.position, point.normal);
   if (unoccluded <= 0) return;
   std::array<UnitLight, kMaxAreaLightSamples> sample;
   std::array<float, kMaxAreaLightSamples> part;
+  light.evaluate_places(point.position, places, std::span(sample).first(places.size()));
   float sum = 0;
-  for (std::uint32_t k = 0; k < count; ++k) {
-    sample[k] = light.evaluate(point.position, glm::vec2(r2_point(first + k, shift)));
+  for (std::size_t k = 0; k < places.size(); ++k) {
     part[k] = sample[k].illuminance * std::max(0.0F, glm::dot(sample[k].direction, point.normal));
     sum += part[k];
   }
@@ -104,9 +102,19 @@ void add_area_rays(const PreparedLight& light, std::size_t patch, const PatchPoi
     batch.add(patch, point, {path / distance, distance, 0}, weight * unoccluded);
     return;
   }
-  for (std::uint32_t k = 0; k < count; ++k) {
-    if (part[k] <= 0) continue;
-    batch.add(patch, point, sample[k], weight * unoccluded * part[k] / sum);
+  const float scale = weight * unoccluded / sum;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    if (part[k] > 0) batch.add(patch, point, sample[k], scale * part[k]);
+  }
+}
+
+/// Moves `places` of the unit square by `shift`, around its edges.
+void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
+                  std::span<glm::vec2> shifted) {
+  const auto around = [](float x) { return x < 1 ? x : x - 1; };
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const glm::vec2 moved = places[k] + shift;
+    shifted[k] = {around(moved.x), around(moved.y)};
   }
 }
 
@@ -115,7 +123,8 @@ void add_area_rays(const PreparedLight& light, std::size_t patch, const PatchPoi
 /// Where light is looked for: the same for every light and every frame.
 struct DirectLighting::Receivers {
   std::size_t points_per_patch = 0;
-  std::uint32_t area_light_samples = 0;
+  std::size_t area_light_samples = 0;
+  std::vector<glm::vec2> places;   ///< [points_per_patch][area_light_samples] of every lamp
   std::vector<PatchPoint> points;  ///< [n][points_per_patch]
   std::vector<Box> block_box;      ///< [blocks] around their points
 
@@ -145,7 +154,11 @@ DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer
   const std::size_t n = data.patches.size();
   const auto receivers = std::make_shared<Receivers>();
   receivers->points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
-  receivers->area_light_samples = static_cast<std::uint32_t>(settings.area_light_samples);
+  receivers->area_light_samples = static_cast<std::size_t>(settings.area_light_samples);
+  receivers->places.resize(receivers->points_per_patch * receivers->area_light_samples);
+  for (std::uint32_t k = 0; k < receivers->places.size(); ++k) {
+    receivers->places[k] = glm::vec2(r2_point(k, {0, 0}));
+  }
   receivers->points.resize(n * receivers->points_per_patch);
   const DisplayMesh& mesh = data.mesh;
   for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
@@ -226,20 +239,22 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
   if (box.distance_squared(light.position()) >= light.reach_squared()) return;
 
   const float weight = 1 / static_cast<float>(receivers_->points_per_patch);
-  const std::uint32_t samples = receivers_->area_light_samples;
+  const std::size_t samples = receivers_->area_light_samples;
+  std::array<glm::vec2, kMaxAreaLightSamples> places;
   ShadowBatch batch(tracer_, irradiance);
   for (std::size_t patch = begin; patch < end; ++patch) {
-    std::uint32_t first_sample = 0;
-    const glm::dvec2 shift = unit_square(mix_bits(~static_cast<std::uint64_t>(patch)));
-    for (const PatchPoint& point : receivers_->points_of(patch)) {
+    const std::span<const PatchPoint> points = receivers_->points_of(patch);
+    const glm::vec2 shift(unit_square(mix_bits(~static_cast<std::uint64_t>(patch))));
+    for (std::size_t k = 0; k < points.size(); ++k) {
       if (light.has_area()) {
-        add_area_rays(light, patch, point, first_sample, samples, shift, weight, batch);
-        first_sample += samples;
+        const std::span<glm::vec2> here = std::span(places).first(samples);
+        shift_places(std::span(receivers_->places).subspan(k * samples, samples), shift, here);
+        add_area_rays(light, patch, points[k], here, weight, batch);
         continue;
       }
-      const UnitLight unit = light.evaluate(point.position, {});
-      const float arriving = unit.illuminance * glm::dot(unit.direction, point.normal);
-      if (arriving > 0) batch.add(patch, point, unit, weight * arriving);
+      const UnitLight unit = light.evaluate(points[k].position);
+      const float arriving = unit.illuminance * glm::dot(unit.direction, points[k].normal);
+      if (arriving > 0) batch.add(patch, points[k], unit, weight * arriving);
     }
   }
   batch.flush();

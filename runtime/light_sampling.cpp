@@ -31,7 +31,14 @@ void check_axes(const Light& light) {
 }  // namespace
 
 IncidentLight evaluate_light(const Light& light, const Float3& point, const Float2& place) {
-  const UnitLight unit = PreparedLight(light).evaluate(to_glm(point), to_glm(place));
+  const PreparedLight prepared(light);
+  UnitLight unit;
+  if (prepared.has_area()) {
+    const glm::vec2 from = to_glm(place);
+    prepared.evaluate_places(to_glm(point), {&from, 1}, {&unit, 1});
+  } else {
+    unit = prepared.evaluate(to_glm(point));
+  }
   return {.direction = to_float3(unit.direction),
           .distance = unit.distance,
           .illuminance = to_float3(to_glm(light.color) * light.intensity * unit.illuminance)};

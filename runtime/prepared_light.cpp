@@ -50,16 +50,19 @@ PreparedLight::PreparedLight(const Light& light)
   area_ = light.size[0] * light.size[1];
 }
 
-UnitLight PreparedLight::evaluate(const glm::vec3& point, const glm::vec2& place) const {
-  switch (type_) {
-    case LightType::kDirectional:
-      return {-direction_, std::numeric_limits<float>::infinity(), 1};
-    case LightType::kSphere:
-      return from_sphere(position_ - point, place);
-    case LightType::kRectangle:
-      return from_rectangle(position_ - point, place);
-    default:
-      return from_lamp(position_ - point);
+UnitLight PreparedLight::evaluate(const glm::vec3& point) const {
+  if (type_ == LightType::kDirectional) {
+    return {-direction_, std::numeric_limits<float>::infinity(), 1};
+  }
+  return from_lamp(position_ - point);
+}
+
+void PreparedLight::evaluate_places(const glm::vec3& point, std::span<const glm::vec2> places,
+                                    std::span<UnitLight> light) const {
+  if (type_ == LightType::kSphere) {
+    from_sphere(position_ - point, places, light);
+  } else {
+    from_rectangle(position_ - point, places, light);
   }
 }
 
@@ -76,36 +79,48 @@ UnitLight PreparedLight::from_lamp(const glm::vec3& to_lamp) const {
 }
 
 // Uniformly in the cone in which the sphere is seen.
-UnitLight PreparedLight::from_sphere(const glm::vec3& to_center, const glm::vec2& place) const {
+void PreparedLight::from_sphere(const glm::vec3& to_center, std::span<const glm::vec2> places,
+                                std::span<UnitLight> light) const {
   const float distance_squared = glm::dot(to_center, to_center);
   const float sine_squared = radius_ * radius_ / distance_squared;
-  if (!(sine_squared < 1)) return {};  // inside
+  if (!(sine_squared < 1)) {  // inside
+    std::ranges::fill(light, UnitLight{});
+    return;
+  }
   const float distance = std::sqrt(distance_squared);
   // 1 - cos of the cone's half angle, without cancellation.
   const float height = sine_squared / (1 + std::sqrt(1 - sine_squared));
-  const float down = place.x * height;  // 1 - cosine of the direction to the axis
-  const float cosine = 1 - down, sine = std::sqrt(down * (1 + cosine));
+  const float illuminance = 2 * kPi * height * range_window(distance_squared);
   const glm::vec3 axis = to_center / distance;
   const glm::vec3 least = std::abs(axis.x) < 0.5F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
   const auto [x, y] = sides_around(axis, least);
-  const float turn = 2 * kPi * place.y;
-  const glm::vec3 direction = cosine * axis + sine * (std::cos(turn) * x + std::sin(turn) * y);
-  // Where it meets the sphere first.
-  const float off_axis_squared = distance_squared * sine * sine;
-  const float into = std::sqrt(std::max(0.0F, radius_ * radius_ - off_axis_squared));
-  return {direction, distance * cosine - into, 2 * kPi * height * range_window(distance_squared)};
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const float down = places[k].x * height;  // 1 - cosine of the direction to the axis
+    const float cosine = 1 - down, sine_squared_here = down * (1 + cosine);
+    const float sine = std::sqrt(sine_squared_here), turn = 2 * kPi * places[k].y;
+    // Where it meets the sphere first.
+    const float off_axis_squared = distance_squared * sine_squared_here;
+    const float into = std::sqrt(std::max(0.0F, radius_ * radius_ - off_axis_squared));
+    light[k] = {cosine * axis + sine * (std::cos(turn) * x + std::sin(turn) * y),
+                distance * cosine - into, illuminance};
+  }
 }
 
 // Uniformly over the area.
-UnitLight PreparedLight::from_rectangle(const glm::vec3& to_center, const glm::vec2& place) const {
-  const glm::vec3 path = to_center + (2 * place.x - 1) * side_ + (2 * place.y - 1) * other_side_;
-  const float distance_squared = glm::dot(path, path);
-  if (!(distance_squared > 0)) return {};
-  const float distance = std::sqrt(distance_squared);
-  const glm::vec3 direction = path / distance;
-  const float cosine = std::max(0.0F, -glm::dot(direction, direction_));
-  const float window = range_window(glm::dot(to_center, to_center));
-  return {direction, distance, window * cosine * area_ / distance_squared};
+void PreparedLight::from_rectangle(const glm::vec3& to_center, std::span<const glm::vec2> places,
+                                   std::span<UnitLight> light) const {
+  const float full = area_ * range_window(glm::dot(to_center, to_center));
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const glm::vec3 path =
+        to_center + (2 * places[k].x - 1) * side_ + (2 * places[k].y - 1) * other_side_;
+    const float distance_squared = glm::dot(path, path);
+    light[k] = {};
+    if (!(distance_squared > 0)) continue;
+    const float distance = std::sqrt(distance_squared);
+    const glm::vec3 direction = path / distance;
+    const float cosine = std::max(0.0F, -glm::dot(direction, direction_));
+    light[k] = {direction, distance, full * cosine / distance_squared};
+  }
 }
 
 float PreparedLight::unoccluded_irradiance(const glm::vec3& point, const glm::vec3& normal) const {

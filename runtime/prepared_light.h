@@ -2,6 +2,7 @@
 
 #include <glm/glm.hpp>
 #include <memory>
+#include <span>
 
 #include "rebounce/runtime/light_sampling.h"
 
@@ -23,8 +24,13 @@ class PreparedLight {
 
   bool operator==(const PreparedLight&) const = default;
 
-  /// See evaluate_light.
-  UnitLight evaluate(const glm::vec3& point, const glm::vec2& place) const;
+  /// See evaluate_light. Not for lamps with a surface.
+  UnitLight evaluate(const glm::vec3& point) const;
+
+  /// See evaluate_light: at one point, from each of `places` of a lamp with a surface. The two are
+  /// of one size.
+  void evaluate_places(const glm::vec3& point, std::span<const glm::vec2> places,
+                       std::span<UnitLight> light) const;
 
   /// The irradiance at `point` on a surface with unit `normal`, per unit of intensity, of a lamp
   /// with a surface of which nothing is hidden: closed forms, cut at the horizon, windowed by the
@@ -42,8 +48,10 @@ class PreparedLight {
 
  private:
   UnitLight from_lamp(const glm::vec3& to_lamp) const;
-  UnitLight from_sphere(const glm::vec3& to_center, const glm::vec2& place) const;
-  UnitLight from_rectangle(const glm::vec3& to_center, const glm::vec2& place) const;
+  void from_sphere(const glm::vec3& to_center, std::span<const glm::vec2> places,
+                   std::span<UnitLight> light) const;
+  void from_rectangle(const glm::vec3& to_center, std::span<const glm::vec2> places,
+                      std::span<UnitLight> light) const;
   float range_window(float distance_squared) const;
   float cone_attenuation(float cosine) const;
   float profile_candela(const glm::vec3& from_lamp) const;
