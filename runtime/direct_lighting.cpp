@@ -9,6 +9,7 @@
 
 #include "prepared_light.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
 
@@ -22,8 +23,8 @@ constexpr int kMaxAreaLightSamples = 64;
 // A shadow ray stops this part of its length before the lamp, which may hang on a surface.
 constexpr float kLampGap = 1e-4F;
 
-/// A point where light is looked for.
-struct PatchPoint {
+/// A point where light is looked for, in the vectors of the inside.
+struct Receiver {
   glm::vec3 position;  ///< moved off the surface
   glm::vec3 normal;    ///< unit
 };
@@ -49,7 +50,7 @@ class ShadowBatch {
       : tracer_(tracer), irradiance_(irradiance) {}
 
   /// A ray to where `light` comes from, which carries `irradiance`.
-  void add(std::size_t patch, const PatchPoint& point, const UnitLight& light, float irradiance) {
+  void add(std::size_t patch, const Receiver& point, const UnitLight& light, float irradiance) {
     if (count_ == kBatch) flush();
     Ray& ray = rays_[count_];
     ray.origin = to_float3(point.position);
@@ -84,7 +85,7 @@ class ShadowBatch {
 /// Shadow rays to `places` of a lamp with a surface: what would arrive is known exactly, and the
 /// rays find which part of it does, each counting by what its place contributes (E. Heitz, S. Hill,
 /// M. McGuire, "Combining analytic direct illumination and stochastic shadows", 2018).
-void add_area_rays(const PreparedLight& light, std::size_t patch, const PatchPoint& point,
+void add_area_rays(const PreparedLight& light, std::size_t patch, const Receiver& point,
                    std::span<const glm::vec2> places, float weight, ShadowBatch& batch) {
   const float unoccluded = light.unoccluded_irradiance(point.position, point.normal);
   if (unoccluded <= 0) return;
@@ -124,11 +125,11 @@ void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
 struct DirectLighting::Receivers {
   std::size_t points_per_patch = 0;
   std::size_t area_light_samples = 0;
-  std::vector<glm::vec2> places;   ///< [points_per_patch][area_light_samples] of every lamp
-  std::vector<PatchPoint> points;  ///< [n][points_per_patch]
-  std::vector<Box> block_box;      ///< [blocks] around their points
+  std::vector<glm::vec2> places;  ///< [points_per_patch][area_light_samples] of every lamp
+  std::vector<Receiver> points;   ///< [n][points_per_patch]
+  std::vector<Box> block_box;     ///< [blocks] around their points
 
-  std::span<const PatchPoint> points_of(std::size_t patch) const {
+  std::span<const Receiver> points_of(std::size_t patch) const {
     return std::span(points).subspan(patch * points_per_patch, points_per_patch);
   }
 };
@@ -145,44 +146,42 @@ struct DirectLighting::LightResponse {
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
                                const DirectLightingSettings& settings)
-    : data_(data), tracer_(tracer) {
+    : data_(data), tracer_(tracer), receivers_(spread_receivers(data, tracer, settings)) {
+  make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
+}
+
+std::shared_ptr<const DirectLighting::Receivers> DirectLighting::spread_receivers(
+    const TransferData& data, const RayTracer& tracer, const DirectLightingSettings& settings) {
   if (settings.points_per_patch < 1) throw Error("direct light needs at least one point per patch");
   if (settings.area_light_samples < 1 || settings.area_light_samples > kMaxAreaLightSamples) {
     throw Error("direct light needs from 1 to " + std::to_string(kMaxAreaLightSamples) +
                 " samples of lamps with a surface");
   }
   const std::size_t n = data.patches.size();
-  const auto receivers = std::make_shared<Receivers>();
-  receivers->points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
+  auto receivers = std::make_shared<Receivers>();
+  const auto points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
+  receivers->points_per_patch = points_per_patch;
   receivers->area_light_samples = static_cast<std::size_t>(settings.area_light_samples);
-  receivers->places.resize(receivers->points_per_patch * receivers->area_light_samples);
+  receivers->places.resize(points_per_patch * receivers->area_light_samples);
   for (std::uint32_t k = 0; k < receivers->places.size(); ++k) {
     receivers->places[k] = glm::vec2(r2_point(k, {0, 0}));
   }
-  receivers->points.resize(n * receivers->points_per_patch);
-  const DisplayMesh& mesh = data.mesh;
-  for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
-    const std::uint32_t patch = mesh.triangle_patch[t];
-    if (patch == kNone) continue;
-    const glm::dvec3 a = to_dvec3(mesh.position[mesh.triangle[t][0]]);
-    const glm::dvec3 ab = to_dvec3(mesh.position[mesh.triangle[t][1]]) - a;
-    const glm::dvec3 ac = to_dvec3(mesh.position[mesh.triangle[t][2]]) - a;
-    const glm::dvec2 shift = unit_square(mix_bits(patch));
-    for (std::size_t k = 0; k < receivers->points_per_patch; ++k) {
-      const glm::dvec2 b = square_to_triangle(r2_point(static_cast<std::uint32_t>(k), shift));
-      const Float3& normal = data.patches.normal[patch];
-      receivers->points[patch * receivers->points_per_patch + k] = {
-          to_glm(tracer.offset_point(to_float3(a + b.x * ab + b.y * ac), normal)), to_glm(normal)};
-    }
-  }
+  receivers->points.resize(n * points_per_patch);
   receivers->block_box.resize((n + kBlock - 1) / kBlock);
-  for (std::size_t patch = 0; patch < n; ++patch) {
-    for (const PatchPoint& point : receivers->points_of(patch)) {
-      receivers->block_box[patch / kBlock].add(point.position);
+  const PatchTriangles triangles(data.mesh.triangle_patch, n);
+  std::vector<PatchPoint> spread(points_per_patch);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::ranges::fill(spread, PatchPoint{data.patches.centroid[i], data.patches.normal[i]});
+    if (!triangles[i].empty()) {
+      spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), spread);
+    }
+    for (std::size_t k = 0; k < points_per_patch; ++k) {
+      const Float3 lifted = tracer.offset_point(spread[k].position, spread[k].normal);
+      receivers->points[i * points_per_patch + k] = {to_glm(lifted), to_glm(spread[k].normal)};
+      receivers->block_box[i / kBlock].add(to_glm(lifted));
     }
   }
-  receivers_ = receivers;
-  make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
+  return receivers;
 }
 
 DirectLighting::~DirectLighting() = default;
@@ -243,7 +242,7 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
   std::array<glm::vec2, kMaxAreaLightSamples> places;
   ShadowBatch batch(tracer_, irradiance);
   for (std::size_t patch = begin; patch < end; ++patch) {
-    const std::span<const PatchPoint> points = receivers_->points_of(patch);
+    const std::span<const Receiver> points = receivers_->points_of(patch);
     const glm::vec2 shift(unit_square(mix_bits(~static_cast<std::uint64_t>(patch))));
     for (std::size_t k = 0; k < points.size(); ++k) {
       if (light.has_area()) {

@@ -52,6 +52,9 @@ class DirectLighting {
   struct Receivers;
   struct LightResponse;
 
+  static std::shared_ptr<const Receivers> spread_receivers(const TransferData& data,
+                                                           const RayTracer& tracer,
+                                                           const DirectLightingSettings& settings);
   void make_room(std::size_t light_count);
   void prepare(std::span<const Light> lights);
   void respond(LightResponse& response, std::size_t block) const;
