@@ -153,7 +153,7 @@ double part_to_triangle(const PatchPart& part, const FlatTriangle& t) {
     return t.area * point_kernel(part.centroid, part.normal, t.centroid, t.normal);
   }
   // Relative to the part, so that single precision is enough.
-  return point_to_triangle_form_factor(
+  return point_to_polygon_form_factor(
       {0, 0, 0}, part.normal,
       {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid, t.vertex[2] - part.centroid});
 }

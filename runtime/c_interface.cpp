@@ -21,6 +21,8 @@
 
 using namespace rebounce;
 
+// NOLINTBEGIN(readability-identifier-naming): the names of a C interface
+
 struct rebounce_transfer {
   std::shared_ptr<const TransferData> data;
   std::atomic<int> references = 1;
@@ -30,7 +32,11 @@ struct rebounce_engine {
   Engine engine;
   std::vector<Light> lights;  ///< of the present frame
   Sky sky;                    ///< likewise
+
+  explicit rebounce_engine(Engine made) : engine(std::move(made)) {}
 };
+
+// NOLINTEND(readability-identifier-naming)
 
 namespace {
 
@@ -79,13 +85,19 @@ Float3 triple(const float* values) {
   return {values[0], values[1], values[2]};
 }
 
+// No structure of any version comes near; more is memory that nobody has filled in.
+constexpr std::size_t kLargestStruct = 4096;
+
+void check_struct_size(std::uint32_t size, std::size_t least_size) {
+  if (size >= least_size && size <= kLargestStruct) return;
+  throw Error("struct_size is " + std::to_string(size) +
+              "; fill the structure with its _init function");
+}
+
 /// `given` as far as its caller knows the structure, and `defaults` beyond.
 template <typename Struct>
 Struct take(const Struct* given, Struct defaults, std::size_t least_size) {
-  if (given->struct_size < least_size) {
-    throw Error("struct_size is " + std::to_string(given->struct_size) +
-                "; fill the structure with its _init function");
-  }
+  check_struct_size(given->struct_size, least_size);
   std::memcpy(&defaults, given, std::min<std::size_t>(given->struct_size, sizeof(Struct)));
   return defaults;
 }
@@ -100,6 +112,7 @@ constexpr std::size_t kInfoSize1 = sizeof(rebounce_transfer_info);
 void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   rebounce_light defaults;
   rebounce_light_init(&defaults);
+  check_struct_size(lights->struct_size, kLightSize1);
   const auto* const bytes = reinterpret_cast<const char*>(lights);
   const auto* const entry =
       reinterpret_cast<const rebounce_light*>(bytes + k * lights->struct_size);

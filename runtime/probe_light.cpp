@@ -54,6 +54,7 @@ void check_size(std::size_t size, std::size_t wanted, const char* name) {
 void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
                   std::span<ProbeLight> light) {
   check_size(light.size(), probes.size(), "the result");
+  if (probes.size() == 0) return;
   check_size(radiosity.size(), probes.patch_count, "the radiosity");
   const Float3 open_sky = {sky.luminance * sky.color[0], sky.luminance * sky.color[1],
                            sky.luminance * sky.color[2]};

@@ -26,6 +26,8 @@
 #ifndef REBOUNCE_H
 #define REBOUNCE_H
 
+/* NOLINTBEGIN(readability-identifier-naming): the names of a C interface */
+
 #include <stddef.h>
 #include <stdint.h>
 
@@ -189,5 +191,7 @@ void rebounce_harmonics_irradiance(const float* harmonics, const float* normal, 
 #ifdef __cplusplus
 }
 #endif
+
+/* NOLINTEND(readability-identifier-naming) */
 
 #endif

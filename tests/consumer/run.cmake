@@ -1,6 +1,7 @@
 # Installs the runtime, builds the consumers against it, by CMake and by pkg-config, and runs them.
 # Takes BUILD (of Rebounce), WORK (a folder of its own), SOURCE (this one), PROGRAM (rebounce),
-# SCENE, GENERATOR, C_COMPILER and CXX_COMPILER.
+# SCENE, GENERATOR, C_COMPILER and CXX_COMPILER; with ROOT (Rebounce's) the runtime is first built
+# without Embree, and BUILD is not used.
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE text ERROR_VARIABLE text)
   if(NOT status EQUAL 0)
@@ -13,6 +14,13 @@ endfunction()
 file(REMOVE_RECURSE ${WORK})
 set(prefix ${WORK}/installed)
 set(file ${WORK}/box.safetensors)
+if(ROOT)
+  set(BUILD ${WORK}/rebounce)
+  run(${CMAKE_COMMAND} -S ${ROOT} -B ${BUILD} -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${CXX_COMPILER}
+      -DCMAKE_BUILD_TYPE=Release -DREBOUNCE_WITH_EMBREE=OFF -DREBOUNCE_BUILD_PRECOMPUTE=OFF
+      -DREBOUNCE_BUILD_DEMO=OFF -DREBOUNCE_BUILD_TESTS=OFF -DREBOUNCE_BUILD_BENCH=OFF)
+  run(${CMAKE_COMMAND} --build ${BUILD} --target rebounce_runtime)
+endif()
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --component runtime)
 run(${PROGRAM} precompute ${SCENE} --patches 100 --probes 2,2,2 --probe-rays 256 --quiet -o ${file})
 

@@ -69,7 +69,8 @@ TEST_F(FromC, StructuresOfALaterVersionAreUnderstood) {
     later[k].light.struct_size = sizeof(LaterLight);
   }
   ASSERT_EQ(rebounce_engine_relight(engine_, now.data(), 2, nullptr), REBOUNCE_OK);
-  rebounce_transfer_info info{.struct_size = sizeof(info)};
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
   ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
   const float* const direct = rebounce_engine_direct_irradiance(engine_);
   const std::vector<float> before(direct, direct + 3 * std::size_t{info.patch_count});
