@@ -153,9 +153,9 @@ double part_to_triangle(const PatchPart& part, const FlatTriangle& t) {
     return t.area * point_kernel(part.centroid, part.normal, t.centroid, t.normal);
   }
   // Relative to the part, so that single precision is enough.
-  return point_to_polygon_form_factor(
-      {0, 0, 0}, part.normal,
-      {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid, t.vertex[2] - part.centroid});
+  const std::array<glm::vec3, 3> corner = {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid,
+                                           t.vertex[2] - part.centroid};
+  return point_to_polygon_form_factor({0, 0, 0}, part.normal, corner);
 }
 
 double parts_to_triangles(std::span<const PatchPart> parts,
