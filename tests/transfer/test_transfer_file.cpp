@@ -115,8 +115,32 @@ TransferData sample_data(Precision precision = Precision::kF16) {
   data.textures = {{{1, 2, 3}, TextureWrap::kRepeat, TextureWrap::kClampToEdge},
                    {{0x89, 'P', 'N', 'G', 0}, TextureWrap::kMirroredRepeat, TextureWrap::kRepeat}};
   data.cameras = {{"front", {1, 2, 3}, {0, 0, 1}, {0, 1, 0}, {-1, 0, 0}, 1.2F}};
-  data.lights = {{LightType::kSpot, "spot", {1, 1, 1}, {0, 0, 1}, {1, 0.5F, 0}, 80, 10, 0.1F, 0.7F},
-                 {LightType::kDirectional, "", {0, 0, 0}, {1, 0, 0}, {1, 1, 1}, 5, 0, 0, 0.5F}};
+  data.lights = {{LightType::kSpot,
+                  "spot",
+                  {1, 1, 1},
+                  {0, 0, 1},
+                  {1, 0.5F, 0},
+                  80,
+                  10,
+                  0.1F,
+                  0.7F,
+                  0,
+                  {0, 0},
+                  {1, 0, 0},
+                  nullptr},
+                 {LightType::kDirectional,
+                  "",
+                  {0, 0, 0},
+                  {1, 0, 0},
+                  {1, 1, 1},
+                  5,
+                  0,
+                  0,
+                  0.5F,
+                  0,
+                  {0, 0},
+                  {1, 0, 0},
+                  nullptr}};
   data.exchange = sample_exchange();
   data.transfer = sample_operator(data.patches.area, precision);
   data.record = {"rebounce 0.1.0",
