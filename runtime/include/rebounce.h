@@ -91,9 +91,10 @@ const float* rebounce_transfer_patch_reflectance(const rebounce_transfer* transf
 const float* rebounce_transfer_vertex_position(const rebounce_transfer* transfer);   /* [v][3] m */
 const float* rebounce_transfer_vertex_normal(const rebounce_transfer* transfer);     /* [v][3] */
 const uint32_t* rebounce_transfer_triangle(const rebounce_transfer* transfer);       /* [t][3] */
-const uint32_t* rebounce_transfer_triangle_patch(const rebounce_transfer* transfer); /* [t]; */
-const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer);    /* [p][3] m */
-const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer);     /* [p] 0, 1 */
+const uint32_t* rebounce_transfer_triangle_patch(
+    const rebounce_transfer* transfer); /* [t], or UINT32_MAX */
+const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer); /* [p][3] m */
+const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer);  /* [p] 0, 1 */
 
 /* ---- Lights ---- */
 
