@@ -65,10 +65,13 @@ Ray ray_to_lamp(const Light& light, const IncidentLight& incident, const Float3&
           .t_far = 1};
 }
 
-// Where on a lamp with a surface a camera sample looks: spread over those of its pixel.
-Float2 place_on_lamp(const CameraSample& sample) {
+// Places of a lamp with a surface at which each camera sample looks.
+constexpr std::uint32_t kPlacesPerSample = 4;
+
+// Place k of those, spread over all of the samples of a pixel.
+Float2 place_on_lamp(const CameraSample& sample, std::uint32_t k) {
   const glm::vec2 shift(hash_to_unit(sample.pixel, 5), hash_to_unit(sample.pixel, 6));
-  const glm::vec2 place = r2_point(sample.index, shift);
+  const glm::vec2 place = r2_point(kPlacesPerSample * sample.index + k, shift);
   return {place.x, place.y};
 }
 
@@ -117,13 +120,18 @@ void add_punctual_light(std::span<CameraSample> samples, std::span<const Light> 
                         const RayTracer& tracer) {
   ShadowRays shadow_rays;
   for (const Light& light : lights) {
+    const std::uint32_t places = is_area_light(light.type) ? kPlacesPerSample : 1;
     for (CameraSample& sample : samples) {
-      const IncidentLight incident =
-          evaluate_light(light, to_float3(sample.point.position), place_on_lamp(sample));
-      const glm::vec3 arriving =
-          to_glm(incident.illuminance) * receiving_cosine(sample.point, to_glm(incident.direction));
-      if (arriving == glm::vec3(0)) continue;
-      shadow_rays.add(sample, ray_to_lamp(light, incident, above(sample.point, tracer)), arriving);
+      for (std::uint32_t k = 0; k < places; ++k) {
+        const IncidentLight incident =
+            evaluate_light(light, to_float3(sample.point.position), place_on_lamp(sample, k));
+        const float cosine = receiving_cosine(sample.point, to_glm(incident.direction));
+        const glm::vec3 arriving =
+            to_glm(incident.illuminance) * (cosine / static_cast<float>(places));
+        if (arriving == glm::vec3(0)) continue;
+        shadow_rays.add(sample, ray_to_lamp(light, incident, above(sample.point, tracer)),
+                        arriving);
+      }
     }
     shadow_rays.deliver(tracer);
   }
