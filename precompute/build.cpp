@@ -137,7 +137,10 @@ std::string settings_json(const BuildSettings& settings) {
                         {"probe_rays", f.probe_rays},
                         {"full_rays", f.full_rays},
                         {"escape_rays", f.escape_rays},
-                        {"kernel_tolerance", f.kernel_tolerance}}
+                        {"kernel_tolerance", f.kernel_tolerance},
+                        {"probe_grid", settings.probes.grid},
+                        {"probe_spacing", settings.probes.spacing},
+                        {"probe_rays_each", settings.probes.ray_count}}
       .dump();
 }
 
@@ -245,6 +248,14 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.mesh = std::move(model.mesh);
   data.exchange = std::move(form_factors.exchange);
   compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh);
+
+  if (settings.probes.grid[0] > 0 || settings.probes.spacing > 0) {
+    data.probes = clock.run("probes", [&](const Progress& part) {
+      LightProbes probes = place_probes(data.mesh, settings.probes);
+      trace_probes(data, tracer, settings.probes, probes, part);
+      return probes;
+    });
+  }
 
   const BuildSettings decided = decide(settings, data.patches.size());
   const bool compressed = decided.operator_kind == OperatorKind::kHierarchical;

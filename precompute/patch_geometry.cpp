@@ -188,9 +188,9 @@ double part_to_triangle(const PatchPart& part, const glm::dvec3& normal, const F
     return t.area * point_kernel(part.centroid, normal, t.centroid, t.normal);
   }
   // Relative to the part, so that single precision is enough.
-  return point_to_triangle_form_factor(
-      {0, 0, 0}, normal,
-      {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid, t.vertex[2] - part.centroid});
+  const std::array<glm::vec3, 3> corner = {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid,
+                                           t.vertex[2] - part.centroid};
+  return point_to_polygon_form_factor({0, 0, 0}, normal, corner);
 }
 
 /// From the parts of patch i to patch j: to its parts where they are far for their size, else to

@@ -1,13 +1,15 @@
 #include "rebounce/runtime/direct_lighting.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "prepared_light.h"
 #include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/light_sampling.h"
+#include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
 
@@ -15,72 +17,267 @@ namespace rebounce {
 namespace {
 
 constexpr std::size_t kBlock = 64;  // patches that a thread lights at a time
+constexpr std::size_t kBatch = 64;  // shadow rays that are traced together
+constexpr int kMaxAreaLightSamples = 64;
 
 // A shadow ray stops this part of its length before the lamp, which may hang on a surface.
 constexpr float kLampGap = 1e-4F;
 
+/// A point where light is looked for, in the vectors of the inside.
+struct Receiver {
+  glm::vec3 position;  ///< moved off the surface
+  glm::vec3 normal;    ///< unit
+};
+
+/// The box around the points of a block.
+struct Box {
+  glm::vec3 low{std::numeric_limits<float>::max()}, high{std::numeric_limits<float>::lowest()};
+
+  void add(const glm::vec3& p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  }
+  float distance_squared(const glm::vec3& p) const {
+    const glm::vec3 apart = glm::max(glm::max(low - p, p - high), glm::vec3(0));
+    return glm::dot(apart, apart);
+  }
+};
+
+/// Collects shadow rays and adds the light of those that get through to their patches, in turn.
+class ShadowBatch {
+ public:
+  ShadowBatch(const RayTracer& tracer, std::span<float> irradiance)
+      : tracer_(tracer), irradiance_(irradiance) {}
+
+  /// A ray to where `light` comes from, which carries `irradiance`.
+  void add(std::size_t patch, const Receiver& point, const UnitLight& light, float irradiance) {
+    if (count_ == kBatch) flush();
+    Ray& ray = rays_[count_];
+    ray.origin = to_float3(point.position);
+    ray.t_near = 0;
+    ray.direction = to_float3(light.direction);
+    ray.time = 0;
+    ray.t_far = light.distance * (1 - kLampGap);
+    ray.mask = 0xFFFFFFFFU;
+    ray.id = 0;
+    ray.flags = 0;
+    patch_[count_] = static_cast<std::uint32_t>(patch);
+    carried_[count_++] = irradiance;
+  }
+
+  void flush() {
+    tracer_.occluded({rays_.data(), count_});
+    for (std::size_t k = 0; k < count_; ++k) {
+      if (!is_occluded(rays_[k])) irradiance_[patch_[k]] += carried_[k];
+    }
+    count_ = 0;
+  }
+
+ private:
+  const RayTracer& tracer_;
+  std::span<float> irradiance_;
+  std::size_t count_ = 0;
+  std::array<Ray, kBatch> rays_;
+  std::array<std::uint32_t, kBatch> patch_;
+  std::array<float, kBatch> carried_;
+};
+
+/// Shadow rays to `places` of a lamp with a surface: what would arrive is known exactly, and the
+/// rays find which part of it does, each counting by what its place contributes (E. Heitz, S. Hill,
+/// M. McGuire, "Combining analytic direct illumination and stochastic shadows", 2018).
+void add_area_rays(const PreparedLight& light, std::size_t patch, const Receiver& point,
+                   std::span<const glm::vec2> places, float weight, ShadowBatch& batch) {
+  const float unoccluded = light.unoccluded_irradiance(point.position, point.normal);
+  if (unoccluded <= 0) return;
+  std::array<UnitLight, kMaxAreaLightSamples> sample;
+  std::array<float, kMaxAreaLightSamples> part;
+  light.evaluate_places(point.position, places, std::span(sample).first(places.size()));
+  float sum = 0;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    part[k] = sample[k].illuminance * std::max(0.0F, glm::dot(sample[k].direction, point.normal));
+    sum += part[k];
+  }
+  if (sum <= 0) {  // but for a sliver, the lamp is below the horizon
+    const glm::vec3 path = light.highest_point(point.normal) - point.position;
+    const float distance = glm::length(path);
+    batch.add(patch, point, {path / distance, distance, 0}, weight * unoccluded);
+    return;
+  }
+  const float scale = weight * unoccluded / sum;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    if (part[k] > 0) batch.add(patch, point, sample[k], scale * part[k]);
+  }
+}
+
+/// Moves `places` of the unit square by `shift`, around its edges.
+void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
+                  std::span<glm::vec2> shifted) {
+  const auto around = [](float x) { return x < 1 ? x : x - 1; };
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const glm::vec2 moved = places[k] + shift;
+    shifted[k] = {around(moved.x), around(moved.y)};
+  }
+}
+
 }  // namespace
+
+/// Where light is looked for: the same for every light and every frame.
+struct DirectLighting::Receivers {
+  std::size_t points_per_patch = 0;
+  std::size_t area_light_samples = 0;
+  std::vector<glm::vec2> places;  ///< [points_per_patch][area_light_samples] of every lamp
+  std::vector<Receiver> points;   ///< [n][points_per_patch]
+  std::vector<Box> block_box;     ///< [blocks] around their points
+
+  std::span<const Receiver> points_of(std::size_t patch) const {
+    return std::span(points).subspan(patch * points_per_patch, points_per_patch);
+  }
+};
+
+/// What one light does.
+struct DirectLighting::LightResponse {
+  PreparedLight light;
+  bool known = false;  ///< irradiance is that of `light`
+  bool stale = false;  ///< to be traced in this frame
+  glm::vec3 intensity{0};
+  std::vector<float> irradiance;  ///< [n] per unit of intensity
+  std::vector<std::uint8_t> lit;  ///< [blocks] 0: the irradiance of all its patches is 0
+};
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
                                const DirectLightingSettings& settings)
-    : data_(data), tracer_(tracer), points_per_patch_(settings.points_per_patch) {
+    : data_(data), tracer_(tracer), receivers_(spread_receivers(data, tracer, settings)) {
+  make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
+}
+
+std::shared_ptr<const DirectLighting::Receivers> DirectLighting::spread_receivers(
+    const TransferData& data, const RayTracer& tracer, const DirectLightingSettings& settings) {
   if (settings.points_per_patch < 1) throw Error("direct light needs at least one point per patch");
+  if (settings.area_light_samples < 1 || settings.area_light_samples > kMaxAreaLightSamples) {
+    throw Error("direct light needs from 1 to " + std::to_string(kMaxAreaLightSamples) +
+                " samples of lamps with a surface");
+  }
   const std::size_t n = data.patches.size();
-  points_.resize(n * points_per_patch_);
-  rays_.resize(n * points_per_patch_);
-  contributions_.resize(n * points_per_patch_);
+  auto receivers = std::make_shared<Receivers>();
+  const auto points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
+  receivers->points_per_patch = points_per_patch;
+  receivers->area_light_samples = static_cast<std::size_t>(settings.area_light_samples);
+  receivers->places.resize(points_per_patch * receivers->area_light_samples);
+  for (std::uint32_t k = 0; k < receivers->places.size(); ++k) {
+    receivers->places[k] = glm::vec2(r2_point(k, {0, 0}));
+  }
+  receivers->points.resize(n * points_per_patch);
+  receivers->block_box.resize((n + kBlock - 1) / kBlock);
   const PatchTriangles triangles(data.mesh.triangle_patch, n);
-#pragma omp parallel for schedule(dynamic, 64)
+  std::vector<PatchPoint> spread(points_per_patch);
   for (std::size_t i = 0; i < n; ++i) {
-    const std::span points = std::span(points_).subspan(i * points_per_patch_, points_per_patch_);
-    spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), points);
-    for (PatchPoint& p : points) p.position = tracer.offset_point(p.position, p.normal);
+    std::ranges::fill(spread, PatchPoint{data.patches.centroid[i], data.patches.normal[i]});
+    if (!triangles[i].empty()) {
+      spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), spread);
+    }
+    for (std::size_t k = 0; k < points_per_patch; ++k) {
+      const Float3 lifted = tracer.offset_point(spread[k].position, spread[k].normal);
+      receivers->points[i * points_per_patch + k] = {to_glm(lifted), to_glm(spread[k].normal)};
+      receivers->block_box[i / kBlock].add(to_glm(lifted));
+    }
+  }
+  return receivers;
+}
+
+DirectLighting::~DirectLighting() = default;
+DirectLighting::DirectLighting(const DirectLighting&) = default;
+
+void DirectLighting::make_room(std::size_t light_count) {
+  while (responses_.size() < light_count) {
+    LightResponse& response = responses_.emplace_back();
+    response.irradiance.resize(data_.patches.size());
+    response.lit.resize(receivers_->block_box.size());
   }
 }
 
 void DirectLighting::compute(std::span<const Light> lights, const Sky& sky,
                              std::span<Float3> direct_irradiance) {
-  const std::size_t n = data_.patches.size();
-  assert(direct_irradiance.size() == n);
+  assert(direct_irradiance.size() == data_.patches.size());
+  prepare(lights);
+  const std::size_t block_count = receivers_->block_box.size();
 #pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t begin = 0; begin < n; begin += kBlock) {
-    const std::size_t end = std::min(n, begin + kBlock);
-    for (std::size_t i = begin; i < end; ++i) {
-      // A uniform sky of luminance L gives pi L to a patch that sees nothing else.
-      const float e = std::numbers::pi_v<float> * sky.luminance * data_.patches.sky_visibility[i];
-      direct_irradiance[i] = {e * sky.color[0], e * sky.color[1], e * sky.color[2]};
+  for (std::size_t block = 0; block < block_count; ++block) {
+    for (std::size_t k = 0; k < light_count_; ++k) {
+      if (responses_[k].stale) respond(responses_[k], block);
     }
-    for (const Light& light : lights) add_light(light, begin, end, direct_irradiance);
+    add_up(sky, block, direct_irradiance);
   }
 }
 
-void DirectLighting::add_light(const Light& light, std::size_t begin, std::size_t end,
-                               std::span<Float3> direct_irradiance) {
-  Ray* const rays = &rays_[begin * points_per_patch_];
-  ShadowRay* const contributions = &contributions_[begin * points_per_patch_];
-  std::size_t count = 0;
-  for (std::size_t k = begin * points_per_patch_; k < end * points_per_patch_; ++k) {
-    const std::size_t patch = k / points_per_patch_;
-    const auto& [position, normal] = points_[k];
-    const IncidentLight incident = evaluate_light(light, position);
-    const float cosine = glm::dot(to_glm(incident.direction), to_glm(normal));
-    const Float3& e = incident.illuminance;
-    if (cosine <= 0 || (e[0] <= 0 && e[1] <= 0 && e[2] <= 0)) continue;
-    const float weight = cosine / static_cast<float>(points_per_patch_);
-    contributions[count] = {static_cast<std::uint32_t>(patch),
-                            {weight * e[0], weight * e[1], weight * e[2]}};
-    Ray& ray = rays[count++];
-    ray = Ray{};
-    ray.origin = position;
-    ray.direction = incident.direction;
-    ray.t_near = 0;
-    ray.t_far = incident.distance * (1 - kLampGap);
+void DirectLighting::prepare(std::span<const Light> lights) {
+  make_room(lights.size());
+  light_count_ = lights.size();
+  traced_light_count_ = 0;
+  for (std::size_t k = 0; k < light_count_; ++k) {
+    LightResponse& response = responses_[k];
+    response.intensity = to_glm(lights[k].color) * lights[k].intensity;
+    response.stale = false;
+    if (response.intensity == glm::vec3(0)) continue;  // off: what is known of it stays
+    const PreparedLight light(lights[k]);
+    response.stale = !response.known || !(response.light == light);
+    if (!response.stale) continue;
+    response.light = light;
+    response.known = true;
+    ++traced_light_count_;
   }
-  tracer_.occluded({rays, count});
-  for (std::size_t k = 0; k < count; ++k) {
-    if (is_occluded(rays[k])) continue;
-    Float3& e = direct_irradiance[contributions[k].patch];
-    for (int c = 0; c < kChannelCount; ++c) e[c] += contributions[k].irradiance[c];
+}
+
+void DirectLighting::respond(LightResponse& response, std::size_t block) const {
+  const std::size_t begin = block * kBlock,
+                    end = std::min(begin + kBlock, response.irradiance.size());
+  const std::span<float> irradiance(response.irradiance);
+  std::ranges::fill(irradiance.subspan(begin, end - begin), 0.0F);
+  const PreparedLight& light = response.light;
+  const Box& box = receivers_->block_box[block];
+  response.lit[block] = 0;
+  if (box.distance_squared(light.position()) >= light.reach_squared()) return;
+
+  const float weight = 1 / static_cast<float>(receivers_->points_per_patch);
+  const std::size_t samples = receivers_->area_light_samples;
+  std::array<glm::vec2, kMaxAreaLightSamples> places;
+  ShadowBatch batch(tracer_, irradiance);
+  for (std::size_t patch = begin; patch < end; ++patch) {
+    const std::span<const Receiver> points = receivers_->points_of(patch);
+    const glm::vec2 shift(unit_square(mix_bits(~static_cast<std::uint64_t>(patch))));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (light.has_area()) {
+        const std::span<glm::vec2> here = std::span(places).first(samples);
+        shift_places(std::span(receivers_->places).subspan(k * samples, samples), shift, here);
+        add_area_rays(light, patch, points[k], here, weight, batch);
+        continue;
+      }
+      const UnitLight unit = light.evaluate(points[k].position);
+      const float arriving = unit.illuminance * glm::dot(unit.direction, points[k].normal);
+      if (arriving > 0) batch.add(patch, points[k], unit, weight * arriving);
+    }
+  }
+  batch.flush();
+  const auto lit = [](float e) { return e > 0; };
+  response.lit[block] = std::ranges::any_of(irradiance.subspan(begin, end - begin), lit) ? 1 : 0;
+}
+
+void DirectLighting::add_up(const Sky& sky, std::size_t block,
+                            std::span<Float3> direct_irradiance) const {
+  const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, data_.patches.size());
+  // A uniform sky of luminance L gives pi L to a patch that sees nothing else.
+  const glm::vec3 open_sky = std::numbers::pi_v<float> * sky.luminance * to_glm(sky.color);
+  for (std::size_t i = begin; i < end; ++i) {
+    direct_irradiance[i] = to_float3(data_.patches.sky_visibility[i] * open_sky);
+  }
+  for (std::size_t k = 0; k < light_count_; ++k) {
+    const LightResponse& response = responses_[k];
+    const glm::vec3 intensity = response.intensity;
+    if (intensity == glm::vec3(0) || response.lit[block] == 0) continue;
+    for (std::size_t i = begin; i < end; ++i) {
+      const float e = response.irradiance[i];
+      Float3& sum = direct_irradiance[i];
+      sum = {sum[0] + e * intensity.x, sum[1] + e * intensity.y, sum[2] + e * intensity.z};
+    }
   }
 }
 

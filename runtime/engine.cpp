@@ -1,23 +1,29 @@
 #include "rebounce/runtime/engine.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "rebounce/runtime/emitting_material.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
+namespace {
 
+std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> data) {
+  if (!data || !data->transfer) throw Error("the transfer data have no operator");
+  return data;
+}
+
+}  // namespace
+
+#if REBOUNCE_WITH_EMBREE
 Engine::Engine(std::shared_ptr<const TransferData> data, const DirectLightingSettings& settings)
-    : data_(std::move(data)),
-      tracer_(data_->mesh.position,
-              std::span(data_->mesh.triangle).first(data_->mesh.surface_count())),
-      direct_lighting_(*data_, tracer_, settings) {
-  if (!data_->transfer) throw Error("the transfer data have no operator");
-  const std::size_t n = data_->patches.size();
-  direct_irradiance_.resize(n);
-  initial_exitance_.resize(n);
-  indirect_irradiance_.resize(n);
-  radiosity_.resize(n);
-  workspace_.resize(data_->transfer->workspace_size());
+    : data_(checked(std::move(data))),
+      tracer_(std::make_shared<const RayTracer>(
+          data_->mesh.position,
+          std::span(data_->mesh.triangle).first(data_->mesh.surface_count()))),
+      direct_lighting_(*data_, *tracer_, settings) {
+  make_room();
 }
 
 void Engine::relight(std::span<const Light> lights, const Sky& sky) {
@@ -27,9 +33,32 @@ void Engine::relight(std::span<const Light> lights, const Sky& sky) {
   compute_radiosity();
 }
 
+void Engine::compute_direct(std::span<const Light> lights, const Sky& sky) {
+  direct_lighting_.compute(lights, sky, direct_irradiance_);
+}
+#else
+Engine::Engine(std::shared_ptr<const TransferData> data) : data_(checked(std::move(data))) {
+  make_room();
+}
+#endif
+
+void Engine::make_room() {
+  const std::size_t n = data_->patches.size();
+  emitting_material_ =
+      std::make_shared<const std::vector<std::uint32_t>>(find_emitting_material(*data_));
+  emitted_exitance_ = data_->patches.emitted_exitance;
+  direct_irradiance_.resize(n);
+  initial_exitance_.resize(n);
+  indirect_irradiance_.resize(n);
+  radiosity_.resize(n);
+  workspace_.resize(data_->transfer->workspace_size());
+}
+
 void Engine::relight(std::span<const Float3> direct_irradiance) {
   if (direct_irradiance.size() != direct_irradiance_.size()) {
-    throw Error("direct irradiance must have one entry per patch");
+    throw Error("direct irradiance must have one entry per patch: " +
+                std::to_string(direct_irradiance_.size()) + ", not " +
+                std::to_string(direct_irradiance.size()));
   }
   std::ranges::copy(direct_irradiance, direct_irradiance_.begin());
   compute_initial_exitance();
@@ -37,8 +66,20 @@ void Engine::relight(std::span<const Float3> direct_irradiance) {
   compute_radiosity();
 }
 
-void Engine::compute_direct(std::span<const Light> lights, const Sky& sky) {
-  direct_lighting_.compute(lights, sky, direct_irradiance_);
+void Engine::set_emission_scale(std::uint32_t material, const Float3& scale) {
+  if (material >= data_->materials.size()) {
+    throw Error("there is no material " + std::to_string(material) + "; the scene has " +
+                std::to_string(data_->materials.size()));
+  }
+  if (!std::ranges::all_of(scale, [](float x) { return std::isfinite(x) && x >= 0; })) {
+    throw Error("a scale of emission must be finite and at least 0");
+  }
+  for (std::size_t i = 0; i < emitted_exitance_.size(); ++i) {
+    if ((*emitting_material_)[i] != material) continue;
+    for (int c = 0; c < kChannelCount; ++c) {
+      emitted_exitance_[i][c] = scale[c] * data_->patches.emitted_exitance[i][c];
+    }
+  }
 }
 
 void Engine::compute_initial_exitance() {
@@ -46,7 +87,7 @@ void Engine::compute_initial_exitance() {
   for (std::size_t i = 0; i < patches.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
       initial_exitance_[i][c] =
-          patches.reflectance[i][c] * direct_irradiance_[i][c] + patches.emitted_exitance[i][c];
+          patches.reflectance[i][c] * direct_irradiance_[i][c] + emitted_exitance_[i][c];
     }
   }
 }

@@ -1,53 +1,68 @@
-// Fall-off, range window and cone of KHR_lights_punctual (Khronos glTF 2.0 extension, sections
-// "Range Property", "Inner and Outer Cone Angles").
-
 #include "rebounce/runtime/light_sampling.h"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numbers>
 
+#include "prepared_light.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {
 
-float range_window(float distance, float range) {
-  if (range <= 0) return 1;
-  const float ratio = distance / range;
-  return std::clamp(1 - ratio * ratio * ratio * ratio, 0.0F, 1.0F);
+bool is_finite(const Float3& v) {
+  return std::ranges::all_of(v, [](float x) { return std::isfinite(x); });
 }
 
-// `cosine`: between the cone's axis and the way from the lamp to the point.
-float cone_attenuation(const Light& light, float cosine) {
-  const float cos_inner = std::cos(light.inner_cone_angle);
-  const float cos_outer = std::cos(light.outer_cone_angle);
-  const float scale = 1 / std::max(0.001F, cos_inner - cos_outer);
-  const float linear = std::clamp((cosine - cos_outer) * scale, 0.0F, 1.0F);
-  return linear * linear;
+void require(bool good, const char* field, const char* wanted) {
+  if (!good) throw Error(std::string("a light's ") + field + " must be " + wanted);
+}
+
+void check_axes(const Light& light) {
+  const glm::vec3 direction = to_glm(light.direction), tangent = to_glm(light.tangent);
+  require(std::abs(glm::length(direction) - 1) < 1e-3F, "direction", "a unit vector");
+  if (light.type != LightType::kRectangle && !light.profile) return;
+  require(is_finite(light.tangent) &&
+              glm::length(glm::cross(direction, tangent)) > 1e-6F * glm::length(tangent),
+          "tangent", "a vector that is not along its direction");
 }
 
 }  // namespace
 
-IncidentLight evaluate_light(const Light& light, const Float3& point) {
-  const glm::vec3 full = to_glm(light.color) * light.intensity;
-  if (light.type == LightType::kDirectional) {
-    return {.direction = to_float3(-to_glm(light.direction)),
-            .distance = std::numeric_limits<float>::infinity(),
-            .illuminance = to_float3(full)};
+IncidentLight evaluate_light(const Light& light, const Float3& point, const Float2& place) {
+  const PreparedLight prepared(light);
+  UnitLight unit;
+  if (prepared.has_area()) {
+    const glm::vec2 from = to_glm(place);
+    prepared.evaluate_places(to_glm(point), {&from, 1}, {&unit, 1});
+  } else {
+    unit = prepared.evaluate(to_glm(point));
   }
-  const glm::vec3 to_lamp = to_glm(light.position) - to_glm(point);
-  const float distance = glm::length(to_lamp);
-  // A point inside the lamp has no direction to it: it receives nothing.
-  if (!(distance > 0)) return {};
-  const glm::vec3 direction = to_lamp / distance;
-  float attenuation = range_window(distance, light.range) / (distance * distance);
+  return {.direction = to_float3(unit.direction),
+          .distance = unit.distance,
+          .illuminance = to_float3(to_glm(light.color) * light.intensity * unit.illuminance)};
+}
+
+void check_light(const Light& light) {
+  const auto is_factor = [](float x) { return std::isfinite(x) && x >= 0; };
+  const auto is_length = [](float x) { return std::isfinite(x) && x > 0; };
+  require(is_finite(light.position), "position", "finite");
+  require(std::ranges::all_of(light.color, is_factor), "color", "at least 0");
+  require(is_factor(light.intensity), "intensity", "at least 0");
+  require(is_factor(light.range), "range", "at least 0");
+  if (light.type != LightType::kSphere && (light.type != LightType::kPoint || light.profile)) {
+    check_axes(light);
+  }
   if (light.type == LightType::kSpot) {
-    attenuation *= cone_attenuation(light, glm::dot(-direction, to_glm(light.direction)));
+    require(light.outer_cone_angle <= std::numbers::pi_v<float> / 2, "outer cone angle",
+            "at most pi / 2");
+    require(light.inner_cone_angle >= 0 && light.inner_cone_angle <= light.outer_cone_angle,
+            "inner cone angle", "from 0 to the outer one");
   }
-  return {.direction = to_float3(direction),
-          .distance = distance,
-          .illuminance = to_float3(full * attenuation)};
+  require(light.type != LightType::kSphere || is_length(light.radius), "radius", "above 0");
+  require(light.type != LightType::kRectangle || std::ranges::all_of(light.size, is_length), "size",
+          "above 0");
 }
 
 }  // namespace rebounce

@@ -5,33 +5,36 @@
 #include "rebounce/runtime/polygon_form_factor.h"
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 
 namespace rebounce {
 namespace {
 
-// A triangle cut by a plane: three or four corners, or none.
-struct Polygon {
-  std::array<glm::vec3, 4> corner;
+constexpr std::size_t kMaxCorners = 4;
+
+// A polygon cut by a plane: at most one corner more, or none.
+struct CutPolygon {
+  std::array<glm::vec3, kMaxCorners + 1> corner;
   std::size_t count = 0;
-  void add(const glm::vec3& v) { corner[count++] = v; }
+  void add(const glm::vec3& v) {
+    // A polygon that is not quite flat could be cut more than twice.
+    if (count < corner.size()) corner[count++] = v;
+  }
 };
 
-Polygon above_horizon(const glm::vec3& position, const glm::vec3& normal,
-                      const std::array<glm::vec3, 3>& triangle) {
-  std::array<glm::vec3, 3> ray;
-  std::array<float, 3> height;
-  for (std::size_t k = 0; k < 3; ++k) {
-    ray[k] = triangle[k] - position;
-    height[k] = glm::dot(ray[k], normal);
-  }
-  Polygon polygon;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::size_t next = (k + 1) % 3;
-    if (height[k] >= 0) polygon.add(ray[k]);
-    if ((height[k] > 0 && height[next] < 0) || (height[k] < 0 && height[next] > 0)) {
-      polygon.add(glm::mix(ray[k], ray[next], height[k] / (height[k] - height[next])));
+CutPolygon above_horizon(const glm::vec3& position, const glm::vec3& normal,
+                         std::span<const glm::vec3> corner) {
+  CutPolygon polygon;
+  for (std::size_t k = 0; k < corner.size(); ++k) {
+    const glm::vec3 ray = corner[k] - position;
+    const glm::vec3 next = corner[(k + 1) % corner.size()] - position;
+    const float height = glm::dot(ray, normal), next_height = glm::dot(next, normal);
+    if (height >= 0) polygon.add(ray);
+    if ((height > 0 && next_height < 0) || (height < 0 && next_height > 0)) {
+      polygon.add(glm::mix(ray, next, height / (height - next_height)));
     }
   }
   return polygon;
@@ -39,9 +42,10 @@ Polygon above_horizon(const glm::vec3& position, const glm::vec3& normal,
 
 }  // namespace
 
-float point_to_triangle_form_factor(const glm::vec3& position, const glm::vec3& normal,
-                                    const std::array<glm::vec3, 3>& triangle) {
-  const Polygon polygon = above_horizon(position, normal, triangle);
+float point_to_polygon_form_factor(const glm::vec3& position, const glm::vec3& normal,
+                                   std::span<const glm::vec3> corner) {
+  assert(corner.size() <= kMaxCorners);
+  const CutPolygon polygon = above_horizon(position, normal, corner);
   float sum = 0;
   for (std::size_t k = 0; k < polygon.count; ++k) {
     const glm::vec3& a = polygon.corner[k];

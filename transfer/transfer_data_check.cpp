@@ -37,6 +37,7 @@ class Checker {
     check_materials();
     check_cameras();
     check_lights();
+    check_probes();
     check_exchange();
   }
 
@@ -205,6 +206,35 @@ class Checker {
     numbers("light.range", lights, &Light::range, kNotNegative);
     numbers("light.inner_cone_angle", lights, &Light::inner_cone_angle, kNotNegative);
     numbers("light.outer_cone_angle", lights, &Light::outer_cone_angle, kNotNegative);
+  }
+
+  void check_probes() const {
+    const LightProbes& probes = data_.probes;
+    const std::size_t count = probes.size(), entries = probes.entry_patch.size();
+    rows("probe.valid", probes.valid.size(), count);
+    rows("probe.sky", probes.sky.size(), count);
+    rows("probe.entry_begin", probes.entry_begin.size(), count + 1);
+    rows("probe.entry_weight", probes.entry_weight.size(), entries);
+    begins<std::uint32_t>("probe.entry_begin", probes.entry_begin, entries);
+    numbers("probe.position", probes.position, kFinite);
+    numbers("probe.sky", probes.sky, kFinite);
+    numbers("probe.entry_weight", probes.entry_weight, kFinite);
+    for (std::size_t i = 0; i < entries; ++i) {
+      index("probe.entry_patch", i, probes.entry_patch[i], data_.patches.size());
+    }
+    for (std::size_t i = 0; i < count; ++i) index("probe.valid", i, probes.valid[i], 2);
+    check_probe_grid();
+  }
+
+  void check_probe_grid() const {
+    const auto [x, y, z] = data_.probes.grid;
+    if (x == 0 && y == 0 && z == 0) return;
+    std::size_t rest = data_.probes.size();
+    for (const std::uint32_t side : {x, y, z}) {
+      if (side == 0 || rest % side != 0) refuse(tensor::kProbeGrid, "not that of the probes");
+      rest /= side;
+    }
+    if (rest != 1) refuse(tensor::kProbeGrid, "not that of the probes");
   }
 
   void check_exchange() const {

@@ -31,6 +31,8 @@ namespace tensor {
 inline constexpr char kRowBegin[] = "form_factor.row_begin";
 inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
+inline constexpr char kProbePosition[] = "probe.position";
+inline constexpr char kProbeGrid[] = "probe.grid";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 }  // namespace tensor
@@ -103,6 +105,16 @@ void visit_tensors_of_mesh(Mesh& mesh, Visit&& visit) {
   visit("mesh.weight_begin", mesh.weight_begin);
   visit("mesh.weight_patch", mesh.weight_patch);
   visit("mesh.weight", mesh.weight);
+}
+
+template <typename Probes, typename Visit>
+void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
+  visit("probe.position", probes.position);
+  visit("probe.valid", probes.valid);
+  visit("probe.sky", probes.sky);
+  visit("probe.entry_begin", probes.entry_begin);
+  visit("probe.entry_patch", probes.entry_patch);
+  visit("probe.entry_weight", probes.entry_weight);
 }
 
 // visit(name, items, member) for each tensor that is a member of every item of an array.

@@ -288,6 +288,15 @@ std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
   return exchange;
 }
 
+/// A file without probes has no tensors of them.
+void read_probes(const SafetensorsFile& file, TransferData& data) {
+  if (!file.tensors().contains(tensor::kProbePosition)) return;
+  visit_tensors_of_probes(data.probes, TensorReader(file));
+  const auto grid = file.tensor<std::uint32_t>(tensor::kProbeGrid, {3});
+  std::ranges::copy(grid, data.probes.grid.begin());
+  data.probes.patch_count = data.patches.size();
+}
+
 }  // namespace
 
 TransferData load_transfer_file(const std::filesystem::path& path) {
@@ -299,6 +308,7 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   visit_tensors_of_patches(data.patches, TensorReader(file));
   visit_tensors_of_mesh(data.mesh, TensorReader(file));
   read_scene(file, data);
+  read_probes(file, data);
   data.exchange = read_exchange(file);
   data.record = read_record(file);
   check_transfer_data(data, file.name());

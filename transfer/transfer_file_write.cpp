@@ -112,6 +112,13 @@ void collect_operator(const TransferOperator* transfer, TensorCollector& collect
   }
 }
 
+/// Files without probes have no tensors of them.
+void collect_probes(const LightProbes& probes, TensorCollector& collector) {
+  if (probes.size() == 0) return;
+  visit_tensors_of_probes(probes, collector);
+  collector.add<std::uint32_t>(tensor::kProbeGrid, {probes.grid.size()}, probes.grid);
+}
+
 std::string names_text(const TransferData& data) {
   nlohmann::json names;
   visit_named_items(data, [&](const char* kind, const auto& items) {
@@ -153,6 +160,7 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   visit_tensors_of_mesh(data.mesh, collector);
   visit_tensors_of_scene(data, collector);
   collect_textures(data.textures, collector);
+  collect_probes(data.probes, collector);
   collect_exchange(data.exchange, collector);
   collect_operator(data.transfer.get(), collector);
   if (data.compressed_form_factors) {

@@ -112,8 +112,11 @@ class PathTracer {
     double total = 0, chosen_weight = 0, number = path.numbers.lamp;
     glm::dvec3 irradiance(0);
     IncidentLight chosen;
+    // Where on a lamp with a surface; emitters of the scene are another integral.
+    const Float2 place = {static_cast<float>(path.numbers.emitter_point.x),
+                          static_cast<float>(path.numbers.emitter_point.y)};
     for (const Light& light : lights_) {
-      const IncidentLight incident = evaluate_light(light, path.origin);
+      const IncidentLight incident = evaluate_light(light, path.origin, place);
       const double cosine = glm::dot(to_dvec3(incident.direction), path.normal);
       const glm::dvec3 e = std::max(cosine, 0.0) * to_dvec3(incident.illuminance);
       const double weight = e.x + e.y + e.z;

@@ -9,7 +9,10 @@
 #include <numbers>
 
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/runtime/emitting_material.h"
+#include "rebounce/runtime/ies_profile.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {
@@ -42,6 +45,13 @@ struct Field {
     return x;
   }
 
+  float required_length(const std::string& name) const {
+    if (!object.contains(name)) fail(name, "given, in metres");
+    const float length = number(name, 0, 0);
+    if (length <= 0) fail(name, "more than 0");
+    return length;
+  }
+
   Float3 triple(const std::string& name, float lowest, const Float3& fallback) const {
     if (!object.contains(name)) return fallback;
     const json& value = object.at(name);
@@ -59,11 +69,17 @@ struct Field {
   }
 };
 
+constexpr std::size_t kLargestProfileBytes = std::size_t{16} << 20U;
+
 constexpr float kAnyNumber = std::numeric_limits<float>::lowest();
+
+float length_of(const Float3& v) {
+  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
 
 Float3 unit_direction(const Field& field) {
   Float3 d = field.triple("direction", kAnyNumber, {0, -1, 0});
-  const float length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+  const float length = length_of(d);
   if (!(length > 1e-20F)) field.fail("direction", "a vector that is not zero");
   for (float& x : d) x /= length;
   return d;
@@ -74,7 +90,9 @@ LightType light_type(const Field& field) {
   if (type == "point") return LightType::kPoint;
   if (type == "spot") return LightType::kSpot;
   if (type == "directional") return LightType::kDirectional;
-  field.fail("type", "\"point\", \"spot\" or \"directional\"");
+  if (type == "sphere") return LightType::kSphere;
+  if (type == "rectangle") return LightType::kRectangle;
+  field.fail("type", "\"point\", \"spot\", \"directional\", \"sphere\" or \"rectangle\"");
 }
 
 void read_cone(const Field& light_field, Light& light) {
@@ -93,10 +111,69 @@ void read_cone(const Field& light_field, Light& light) {
   }
 }
 
-Light read_light(const Field& field) {
+/// The direction in which a rectangle's first side lies, and in which the horizontal angles of a
+/// profile begin: by default x, or z where the light travels along x.
+Float3 read_tangent(const Field& field, const Float3& direction) {
+  const Float3 fallback = std::abs(direction[0]) < 0.9F ? Float3{1, 0, 0} : Float3{0, 0, 1};
+  const Float3 t = field.triple("tangent", kAnyNumber, fallback);
+  const Float3 across = {direction[1] * t[2] - direction[2] * t[1],
+                         direction[2] * t[0] - direction[0] * t[2],
+                         direction[0] * t[1] - direction[1] * t[0]};
+  if (!(length_of(across) > 1e-3F * length_of(t)) || length_of(t) <= 0) {
+    field.fail("tangent", "a vector that does not lie along the direction");
+  }
+  return t;
+}
+
+/// The profile that the light names, relative to the light file.
+std::shared_ptr<const IntensityProfile> read_profile(const Field& field,
+                                                     const std::filesystem::path& folder) {
+  const json& name = field.object.at("ies");
+  if (!name.is_string()) field.fail("ies", "the name of an IES file");
+  const std::filesystem::path path = folder / name.get<std::string>();
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream)
+    throw Error(fmt::format("{}: cannot open {}; check \"ies\"", field.where, path.string()));
+  std::string text(kLargestProfileBytes + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.size() > kLargestProfileBytes) {
+    throw Error(fmt::format("{}: {} is too large for an IES file", field.where, path.string()));
+  }
+  return parse_ies_profile(text, fmt::format("{}: {}", field.where, path.string()));
+}
+
+/// The fields that belong to some types only, refused elsewhere.
+void check_fields_of_type(const Field& field, LightType type) {
+  const bool profiled = field.object.contains("ies");
+  const auto only = [&](const char* name, bool allowed, const char* where) {
+    if (field.object.contains(name) && !allowed) {
+      throw Error(fmt::format("{}: \"{}\" is for {} only", field.where, name, where));
+    }
+  };
+  only("radius", type == LightType::kSphere, "spheres");
+  only("width", type == LightType::kRectangle, "rectangles");
+  only("height", type == LightType::kRectangle, "rectangles");
+  only("tangent", type == LightType::kRectangle || profiled, "rectangles and lights with \"ies\"");
+  only("ies", type == LightType::kPoint || type == LightType::kSpot, "points and spots");
+}
+
+void read_shape(const Field& field, const std::filesystem::path& folder, Light& light) {
+  check_fields_of_type(field, light.type);
+  if (light.type == LightType::kSphere) light.radius = field.required_length("radius");
+  if (light.type == LightType::kRectangle) {
+    light.size = {field.required_length("width"), field.required_length("height")};
+  }
+  if (field.object.contains("ies")) light.profile = read_profile(field, folder);
+  if (light.type == LightType::kRectangle || light.profile) {
+    light.tangent = read_tangent(field, light.direction);
+  }
+}
+
+Light read_light(const Field& field, const std::filesystem::path& folder) {
   if (!field.object.is_object()) throw Error(field.where + ": must be an object");
-  field.check_names(
-      {"type", "name", "position", "direction", "color", "intensity", "range", "spot"});
+  field.check_names({"type", "name", "position", "direction", "color", "intensity", "range", "spot",
+                     "radius", "width", "height", "tangent", "ies"});
   Light light;
   light.type = light_type(field);
   if (field.object.contains("name")) {
@@ -109,7 +186,46 @@ Light read_light(const Field& field) {
   light.intensity = field.number("intensity", 0, light.intensity);
   light.range = field.number("range", 0, light.range);
   read_cone(field, light);
+  read_shape(field, folder, light);
   return light;
+}
+
+std::vector<EmitterScale> read_emitters(const Field& root) {
+  std::vector<EmitterScale> emitters;
+  if (!root.object.contains("emitters")) return emitters;
+  const json& list = root.object.at("emitters");
+  if (!list.is_array()) root.fail("emitters", "an array");
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    const Field field{list[k], fmt::format("{}: emitter {}", root.where, k)};
+    if (!field.object.is_object()) throw Error(field.where + ": must be an object");
+    field.check_names({"material", "color", "scale"});
+    const json material = field.object.value("material", json());
+    if (!material.is_string()) field.fail("material", "the name of a material of the scene");
+    EmitterScale emitter{material.get<std::string>(), field.triple("color", 0, {1, 1, 1})};
+    for (float& x : emitter.scale) x *= field.number("scale", 0, 1);
+    emitters.push_back(emitter);
+  }
+  return emitters;
+}
+
+/// Scales what the surfaces of a material emit. Throws Error if there are none of that name.
+void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> patch_material,
+                   TransferData& data) {
+  bool found = false;
+  for (std::uint32_t m = 0; m < data.materials.size(); ++m) {
+    if (data.materials[m].name != emitter.material) continue;
+    found = true;
+    for (int c = 0; c < kChannelCount; ++c) {
+      data.materials[m].emitted_luminance[c] *= emitter.scale[c];
+      for (std::size_t i = 0; i < patch_material.size(); ++i) {
+        if (patch_material[i] == m) data.patches.emitted_exitance[i][c] *= emitter.scale[c];
+      }
+    }
+  }
+  if (!found) {
+    throw Error(fmt::format("the scene has no material \"{}\" to scale; check \"emitters\"",
+                            emitter.material));
+  }
 }
 
 LightSetup read_json(const std::filesystem::path& path) {
@@ -123,16 +239,17 @@ LightSetup read_json(const std::filesystem::path& path) {
   }
   const Field root{document, path.string()};
   if (!document.is_object()) throw Error(path.string() + ": must hold an object with \"lights\"");
-  root.check_names({"lights", "sky"});
+  root.check_names({"lights", "sky", "emitters"});
   LightSetup setup;
   if (document.contains("lights")) {
     const json& lights = document.at("lights");
     if (!lights.is_array()) root.fail("lights", "an array");
     for (std::size_t k = 0; k < lights.size(); ++k) {
-      setup.lights.push_back(
-          read_light({lights[k], fmt::format("{}: light {}", path.string(), k)}));
+      setup.lights.push_back(read_light({lights[k], fmt::format("{}: light {}", path.string(), k)},
+                                        path.parent_path()));
     }
   }
+  setup.emitters = read_emitters(root);
   if (document.contains("sky")) {
     if (!document.at("sky").is_object()) root.fail("sky", "an object");
     const Field field{document.at("sky"), path.string() + ": sky"};
@@ -168,6 +285,18 @@ LightSetup choose_lights(const std::filesystem::path& path, const TransferData& 
     throw Error("there is no light: the scene has none of its own; give some with --lights");
   }
   return setup;
+}
+
+std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& file,
+                                                   const std::filesystem::path& lights,
+                                                   LightSetup& setup) {
+  TransferData data = load_transfer_file(file);
+  setup = choose_lights(lights, data);
+  const std::vector<std::uint32_t> patch_material = find_emitting_material(data);
+  for (const EmitterScale& emitter : setup.emitters) {
+    scale_emitter(emitter, patch_material, data);
+  }
+  return std::make_shared<const TransferData>(std::move(data));
 }
 
 }  // namespace rebounce::cli

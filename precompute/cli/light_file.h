@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <string>
 #include <vector>
 
 #include "rebounce/transfer/scene_description.h"
@@ -8,9 +10,16 @@
 
 namespace rebounce::cli {
 
+/// How much of what the scene says a material emits.
+struct EmitterScale {
+  std::string material;
+  Float3 scale{1, 1, 1};
+};
+
 struct LightSetup {
   std::vector<Light> lights;
   Sky sky;
+  std::vector<EmitterScale> emitters;
 };
 
 /// Reads lights from a .json file (notes/light_file.md), or from a .glb or .gltf with
@@ -20,5 +29,11 @@ LightSetup read_lights(const std::filesystem::path& path);
 /// The lights of `path`, or those stored in the transfer file if `path` is empty. Throws Error if
 /// there is no light at all: no lamp, no sky and no patch that emits.
 LightSetup choose_lights(const std::filesystem::path& path, const TransferData& data);
+
+/// Loads a transfer file whose surfaces emit what the light file says, and the lights: as
+/// choose_lights finds them. Throws Error if a material is not in the scene.
+std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& file,
+                                                   const std::filesystem::path& lights,
+                                                   LightSetup& setup);
 
 }  // namespace rebounce::cli

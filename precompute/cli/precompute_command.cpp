@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
@@ -19,6 +21,7 @@ struct PrecomputeOptions {
   bool tolerance_given = false;
   BuildSettings settings;
   double memory_limit_gib = 0;
+  std::vector<float> probes;
 };
 
 std::uint64_t peak_memory_bytes() {
@@ -84,8 +87,22 @@ void check_tolerance(const BuildRecord& record) {
       record.error_mean, record.tolerance));
 }
 
+/// --probes NX,NY,NZ or --probes SPACING.
+void take_probes(const std::vector<float>& numbers, ProbeSettings& settings) {
+  if (numbers.empty()) return;
+  const auto is_count = [](float x) { return x >= 1 && x <= 65536 && x == std::floor(x); };
+  if (numbers.size() == 1 && numbers[0] > 0) {
+    settings.spacing = numbers[0];
+  } else if (numbers.size() == 3 && std::ranges::all_of(numbers, is_count)) {
+    for (std::size_t k = 0; k < 3; ++k) settings.grid[k] = static_cast<std::uint32_t>(numbers[k]);
+  } else {
+    throw Error("--probes takes three whole numbers, NX,NY,NZ, or the metres between probes");
+  }
+}
+
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
+  take_probes(chosen.probes, settings.probes);
   for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
     if (chosen.precision == precision_name(precision)) settings.precision = precision;
   }
@@ -175,6 +192,16 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--memory-limit", chosen->memory_limit_gib,
                    "Refuse to start what needs more GiB; by default half of the machine's memory")
       ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--probes", chosen->probes,
+                   "Light probes in a grid of NX,NY,NZ over the scene, or this many metres apart")
+      ->delimiter(',')
+      ->expected(1, 3);
+  command
+      ->add_option("--probe-rays", chosen->settings.probes.ray_count,
+                   "Rays by which each light probe looks around")
+      ->check(CLI::Range(64, 1000000))
+      ->capture_default_str();
   command->add_option("--seed", chosen->settings.form_factors.seed, "Seed of the sample points")
       ->capture_default_str();
   command->callback([chosen, &options] { run(*chosen, options); });

@@ -114,9 +114,10 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   settings.show = parse_show(chosen.show);
   settings.exposure = chosen.exposure;
   check_can_write(chosen.output);
-  const auto data = std::make_shared<const TransferData>(load_transfer_file(chosen.file));
-  const bool needs_light = settings.show != Show::kPatches;
-  const LightSetup setup = needs_light ? choose_lights(chosen.lights, *data) : LightSetup{};
+  LightSetup setup;
+  const auto data = settings.show == Show::kPatches
+                        ? std::make_shared<const TransferData>(load_transfer_file(chosen.file))
+                        : load_lit_scene(chosen.file, chosen.lights, setup);
 
   Engine engine(data);
   engine.relight(setup.lights, setup.sky);

@@ -15,7 +15,6 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/error.h"
-#include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {
@@ -158,8 +157,8 @@ std::vector<std::string> method_names() {
 }
 
 void run(const SolveOptions& chosen, const CommonOptions& options) {
-  const auto data = std::make_shared<const TransferData>(load_transfer_file(chosen.file));
-  const LightSetup setup = choose_lights(chosen.lights, *data);
+  LightSetup setup;
+  const auto data = load_lit_scene(chosen.file, chosen.lights, setup);
   Engine engine(data);
   engine.compute_direct(setup.lights, setup.sky);
   engine.compute_initial_exitance();

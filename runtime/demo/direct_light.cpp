@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "rebounce/runtime/polygon_form_factor.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
+#include "rebounce/runtime/polygon_form_factor.h"
 #include "sample_sequence.h"
 
 namespace rebounce {
@@ -49,15 +49,30 @@ Float3 above(const SurfacePoint& point, const RayTracer& tracer) {
   return tracer.offset_point(to_float3(point.position), to_float3(point.geometric_normal));
 }
 
+// A lamp with a surface may lie on another: rays end a little before it.
+constexpr float kLampGap = 1e-4F;
+
 Ray ray_to_lamp(const Light& light, const IncidentLight& incident, const Float3& origin) {
-  if (light.type == LightType::kDirectional) {
-    return {
-        .origin = origin, .t_near = 0, .direction = incident.direction, .t_far = incident.distance};
+  if (light.type == LightType::kDirectional || is_area_light(light.type)) {
+    return {.origin = origin,
+            .t_near = 0,
+            .direction = incident.direction,
+            .t_far = incident.distance * (1 - kLampGap)};
   }
   return {.origin = origin,
           .t_near = 0,
           .direction = to_float3(to_glm(light.position) - to_glm(origin)),
           .t_far = 1};
+}
+
+// Places of a lamp with a surface at which each camera sample looks.
+constexpr std::uint32_t kPlacesPerSample = 4;
+
+// Place k of those, spread over all of the samples of a pixel.
+Float2 place_on_lamp(const CameraSample& sample, std::uint32_t k) {
+  const glm::vec2 shift(hash_to_unit(sample.pixel, 5), hash_to_unit(sample.pixel, 6));
+  const glm::vec2 place = r2_point(kPlacesPerSample * sample.index + k, shift);
+  return {place.x, place.y};
 }
 
 float form_factor(const SurfacePoint& receiver, const EmitterPiece& piece) {
@@ -66,7 +81,7 @@ float form_factor(const SurfacePoint& receiver, const EmitterPiece& piece) {
   // From this far, a piece's middle stands for the whole to about 0.2 %.
   constexpr float kFar = 32;
   if (distance_squared < kFar * piece.area) {
-    return point_to_triangle_form_factor(receiver.position, receiver.shading_normal, piece.corner);
+    return point_to_polygon_form_factor(receiver.position, receiver.shading_normal, piece.corner);
   }
   const float cosines = std::max(0.0F, glm::dot(receiver.shading_normal, path)) *
                         std::max(0.0F, -glm::dot(piece.normal, path));
@@ -105,12 +120,18 @@ void add_punctual_light(std::span<CameraSample> samples, std::span<const Light> 
                         const RayTracer& tracer) {
   ShadowRays shadow_rays;
   for (const Light& light : lights) {
+    const std::uint32_t places = is_area_light(light.type) ? kPlacesPerSample : 1;
     for (CameraSample& sample : samples) {
-      const IncidentLight incident = evaluate_light(light, to_float3(sample.point.position));
-      const glm::vec3 arriving =
-          to_glm(incident.illuminance) * receiving_cosine(sample.point, to_glm(incident.direction));
-      if (arriving == glm::vec3(0)) continue;
-      shadow_rays.add(sample, ray_to_lamp(light, incident, above(sample.point, tracer)), arriving);
+      for (std::uint32_t k = 0; k < places; ++k) {
+        const IncidentLight incident =
+            evaluate_light(light, to_float3(sample.point.position), place_on_lamp(sample, k));
+        const float cosine = receiving_cosine(sample.point, to_glm(incident.direction));
+        const glm::vec3 arriving =
+            to_glm(incident.illuminance) * (cosine / static_cast<float>(places));
+        if (arriving == glm::vec3(0)) continue;
+        shadow_rays.add(sample, ray_to_lamp(light, incident, above(sample.point, tracer)),
+                        arriving);
+      }
     }
     shadow_rays.deliver(tracer);
   }

@@ -20,7 +20,7 @@ struct CameraSample {
   glm::vec3 irradiance{0, 0, 0};  ///< lx
 };
 
-/// Adds the light of punctual lamps, with shadows, to every sample's irradiance.
+/// Adds the light of lamps, with shadows, to every sample's irradiance.
 void add_punctual_light(std::span<CameraSample> samples, std::span<const Light> lights,
                         const RayTracer& tracer);
 

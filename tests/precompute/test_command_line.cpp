@@ -474,6 +474,21 @@ TEST_F(CommandLine, RefusesAMalformedLightFileWithTheField) {
       {R"({"lights": [{"spot": {"outerConeAngle": 2}}]})", "\"outerConeAngle\""},
       {R"({"lights": [{"spot": {"innerConeAngle": 0.5, "outerConeAngle": 0.5}}]})",
        "\"innerConeAngle\""},
+      {R"({"lights": [{"type": "sphere"}]})", "\"radius\""},
+      {R"({"lights": [{"type": "sphere", "radius": 0}]})", "\"radius\""},
+      {R"({"lights": [{"radius": 1}]})", "\"radius\""},
+      {R"({"lights": [{"type": "rectangle", "width": 1}]})", "\"height\""},
+      {R"({"lights": [{"type": "rectangle", "width": 1, "height": 1, "tangent": [0, 2, 0]}]})",
+       "\"tangent\""},
+      {R"({"lights": [{"tangent": [1, 0, 0]}]})", "\"tangent\""},
+      {R"({"lights": [{"type": "sphere", "radius": 1, "ies": "x"}]})", "\"ies\""},
+      {R"({"lights": [{"ies": 1}]})", "\"ies\""},
+      {R"({"lights": [{"ies": "none.ies"}]})", "none.ies"},
+      {R"({"lights": [{"ies": "bad.lights.json"}]})", "TILT="},
+      {R"({"emitters": 1})", "\"emitters\""},
+      {R"({"emitters": [{"scale": 1}]})", "\"material\""},
+      {R"({"emitters": [{"material": "lamp", "scale": -1}]})", "\"scale\""},
+      {R"({"emitters": [{"material": "no such"}]})", "no such"},
       {R"({"sky": 1})", "\"sky\""},
       {R"({"sky": {"luminance": -1}})", "\"luminance\""},
       {R"({"sky": {"color": [1]}})", "\"color\""},
@@ -482,6 +497,47 @@ TEST_F(CommandLine, RefusesAMalformedLightFileWithTheField) {
   for (const auto& [text, field] : cases) {
     const std::string lights = write("bad.lights.json", text);
     expect_refused({"solve", file, "--lights", lights, "-o", path("x.csv")}, field);
+  }
+}
+
+TEST_F(CommandLine, TakesEveryKindOfLight) {
+  const std::string file = precompute("box.safetensors");
+  const std::string profile = "IESNA91\nTILT=NONE\n1 1 1 2 1 1 1 0 0 0\n1 1 1\n0 90\n0\n100 0\n";
+  write("lamp.ies", profile);
+  const auto irradiance = [&](const std::string& text) {
+    const std::string lights = write("kind.lights.json", text);
+    summary_of({"solve", file, "--lights", lights, "-o", path("kind.npz")});
+    const auto arrays = test::unzip(path("kind.npz"));
+    double sum = 0;
+    for (const float e : test::npz_values<float>(arrays, "radiosity", "<f4")) sum += e;
+    return sum;
+  };
+  const double lamp = irradiance(R"({"lights": []})");  // the scene's own
+  EXPECT_NEAR(irradiance(R"({"emitters": [{"material": "lamp", "scale": 0.5}]})") / lamp, 0.5,
+              1e-4);
+  const std::string off = R"("emitters": [{"material": "lamp", "scale": 0}])";
+  for (const char* light :
+       {R"({"type": "sphere", "position": [0.28, 0.4, 0.28], "radius": 0.02})",
+        R"({"type": "rectangle", "position": [0.28, 0.5, 0.28], "width": 0.1, "height": 0.1})",
+        R"({"position": [0.28, 0.5, 0.28], "ies": "lamp.ies", "tangent": [0, 0, 1]})"}) {
+    const std::string one = std::string(R"({"lights": [)") + light + "], " + off + "}";
+    EXPECT_GT(irradiance(one), 0) << light;
+  }
+}
+
+TEST_F(CommandLine, PutsProbesIntoTheFile) {
+  const Words words = {"precompute", kScene, "--patches", "300", "-o", path("p.safetensors")};
+  const auto with = [&](const std::string& probes) {
+    Words more = words;
+    more.insert(more.end(), {"--probes", probes});
+    return more;
+  };
+  const double plain = summary_of(words)["file_bytes"].get<double>();
+  EXPECT_GT(summary_of(with("2,2,2"))["file_bytes"].get<double>(), plain + 10000);
+  EXPECT_GT(summary_of(with("0.25"))["file_bytes"].get<double>(), plain + 10000);
+  for (const char* bad : {"2,2", "0,1,1", "1.5,1,1", "-1", "0.001"}) {
+    const Outcome outcome = run(with(bad));
+    EXPECT_NE(outcome.exit_code, 0) << bad;
   }
 }
 

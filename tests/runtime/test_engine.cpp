@@ -81,6 +81,50 @@ TEST(Engine, TakesTheCallersDirectLight) {
   EXPECT_THROW(engine.relight(std::span(direct).first(5)), Error);
 }
 
+TEST(Engine, ACopyHasALightStateOfItsOwn) {
+  Engine engine(two_squares());
+  const Light here = lamp_at(0.1F), there = lamp_at(0.7F);
+  engine.relight({&here, 1}, {});
+  const std::vector<Float3> before = copy(engine.radiosity());
+  Engine second = engine;
+  EXPECT_EQ(&second.tracer(), &engine.tracer());
+  second.relight({&there, 1}, {});
+  EXPECT_EQ(before, copy(engine.radiosity()));
+  EXPECT_NE(before, copy(second.radiosity()));
+  second.relight({&here, 1}, {});
+  EXPECT_EQ(second.direct_lighting().traced_light_count(), 1);
+  EXPECT_EQ(before, copy(second.radiosity()));
+}
+
+TEST(Engine, EmittersAreScaledByMaterial) {
+  const auto data = std::make_shared<TransferData>(*two_squares());
+  data->materials.resize(3);
+  data->materials[1].emitted_luminance = data->materials[2].emitted_luminance = {1, 1, 1};
+  data->mesh.triangle_material[3] = 1;
+  data->mesh.triangle_material[5] = 2;
+  data->patches.emitted_exitance[5] = {4, 5, 6};
+  Engine engine(data);
+  engine.relight({}, {});
+  const std::vector<Float3> full = copy(engine.radiosity());
+  engine.set_emission_scale(1, {0, 0, 0});
+  engine.relight({}, {});
+  const std::vector<Float3> without = copy(engine.radiosity());
+  engine.set_emission_scale(1, {2, 3, 4});
+  engine.relight({}, {});
+  for (std::size_t i = 0; i < full.size(); ++i) {  // light is linear in what emits
+    for (int c = 0; c < kChannelCount; ++c) {
+      const auto scale = static_cast<float>(c + 2);
+      const float expected = without[i][c] + scale * (full[i][c] - without[i][c]);
+      EXPECT_NEAR(engine.radiosity()[i][c], expected, 1e-5F * expected + 1e-7F);
+    }
+  }
+  engine.set_emission_scale(1, {1, 1, 1});
+  engine.relight({}, {});
+  EXPECT_EQ(full, copy(engine.radiosity()));
+  EXPECT_THROW(engine.set_emission_scale(3, {1, 1, 1}), Error);
+  EXPECT_THROW(engine.set_emission_scale(1, {1, -1, 1}), Error);
+}
+
 TEST(Engine, NeedsAnOperator) {
   const auto data = std::make_shared<TransferData>(*two_squares());
   data->transfer = nullptr;

@@ -115,8 +115,32 @@ TransferData sample_data(Precision precision = Precision::kF16) {
   data.textures = {{{1, 2, 3}, TextureWrap::kRepeat, TextureWrap::kClampToEdge},
                    {{0x89, 'P', 'N', 'G', 0}, TextureWrap::kMirroredRepeat, TextureWrap::kRepeat}};
   data.cameras = {{"front", {1, 2, 3}, {0, 0, 1}, {0, 1, 0}, {-1, 0, 0}, 1.2F}};
-  data.lights = {{LightType::kSpot, "spot", {1, 1, 1}, {0, 0, 1}, {1, 0.5F, 0}, 80, 10, 0.1F, 0.7F},
-                 {LightType::kDirectional, "", {0, 0, 0}, {1, 0, 0}, {1, 1, 1}, 5, 0, 0, 0.5F}};
+  data.lights = {{LightType::kSpot,
+                  "spot",
+                  {1, 1, 1},
+                  {0, 0, 1},
+                  {1, 0.5F, 0},
+                  80,
+                  10,
+                  0.1F,
+                  0.7F,
+                  0,
+                  {0, 0},
+                  {1, 0, 0},
+                  nullptr},
+                 {LightType::kDirectional,
+                  "",
+                  {0, 0, 0},
+                  {1, 0, 0},
+                  {1, 1, 1},
+                  5,
+                  0,
+                  0,
+                  0.5F,
+                  0,
+                  {0, 0},
+                  {1, 0, 0},
+                  nullptr}};
   data.exchange = sample_exchange();
   data.transfer = sample_operator(data.patches.area, precision);
   data.record = {"rebounce 0.1.0",
@@ -484,6 +508,50 @@ TEST(TransferFile, RefusesAnImpossibleScene) {
       {"light.range", [](auto& d) { d.lights[0].range = -1; }},
       {"light.inner_cone_angle", [](auto& d) { d.lights[0].inner_cone_angle = kNan; }},
       {"light.outer_cone_angle", [](auto& d) { d.lights[0].outer_cone_angle = -1; }},
+  });
+}
+
+LightProbes sample_probes() {
+  LightProbes probes;
+  probes.position = {{0, 1, 2}, {3, 4, 5}};
+  probes.valid = {1, 0};
+  probes.sky = {Harmonics{1, 2, 3}, Harmonics{}};
+  probes.entry_begin = {0, 3, 3};
+  probes.entry_patch = {0, 1, 2};
+  probes.entry_weight = {Harmonics{1}, Harmonics{0, -1}, Harmonics{2}};
+  probes.grid = {2, 1, 1};
+  return probes;
+}
+
+TEST(TransferFile, RefusesImpossibleProbes) {
+  const auto probes = [](auto change) {
+    return [change](TransferData& data) {
+      data.probes = sample_probes();
+      change(data.probes);
+    };
+  };
+  expect_refused({
+      {"probe.position", probes([](auto& p) { p.position[1][1] = kNan; })},
+      {"probe.valid: 1 rows, not 2", probes([](auto& p) { p.valid.pop_back(); })},
+      {"probe.valid", probes([](auto& p) { p.valid[0] = 2; })},
+      {"probe.sky", probes([](auto& p) { p.sky[0][8] = kInfinity; })},
+      {"probe.sky", probes([](auto& p) { p.sky.pop_back(); })},
+      {"probe.entry_begin", probes([](auto& p) {
+         p.entry_begin = {0, 4, 3};
+       })},
+      {"probe.entry_begin", probes([](auto& p) { p.entry_begin.pop_back(); })},
+      {"probe.entry_patch: entry 1 is 3", probes([](auto& p) { p.entry_patch[1] = 3; })},
+      {"probe.entry_weight", probes([](auto& p) { p.entry_weight[2][0] = kNan; })},
+      {"probe.entry_weight", probes([](auto& p) { p.entry_weight.pop_back(); })},
+      {"probe.grid", probes([](auto& p) {
+         p.grid = {1, 1, 1};
+       })},
+      {"probe.grid", probes([](auto& p) {
+         p.grid = {0, 2, 1};
+       })},
+      {"probe.grid", probes([](auto& p) {
+         p.grid = {2, 2, 1};
+       })},
   });
 }
 

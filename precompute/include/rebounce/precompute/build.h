@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/light_probes.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/subdivision.h"
 #include "rebounce/transfer/dense_operator.h"
@@ -33,6 +34,7 @@ struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
+  ProbeSettings probes;  ///< by default none
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
   /// kF16: half the bytes, an error of some 1e-4. By default that for the hierarchical operator,

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
-#include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -14,37 +14,58 @@ struct DirectLightingSettings {
   /// Points of a patch at which lamps are looked at. More: softer, truer shadow borders; time grows
   /// in proportion. At least 1.
   int points_per_patch = 8;
+  /// Places of a lamp with a surface that each point looks at, from 1 to 64. More: smoother half
+  /// shadows; time of such lamps grows in proportion.
+  int area_light_samples = 4;
+  /// Lights for which room is made at once: 5 bytes per patch and light. A frame that has more
+  /// makes the room it lacks, the only time that one allocates. At least 0.
+  int light_capacity = 16;
 };
 
 /// Direct irradiance of the patches of one scene, with shadows.
 ///
-/// The points are spread over each patch once and stay where they are, so that a light that moves
-/// does not flicker. Holds scratch: one object per thread that lights.
+/// Points of the patches and places on the lamps are chosen once and stay where they are, so that a
+/// light that moves does not flicker. What each light of a frame does at intensity 1 is kept, by
+/// its number among the lights: only lights that have moved or changed shape since the last frame
+/// are traced again, and those of another intensity or colour are not. Results depend on the lights
+/// alone, not on those before.
+///
+/// One object per thread that lights; copies share the points.
 class DirectLighting {
  public:
-  /// `data` and `tracer` (the first surface_count triangles of data.mesh) must outlive the object.
+  /// `data` and `tracer` (the first surface_count triangles of data.mesh) must outlive the object
+  /// and its copies. Throws Error if a setting is out of range.
   DirectLighting(const TransferData& data, const RayTracer& tracer,
                  const DirectLightingSettings& settings = {});
+  ~DirectLighting();
+  DirectLighting(const DirectLighting&);
+  DirectLighting& operator=(const DirectLighting&) = delete;
 
   /// Writes the irradiance [n] in lx that arrives straight from `lights` and `sky`. Does not
-  /// allocate. The same bits for any number of OpenMP threads.
+  /// allocate, but see light_capacity. The same bits for any number of OpenMP threads.
   void compute(std::span<const Light> lights, const Sky& sky, std::span<Float3> direct_irradiance);
 
- private:
-  struct ShadowRay {
-    std::uint32_t patch;
-    Float3 irradiance;
-  };
+  /// Lights that the last compute() traced: those that were new or had changed.
+  int traced_light_count() const { return traced_light_count_; }
 
-  void add_light(const Light& light, std::size_t begin, std::size_t end,
-                 std::span<Float3> direct_irradiance);
+ private:
+  struct Receivers;
+  struct LightResponse;
+
+  static std::shared_ptr<const Receivers> spread_receivers(const TransferData& data,
+                                                           const RayTracer& tracer,
+                                                           const DirectLightingSettings& settings);
+  void make_room(std::size_t light_count);
+  void prepare(std::span<const Light> lights);
+  void respond(LightResponse& response, std::size_t block) const;
+  void add_up(const Sky& sky, std::size_t block, std::span<Float3> direct_irradiance) const;
 
   const TransferData& data_;
   const RayTracer& tracer_;
-  std::size_t points_per_patch_;
-  std::vector<PatchPoint> points_;        ///< [n][points_per_patch], moved off the surface
-  std::vector<Ray> rays_;                 ///< [n][points_per_patch] scratch
-  std::vector<ShadowRay> contributions_;  ///< [n][points_per_patch] scratch, beside rays_
+  std::shared_ptr<const Receivers> receivers_;
+  std::vector<LightResponse> responses_;
+  std::size_t light_count_ = 0;  ///< of the present frame; no more than there are responses
+  int traced_light_count_ = 0;
 };
 
 }  // namespace rebounce

@@ -4,16 +4,30 @@
 
 namespace rebounce {
 
-/// Light from one lamp at one point, before cosine and shadow.
+/// Light from one lamp, or from one place of it, at one point, before cosine and shadow.
 struct IncidentLight {
-  Float3 direction{0, 0, 0};  ///< unit, from the point to the lamp
-  float distance = 0;         ///< metres; infinite for directional lights
-  Float3 illuminance{0, 0,
-                     0};  ///< lx on a surface that faces the lamp; 0: the lamp is out of reach
+  Float3 direction{0, 0, 0};    ///< unit, from the point to the lamp
+  float distance = 0;           ///< metres; infinite for directional lights
+  Float3 illuminance{0, 0, 0};  ///< lx on a surface that faces the lamp; 0: it is out of reach
 };
 
+/// True for lamps that have a surface, whose light comes from many directions.
+inline bool is_area_light(LightType type) {
+  return type == LightType::kSphere || type == LightType::kRectangle;
+}
+
 /// Evaluates `light` at `point`: inverse-square fall-off, range window and spot cone as
-/// KHR_lights_punctual defines them.
-IncidentLight evaluate_light(const Light& light, const Float3& point);
+/// KHR_lights_punctual defines them, times the candelas of its profile if it has one.
+///
+/// Of a lamp with a surface, `place` in [0, 1)² is where the light comes from; the mean over all
+/// places of illuminance times cosine is its irradiance. Spheres are sampled by the cone in which
+/// they are seen (C. Wang, "Direct lighting models for ray tracing with cylindrical lamps", 1992),
+/// rectangles by their area. The range window is then that of the lamp's middle.
+IncidentLight evaluate_light(const Light& light, const Float3& point,
+                             const Float2& place = {0.5F, 0.5F});
+
+/// Checks the fields of `light` that its type uses against their ranges (scene_description.h).
+/// Throws Error that names the field.
+void check_light(const Light& light);
 
 }  // namespace rebounce

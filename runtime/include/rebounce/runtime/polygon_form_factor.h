@@ -1,13 +1,14 @@
 #pragma once
 
-#include <array>
 #include <glm/glm.hpp>
+#include <span>
 
 namespace rebounce {
 
-/// The form factor from a differential element at `position` with unit `normal` to a triangle, both
-/// sides of which count; what is below the element's horizon is cut off. In [0, 1].
-float point_to_triangle_form_factor(const glm::vec3& position, const glm::vec3& normal,
-                                    const std::array<glm::vec3, 3>& triangle);
+/// The form factor from a differential element at `position` with unit `normal` to a flat convex
+/// polygon of three or four corners in turn, both sides of which count; what is below the element's
+/// horizon is cut off. In [0, 1].
+float point_to_polygon_form_factor(const glm::vec3& position, const glm::vec3& normal,
+                                   std::span<const glm::vec3> corner);
 
 }  // namespace rebounce

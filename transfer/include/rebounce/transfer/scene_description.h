@@ -4,26 +4,38 @@
 // Shared by the importer (which fills it), the transfer file (which stores it) and the runtime.
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "rebounce/transfer/intensity_profile.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
 
-enum class LightType : std::uint8_t { kPoint, kSpot, kDirectional };
+enum class LightType : std::uint8_t { kPoint, kSpot, kDirectional, kSphere, kRectangle };
 
-/// A punctual light with the fields and units of KHR_lights_punctual, placed in the world.
+/// A lamp in the world. Points, spots and directional lights have the fields and units of
+/// KHR_lights_punctual; spheres and rectangles shine with the same luminance from all of their
+/// surface.
 struct Light {
   LightType type = LightType::kPoint;
   std::string name;
-  Float3 position{0, 0, 0};    ///< metres; not used by directional lights
-  Float3 direction{0, -1, 0};  ///< unit; the way the light travels; not used by point lights
+  Float3 position{0, 0, 0};    ///< metres, the middle; not used by directional lights
+  Float3 direction{0, -1, 0};  ///< unit; the way the light travels; the side of a rectangle that
+                               ///< shines; not used by spheres, and by points without a profile
   Float3 color{1, 1, 1};       ///< linear Rec.709, each >= 0
-  float intensity = 1;         ///< candela (point, spot) or lux (directional), >= 0
+  float intensity = 1;         ///< >= 0; candela (point, spot), lux (directional), candela per m²
+                               ///< (sphere, rectangle); with a profile a factor of its candelas
   float range = 0;             ///< metres; beyond it no light arrives; 0 means unlimited
   float inner_cone_angle = 0;  ///< radians from the axis: full intensity inside (spot)
   float outer_cone_angle = 0.785398163F;  ///< radians from the axis: none outside (spot)
+  float radius = 0;                       ///< metres, > 0 (sphere)
+  Float2 size{0, 0};                      ///< metres, > 0: along `tangent`, across it (rectangle)
+  /// Not along `direction`, of which it is made perpendicular: the first side of a rectangle, and
+  /// where the horizontal angles of a profile begin.
+  Float3 tangent{1, 0, 0};
+  std::shared_ptr<const IntensityProfile> profile;  ///< of a luminaire (point, spot); may be null
 };
 
 /// A uniform sky: the same luminance from every direction in which nothing is hit.

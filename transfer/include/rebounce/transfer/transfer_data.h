@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/light_probes.h"
 #include "rebounce/transfer/scene_description.h"
 #include "rebounce/transfer/transfer_operator.h"
 #include "rebounce/transfer/types.h"
@@ -76,6 +77,7 @@ struct TransferData {
   std::vector<Texture> textures;
   std::vector<Camera> cameras;
   std::vector<Light> lights;
+  LightProbes probes;  ///< may be none
   ExchangeMatrix exchange;
   /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels, or null if that is not kept:
   /// see CompressedFormFactors.

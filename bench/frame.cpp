@@ -1,0 +1,163 @@
+// The stages of a frame: direct light, the product, outputs.
+
+#include <omp.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+
+#include "program.h"
+#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/measured_error.h"
+#include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/probe_light.h"
+#include "rebounce/runtime/vertex_light.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "timing.h"
+
+namespace rebounce::bench {
+namespace {
+
+constexpr std::array<std::size_t, 3> kLightCounts = {1, 4, 16};
+constexpr std::size_t kMovingCount = 2;  // of the lights of a whole frame
+
+struct FrameOptions {
+  std::vector<std::string> inputs;
+  BuildSettings settings;
+  CommonOptions common{.repeats = 31};
+};
+
+TransferData load_or_build(const std::string& input, const BuildSettings& settings) {
+  if (std::filesystem::path(input).extension() == ".safetensors") {
+    return load_transfer_file(input);
+  }
+  BuildReport report;
+  return build_transfer_data(input, settings, report);
+}
+
+/// Lights in two places each, so that every run finds them moved.
+class MovingLights {
+ public:
+  MovingLights(const Engine& engine, std::size_t count, std::size_t moving)
+      : moving_(std::min(count, moving)) {
+    const int twice = static_cast<int>(2 * count);
+    const std::vector<Light> all = random_point_lights(engine.data(), engine.tracer(), twice, 7);
+    lights_.assign(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
+    elsewhere_.assign(all.begin() + static_cast<std::ptrdiff_t>(count), all.end());
+  }
+
+  void give_area() {
+    for (std::vector<Light>* lights : {&lights_, &elsewhere_}) {
+      for (Light& light : *lights) {
+        light.type = LightType::kSphere;
+        light.radius = 0.05F;
+      }
+    }
+  }
+
+  std::span<const Light> next() {
+    for (std::size_t k = 0; k < moving_; ++k)
+      std::swap(lights_[k].position, elsewhere_[k].position);
+    return lights_;
+  }
+
+ private:
+  std::size_t moving_;
+  std::vector<Light> lights_, elsewhere_;
+};
+
+class FrameBenchmark {
+ public:
+  FrameBenchmark(std::shared_ptr<const TransferData> data, const CommonOptions& options)
+      : options_(options),
+        engine_(std::move(data)),
+        vertices_(engine_.data().mesh.position.size()),
+        probes_(engine_.data().probes.size()) {}
+
+  void run(int threads, Table& table) {
+    omp_set_num_threads(threads);
+    names_.clear();
+    cases_.clear();
+    for (const std::size_t count : kLightCounts) add_lights(count);
+    add("initial exitance", {}, [this] { engine_.compute_initial_exitance(); });
+    add("product", {}, [this] { engine_.apply_transfer(); });
+    add("radiosity", {}, [this] { engine_.compute_radiosity(); });
+    add("vertices", {}, [this] { to_vertices(); });
+    if (!probes_.empty()) add("probes", {}, [this] { to_probes(); });
+    const std::vector<Timing> timings = time_interleaved(cases_, {.rounds = options_.repeats});
+    const std::string scene =
+        std::filesystem::path(engine_.data().record.scene_name).stem().string();
+    for (std::size_t k = 0; k < cases_.size(); ++k) {
+      table.add({scene, engine_.data().patches.size(), threads, names_[k].first, names_[k].second,
+                 timings[k].median * 1e6, timings[k].spread});
+    }
+  }
+
+ private:
+  void add(const std::string& stage, const Table::Cell& lights, const std::function<void()>& work) {
+    names_.emplace_back(stage, lights);
+    cases_.push_back({.work = work});
+  }
+
+  void add_lights(std::size_t count) {
+    const auto all = std::make_shared<MovingLights>(engine_, count, count);
+    add("direct, all moved", count, [this, all] { engine_.compute_direct(all->next(), {}); });
+    const auto none = std::make_shared<MovingLights>(engine_, count, 0);
+    const auto still = std::make_shared<Engine>(engine_);
+    add("direct, none moved", count, [still, none] { still->compute_direct(none->next(), {}); });
+    const auto spheres = std::make_shared<MovingLights>(engine_, count, count);
+    spheres->give_area();
+    add("direct, spheres moved", count,
+        [this, spheres] { engine_.compute_direct(spheres->next(), {}); });
+    // The whole frame keeps its own engine: what does not move is known from its last frame.
+    const auto some = std::make_shared<MovingLights>(engine_, count, kMovingCount);
+    const auto own = std::make_shared<Engine>(engine_);
+    add("frame, two moved", count, [this, own, some] {
+      own->relight(some->next(), {});
+      reconstruct_at_vertices(own->data().mesh, own->indirect_irradiance(), vertices_);
+    });
+  }
+
+  void to_vertices() {
+    reconstruct_at_vertices(engine_.data().mesh, engine_.indirect_irradiance(), vertices_);
+  }
+  void to_probes() { apply_probes(engine_.data().probes, engine_.radiosity(), {}, probes_); }
+
+  const CommonOptions& options_;
+  Engine engine_;
+  std::vector<Float3> vertices_;
+  std::vector<ProbeLight> probes_;
+  std::vector<std::pair<std::string, Table::Cell>> names_;
+  std::vector<TimedCase> cases_;
+};
+
+void run(const FrameOptions& options) {
+  Table table({"scene", "patches", "threads", "stage", "lights", "microseconds", "spread"});
+  for (const std::string& input : options.inputs) {
+    FrameBenchmark benchmark(
+        std::make_shared<const TransferData>(load_or_build(input, options.settings)),
+        options.common);
+    benchmark.run(1, table);
+    const int all = thread_count(options.common);
+    if (all > 1) benchmark.run(all, table);
+    omp_set_num_threads(all);
+  }
+  publish("frame", table, options.common);
+}
+
+}  // namespace
+}  // namespace rebounce::bench
+
+int main(int argc, char** argv) {
+  rebounce::bench::FrameOptions options;
+  CLI::App app("Times the stages of a frame, with 1, 4 and 16 lights.", "bench_frame");
+  app.add_option("inputs", options.inputs, "Transfer files, or scenes to build them from")
+      ->required();
+  app.add_option("--patches", options.settings.subdivision.patch_count,
+                 "Patches of each scene, about")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  add_common_options(app, options.common);
+  return rebounce::bench::run_program(app, argc, argv, options.common,
+                                      [&] { rebounce::bench::run(options); });
+}

@@ -1,0 +1,194 @@
+#include "rebounce/precompute/light_probes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sampling.h"
+#include "rebounce/runtime/spherical_harmonics.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kMostProbes = 65536;
+constexpr std::size_t kBatch = 64;  // probes between two looks at the progress
+constexpr double kLargestBackPart = 0.25;
+
+struct Entry {
+  std::uint32_t patch;
+  Harmonics weight;
+};
+
+/// What one probe sees.
+struct View {
+  std::vector<Entry> entries;  ///< ascending patches
+  Harmonics sky{};
+  bool valid = true;
+};
+
+/// Direction k of `count`, spread evenly over the sphere and turned about y by `turn` turns: the
+/// spherical Fibonacci lattice (R. Swinbank, R. J. Purser, 2006).
+Float3 fibonacci_direction(int k, int count, double turn) {
+  const double y = 1 - (2 * k + 1.0) / count;
+  const double r = std::sqrt(std::max(0.0, 1 - y * y));
+  const double phi = 2 * std::numbers::pi * std::fmod(k / std::numbers::phi + turn, 1.0);
+  return {static_cast<float>(r * std::cos(phi)), static_cast<float>(y),
+          static_cast<float>(r * std::sin(phi))};
+}
+
+void add(Harmonics& sum, const Harmonics& y, float factor) {
+  for (std::size_t k = 0; k < kHarmonicCount; ++k) sum[k] += factor * y[k];
+}
+
+/// The patch whose light a ray meets; kNone for one that goes into a back or a side without one.
+std::uint32_t seen_patch(const DisplayMesh& mesh, const Hit& hit) {
+  if (hit.front) return mesh.triangle_patch[hit.triangle];
+  const std::uint32_t back = mesh.back_triangle[hit.triangle];
+  return back == kNone ? kNone : mesh.triangle_patch[back];
+}
+
+class Viewer {
+ public:
+  Viewer(const DisplayMesh& mesh, const RayTracer& tracer, int ray_count)
+      : mesh_(mesh),
+        tracer_(tracer),
+        rays_(static_cast<std::size_t>(ray_count)),
+        hits_(rays_.size()) {}
+
+  View look_around(const Float3& position, std::uint64_t number) {
+    const auto count = static_cast<int>(rays_.size());
+    const double turn = unit_square(mix_bits(number)).x;
+    for (int k = 0; k < count; ++k) {
+      Ray& ray = rays_[static_cast<std::size_t>(k)] = Ray{};
+      ray.origin = position;
+      ray.direction = fibonacci_direction(k, count, turn);
+      ray.t_near = 0;
+      ray.t_far = std::numeric_limits<float>::infinity();
+    }
+    tracer_.intersect(rays_, hits_);
+    return sum_up();
+  }
+
+ private:
+  View sum_up() {
+    View view;
+    std::size_t backs = 0;
+    by_patch_.clear();
+    const float solid_angle = 4 * std::numbers::pi_v<float> / static_cast<float>(rays_.size());
+    for (std::uint32_t k = 0; k < hits_.size(); ++k) {
+      const Hit& hit = hits_[k];
+      if (hit.triangle == kNone) {
+        add(view.sky, spherical_harmonics(rays_[k].direction), solid_angle);
+        continue;
+      }
+      if (!hit.front && mesh_.back_triangle[hit.triangle] == kNone) ++backs;
+      const std::uint32_t patch = seen_patch(mesh_, hit);
+      if (patch != kNone) by_patch_.emplace_back(patch, k);
+    }
+    if (static_cast<double>(backs) > kLargestBackPart * static_cast<double>(hits_.size())) {
+      view = View();
+      view.valid = false;
+      return view;
+    }
+    std::ranges::sort(by_patch_);
+    for (const auto& [patch, k] : by_patch_) {
+      if (view.entries.empty() || view.entries.back().patch != patch) {
+        view.entries.push_back({patch, {}});
+      }
+      // A diffuse patch of radiosity B has the luminance B / pi.
+      add(view.entries.back().weight, spherical_harmonics(rays_[k].direction),
+          solid_angle / std::numbers::pi_v<float>);
+    }
+    return view;
+  }
+
+  const DisplayMesh& mesh_;
+  const RayTracer& tracer_;
+  std::vector<Ray> rays_;
+  std::vector<Hit> hits_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_patch_;  ///< and number of the ray
+};
+
+void append(const View& view, LightProbes& probes) {
+  probes.valid.push_back(view.valid ? 1 : 0);
+  probes.sky.push_back(view.sky);
+  for (const Entry& entry : view.entries) {
+    probes.entry_patch.push_back(entry.patch);
+    probes.entry_weight.push_back(entry.weight);
+  }
+  if (probes.entry_patch.size() >= kNone) {
+    throw Error("the probes see too much for one file; ask for fewer of them or for fewer rays");
+  }
+  probes.entry_begin.push_back(static_cast<std::uint32_t>(probes.entry_patch.size()));
+}
+
+}  // namespace
+
+LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings) {
+  glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
+  for (const Float3& p : mesh.position) {
+    low = glm::min(low, to_glm(p));
+    high = glm::max(high, to_glm(p));
+  }
+  LightProbes probes;
+  double total = 1;
+  std::array<double, 3> count{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double extent = static_cast<double>(high[axis]) - low[axis];
+    count[axis] = settings.grid[0] > 0 ? settings.grid[axis]
+                                       : std::max(1.0, std::round(extent / settings.spacing));
+    total *= count[axis];
+  }
+  if (total > static_cast<double>(kMostProbes)) {
+    throw Error("that would be " + std::to_string(static_cast<long long>(total)) +
+                " probes, and there can be " + std::to_string(kMostProbes) +
+                "; space them further apart");
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    probes.grid[axis] = static_cast<std::uint32_t>(count[axis]);
+  }
+  for (std::uint32_t z = 0; z < probes.grid[2]; ++z) {
+    for (std::uint32_t y = 0; y < probes.grid[1]; ++y) {
+      for (std::uint32_t x = 0; x < probes.grid[0]; ++x) {
+        const glm::vec3 part =
+            (glm::vec3(x, y, z) + 0.5F) / glm::vec3(probes.grid[0], probes.grid[1], probes.grid[2]);
+        probes.position.push_back(to_float3(glm::mix(low, high, part)));
+      }
+    }
+  }
+  return probes;
+}
+
+void trace_probes(const TransferData& data, const RayTracer& tracer, const ProbeSettings& settings,
+                  LightProbes& probes, const Progress& progress) {
+  if (settings.ray_count < 64) throw Error("a probe needs at least 64 rays");
+  probes.valid.clear();
+  probes.sky.clear();
+  probes.entry_begin = {0};
+  probes.entry_patch.clear();
+  probes.entry_weight.clear();
+  probes.patch_count = data.patches.size();
+  std::vector<View> views;
+  for (std::size_t first = 0; first < probes.size(); first += kBatch) {
+    if (progress && !progress(static_cast<double>(first) / static_cast<double>(probes.size()))) {
+      throw Cancelled();
+    }
+    const std::size_t count = std::min(kBatch, probes.size() - first);
+    views.resize(count);
+#pragma omp parallel
+    {
+      Viewer viewer(data.mesh, tracer, settings.ray_count);
+#pragma omp for schedule(dynamic, 1)
+      for (std::size_t k = 0; k < count; ++k) {
+        views[k] = viewer.look_around(probes.position[first + k], first + k);
+      }
+    }
+    for (const View& view : views) append(view, probes);
+  }
+}
+
+}  // namespace rebounce

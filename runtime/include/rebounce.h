@@ -1,0 +1,198 @@
+/* Rebounce from C, and from every language that can call C.
+ *
+ * One way through: load a transfer file, make an engine for each light state, relight it each
+ * frame, read what arrives.
+ *
+ *   rebounce_transfer* transfer;
+ *   rebounce_engine* engine;
+ *   if (rebounce_transfer_load("room.safetensors", &transfer) != REBOUNCE_OK ||
+ *       rebounce_engine_create(transfer, NULL, &engine) != REBOUNCE_OK) {
+ *     fprintf(stderr, "%s\n", rebounce_last_error());
+ *   }
+ *   rebounce_light lamp;
+ *   rebounce_light_init(&lamp);
+ *   lamp.position[1] = 1.9f;
+ *   rebounce_engine_relight(engine, &lamp, 1, NULL);
+ *   const float* indirect = rebounce_engine_indirect_irradiance(engine);   // [n][3], lx
+ *
+ * Functions that can fail return a status; no exception leaves the library. Handles may be given
+ * NULL where that is said, and arrays are borrowed for the time of a call. Units are photometric
+ * (cd, lx, cd/m²), lengths metres, space glTF's, colours linear Rec.709.
+ *
+ * Threads: a transfer is immutable and may be used by any number of threads; an engine belongs to
+ * one thread at a time. A frame neither allocates nor locks, but see light_capacity. It runs on
+ * OpenMP threads: omp_set_num_threads(1) on the calling thread keeps it there. */
+
+#ifndef REBOUNCE_H
+#define REBOUNCE_H
+
+/* NOLINTBEGIN(readability-identifier-naming): the names of a C interface */
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Raised when a function or structure of this header changes its meaning. Structures that may grow
+ * begin with their size, which the _init functions fill in: a program that was compiled with an
+ * older header goes on working. */
+#define REBOUNCE_ABI_VERSION 1
+
+typedef enum rebounce_status {
+  REBOUNCE_OK = 0,
+  REBOUNCE_INVALID_ARGUMENT = 1, /* NULL, a wrong size, a light out of its range */
+  REBOUNCE_BAD_INPUT = 2,        /* a file that cannot be opened, is damaged or is none of ours */
+  REBOUNCE_OUT_OF_MEMORY = 3,
+  REBOUNCE_UNSUPPORTED = 4, /* the library was built without what this needs */
+  REBOUNCE_INTERNAL = 5     /* a mistake of ours */
+} rebounce_status;
+
+/* REBOUNCE_ABI_VERSION and the version ("0.1.0") of the library that is linked. */
+uint32_t rebounce_abi_version(void);
+const char* rebounce_version(void);
+
+/* One line about the last call on this thread that failed: what, where, what to do. Empty if none
+ * has. Valid until the next one that fails. */
+const char* rebounce_last_error(void);
+
+/* ---- Transfer data: everything that was found out about a scene offline ---- */
+
+typedef struct rebounce_transfer rebounce_transfer;
+
+/* Loads a transfer file (UTF-8 path), checks all of it, and writes a handle with one reference. */
+rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** transfer);
+
+/* One more reference, for another owner; one less, and at the last the data go once no engine uses
+ * them any more. NULL is ignored. */
+void rebounce_transfer_retain(rebounce_transfer* transfer);
+void rebounce_transfer_release(rebounce_transfer* transfer);
+
+typedef struct rebounce_transfer_info {
+  uint32_t struct_size; /* in: sizeof(rebounce_transfer_info) */
+  uint32_t patch_count;
+  uint32_t vertex_count;   /* of the display mesh */
+  uint32_t triangle_count; /* of the display mesh */
+  uint32_t material_count;
+  uint32_t probe_count;    /* 0: there are none */
+  uint32_t probe_grid[3];  /* probes along x, y, z, x fastest; zeros: no grid */
+  uint64_t operator_bytes; /* that a frame reads, all channels */
+} rebounce_transfer_info;
+
+rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
+                                           rebounce_transfer_info* info);
+
+/* Tables, valid as long as the transfer; NULL if it is. */
+const float* rebounce_transfer_patch_area(const rebounce_transfer* transfer);        /* [n] m² */
+const float* rebounce_transfer_patch_centroid(const rebounce_transfer* transfer);    /* [n][3] m */
+const float* rebounce_transfer_patch_normal(const rebounce_transfer* transfer);      /* [n][3] */
+const float* rebounce_transfer_patch_reflectance(const rebounce_transfer* transfer); /* [n][3] */
+const float* rebounce_transfer_vertex_position(const rebounce_transfer* transfer);   /* [v][3] m */
+const float* rebounce_transfer_vertex_normal(const rebounce_transfer* transfer);     /* [v][3] */
+const uint32_t* rebounce_transfer_triangle(const rebounce_transfer* transfer);       /* [t][3] */
+const uint32_t* rebounce_transfer_triangle_patch(
+    const rebounce_transfer* transfer); /* [t], or UINT32_MAX */
+const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer); /* [p][3] m */
+const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer);  /* [p] 0, 1 */
+
+/* ---- Lights ---- */
+
+typedef enum rebounce_light_type {
+  REBOUNCE_LIGHT_POINT = 0,
+  REBOUNCE_LIGHT_SPOT = 1,
+  REBOUNCE_LIGHT_DIRECTIONAL = 2,
+  REBOUNCE_LIGHT_SPHERE = 3,
+  REBOUNCE_LIGHT_RECTANGLE = 4
+} rebounce_light_type;
+
+/* A lamp, with the fields, units and fall-off of KHR_lights_punctual where it is one of those. */
+typedef struct rebounce_light {
+  uint32_t struct_size; /* sizeof(rebounce_light) */
+  uint32_t type;        /* rebounce_light_type; default point */
+  float position[3];    /* m, the middle; default 0; not of directional lights */
+  float direction[3];   /* unit, the way the light travels; default down; not of points, spheres */
+  float color[3];       /* >= 0; default 1 */
+  float intensity;      /* >= 0; cd (point, spot), lx (directional), cd/m² (others); default 1 */
+  float range;          /* m; no light arrives from further away; 0, the default: unlimited */
+  float inner_cone_angle; /* rad from the axis, spot; default 0 */
+  float outer_cone_angle; /* rad from the axis, spot, at most pi/2; default pi/4 */
+  float radius;           /* m, > 0, sphere */
+  float size[2];          /* m, > 0, rectangle: along the tangent and across it */
+  float tangent[3];       /* rectangle: first side, not along its direction; default x */
+} rebounce_light;
+
+/* Writes the defaults. */
+void rebounce_light_init(rebounce_light* light);
+
+/* The same luminance in cd/m² from every direction in which the scene is open. */
+typedef struct rebounce_sky {
+  float color[3];
+  float luminance;
+} rebounce_sky;
+
+/* ---- Engines: one light state each ---- */
+
+typedef struct rebounce_engine rebounce_engine;
+
+typedef struct rebounce_engine_settings {
+  uint32_t struct_size;        /* sizeof(rebounce_engine_settings) */
+  uint32_t points_per_patch;   /* at which lamps are looked at; default 8; more: truer shadows */
+  uint32_t area_light_samples; /* of spheres and rectangles, for each point; default 4, most 64 */
+  uint32_t light_capacity; /* lights for which there is room at once; default 16. The first frame
+                              with more makes the room it lacks, the only one that allocates */
+} rebounce_engine_settings;
+
+void rebounce_engine_settings_init(rebounce_engine_settings* settings);
+
+/* Makes an engine; settings may be NULL. It keeps the transfer's data. */
+rebounce_status rebounce_engine_create(rebounce_transfer* transfer,
+                                       const rebounce_engine_settings* settings,
+                                       rebounce_engine** engine);
+
+/* Makes another light state of the same scene, which shares all that does not change; `engine` must
+ * not be relit meanwhile. */
+rebounce_status rebounce_engine_clone(const rebounce_engine* engine, rebounce_engine** clone);
+
+/* NULL is ignored. */
+void rebounce_engine_destroy(rebounce_engine* engine);
+
+/* One frame. Lights are known by their number: one that is as it was is not traced again, nor one
+ * that has only another colour or intensity. `sky` may be NULL: none. Fails with
+ * REBOUNCE_UNSUPPORTED in a library without Embree. A frame that fails changes nothing. */
+rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_light* lights,
+                                        size_t light_count, const rebounce_sky* sky);
+
+/* One frame with a direct irradiance [patch_count][3] in lx of the caller's own. */
+rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const float* irradiance,
+                                               size_t patch_count);
+
+/* From the next frame on, surfaces of this material emit that of the scene times scale [3] >= 0. */
+rebounce_status rebounce_engine_set_emission_scale(rebounce_engine* engine, uint32_t material,
+                                                   const float* scale);
+
+/* Results of the last frame, [n][3] in lx; they change with the next one. NULL if `engine` is. */
+const float* rebounce_engine_direct_irradiance(const rebounce_engine* engine);
+const float* rebounce_engine_indirect_irradiance(const rebounce_engine* engine);
+const float* rebounce_engine_radiosity(const rebounce_engine* engine);
+
+/* Indirect irradiance of the last frame at the vertices of the display mesh [vertex_count][3]. */
+rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
+                                                  size_t vertex_count);
+
+/* Radiance in cd/m² that arrives at the light probes from patches and sky in the last frame, lamps
+ * apart: [probe_count][9][3], coefficients of real spherical harmonics of degree 0 to 2
+ * (Ramamoorthi and Hanrahan 2001). */
+rebounce_status rebounce_engine_probe_light(const rebounce_engine* engine, float* harmonics,
+                                            size_t probe_count);
+
+/* Irradiance in lx on a surface with unit normal [3] of coefficients [9][3]; writes [3]. */
+void rebounce_harmonics_irradiance(const float* harmonics, const float* normal, float* irradiance);
+
+#ifdef __cplusplus
+}
+#endif
+
+/* NOLINTEND(readability-identifier-naming) */
+
+#endif

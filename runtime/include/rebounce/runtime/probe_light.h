@@ -1,0 +1,31 @@
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "rebounce/transfer/light_probes.h"
+#include "rebounce/transfer/scene_description.h"
+
+namespace rebounce {
+
+/// Incoming radiance at a point, cd/m²: coefficients of spherical harmonics, each of three
+/// channels.
+using ProbeLight = std::array<Float3, kHarmonicCount>;
+
+/// Writes the light that arrives at each probe [p] from patches of `radiosity` [n] in lx and from
+/// `sky`; that of lamps is not in it. Probes that are not valid get none. Neither allocates nor
+/// locks; the same bits for any number of OpenMP threads. Throws Error if a size is wrong.
+void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
+                  std::span<ProbeLight> light);
+
+/// The irradiance in lx on a surface with unit `normal`, at least 0: R. Ramamoorthi, P. Hanrahan,
+/// "An efficient representation for irradiance environment maps", SIGGRAPH 2001.
+Float3 probe_irradiance(const ProbeLight& light, const Float3& normal);
+
+/// The light at any point of the grid that `probes` are, between the eight probes around it,
+/// without those that are not valid; outside of the grid that of its border. Zero where none of the
+/// eight is valid, or if the probes are no grid.
+ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,
+                              const Float3& position);
+
+}  // namespace rebounce

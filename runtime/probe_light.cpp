@@ -1,0 +1,116 @@
+#include "rebounce/runtime/probe_light.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "rebounce/runtime/spherical_harmonics.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+/// Adds `weight` times a colour to the coefficients, which are kept channel by channel so that the
+/// compiler has rows to work on.
+struct PlanarLight {
+  std::array<Harmonics, kChannelCount> channel{};
+
+  void add(const Harmonics& weight, const Float3& color) {
+    for (std::size_t c = 0; c < kChannelCount; ++c) {
+      for (std::size_t k = 0; k < kHarmonicCount; ++k) channel[c][k] += color[c] * weight[k];
+    }
+  }
+  ProbeLight interleaved() const {
+    ProbeLight light;
+    for (std::size_t k = 0; k < kHarmonicCount; ++k) {
+      light[k] = {channel[0][k], channel[1][k], channel[2][k]};
+    }
+    return light;
+  }
+};
+
+/// Where a coordinate lies in a row of evenly spaced probes.
+struct GridPlace {
+  std::uint32_t low = 0, high = 0;
+  float fraction = 0;
+};
+
+GridPlace place_in_row(float x, float first, float last, std::uint32_t count) {
+  if (count < 2 || !(last > first)) return {};
+  const auto end = static_cast<float>(count - 1);
+  const float at = std::clamp((x - first) / (last - first) * end, 0.0F, end);
+  const auto low = std::min(static_cast<std::uint32_t>(at), count - 2);
+  return {low, low + 1, at - static_cast<float>(low)};
+}
+
+void check_size(std::size_t size, std::size_t wanted, const char* name) {
+  if (size == wanted) return;
+  throw Error(std::string("probes: ") + name + " has " + std::to_string(size) +
+              " entries; it must have " + std::to_string(wanted));
+}
+
+}  // namespace
+
+void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
+                  std::span<ProbeLight> light) {
+  check_size(light.size(), probes.size(), "the result");
+  if (probes.size() == 0) return;
+  check_size(radiosity.size(), probes.patch_count, "the radiosity");
+  const Float3 open_sky = {sky.luminance * sky.color[0], sky.luminance * sky.color[1],
+                           sky.luminance * sky.color[2]};
+#pragma omp parallel for schedule(static)
+  for (std::size_t p = 0; p < probes.size(); ++p) {
+    PlanarLight sum;
+    sum.add(probes.sky[p], open_sky);
+    for (std::uint32_t e = probes.entry_begin[p]; e < probes.entry_begin[p + 1]; ++e) {
+      sum.add(probes.entry_weight[e], radiosity[probes.entry_patch[e]]);
+    }
+    light[p] = sum.interleaved();
+  }
+}
+
+Float3 probe_irradiance(const ProbeLight& light, const Float3& normal) {
+  const Harmonics y = spherical_harmonics(normal);
+  Float3 sum{0, 0, 0};
+  for (std::size_t k = 0; k < kHarmonicCount; ++k) {
+    for (std::size_t c = 0; c < kChannelCount; ++c) sum[c] += kCosineLobe[k] * y[k] * light[k][c];
+  }
+  for (float& x : sum) x = std::max(x, 0.0F);  // the series may undershoot
+  return sum;
+}
+
+ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,
+                              const Float3& position) {
+  const auto [nx, ny, nz] = probes.grid;
+  ProbeLight sum{};
+  if (nx == 0 || light.size() != probes.size()) return sum;
+  const Float3& first = probes.position.front();
+  const Float3& last = probes.position.back();
+  std::array<GridPlace, 3> place;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    place[axis] = place_in_row(position[axis], first[axis], last[axis], probes.grid[axis]);
+  }
+  float total = 0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    float weight = 1;
+    std::array<std::uint32_t, 3> at{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const bool high = (corner >> axis & 1U) != 0;
+      weight *= high ? place[axis].fraction : 1 - place[axis].fraction;
+      at[axis] = high ? place[axis].high : place[axis].low;
+    }
+    const std::size_t probe = at[0] + std::size_t{nx} * (at[1] + std::size_t{ny} * at[2]);
+    if (weight <= 0 || probes.valid[probe] == 0) continue;
+    total += weight;
+    for (std::size_t k = 0; k < kHarmonicCount; ++k) {
+      for (std::size_t c = 0; c < kChannelCount; ++c) sum[k][c] += weight * light[probe][k][c];
+    }
+  }
+  if (total <= 0) return sum;
+  for (Float3& coefficient : sum) {
+    for (float& x : coefficient) x /= total;
+  }
+  return sum;
+}
+
+}  // namespace rebounce

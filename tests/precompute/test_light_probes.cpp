@@ -1,0 +1,178 @@
+#include "rebounce/precompute/light_probes.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <numbers>
+
+#include "expect_error.h"
+#include "rebounce/precompute/build.h"
+#include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/probe_light.h"
+#include "rebounce/runtime/sampling.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "temporary_folder.h"
+
+namespace rebounce {
+namespace {
+
+const TransferData& cornell_box() {
+  static const TransferData data = [] {
+    BuildSettings settings;
+    settings.subdivision.patch_count = 600;
+    settings.probes.grid = {4, 3, 4};
+    BuildReport report;
+    return build_transfer_data(
+        std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests/scenes/cornell_box.gltf", settings,
+        report);
+  }();
+  return data;
+}
+
+RayTracer tracer_of(const TransferData& data) {
+  return {data.mesh.position, std::span(data.mesh.triangle).first(data.mesh.surface_count())};
+}
+
+/// Irradiance at a point in the air by brute force: many cosine-distributed rays, and the
+/// radiosity of what each meets.
+Float3 gather(const TransferData& data, const RayTracer& tracer, std::span<const Float3> radiosity,
+              const Float3& position, const Float3& normal) {
+  constexpr int kRays = 1 << 14;
+  std::vector<Ray> rays(kRays);
+  std::vector<Hit> hits(kRays);
+  const glm::dmat3 frame = frame_around(to_dvec3(normal));
+  for (std::uint32_t k = 0; k < kRays; ++k) {
+    rays[k] = Ray{};
+    rays[k].origin = position;
+    rays[k].direction = to_float3(frame * square_to_cosine_hemisphere(r2_point(k, {0.3, 0.7})));
+    rays[k].t_near = 0;
+    rays[k].t_far = std::numeric_limits<float>::infinity();
+  }
+  tracer.intersect(rays, hits);
+  glm::dvec3 sum(0);
+  for (const Hit& hit : hits) {
+    if (hit.triangle == kNone) continue;
+    const std::uint32_t side = hit.front ? hit.triangle : data.mesh.back_triangle[hit.triangle];
+    if (side == kNone || data.mesh.triangle_patch[side] == kNone) continue;
+    sum += to_dvec3(radiosity[data.mesh.triangle_patch[side]]);
+  }
+  return to_float3(sum / static_cast<double>(kRays));
+}
+
+/// The relative error of the irradiance in six directions at every valid probe.
+double error_of_probes(const Engine& engine) {
+  const TransferData& data = engine.data();
+  std::vector<ProbeLight> light(data.probes.size());
+  apply_probes(data.probes, engine.radiosity(), {}, light);
+  double difference = 0, total = 0;
+  for (std::size_t p = 0; p < light.size(); ++p) {
+    if (data.probes.valid[p] == 0) continue;
+    for (int axis = 0; axis < 6; ++axis) {
+      Float3 normal{0, 0, 0};
+      normal[static_cast<std::size_t>(axis / 2)] = axis % 2 == 0 ? 1.0F : -1.0F;
+      const Float3 truth =
+          gather(data, engine.tracer(), engine.radiosity(), data.probes.position[p], normal);
+      const Float3 found = probe_irradiance(light[p], normal);
+      for (int c = 0; c < kChannelCount; ++c) {
+        difference += (found[c] - truth[c]) * (found[c] - truth[c]);
+        total += truth[c] * truth[c];
+      }
+    }
+  }
+  return std::sqrt(difference / total);
+}
+
+TEST(LightProbes, IrradianceIsThatOfABruteForceGather) {
+  const auto data = std::make_shared<const TransferData>(cornell_box());
+  EXPECT_GE(std::ranges::count(data->probes.valid, 1), 40);
+  EXPECT_LT(std::ranges::count(data->probes.valid, 1), 48);  // some are within the blocks
+  Engine engine(data);
+  engine.relight({}, {});
+  const double lamp_error = error_of_probes(engine);
+  // Reflected light alone, which is what the probes are for.
+  engine.set_emission_scale(3, {0, 0, 0});
+  Light light;
+  light.position = {0.278F, 0.4F, 0.1F};
+  engine.relight({&light, 1}, {});
+  const double error = error_of_probes(engine);
+  std::printf("relative L2 error of the irradiance: %.4f reflected, %.4f with the lamp's surface\n",
+              error, lamp_error);
+  EXPECT_LE(error, 0.02);
+  // A small bright surface in view has harmonics beyond degree 2, which the series leaves out.
+  EXPECT_LE(lamp_error, 0.08);
+}
+
+TEST(LightProbes, TheFileKeepsThem) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "probes.safetensors", cornell_box());
+  const TransferData read = load_transfer_file(folder / "probes.safetensors");
+  const LightProbes &a = cornell_box().probes, &b = read.probes;
+  EXPECT_EQ(a.position, b.position);
+  EXPECT_EQ(a.valid, b.valid);
+  EXPECT_EQ(a.sky, b.sky);
+  EXPECT_EQ(a.entry_begin, b.entry_begin);
+  EXPECT_EQ(a.entry_patch, b.entry_patch);
+  EXPECT_EQ(a.entry_weight, b.entry_weight);
+  EXPECT_EQ(a.grid, b.grid);
+  EXPECT_EQ(b.patch_count, read.patches.size());
+}
+
+TEST(LightProbes, EveryDirectionIsPatchOrSkyOrBack) {
+  // In degree 0, all that is seen adds up to the sphere.
+  const TransferData& data = cornell_box();
+  const LightProbes& probes = data.probes;
+  for (std::size_t p = 0; p < probes.size(); ++p) {
+    double seen = probes.sky[p][0];
+    for (std::uint32_t e = probes.entry_begin[p]; e < probes.entry_begin[p + 1]; ++e) {
+      seen += std::numbers::pi * probes.entry_weight[e][0];
+    }
+    const double sphere = 4 * std::numbers::pi * 0.282095;
+    if (probes.valid[p] != 0) {
+      EXPECT_LE(seen, sphere * (1 + 1e-4));
+      EXPECT_GE(seen, 0.7 * sphere);
+    } else {
+      EXPECT_EQ(seen, 0);
+    }
+  }
+}
+
+TEST(LightProbes, BehindWallsTheyAreNotValid) {
+  // Probes outside of the one-sided box see backs.
+  const TransferData& data = cornell_box();
+  const RayTracer tracer = tracer_of(data);
+  LightProbes probes;
+  const Float3 middle = data.probes.position[1 + 4 * (1 + 3 * 1)];
+  probes.position = {middle, {middle[0], middle[1] - 10, middle[2]}};
+  trace_probes(data, tracer, {}, probes);
+  EXPECT_EQ(probes.valid[0], 1);
+}
+
+TEST(LightProbes, SameBitsForAnyNumberOfThreads) {
+  const TransferData& data = cornell_box();
+  const RayTracer tracer = tracer_of(data);
+  LightProbes probes = place_probes(data.mesh, {.grid = {3, 2, 2}});
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  trace_probes(data, tracer, {}, probes);
+  const auto one = probes.entry_weight;
+  omp_set_num_threads(4);
+  trace_probes(data, tracer, {}, probes);
+  omp_set_num_threads(before);
+  EXPECT_EQ(one, probes.entry_weight);
+}
+
+TEST(LightProbes, SpacingAndLimits) {
+  const TransferData& data = cornell_box();
+  const LightProbes probes = place_probes(data.mesh, {.spacing = 0.1F});
+  EXPECT_EQ(probes.size(), std::size_t{probes.grid[0]} * probes.grid[1] * probes.grid[2]);
+  EXPECT_GE(probes.grid[0], 2U);
+  test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "further apart");
+  LightProbes few = place_probes(data.mesh, {.grid = {1, 1, 1}});
+  test::expect_error([&] { trace_probes(data, tracer_of(data), {.ray_count = 3}, few); },
+                     "64 rays");
+}
+
+}  // namespace
+}  // namespace rebounce

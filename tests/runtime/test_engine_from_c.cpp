@@ -1,0 +1,117 @@
+// The C interface from within, where allocations can be counted; tests/consumer uses it from C.
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <thread>
+
+#include "allocation_counter.h"
+#include "rebounce.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "temporary_folder.h"
+#include "test_scene_data.h"
+
+namespace rebounce {
+namespace {
+
+class FromC : public testing::Test {
+ protected:
+  void SetUp() override {
+    TransferData data;
+    test::add_square(data, 1, 0, 4, true, {0.5F, 0.4F, 0.3F});
+    test::add_square(data, 1, 2, 4, false, {0.2F, 0.7F, 0.9F});
+    test::add_even_exchange(data);
+    DisplayMesh& mesh = data.mesh;
+    mesh.base_color_texcoord.resize(mesh.position.size());
+    mesh.emissive_texcoord.resize(mesh.position.size());
+    mesh.vertex_color.resize(mesh.position.size());
+    mesh.weight_begin.resize(mesh.position.size() + 1);
+    data.materials.resize(1);
+    const std::string path = (folder_ / "room.safetensors").string();
+    save_transfer_file(path, data);
+    ASSERT_EQ(rebounce_transfer_load(path.c_str(), &transfer_), REBOUNCE_OK);
+    ASSERT_EQ(rebounce_engine_create(transfer_, nullptr, &engine_), REBOUNCE_OK);
+    rebounce_light_init(&lamp_);
+    lamp_.position[1] = 1;
+  }
+  void TearDown() override {
+    rebounce_engine_destroy(engine_);
+    rebounce_transfer_release(transfer_);
+  }
+
+  test::TemporaryFolder folder_;
+  rebounce_transfer* transfer_ = nullptr;
+  rebounce_engine* engine_ = nullptr;
+  rebounce_light lamp_{};
+};
+
+TEST_F(FromC, AFrameDoesNotAllocate) {
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  const int count = test::count_allocations([&] {
+    lamp_.position[0] += 0.1F;
+    rebounce_engine_relight(engine_, &lamp_, 1, nullptr);
+  });
+  EXPECT_EQ(count, 0);
+}
+
+TEST_F(FromC, StructuresOfALaterVersionAreUnderstood) {
+  struct LaterLight {
+    rebounce_light light;
+    float something_new[5];
+  };
+  std::array<LaterLight, 2> later{};
+  std::array<rebounce_light, 2> now{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    now[k] = lamp_;
+    now[k].position[0] = 0.3F * static_cast<float>(k);
+    later[k].light = now[k];
+    later[k].light.struct_size = sizeof(LaterLight);
+  }
+  ASSERT_EQ(rebounce_engine_relight(engine_, now.data(), 2, nullptr), REBOUNCE_OK);
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  const float* const direct = rebounce_engine_direct_irradiance(engine_);
+  const std::vector<float> before(direct, direct + 3 * std::size_t{info.patch_count});
+  ASSERT_EQ(rebounce_engine_relight(engine_, &later[0].light, 2, nullptr), REBOUNCE_OK);
+  EXPECT_TRUE(std::equal(before.begin(), before.end(), direct));
+}
+
+TEST_F(FromC, AnErrorIsALineAndBelongsToItsThread) {
+  lamp_.struct_size = 4;
+  EXPECT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_INVALID_ARGUMENT);
+  const std::string here = rebounce_last_error();
+  EXPECT_NE(here.find("struct_size"), std::string::npos);
+  EXPECT_EQ(here.find('\n'), std::string::npos);
+  std::thread([] { EXPECT_STREQ(rebounce_last_error(), ""); }).join();
+}
+
+TEST_F(FromC, LightsOutOfRangeAreRefused) {
+  const auto refused = [&](auto change) {
+    rebounce_light light = lamp_;
+    change(light);
+    return rebounce_engine_relight(engine_, &light, 1, nullptr) == REBOUNCE_INVALID_ARGUMENT;
+  };
+  EXPECT_FALSE(refused([](auto&) {}));
+  EXPECT_TRUE(refused([](auto& l) { l.type = 5; }));
+  EXPECT_TRUE(refused([](auto& l) { l.position[2] = NAN; }));
+  EXPECT_TRUE(refused([](auto& l) { l.color[0] = -1; }));
+  EXPECT_TRUE(refused([](auto& l) { l.intensity = INFINITY; }));
+  EXPECT_TRUE(refused([](auto& l) { l.range = -1; }));
+  EXPECT_TRUE(refused([](auto& l) { l.type = REBOUNCE_LIGHT_SPHERE; }));  // no radius
+  EXPECT_TRUE(refused([](auto& l) { l.type = REBOUNCE_LIGHT_RECTANGLE; }));
+  EXPECT_TRUE(refused([](auto& l) {
+    l.type = REBOUNCE_LIGHT_SPOT;
+    l.direction[1] = -2;
+  }));
+  EXPECT_TRUE(refused([](auto& l) {
+    l.type = REBOUNCE_LIGHT_SPOT;
+    l.inner_cone_angle = 1;
+  }));
+  const rebounce_sky dark = {{1, 1, 1}, -1};
+  EXPECT_EQ(rebounce_engine_relight(engine_, nullptr, 0, &dark), REBOUNCE_INVALID_ARGUMENT);
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,121 @@
+#include "rebounce/runtime/probe_light.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "allocation_counter.h"
+#include "expect_error.h"
+#include "rebounce/runtime/spherical_harmonics.h"
+
+namespace rebounce {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// Sums over a fine grid of the sphere: f(direction, solid angle).
+template <typename Function>
+void over_sphere(const Function& f) {
+  constexpr int kRows = 200, kColumns = 400;
+  for (int i = 0; i < kRows; ++i) {
+    for (int j = 0; j < kColumns; ++j) {
+      const double z = -1 + (i + 0.5) * 2 / kRows, r = std::sqrt(1 - z * z);
+      const double phi = 2 * kPi * (j + 0.5) / kColumns;
+      f(Float3{static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)),
+               static_cast<float>(z)},
+        4 * kPi / (kRows * kColumns));
+    }
+  }
+}
+
+TEST(SphericalHarmonics, AreOrthonormal) {
+  std::array<std::array<double, 9>, 9> product{};
+  over_sphere([&](const Float3& d, double solid_angle) {
+    const Harmonics y = spherical_harmonics(d);
+    for (std::size_t a = 0; a < 9; ++a) {
+      for (std::size_t b = 0; b < 9; ++b) product[a][b] += solid_angle * y[a] * y[b];
+    }
+  });
+  for (std::size_t a = 0; a < 9; ++a) {
+    for (std::size_t b = 0; b < 9; ++b) EXPECT_NEAR(product[a][b], a == b ? 1 : 0, 1e-3);
+  }
+}
+
+TEST(ProbeLight, UniformLightIsPiTimesLuminance) {
+  ProbeLight light{};
+  light[0] = {2 / 0.282095F, 0, 0};  // luminance 2: 2 / Y00 is 2 sqrt(4 pi)
+  EXPECT_NEAR(probe_irradiance(light, {0, 1, 0})[0], 2 * kPi, 1e-5);
+  EXPECT_NEAR(probe_irradiance(light, {0.6F, 0, -0.8F})[0], 2 * kPi, 1e-5);
+}
+
+TEST(ProbeLight, SmoothLightIsExact) {
+  // L = 1 + d.a + (d.b)²: degree 2, for which the method is exact.
+  const Float3 a = {0.2F, -0.1F, 0.3F}, b = {0.5F, 0.4F, -0.6F};
+  const auto dot = [](const Float3& u, const Float3& v) {
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+  };
+  ProbeLight light{};
+  over_sphere([&](const Float3& d, double solid_angle) {
+    const Harmonics y = spherical_harmonics(d);
+    const double radiance = 1 + dot(d, a) + dot(d, b) * dot(d, b);
+    for (std::size_t k = 0; k < 9; ++k)
+      light[k][1] += static_cast<float>(solid_angle * radiance * y[k]);
+  });
+  for (const Float3& n : {Float3{0, 0, 1}, Float3{0.6F, 0.8F, 0}, Float3{-0.48F, 0.6F, -0.64F}}) {
+    double truth = 0;
+    over_sphere([&](const Float3& d, double solid_angle) {
+      truth += solid_angle * std::max(0.0F, dot(d, n)) * (1 + dot(d, a) + dot(d, b) * dot(d, b));
+    });
+    EXPECT_NEAR(probe_irradiance(light, n)[1] / truth, 1, 1e-3);
+  }
+}
+
+LightProbes row_of_three() {
+  LightProbes probes;
+  probes.position = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  probes.valid = {1, 1, 0};
+  probes.sky = {Harmonics{1}, Harmonics{2}, Harmonics{}};
+  probes.entry_begin = {0, 2, 3, 3};
+  probes.entry_patch = {0, 1, 1};
+  probes.entry_weight = {Harmonics{1, 2}, Harmonics{3}, Harmonics{0, 0, 5}};
+  probes.grid = {3, 1, 1};
+  probes.patch_count = 2;
+  return probes;
+}
+
+TEST(ProbeLight, AppliesItsMap) {
+  const LightProbes probes = row_of_three();
+  const std::vector<Float3> radiosity = {{10, 0, 1}, {0, 20, 2}};
+  std::vector<ProbeLight> light(3);
+  const Sky sky{.color = {1, 0, 0}, .luminance = 100};
+  const int count = test::count_allocations([&] { apply_probes(probes, radiosity, sky, light); });
+  EXPECT_LE(count, 0);
+  EXPECT_EQ(light[0][0], (Float3{110, 60, 7}));
+  EXPECT_EQ(light[0][1], (Float3{20, 0, 2}));
+  EXPECT_EQ(light[1][0], (Float3{200, 0, 0}));
+  EXPECT_EQ(light[1][2], (Float3{0, 100, 10}));
+  EXPECT_EQ(light[2], ProbeLight{});
+  test::expect_error([&] { apply_probes(probes, radiosity, sky, std::span(light).first(2)); },
+                     "must have 3");
+  test::expect_error([&] { apply_probes(probes, std::span(radiosity).first(1), sky, light); },
+                     "must have 2");
+}
+
+TEST(ProbeLight, InterpolatesBetweenValidProbes) {
+  const LightProbes probes = row_of_three();
+  std::vector<ProbeLight> light(3);
+  light[0][0] = {8, 0, 0};
+  light[1][0] = {4, 0, 0};
+  light[2][0] = {1000, 0, 0};
+  const auto at = [&](float x) { return interpolate_probes(probes, light, {x, 7, -3})[0][0]; };
+  EXPECT_FLOAT_EQ(at(0), 8);
+  EXPECT_FLOAT_EQ(at(0.25F), 7);
+  EXPECT_FLOAT_EQ(at(-9), 8);
+  EXPECT_FLOAT_EQ(at(1.9F), 4);  // the third is not valid
+  EXPECT_FLOAT_EQ(at(5), 0);
+}
+
+}  // namespace
+}  // namespace rebounce
