@@ -1,16 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 
 #include "commands.h"
 #include "light_file.h"
 #include "output_check.h"
-#include "rebounce/demo/camera.h"
+#include "picture_options.h"
 #include "rebounce/demo/image_file.h"
 #include "rebounce/demo/picture.h"
 #include "rebounce/precompute/reference_solution.h"
@@ -22,63 +20,10 @@
 namespace rebounce::cli {
 namespace {
 
-constexpr int kLargestSide = 16384;  // pixels
-
 struct RenderOptions {
   std::string file, lights, camera, size = "1280x720", show = "radiosity", output;
   std::optional<float> exposure;
 };
-
-std::vector<float> parse_numbers(const std::string& text) {
-  std::vector<float> numbers;
-  for (const char* at = text.data(); at <= text.data() + text.size();) {
-    float value = 0;
-    const auto [end, error] = std::from_chars(at, text.data() + text.size(), value);
-    const bool at_end = end == text.data() + text.size();
-    if (error != std::errc() || (!at_end && *end != ',')) return {};
-    numbers.push_back(value);
-    if (at_end) return numbers;
-    at = end + 1;
-  }
-  return {};
-}
-
-Camera choose_camera(const std::string& wanted, const Engine& engine) {
-  const TransferData& data = engine.data();
-  if (wanted.empty()) {
-    return data.cameras.empty() ? fit_camera(data, engine.tracer(), engine.radiosity())
-                                : data.cameras.front();
-  }
-  for (const Camera& camera : data.cameras) {
-    if (camera.name == wanted) return camera;
-  }
-  const std::vector<float> n = parse_numbers(wanted);
-  if (n.size() == 1 && n[0] >= 0 && n[0] < static_cast<float>(data.cameras.size())) {
-    return data.cameras[static_cast<std::size_t>(n[0])];
-  }
-  if (n.size() == 6 || n.size() == 7) {
-    constexpr float kDegree = std::numbers::pi_v<float> / 180;
-    return look_at({n[0], n[1], n[2]}, {n[3], n[4], n[5]}, (n.size() == 7 ? n[6] : 50) * kDegree);
-  }
-  throw Error(fmt::format("no camera \"{}\": the file has {}; or give px,py,pz,tx,ty,tz[,degrees]",
-                          wanted, data.cameras.size()));
-}
-
-std::pair<int, int> parse_size(const std::string& text) {
-  const std::size_t cross = text.find('x');
-  int width = 0, height = 0;
-  if (cross != std::string::npos) {
-    const char* end = text.data() + text.size();
-    const auto first = std::from_chars(text.data(), text.data() + cross, width);
-    const auto second = std::from_chars(text.data() + cross + 1, end, height);
-    const bool whole = first.ptr == text.data() + cross && second.ptr == end;
-    if (whole && width >= 1 && height >= 1 && width <= kLargestSide && height <= kLargestSide) {
-      return {width, height};
-    }
-  }
-  throw Error(
-      fmt::format("size \"{}\" must be WIDTHxHEIGHT with sides from 1 to {}", text, kLargestSide));
-}
 
 Show parse_show(const std::string& show) {
   if (show == "direct") return Show::kDirect;
@@ -121,9 +66,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   engine.relight(setup.lights, setup.sky);
   settings.camera = choose_camera(chosen.camera, engine);
-  std::vector<Float3> emitted_irradiance(data->patches.size());
-  FormFactorRows(data->exchange, data->patches.area)
-      .gather(data->patches.emitted_exitance, emitted_irradiance);
+  const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
   std::vector<float> error;
   if (settings.show == Show::kError) error = patch_errors(engine);
 
