@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <numbers>
+#include <string_view>
 #include <vector>
 
 #include "rebounce/demo/camera.h"
@@ -13,6 +16,16 @@ namespace rebounce::cli {
 namespace {
 
 constexpr int kLargestSide = 16384;  // pixels
+
+struct NamedShow {
+  std::string_view name;
+  Show show;
+};
+constexpr std::array<NamedShow, 5> kShows = {{{"direct", Show::kDirect},
+                                              {"indirect", Show::kIndirect},
+                                              {"radiosity", Show::kRadiosity},
+                                              {"patches", Show::kPatches},
+                                              {"error", Show::kError}}};
 
 std::vector<float> parse_numbers(const std::string& text) {
   std::vector<float> numbers;
@@ -65,6 +78,16 @@ std::pair<int, int> parse_size(const std::string& text) {
   }
   throw Error(
       fmt::format("size \"{}\" must be WIDTHxHEIGHT with sides from 1 to {}", text, kLargestSide));
+}
+
+std::vector<std::string> show_names() {
+  std::vector<std::string> names;
+  for (const NamedShow& named : kShows) names.emplace_back(named.name);
+  return names;
+}
+
+Show parse_show(const std::string& name) {
+  return std::ranges::find(kShows, name, &NamedShow::name)->show;
 }
 
 }  // namespace rebounce::cli

@@ -2,7 +2,9 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "rebounce/demo/picture.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/transfer/scene_description.h"
 
@@ -15,5 +17,9 @@ Camera choose_camera(const std::string& wanted, const Engine& engine);
 
 /// Width and height in pixels from "WIDTHxHEIGHT". Throws Error if it is anything else.
 std::pair<int, int> parse_size(const std::string& text);
+
+/// What --show takes, and what it means. parse_show wants one of the names.
+std::vector<std::string> show_names();
+Show parse_show(const std::string& name);
 
 }  // namespace rebounce::cli

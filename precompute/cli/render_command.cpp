@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -10,10 +9,10 @@
 #include "output_check.h"
 #include "picture_options.h"
 #include "rebounce/demo/image_file.h"
+#include "rebounce/demo/patch_errors.h"
 #include "rebounce/demo/picture.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/engine.h"
-#include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 
@@ -24,34 +23,6 @@ struct RenderOptions {
   std::string file, lights, camera, size = "1280x720", show = "radiosity", output;
   std::optional<float> exposure;
 };
-
-Show parse_show(const std::string& show) {
-  if (show == "direct") return Show::kDirect;
-  if (show == "indirect") return Show::kIndirect;
-  if (show == "patches") return Show::kPatches;
-  if (show == "error") return Show::kError;
-  return Show::kRadiosity;
-}
-
-/// |H - reference| of each patch, as a part of the reference's root mean square.
-std::vector<float> patch_errors(const Engine& engine) {
-  const TransferData& data = engine.data();
-  const ReferenceSolver solver(data.exchange, data.patches);
-  const std::vector<Float3> truth = solver.indirect_irradiance(engine.initial_exitance());
-  double total_area = 0;
-  for (const float area : data.patches.area) total_area += area;
-  const double rms = area_norm(truth, data.patches.area) / std::sqrt(total_area);
-  std::vector<float> error(truth.size(), 0.0F);
-  for (std::size_t i = 0; i < truth.size() && rms > 0; ++i) {
-    double sum = 0;
-    for (int c = 0; c < kChannelCount; ++c) {
-      const double d = static_cast<double>(engine.indirect_irradiance()[i][c]) - truth[i][c];
-      sum += d * d;
-    }
-    error[i] = static_cast<float>(std::sqrt(sum) / rms);
-  }
-  return error;
-}
 
 void run(const RenderOptions& chosen, const CommonOptions& options) {
   PictureSettings settings;
@@ -68,7 +39,11 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   settings.camera = choose_camera(chosen.camera, engine);
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
   std::vector<float> error;
-  if (settings.show == Show::kError) error = patch_errors(engine);
+  if (settings.show == Show::kError) {
+    const ReferenceSolver solver(data->exchange, data->patches);
+    error = patch_errors(engine.indirect_irradiance(),
+                         solver.indirect_irradiance(engine.initial_exitance()), data->patches.area);
+  }
 
   PictureLight light;
   light.lights = setup.lights;
@@ -109,7 +84,7 @@ void add_render_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--show", chosen->show,
                    "direct, indirect (bounced light only), radiosity (both), patches, or error "
                    "(of the indirect irradiance against the reference solution)")
-      ->check(CLI::IsMember({"direct", "indirect", "radiosity", "patches", "error"}))
+      ->check(CLI::IsMember(show_names()))
       ->capture_default_str();
   command->add_option("--exposure", chosen->exposure, "Stops; by default found from the picture");
   command->add_option("-o,--output", chosen->output, "Image to write (.png)")

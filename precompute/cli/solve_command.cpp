@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "light_file.h"
+#include "method_names.h"
 #include "rebounce/precompute/csv_writer.h"
 #include "rebounce/precompute/npz_writer.h"
 #include "rebounce/runtime/engine.h"
@@ -19,10 +20,8 @@
 namespace rebounce::cli {
 namespace {
 
-constexpr const char* kTransfer = "transfer";  // the product with the operator, no iteration
-
 struct SolveOptions {
-  std::string file, lights, method = kTransfer, output;
+  std::string file, lights, method = kTransferMethod, output;
   SolveSettings settings;
 };
 
@@ -123,19 +122,12 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
 
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorBlocks& form_factors) {
-  if (chosen.method == kTransfer) return solve_by_transfer(engine);
+  if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
   const TransferData& data = engine.data();
   const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
   const auto solver = make_solver(named->method, form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
   return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
-}
-
-/// The names that --method takes.
-std::vector<std::string> method_names() {
-  std::vector<std::string> names = {kTransfer};
-  for (const NamedSolveMethod& method : kSolveMethods) names.emplace_back(method.name);
-  return names;
 }
 
 void run(const SolveOptions& chosen, const CommonOptions& options) {

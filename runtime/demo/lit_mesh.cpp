@@ -223,16 +223,6 @@ LitMesh without_light(const DisplayMesh& display, const SubdividedMesh& mesh) {
   return lit;
 }
 
-float find_exposure(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
-                    const Camera& camera) {
-  PictureSettings small;
-  small.width = 160;
-  small.height = 120;
-  small.camera = camera;
-  small.samples_per_axis = 2;
-  return render_picture(data, tracer, light, small).exposure;
-}
-
 }  // namespace
 
 LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
@@ -241,8 +231,8 @@ LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const Pict
   const SubdividedMesh mesh =
       subdivide(data.mesh, divisions_for(data.mesh.triangle.size(), settings.triangle_target));
   LitMesh lit = without_light(data.mesh, mesh);
-  lit.exposure =
-      settings.exposure ? *settings.exposure : find_exposure(data, tracer, light, camera);
+  lit.exposure = settings.exposure ? *settings.exposure
+                                   : exposure_for(PictureRenderer(data, tracer), light, camera);
 
   const VertexLighter lighter(data, tracer, light, settings, mesh, lit.position);
   const auto vertex_count = static_cast<std::uint32_t>(mesh.vertex.size());

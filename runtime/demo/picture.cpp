@@ -349,6 +349,16 @@ Picture render_picture(const TransferData& data, const RayTracer& tracer, const 
   return PictureRenderer(data, tracer).render(light, settings);
 }
 
+float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
+                   const Camera& camera) {
+  PictureSettings small;
+  small.width = 160;
+  small.height = 120;
+  small.camera = camera;
+  small.samples_per_axis = 2;
+  return renderer.render(light, small).exposure;
+}
+
 std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
   std::vector<Float3> irradiance(data.patches.size());
   FormFactorRows(data.exchange, data.patches.area)
