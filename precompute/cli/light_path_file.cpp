@@ -79,9 +79,9 @@ LightMotion read_motion(const Field& field, const Light& light) {
 
 ViewerLight& light_of(const Field& field, std::vector<ViewerLight>& lights) {
   const json number = field.object.value("light", json(0));
-  if (!number.is_number_unsigned() || number.get<std::uint64_t>() >= lights.size()) {
-    field.fail("light", fmt::format("the number of a light, below {}", lights.size()));
-  }
+  const bool known = number.is_number_integer() && number.get<std::int64_t>() >= 0 &&
+                     number.get<std::uint64_t>() < lights.size();
+  if (!known) field.fail("light", fmt::format("the number of a light, below {}", lights.size()));
   return lights[number.get<std::size_t>()];
 }
 

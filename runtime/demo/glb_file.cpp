@@ -32,6 +32,8 @@ constexpr int kRepeat = 10497, kClampToEdge = 33071, kMirroredRepeat = 33648;
 constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8, kAlignment = 4;
 
+constexpr double kNearPart = 1e-4;  // of the scene's diagonal: the cameras' near plane
+
 using Color16 = std::array<std::uint16_t, 4>;
 
 std::size_t padded(std::size_t size) {
@@ -125,9 +127,11 @@ class GlbBuilder {
   }
 
   void add_cameras() {
+    const auto [low, high] = bounds_of(mesh_.position);
+    const double near = kNearPart * glm::distance(to_dvec3(low), to_dvec3(high));
     for (const Camera& camera : data_.cameras) {
       json entry = {{"type", "perspective"},
-                    {"perspective", {{"yfov", camera.vertical_fov}, {"znear", 0.01}}}};
+                    {"perspective", {{"yfov", camera.vertical_fov}, {"znear", near}}}};
       name(entry, camera.name);
       json node = {{"camera", document_["cameras"].size()},
                    {"translation", camera.position},

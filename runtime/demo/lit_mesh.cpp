@@ -90,8 +90,9 @@ class VertexLighter {
         vertex_light_(light_at_vertices(data, light)),
         around_(mesh, position) {}
 
-  // Luminance in cd/m² that leaves vertices [begin, end) if their textures were white.
-  void light(std::uint32_t begin, std::uint32_t end, std::span<glm::vec3> luminance) const {
+  // What vertices [begin, end) show if their textures are white, in parts of the screen's white.
+  void light(std::uint32_t begin, std::uint32_t end, float exposure_scale,
+             std::span<glm::vec3> shown) const {
     const std::vector<glm::vec3> direct = direct_irradiance(begin, end);
     for (std::uint32_t v = begin; v < end; ++v) {
       const SurfacePoint point =
@@ -99,9 +100,10 @@ class VertexLighter {
       const glm::vec3 irradiance = direct[v - begin] +
                                    interpolate(data_.mesh, vertex_light_.sky, point) +
                                    interpolate(data_.mesh, vertex_light_.bounced, point);
-      luminance[v] =
-          surface_.untextured_albedo(point) * irradiance * std::numbers::inv_pi_v<float> +
-          surface_.emitted_luminance(point, size_around(v));
+      const glm::vec3 reflected =
+          surface_.untextured_albedo(point) * irradiance * std::numbers::inv_pi_v<float>;
+      const glm::vec3 emitted = surface_.emitted_luminance(point, size_around(v));
+      shown[v] = exposure_scale * reflected + dimmed(exposure_scale * emitted, kBrightestEmitter);
     }
   }
 
@@ -236,14 +238,13 @@ LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const Pict
 
   const VertexLighter lighter(data, tracer, light, settings, mesh, lit.position);
   const auto vertex_count = static_cast<std::uint32_t>(mesh.vertex.size());
-  std::vector<glm::vec3> luminance(vertex_count);
+  std::vector<glm::vec3> shown(vertex_count);
 #pragma omp parallel for schedule(dynamic)
   for (std::uint32_t begin = 0; begin < vertex_count; begin += kBlock) {
-    lighter.light(begin, std::min(begin + kBlock, vertex_count), luminance);
+    lighter.light(begin, std::min(begin + kBlock, vertex_count), std::exp2(lit.exposure), shown);
   }
-  const float scale = std::exp2(lit.exposure);
-  for (const glm::vec3& value : luminance) {
-    lit.color.push_back(to_float3(glm::clamp(tone_curve(scale * value), 0.0F, 1.0F)));
+  for (const glm::vec3& value : shown) {
+    lit.color.push_back(to_float3(glm::clamp(tone_curve(value), 0.0F, 1.0F)));
   }
   return lit;
 }

@@ -15,6 +15,7 @@
 #include "rebounce/transfer/error.h"
 #include "sample_sequence.h"
 #include "srgb.h"
+#include "tone_curve.h"
 #include "vertex_light.h"
 
 namespace rebounce {
@@ -24,8 +25,7 @@ constexpr int kTile = 16;  // pixels a side
 constexpr int kMaxSide = 32768;
 constexpr int kMaxSamplesPerAxis = 64;
 constexpr int kMaxEmitterSamples = 65536;
-constexpr float kBrightestEmitter = 2;  // where the tone curve takes 1 for white
-const glm::vec3 kNothing(0.02F);        // what is behind patches and errors
+const glm::vec3 kNothing(0.02F);  // what is behind patches and errors
 
 void check_setting(int value, int most, const char* name) {
   if (value >= 1 && value <= most) return;
@@ -154,10 +154,7 @@ struct ShiningLayer {
   // sixteenth would be white as well, and its edge jagged. So it is dimmed, hue kept, to
   // `brightest` before it is mixed in.
   glm::vec3 dimmed(std::size_t pixel, float brightest) const {
-    const glm::vec3& value = luminance[pixel];
-    const float peak = std::max({value.x, value.y, value.z});
-    const float allowed = brightest * coverage[pixel];
-    return peak > allowed ? value * (allowed / peak) : value;
+    return rebounce::dimmed(luminance[pixel], brightest * coverage[pixel]);
   }
 };
 

@@ -20,4 +20,14 @@ inline glm::vec3 tone_curve(const glm::vec3& color) {
   return glm::mix(color * (new_peak / peak), glm::vec3(new_peak), white);
 }
 
+/// How bright an emitter may be, where 1 is the screen's white, so that its edges are smooth and it
+/// keeps some of its hue.
+inline constexpr float kBrightestEmitter = 2;
+
+/// `color`, hue kept, no brighter than `brightest`.
+inline glm::vec3 dimmed(const glm::vec3& color, float brightest) {
+  const float peak = std::max({color.x, color.y, color.z});
+  return peak > brightest ? color * (brightest / peak) : color;
+}
+
 }  // namespace rebounce

@@ -8,6 +8,7 @@
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 #include "shaders.h"
+#include "tone_curve.h"
 
 namespace rebounce {
 namespace {
@@ -15,7 +16,6 @@ namespace {
 constexpr int kSamples = 4;         // per pixel
 constexpr int kCubeShadow = 1024;   // texels a side
 constexpr int kPlaneShadow = 4096;  // texels a side
-constexpr float kBrightestSky = 2;  // as emitters in picture.cpp
 constexpr float kNearPart = 2e-4F;  // of the scene's diagonal
 
 void check_complete() {
@@ -30,8 +30,7 @@ glm::vec3 background(const FrameSettings& frame) {
   if (frame.show == Show::kPatches || frame.show == Show::kError) return glm::vec3(0.02F);
   if (frame.show == Show::kIndirect) return glm::vec3(0);
   const glm::vec3 sky = to_glm(frame.sky.color) * (frame.sky.luminance * std::exp2(frame.exposure));
-  const float peak = std::max({sky.x, sky.y, sky.z});
-  return peak > kBrightestSky ? sky * (kBrightestSky / peak) : sky;
+  return dimmed(sky, kBrightestEmitter);
 }
 
 }  // namespace
@@ -133,6 +132,19 @@ void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
   glBindTexture(GL_TEXTURE_2D, resolved_color_.name());
   glBindVertexArray(empty_.name());
   glDrawArrays(GL_TRIANGLES, 0, 3);
+  if (frame.split) draw_divider(split_column(frame));
+}
+
+int SceneRenderer::split_column(const FrameSettings& frame) const {
+  return static_cast<int>(std::lround(*frame.split * static_cast<float>(width_)));
+}
+
+void SceneRenderer::draw_divider(int column) const {
+  glEnable(GL_SCISSOR_TEST);
+  glScissor(column - 1, 0, 2, height_);
+  glClearColor(1, 1, 1, 1);
+  glClear(GL_COLOR_BUFFER_BIT);
+  glDisable(GL_SCISSOR_TEST);
 }
 
 template <typename Draw>
@@ -141,7 +153,7 @@ void SceneRenderer::for_each_side(const FrameSettings& frame, const Draw& draw) 
     draw(Side::kFirst);
     return;
   }
-  const int left = static_cast<int>(std::lround(*frame.split * static_cast<float>(width_)));
+  const int left = split_column(frame);
   glEnable(GL_SCISSOR_TEST);
   glScissor(0, 0, left, height_);
   draw(Side::kFirst);
@@ -171,13 +183,13 @@ void SceneRenderer::draw_light(const FrameSettings& frame, const glm::mat4& view
   lamp_.set("base_color_texture", 0);
   lamp_.set("eye", to_glm(frame.camera.position));
   for (std::size_t k = 0; k < frame.lights.size(); ++k) {
-    draw_lamp(frame, frame.lights[k], *shadow_maps_[k]);
+    draw_lamp(frame.lights[k], *shadow_maps_[k]);
   }
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
 }
 
-void SceneRenderer::draw_lamp(const FrameSettings&, const Light& light, const ShadowMap& shadow) {
+void SceneRenderer::draw_lamp(const Light& light, const ShadowMap& shadow) {
   shadow.bind(lamp_);
   lamp_.set("lamp_type", static_cast<int>(light.type));
   lamp_.set("lamp_position", to_glm(light.position));

@@ -41,12 +41,12 @@ class SceneRenderer {
   void draw(const FrameSettings& frame, GLuint framebuffer);
 
  private:
-  struct Targets;
-
   void resize(int width, int height);
   void draw_light(const FrameSettings& frame, const glm::mat4& clip_from_world);
-  void draw_lamp(const FrameSettings& frame, const Light& light, const ShadowMap& shadow);
+  void draw_lamp(const Light& light, const ShadowMap& shadow);
   void draw_patches(const FrameSettings& frame, const glm::mat4& clip_from_world);
+  int split_column(const FrameSettings& frame) const;
+  void draw_divider(int column) const;
   template <typename Draw>
   void for_each_side(const FrameSettings& frame, const Draw& draw) const;
 
