@@ -74,7 +74,8 @@ TEST_F(CommandLine, HelpsAndTellsItsVersion) {
                              {"info", "--help"},
                              {"solve", "--help"},
                              {"export", "--help"},
-                             {"render", "--help"}}) {
+                             {"render", "--help"},
+                             {"bake", "--help"}}) {
     const Outcome outcome = run(words);
     EXPECT_EQ(outcome.exit_code, kDone) << words.front();
     EXPECT_NE(outcome.out.find("Usage: "), std::string::npos) << words.front();
