@@ -20,6 +20,7 @@ namespace rebounce {
 namespace {
 
 constexpr int kMaxDivisions = 64;
+constexpr float kBrightest = 1e6F;     // of the screen's white: white by any curve
 constexpr std::uint32_t kBlock = 256;  // vertices that a thread lights at a time
 
 // The triangles around each vertex, and their areas summed up.
@@ -244,7 +245,9 @@ LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const Pict
     lighter.light(begin, std::min(begin + kBlock, vertex_count), std::exp2(lit.exposure), shown);
   }
   for (const glm::vec3& value : shown) {
-    lit.color.push_back(to_float3(glm::clamp(tone_curve(value), 0.0F, 1.0F)));
+    // Light without bound, as right beside a lamp, has no place on the curve.
+    const glm::vec3 bounded = glm::min(value, glm::vec3(kBrightest));
+    lit.color.push_back(to_float3(glm::clamp(tone_curve(bounded), 0.0F, 1.0F)));
   }
   return lit;
 }
