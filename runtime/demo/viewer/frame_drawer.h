@@ -21,6 +21,7 @@ class FrameDrawer {
 
   const StageTimes& times() const { return times_; }
   const LitScene& scene() const { return lit_; }
+  const SceneBounds& bounds() const { return renderer_.bounds(); }
 
   /// The largest error of a patch that is shown (LitScene::patch_errors); 0 without any.
   float error_top() const { return error_top_; }

@@ -232,7 +232,7 @@ void Panels::draw_times(const ViewerState& state) const {
 
 void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
   if (!ImGui::CollapsingHeader("Lights", ImGuiTreeNodeFlags_DefaultOpen)) return;
-  const float size = bounds_of(frame.scene().data().mesh).diagonal();
+  const float size = frame.bounds().diagonal();
   ImGui::Checkbox("play motions", &state.playing);
   for (std::size_t k = 0; k < state.lights.size(); ++k) {
     ImGui::PushID(static_cast<int>(k));

@@ -33,8 +33,6 @@ glm::vec3 background(const FrameSettings& frame) {
   return dimmed(sky, kBrightestEmitter);
 }
 
-}  // namespace
-
 SceneBounds bounds_of(const DisplayMesh& mesh) {
   SceneBounds bounds{glm::vec3(std::numeric_limits<float>::max()),
                      glm::vec3(std::numeric_limits<float>::lowest())};
@@ -45,12 +43,15 @@ SceneBounds bounds_of(const DisplayMesh& mesh) {
   return bounds;
 }
 
-glm::mat4 clip_from_world(const Camera& camera, float aspect, const SceneBounds& bounds) {
+// World to clip space of `camera`, whose picture has this `aspect` (width / height).
+glm::mat4 view_of(const Camera& camera, float aspect, const SceneBounds& bounds) {
   const glm::vec3 eye = to_glm(camera.position);
   const float reach = bounds.diagonal() + glm::distance(eye, 0.5F * (bounds.low + bounds.high));
   return glm::perspective(camera.vertical_fov, aspect, kNearPart * bounds.diagonal(), reach) *
          glm::lookAt(eye, eye - to_glm(camera.backward), to_glm(camera.up));
 }
+
+}  // namespace
 
 SceneRenderer::SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh)
     : scene_(scene),
@@ -109,8 +110,8 @@ void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
   const glm::vec3 behind = background(frame);
   glClearColor(behind.r, behind.g, behind.b, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  const glm::mat4 view = clip_from_world(
-      frame.camera, static_cast<float>(width_) / static_cast<float>(height_), bounds_);
+  const glm::mat4 view =
+      view_of(frame.camera, static_cast<float>(width_) / static_cast<float>(height_), bounds_);
   const bool patches = frame.show == Show::kPatches || frame.show == Show::kError;
   if (patches) {
     draw_patches(frame, view);

@@ -37,14 +37,16 @@ class SceneRenderer {
   /// Brings the shadow maps up to date: one for each light.
   void update_shadows(std::span<const Light> lights);
 
+  const SceneBounds& bounds() const { return bounds_; }
+
   /// Draws into `framebuffer` (0: the window). update_shadows must have seen the same lights.
   void draw(const FrameSettings& frame, GLuint framebuffer);
 
  private:
   void resize(int width, int height);
-  void draw_light(const FrameSettings& frame, const glm::mat4& clip_from_world);
+  void draw_light(const FrameSettings& frame, const glm::mat4& view);
   void draw_lamp(const Light& light, const ShadowMap& shadow);
-  void draw_patches(const FrameSettings& frame, const glm::mat4& clip_from_world);
+  void draw_patches(const FrameSettings& frame, const glm::mat4& view);
   int split_column(const FrameSettings& frame) const;
   void draw_divider(int column) const;
   template <typename Draw>
@@ -73,10 +75,5 @@ class OffscreenTarget {
   GlFramebuffer framebuffer_;
   GlRenderbuffer color_;
 };
-
-/// World to clip space of `camera`, whose picture has this `aspect` (width / height).
-glm::mat4 clip_from_world(const Camera& camera, float aspect, const SceneBounds& bounds);
-
-SceneBounds bounds_of(const DisplayMesh& mesh);
 
 }  // namespace rebounce

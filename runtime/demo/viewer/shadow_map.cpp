@@ -1,7 +1,9 @@
 #include "shadow_map.h"
 
+#include <algorithm>
 #include <array>
 #include <glm/gtc/matrix_transform.hpp>
+#include <limits>
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"

@@ -78,8 +78,7 @@ ViewerState begin(const ViewerSetup& setup) {
 void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup) {
   Window window(setup.width, setup.height, setup.title);
   FrameDrawer drawer(data, setup);
-  const SceneBounds bounds = bounds_of(data->mesh);
-  Controls controls(drawer.scene(), bounds);
+  Controls controls(drawer.scene(), drawer.bounds());
   Panels panels;
   ViewerState state = begin(setup);
   while (window.begin_frame()) {
@@ -103,8 +102,7 @@ StageTimes draw_viewer_frames(std::shared_ptr<const TransferData> data, const Vi
   if (frame_count < 1) throw Error("the viewer was asked for no frame; ask for at least one");
   const HeadlessContext context;
   FrameDrawer drawer(data, setup);
-  const SceneBounds bounds = bounds_of(data->mesh);
-  const Controls controls(drawer.scene(), bounds);
+  const Controls controls(drawer.scene(), drawer.bounds());
   Panels panels;
   std::optional<HeadlessPanels> overlay;
   if (setup.panels) overlay.emplace(setup.width, setup.height);
