@@ -15,14 +15,11 @@ layout(location = 4) in vec2 emissive_texcoord;
 layout(location = 5) in vec3 first_flight;  // sky and emitters, lx
 layout(location = 6) in vec3 bounced;       // lx
 uniform mat4 clip_from_world;
-// Where a triangle covers a pixel in part, its middle lies beyond the edge, in other light.
-centroid out vec3 lit_position;
-out vec3 world_position;  // for derivatives
-out vec3 shading_normal, color, first_light, bounced_light;
+out vec3 world_position, shading_normal, color, first_light, bounced_light;
 out vec2 base_uv, emissive_uv;
 invariant gl_Position;
 void main() {
-  lit_position = world_position = position;
+  world_position = position;
   shading_normal = normal;
   color = vertex_color;
   base_uv = base_color_texcoord;
@@ -55,7 +52,6 @@ void main() {
 
 /// One lamp, added to what is there. Fall-off, range and cone as in light_sampling.cpp.
 inline constexpr const char* kLampFragment = R"(#version 330 core
-centroid in vec3 lit_position;
 in vec3 world_position, shading_normal, color;
 in vec2 base_uv;
 uniform sampler2D base_color_texture;
@@ -111,7 +107,7 @@ float plane_visibility(vec3 point, vec3 geometric_normal) {
 }
 
 void main() {
-  vec3 to_lamp = lamp_type == 2 ? -lamp_direction : lamp_position - lit_position;
+  vec3 to_lamp = lamp_type == 2 ? -lamp_direction : lamp_position - world_position;
   float distance_squared = dot(to_lamp, to_lamp);
   vec3 direction = to_lamp * inversesqrt(max(distance_squared, 1e-12));
   vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
@@ -132,8 +128,8 @@ void main() {
     strength *= inside * inside;
   }
   if (strength <= 0) discard;
-  strength *= lamp_type == 2 ? plane_visibility(lit_position, geometric_normal)
-                             : cube_visibility(lit_position, geometric_normal);
+  strength *= lamp_type == 2 ? plane_visibility(world_position, geometric_normal)
+                             : cube_visibility(world_position, geometric_normal);
   vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
   result = vec4(albedo * lamp_color * (strength * exposure_scale / 3.14159265), 0);
 }
