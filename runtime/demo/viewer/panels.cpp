@@ -158,8 +158,10 @@ ViewerLight lamp_ahead(const FlyCamera& camera, float size) {
 }  // namespace
 
 void Panels::smooth(const StageTimes& times) {
-  const float part = first_ ? 1 : 0.1F;
-  first_ = false;
+  // The first frames fill caches and make solvers: they do not count.
+  constexpr int kWarmUp = 3;
+  const float part = frame_ < kWarmUp ? 1 : 0.1F;
+  frame_ = std::min(frame_ + 1, kWarmUp);
   const auto blend = [part](double& old, double value) { old += part * (value - old); };
   blend(smoothed_.direct, times.direct);
   for (std::size_t k = 0; k < kSideCount; ++k) blend(smoothed_.solve[k], times.solve[k]);

@@ -18,7 +18,7 @@ class Panels {
   void draw_lights(ViewerState& state, const FrameDrawer& frame) const;
 
   StageTimes smoothed_;
-  bool first_ = true;
+  int frame_ = 0;
 };
 
 }  // namespace rebounce
