@@ -13,5 +13,8 @@ void add_info_command(CLI::App& app, const CommonOptions& options);
 void add_solve_command(CLI::App& app, const CommonOptions& options);
 void add_export_command(CLI::App& app, const CommonOptions& options);
 void add_render_command(CLI::App& app, const CommonOptions& options);
+void add_bake_command(CLI::App& app, const CommonOptions& options);
+// In builds with the viewer.
+void add_view_command(CLI::App& app, const CommonOptions& options);
 
 }  // namespace rebounce::cli

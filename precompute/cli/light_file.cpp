@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "json_fields.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/runtime/emitting_material.h"
 #include "rebounce/runtime/ies_profile.h"
@@ -19,70 +19,10 @@ namespace {
 
 using nlohmann::json;
 
-/// One JSON object and where it stands, for messages.
-struct Field {
-  const json& object;
-  std::string where;
-
-  [[noreturn]] void fail(const std::string& name, const std::string& wanted) const {
-    throw Error(fmt::format("{}: \"{}\" must be {}", where, name, wanted));
-  }
-
-  void check_names(std::initializer_list<const char*> known) const {
-    for (const auto& [name, value] : object.items()) {
-      if (std::ranges::find(known, name) == known.end()) {
-        throw Error(fmt::format("{}: unknown field \"{}\"; known are {}", where, name,
-                                fmt::join(known, ", ")));
-      }
-    }
-  }
-
-  float number(const std::string& name, float lowest, float fallback) const {
-    if (!object.contains(name)) return fallback;
-    const json& value = object.at(name);
-    const auto x = value.is_number() ? value.get<float>() : std::nanf("");
-    if (!std::isfinite(x) || x < lowest) fail(name, fmt::format("a number, at least {}", lowest));
-    return x;
-  }
-
-  float required_length(const std::string& name) const {
-    if (!object.contains(name)) fail(name, "given, in metres");
-    const float length = number(name, 0, 0);
-    if (length <= 0) fail(name, "more than 0");
-    return length;
-  }
-
-  Float3 triple(const std::string& name, float lowest, const Float3& fallback) const {
-    if (!object.contains(name)) return fallback;
-    const json& value = object.at(name);
-    Float3 result{};
-    bool good = value.is_array() && value.size() == 3;
-    for (std::size_t k = 0; good && k < 3; ++k) {
-      good = value[k].is_number();
-      if (good) result[k] = value[k].get<float>();
-      good = good && std::isfinite(result[k]) && result[k] >= lowest;
-    }
-    if (!good) {
-      fail(name, lowest < 0 ? "three numbers" : fmt::format("three numbers, at least {}", lowest));
-    }
-    return result;
-  }
-};
-
 constexpr std::size_t kLargestProfileBytes = std::size_t{16} << 20U;
-
-constexpr float kAnyNumber = std::numeric_limits<float>::lowest();
 
 float length_of(const Float3& v) {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
-
-Float3 unit_direction(const Field& field) {
-  Float3 d = field.triple("direction", kAnyNumber, {0, -1, 0});
-  const float length = length_of(d);
-  if (!(length > 1e-20F)) field.fail("direction", "a vector that is not zero");
-  for (float& x : d) x /= length;
-  return d;
 }
 
 LightType light_type(const Field& field) {
@@ -181,7 +121,7 @@ Light read_light(const Field& field, const std::filesystem::path& folder) {
     light.name = field.object.at("name").get<std::string>();
   }
   light.position = field.triple("position", kAnyNumber, light.position);
-  light.direction = unit_direction(field);
+  light.direction = field.unit_vector("direction", light.direction);
   light.color = field.triple("color", 0, light.color);
   light.intensity = field.number("intensity", 0, light.intensity);
   light.range = field.number("range", 0, light.range);
@@ -229,16 +169,8 @@ void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> p
 }
 
 LightSetup read_json(const std::filesystem::path& path) {
-  std::ifstream stream(path);
-  if (!stream) throw Error("cannot open " + path.string() + "; check the name");
-  json document;
-  try {
-    document = json::parse(stream);
-  } catch (const json::exception& error) {
-    throw Error(path.string() + " is not JSON: " + error.what());
-  }
+  const json document = read_json_object(path, "lights");
   const Field root{document, path.string()};
-  if (!document.is_object()) throw Error(path.string() + ": must hold an object with \"lights\"");
   root.check_names({"lights", "sky", "emitters"});
   LightSetup setup;
   if (document.contains("lights")) {

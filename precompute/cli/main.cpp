@@ -49,6 +49,10 @@ int run(int argc, char** argv) {
   rebounce::cli::add_solve_command(app, options);
   rebounce::cli::add_export_command(app, options);
   rebounce::cli::add_render_command(app, options);
+  rebounce::cli::add_bake_command(app, options);
+#ifdef REBOUNCE_WITH_VIEWER
+  rebounce::cli::add_view_command(app, options);
+#endif
   for (CLI::App* command : app.get_subcommands({})) add_common_options(*command, options);
   try {
     app.parse(argc, argv);

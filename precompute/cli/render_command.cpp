@@ -1,112 +1,28 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <numbers>
 #include <optional>
 
 #include "commands.h"
 #include "light_file.h"
 #include "output_check.h"
-#include "rebounce/demo/camera.h"
+#include "picture_options.h"
 #include "rebounce/demo/image_file.h"
+#include "rebounce/demo/patch_errors.h"
 #include "rebounce/demo/picture.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/engine.h"
-#include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {
 
-constexpr int kLargestSide = 16384;  // pixels
-
 struct RenderOptions {
   std::string file, lights, camera, size = "1280x720", show = "radiosity", output;
   std::optional<float> exposure;
 };
-
-std::vector<float> parse_numbers(const std::string& text) {
-  std::vector<float> numbers;
-  for (const char* at = text.data(); at <= text.data() + text.size();) {
-    float value = 0;
-    const auto [end, error] = std::from_chars(at, text.data() + text.size(), value);
-    const bool at_end = end == text.data() + text.size();
-    if (error != std::errc() || (!at_end && *end != ',')) return {};
-    numbers.push_back(value);
-    if (at_end) return numbers;
-    at = end + 1;
-  }
-  return {};
-}
-
-Camera choose_camera(const std::string& wanted, const Engine& engine) {
-  const TransferData& data = engine.data();
-  if (wanted.empty()) {
-    return data.cameras.empty() ? fit_camera(data, engine.tracer(), engine.radiosity())
-                                : data.cameras.front();
-  }
-  for (const Camera& camera : data.cameras) {
-    if (camera.name == wanted) return camera;
-  }
-  const std::vector<float> n = parse_numbers(wanted);
-  if (n.size() == 1 && n[0] >= 0 && n[0] < static_cast<float>(data.cameras.size())) {
-    return data.cameras[static_cast<std::size_t>(n[0])];
-  }
-  if (n.size() == 6 || n.size() == 7) {
-    constexpr float kDegree = std::numbers::pi_v<float> / 180;
-    return look_at({n[0], n[1], n[2]}, {n[3], n[4], n[5]}, (n.size() == 7 ? n[6] : 50) * kDegree);
-  }
-  throw Error(fmt::format("no camera \"{}\": the file has {}; or give px,py,pz,tx,ty,tz[,degrees]",
-                          wanted, data.cameras.size()));
-}
-
-std::pair<int, int> parse_size(const std::string& text) {
-  const std::size_t cross = text.find('x');
-  int width = 0, height = 0;
-  if (cross != std::string::npos) {
-    const char* end = text.data() + text.size();
-    const auto first = std::from_chars(text.data(), text.data() + cross, width);
-    const auto second = std::from_chars(text.data() + cross + 1, end, height);
-    const bool whole = first.ptr == text.data() + cross && second.ptr == end;
-    if (whole && width >= 1 && height >= 1 && width <= kLargestSide && height <= kLargestSide) {
-      return {width, height};
-    }
-  }
-  throw Error(
-      fmt::format("size \"{}\" must be WIDTHxHEIGHT with sides from 1 to {}", text, kLargestSide));
-}
-
-Show parse_show(const std::string& show) {
-  if (show == "direct") return Show::kDirect;
-  if (show == "indirect") return Show::kIndirect;
-  if (show == "patches") return Show::kPatches;
-  if (show == "error") return Show::kError;
-  return Show::kRadiosity;
-}
-
-/// |H - reference| of each patch, as a part of the reference's root mean square.
-std::vector<float> patch_errors(const Engine& engine) {
-  const TransferData& data = engine.data();
-  const ReferenceSolver solver(data.exchange, data.patches);
-  const std::vector<Float3> truth = solver.indirect_irradiance(engine.initial_exitance());
-  double total_area = 0;
-  for (const float area : data.patches.area) total_area += area;
-  const double rms = area_norm(truth, data.patches.area) / std::sqrt(total_area);
-  std::vector<float> error(truth.size(), 0.0F);
-  for (std::size_t i = 0; i < truth.size() && rms > 0; ++i) {
-    double sum = 0;
-    for (int c = 0; c < kChannelCount; ++c) {
-      const double d = static_cast<double>(engine.indirect_irradiance()[i][c]) - truth[i][c];
-      sum += d * d;
-    }
-    error[i] = static_cast<float>(std::sqrt(sum) / rms);
-  }
-  return error;
-}
 
 void run(const RenderOptions& chosen, const CommonOptions& options) {
   PictureSettings settings;
@@ -122,11 +38,13 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   engine.relight(setup.lights, setup.sky);
   settings.camera = choose_camera(chosen.camera, engine);
-  std::vector<Float3> emitted_irradiance(data->patches.size());
-  FormFactorRows(data->exchange, data->patches.area)
-      .gather(data->patches.emitted_exitance, emitted_irradiance);
+  const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
   std::vector<float> error;
-  if (settings.show == Show::kError) error = patch_errors(engine);
+  if (settings.show == Show::kError) {
+    const ReferenceSolver solver(data->exchange, data->patches);
+    error = patch_errors(engine.indirect_irradiance(),
+                         solver.indirect_irradiance(engine.initial_exitance()), data->patches.area);
+  }
 
   PictureLight light;
   light.lights = setup.lights;
@@ -167,7 +85,7 @@ void add_render_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--show", chosen->show,
                    "direct, indirect (bounced light only), radiosity (both), patches, or error "
                    "(of the indirect irradiance against the reference solution)")
-      ->check(CLI::IsMember({"direct", "indirect", "radiosity", "patches", "error"}))
+      ->check(CLI::IsMember(show_names()))
       ->capture_default_str();
   command->add_option("--exposure", chosen->exposure, "Stops; by default found from the picture");
   command->add_option("-o,--output", chosen->output, "Image to write (.png)")

@@ -8,6 +8,7 @@
 
 #include "commands.h"
 #include "light_file.h"
+#include "method_names.h"
 #include "rebounce/precompute/csv_writer.h"
 #include "rebounce/precompute/npz_writer.h"
 #include "rebounce/runtime/engine.h"
@@ -19,11 +20,10 @@
 namespace rebounce::cli {
 namespace {
 
-constexpr const char* kTransfer = "transfer";  // the product with the operator, no iteration
 constexpr const char *kExact = "exact", *kCompressed = "compressed";  // F as methods see it
 
 struct SolveOptions {
-  std::string file, lights, method = kTransfer, form_factors = kExact, output;
+  std::string file, lights, method = kTransferMethod, form_factors = kExact, output;
   SolveSettings settings;
 };
 
@@ -130,7 +130,7 @@ SolveMethod method_of(const SolveOptions& chosen) {
 
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorOperator& form_factors) {
-  if (chosen.method == kTransfer) return solve_by_transfer(engine);
+  if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
   const TransferData& data = engine.data();
   const auto solver = make_solver(method_of(chosen), form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
@@ -147,13 +147,6 @@ std::unique_ptr<const FormFactorOperator> choose_form_factors(const SolveOptions
                 " holds no compressed form factors; make it with --compress-form-factors");
   }
   return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
-}
-
-/// The names that --method takes.
-std::vector<std::string> method_names() {
-  std::vector<std::string> names = {kTransfer};
-  for (const NamedSolveMethod& method : kSolveMethods) names.emplace_back(method.name);
-  return names;
 }
 
 void run(const SolveOptions& chosen, const CommonOptions& options) {

@@ -105,14 +105,17 @@ glm::vec3 DisplaySurface::texture_color(std::uint32_t texture, std::span<const F
 }
 
 glm::vec3 DisplaySurface::albedo(const SurfacePoint& point, float width) const {
-  const Material& material = material_of(point);
+  return untextured_albedo(point) * texture_color(material_of(point).base_color_texture,
+                                                  mesh().base_color_texcoord, point, width);
+}
+
+glm::vec3 DisplaySurface::untextured_albedo(const SurfacePoint& point) const {
   const Uint3& corner = mesh().triangle[point.triangle];
   const auto& color = mesh().vertex_color;
   const glm::vec3 vertex_color = point.weight.x * to_glm(color[corner[0]]) +
                                  point.weight.y * to_glm(color[corner[1]]) +
                                  point.weight.z * to_glm(color[corner[2]]);
-  return to_glm(material.base_color) * vertex_color *
-         texture_color(material.base_color_texture, mesh().base_color_texcoord, point, width);
+  return to_glm(material_of(point).base_color) * vertex_color;
 }
 
 glm::vec3 DisplaySurface::emitted_luminance(const SurfacePoint& point, float width) const {

@@ -38,7 +38,10 @@ class DisplaySurface {
   /// Linear diffuse reflectance, filtered over `width` metres of surface.
   glm::vec3 albedo(const SurfacePoint& point, float width) const;
 
-  /// Emitted luminance in cd/m², likewise.
+  /// The same without the texture.
+  glm::vec3 untextured_albedo(const SurfacePoint& point) const;
+
+  /// Emitted luminance in cd/m², filtered likewise.
   glm::vec3 emitted_luminance(const SurfacePoint& point, float width) const;
 
  private:

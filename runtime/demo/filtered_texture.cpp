@@ -1,21 +1,14 @@
 #include "filtered_texture.h"
 
-#include <stb_image.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <memory>
-#include <string>
 
-#include "rebounce/transfer/error.h"
+#include "decoded_image.h"
 #include "srgb.h"
 
 namespace rebounce {
 namespace {
-
-constexpr int kMaxSide = 16384;  // texels: 1 GiB decoded is the most one texture may ask for
 
 float byte_to_linear(std::uint8_t value) {
   static const auto table = [] {
@@ -44,24 +37,8 @@ float reduced(float texcoord, TextureWrap wrap) {
 
 FilteredTexture::FilteredTexture(const Texture& texture)
     : wrap_s_(texture.wrap_s), wrap_t_(texture.wrap_t) {
-  const auto fail = [](const std::string& reason) -> Error {
-    return Error("texture: " + reason + "; precompute the scene again from a sound file");
-  };
-  if (texture.encoded.size() > std::numeric_limits<int>::max()) throw fail("too many bytes");
-  const auto* bytes = texture.encoded.data();
-  const int byte_count = static_cast<int>(texture.encoded.size());
-  Level base;
-  int channel_count = 0;
-  if (!stbi_info_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count)) {
-    throw fail("not a PNG or JPEG image");
-  }
-  if (base.width > kMaxSide || base.height > kMaxSide) throw fail("more than 16384 texels a side");
-  const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
-      stbi_load_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count, 3),
-      stbi_image_free);
-  if (!texels) throw fail("a damaged image");
-  base.rgb.assign(texels.get(), texels.get() + std::size_t{3} * base.width * base.height);
-  levels_.push_back(std::move(base));
+  DecodedImage image = decode_image(texture);
+  levels_.push_back({image.width, image.height, std::move(image.rgb)});
   while (levels_.back().width > 1 || levels_.back().height > 1) {
     levels_.push_back(half_size(levels_.back()));
   }

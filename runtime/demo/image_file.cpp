@@ -11,21 +11,10 @@
 #include "rebounce/transfer/atomic_file.h"
 #include "rebounce/transfer/error.h"
 #include "srgb.h"
+#include "tone_curve.h"
 
 namespace rebounce {
 namespace {
-
-// Maps [0, inf) into [0, 1).
-glm::vec3 tone_curve(const glm::vec3& color) {
-  constexpr float kShoulder = 0.7F;       // linear below
-  constexpr float kDesaturation = 0.15F;  // how fast highlights fade to white
-  const float peak = std::max({color.x, color.y, color.z});
-  if (peak <= kShoulder) return color;
-  constexpr float kRoom = 1 - kShoulder;
-  const float new_peak = 1 - kRoom * kRoom / (peak + kRoom - kShoulder);
-  const float white = 1 - 1 / (kDesaturation * (peak - new_peak) + 1);
-  return glm::mix(color * (new_peak / peak), glm::vec3(new_peak), white);
-}
 
 std::vector<std::uint8_t> encode_png(const ScreenImage& image) {
   png_image header{};

@@ -15,6 +15,8 @@
 #include "rebounce/transfer/error.h"
 #include "sample_sequence.h"
 #include "srgb.h"
+#include "tone_curve.h"
+#include "vertex_light.h"
 
 namespace rebounce {
 namespace {
@@ -23,8 +25,7 @@ constexpr int kTile = 16;  // pixels a side
 constexpr int kMaxSide = 32768;
 constexpr int kMaxSamplesPerAxis = 64;
 constexpr int kMaxEmitterSamples = 65536;
-constexpr float kBrightestEmitter = 2;  // where the tone curve takes 1 for white
-const glm::vec3 kNothing(0.02F);        // what is behind patches and errors
+const glm::vec3 kNothing(0.02F);  // what is behind patches and errors
 
 void check_setting(int value, int most, const char* name) {
   if (value >= 1 && value <= most) return;
@@ -42,35 +43,6 @@ void check(const PictureSettings& settings) {
     throw Error("picture: the camera's vertical field of view is " + std::to_string(fov) +
                 " radians; it must be between 0 and pi");
   }
-}
-
-void check_length(std::size_t length, std::size_t patch_count, const char* name) {
-  if (length == 0 || length == patch_count) return;
-  throw Error("picture: " + std::string(name) + " has " + std::to_string(length) + " entries for " +
-              std::to_string(patch_count) + " patches; give one for each");
-}
-
-// The light of one picture as values at the vertices, in lx.
-struct VertexLight {
-  std::vector<glm::vec3> sky;
-  std::vector<glm::vec3> bounced;  // H without the emitters' first flight
-};
-
-VertexLight light_at_vertices(const TransferData& data, const PictureLight& light) {
-  const std::size_t n = data.patches.size();
-  check_length(light.indirect_irradiance.size(), n, "indirect_irradiance");
-  check_length(light.emitted_irradiance.size(), n, "emitted_irradiance");
-  const glm::vec3 sky_irradiance =
-      to_glm(light.sky.color) * light.sky.luminance * std::numbers::pi_v<float>;
-  std::vector<glm::vec3> sky(n), bounced(n, glm::vec3(0));
-  for (std::size_t i = 0; i < n; ++i) {
-    sky[i] = sky_irradiance * data.patches.sky_visibility[i];
-    if (!light.indirect_irradiance.empty()) bounced[i] = to_glm(light.indirect_irradiance[i]);
-    if (!light.emitted_irradiance.empty()) bounced[i] -= to_glm(light.emitted_irradiance[i]);
-    // The operator's error may leave a little less than the first flight.
-    bounced[i] = glm::max(bounced[i], glm::vec3(0));
-  }
-  return {reconstruct_at_vertices(data.mesh, sky), reconstruct_at_vertices(data.mesh, bounced)};
 }
 
 // Camera rays of a tile, in the order of pixels and then samples.
@@ -182,10 +154,7 @@ struct ShiningLayer {
   // sixteenth would be white as well, and its edge jagged. So it is dimmed, hue kept, to
   // `brightest` before it is mixed in.
   glm::vec3 dimmed(std::size_t pixel, float brightest) const {
-    const glm::vec3& value = luminance[pixel];
-    const float peak = std::max({value.x, value.y, value.z});
-    const float allowed = brightest * coverage[pixel];
-    return peak > allowed ? value * (allowed / peak) : value;
+    return rebounce::dimmed(luminance[pixel], brightest * coverage[pixel]);
   }
 };
 
@@ -375,6 +344,23 @@ Picture PictureRenderer::render(const PictureLight& light, const PictureSettings
 Picture render_picture(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                        const PictureSettings& settings) {
   return PictureRenderer(data, tracer).render(light, settings);
+}
+
+float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
+                   const Camera& camera) {
+  PictureSettings small;
+  small.width = 160;
+  small.height = 120;
+  small.camera = camera;
+  small.samples_per_axis = 2;
+  return renderer.render(light, small).exposure;
+}
+
+std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
+  std::vector<Float3> irradiance(data.patches.size());
+  FormFactorRows(data.exchange, data.patches.area)
+      .gather(data.patches.emitted_exitance, irradiance);
+  return irradiance;
 }
 
 RayTracer make_surface_tracer(const DisplayMesh& mesh) {

@@ -15,11 +15,7 @@ struct ScreenImage {
   std::vector<std::uint8_t> rgb{};  ///< [height][width][3]
 };
 
-/// Brings a picture to the screen's range: exposure, tone curve, sRGB encoding.
-///
-/// The curve is that of the Khronos PBR Neutral tone mapper (2024) without its Fresnel term: linear
-/// up to a shoulder, so that colours under white light are shown as they are, then all channels
-/// compressed by one factor, so that hues stay, with highlights that fade to white.
+/// Brings a picture to the screen's range: exposure, tone curve (tone_curve.h), sRGB encoding.
 ScreenImage tone_map(const Picture& picture);
 
 /// Writes a PNG file whole or not at all (see AtomicFile). Throws Error if the folder is missing,

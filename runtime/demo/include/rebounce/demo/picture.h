@@ -77,6 +77,13 @@ class PictureRenderer {
 Picture render_picture(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                        const PictureSettings& settings);
 
+/// Stops that suit a picture of the scene from `camera`, found from a small one.
+float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
+                   const Camera& camera);
+
+/// F M_e [n] in lx: what arrives straight from the scene's own emitters, for PictureLight.
+std::vector<Float3> irradiance_from_emitters(const TransferData& data);
+
 /// A ray tracer over the surface of `mesh`, as the renderer needs it.
 RayTracer make_surface_tracer(const DisplayMesh& mesh);
 

@@ -1,0 +1,75 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands.h"
+#include "light_file.h"
+#include "output_check.h"
+#include "picture_options.h"
+#include "rebounce/demo/glb_file.h"
+#include "rebounce/demo/lit_mesh.h"
+#include "rebounce/runtime/engine.h"
+#include "rebounce/transfer/transfer_file.h"
+
+namespace rebounce::cli {
+namespace {
+
+struct BakeOptions {
+  std::string file, lights, camera, output;
+  LitMeshSettings settings;
+};
+
+void run(const BakeOptions& chosen, const CommonOptions& options) {
+  check_can_write(chosen.output);
+  LightSetup setup;
+  const auto data = load_lit_scene(chosen.file, chosen.lights, setup);
+  Engine engine(data);
+  engine.relight(setup.lights, setup.sky);
+  const std::vector<Float3> emitted = irradiance_from_emitters(*data);
+  const PictureLight light{.lights = setup.lights,
+                           .sky = setup.sky,
+                           .indirect_irradiance = engine.indirect_irradiance(),
+                           .emitted_irradiance = emitted};
+  const LitMesh mesh = light_mesh(*data, engine.tracer(), light,
+                                  choose_camera(chosen.camera, engine), chosen.settings);
+  const std::size_t bytes = write_glb(chosen.output, mesh, *data, setup.lights);
+  if (options.json) {
+    const nlohmann::json summary = {{"vertices", mesh.position.size()},
+                                    {"triangles", mesh.index.size() / 3},
+                                    {"exposure", mesh.exposure},
+                                    {"bytes", bytes}};
+    fmt::print("{}\n", summary.dump(2));
+  } else if (!options.quiet) {
+    fmt::print("{}: {} triangles, {} vertices, exposure {:+.2f} EV, {} bytes\n", chosen.output,
+               mesh.index.size() / 3, mesh.position.size(), mesh.exposure, bytes);
+  }
+}
+
+}  // namespace
+
+void add_bake_command(CLI::App& app, const CommonOptions& options) {
+  auto chosen = std::make_shared<BakeOptions>();
+  CLI::App* command =
+      app.add_subcommand("bake", "Write the lit scene as a .glb that any glTF viewer shows lit");
+  command->add_option("file", chosen->file, "Transfer file")->required();
+  command->add_option("--lights", chosen->lights,
+                      "Lights: .json, or a .glb that has some; by default those of the scene");
+  command->add_option("--exposure", chosen->settings.exposure,
+                      "Stops; by default what a picture from the camera would take");
+  command->add_option("--camera", chosen->camera,
+                      "Where the exposure is found from: as for render");
+  command
+      ->add_option("--triangles", chosen->settings.triangle_target,
+                   "Cut triangles, all alike, as finely as stays below this number")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{20000000}))
+      ->capture_default_str();
+  command->add_option("-o,--output", chosen->output, "Scene to write (.glb)")
+      ->required()
+      ->check([](const std::string& path) {
+        return std::filesystem::path(path).extension() == ".glb" ? "" : "must end in .glb";
+      });
+  command->callback([chosen, &options] { run(*chosen, options); });
+}
+
+}  // namespace rebounce::cli

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "rebounce/demo/viewer.h"
+
+namespace rebounce::cli {
+
+/// Reads how lamps move (notes/viewer.md) into the motions of `lights`, which are counted from 0.
+/// Returns the frames per second, 30 if the file does not say. Throws Error naming the file, the
+/// motion and the field that is wrong.
+float read_light_path(const std::filesystem::path& path, std::vector<ViewerLight>& lights);
+
+}  // namespace rebounce::cli

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "rebounce/runtime/solve_radiosity.h"
+
+namespace rebounce::cli {
+
+/// The product with the operator, no iteration.
+inline constexpr const char* kTransferMethod = "transfer";
+
+/// The names that --method takes.
+inline std::vector<std::string> method_names() {
+  std::vector<std::string> names = {kTransferMethod};
+  for (const NamedSolveMethod& method : kSolveMethods) names.emplace_back(method.name);
+  return names;
+}
+
+}  // namespace rebounce::cli

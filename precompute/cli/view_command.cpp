@@ -1,0 +1,185 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "commands.h"
+#include "light_file.h"
+#include "light_path_file.h"
+#include "method_names.h"
+#include "output_check.h"
+#include "picture_options.h"
+#include "rebounce/demo/key_light.h"
+#include "rebounce/demo/viewer.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/runtime/engine.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
+
+namespace rebounce::cli {
+namespace {
+
+struct ViewOptions {
+  std::string file, lights, camera, size = "1280x800", show = "radiosity";
+  std::optional<float> exposure;
+  std::string method = kTransferMethod, against;
+  int sweeps = 1;
+  bool cold = false, panels = false;
+  std::string screenshot, path, out;
+  int frames = 1;
+};
+
+IndirectMethod method_of(const std::string& name, const ViewOptions& chosen) {
+  IndirectMethod method{.sweeps = chosen.sweeps, .warm = !chosen.cold};
+  if (name != kTransferMethod) {
+    method.iteration = std::ranges::find(kSolveMethods, name, &NamedSolveMethod::name)->method;
+  }
+  return method;
+}
+
+bool emits(const TransferData& data) {
+  return std::ranges::any_of(data.patches.emitted_exitance,
+                             [](const Float3& m) { return m[0] > 0 || m[1] > 0 || m[2] > 0; });
+}
+
+/// The lights that were asked for or are the scene's own, or a lamp where there would be none.
+LightSetup lights_to_begin_with(const ViewOptions& chosen, const Engine& engine) {
+  const TransferData& data = engine.data();
+  if (!chosen.lights.empty() || !data.lights.empty() || emits(data)) {
+    return choose_lights(chosen.lights, data);
+  }
+  return {.lights = {make_key_light(data, engine.tracer())}, .sky = {}};
+}
+
+ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data) {
+  Engine engine(data);
+  const LightSetup lights = lights_to_begin_with(chosen, engine);
+  engine.relight(lights.lights, lights.sky);
+  ViewerSetup setup;
+  setup.title = "Rebounce: " + data->record.scene_name;
+  std::tie(setup.width, setup.height) = parse_size(chosen.size);
+  for (const Light& light : lights.lights) setup.lights.push_back({.light = light});
+  setup.sky = lights.sky;
+  setup.camera = choose_camera(chosen.camera, engine);
+  setup.show = parse_show(chosen.show);
+  setup.exposure = chosen.exposure;
+  setup.methods[0] = method_of(chosen.method, chosen);
+  if (!chosen.against.empty()) {
+    setup.methods[1] = method_of(chosen.against, chosen);
+    setup.split = 0.5F;
+  }
+  setup.panels = chosen.panels;
+  setup.reference = [data, solver = std::make_shared<const ReferenceSolver>(
+                               data->exchange, data->patches)](std::span<const Float3> exitance) {
+    return solver->indirect_irradiance(exitance);
+  };
+  return setup;
+}
+
+void report(const StageTimes& times, int frames, const CommonOptions& options) {
+  const nlohmann::json summary = {{"frames", frames},
+                                  {"microseconds",
+                                   {{"direct", times.direct},
+                                    {"solve", times.solve[0]},
+                                    {"solve_right", times.solve[1]},
+                                    {"upload", times.upload},
+                                    {"shadows", times.shadows},
+                                    {"draw", times.draw}}}};
+  if (options.json) {
+    fmt::print("{}\n", summary.dump(2));
+  } else if (!options.quiet) {
+    fmt::print(
+        "{} frames; median milliseconds: direct {:.2f}, solve {:.2f}, upload {:.2f}, "
+        "shadows {:.2f}, draw {:.2f}\n",
+        frames, times.direct / 1e3, (times.solve[0] + times.solve[1]) / 1e3, times.upload / 1e3,
+        times.shadows / 1e3, times.draw / 1e3);
+  }
+}
+
+void write_pictures(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data,
+                    const ViewerSetup& setup, float frames_per_second,
+                    const CommonOptions& options) {
+  if (!chosen.out.empty()) std::filesystem::create_directories(chosen.out);
+  ProgressBar progress(!options.quiet && !options.json);
+  const auto write = [&](int frame, const ScreenImage& image) {
+    const std::filesystem::path name =
+        chosen.out.empty()
+            ? std::filesystem::path(chosen.screenshot)
+            : std::filesystem::path(chosen.out) / fmt::format("frame_{:05}.png", frame);
+    write_png(name, image);
+    if (!progress.update("drawing", static_cast<double>(frame + 1) / chosen.frames)) {
+      throw Error(
+          fmt::format("stopped on request after {} of {} pictures", frame + 1, chosen.frames));
+    }
+  };
+  const StageTimes times = draw_viewer_frames(data, setup, chosen.frames, frames_per_second, write);
+  report(times, chosen.frames, options);
+}
+
+void run(const ViewOptions& chosen, const CommonOptions& options) {
+  if (!chosen.screenshot.empty()) check_can_write(chosen.screenshot);
+  LightSetup lights;
+  const auto data = chosen.lights.empty()
+                        ? std::make_shared<const TransferData>(load_transfer_file(chosen.file))
+                        : load_lit_scene(chosen.file, chosen.lights, lights);
+  ViewerSetup setup = make_setup(chosen, data);
+  float frames_per_second = 30;
+  if (!chosen.path.empty()) frames_per_second = read_light_path(chosen.path, setup.lights);
+  if (chosen.screenshot.empty() && chosen.out.empty()) {
+    run_viewer(data, setup);
+  } else {
+    write_pictures(chosen, data, setup, frames_per_second, options);
+  }
+}
+
+void add_picture_options(CLI::App& command, ViewOptions& chosen) {
+  CLI::Option* screenshot =
+      command.add_option("--screenshot", chosen.screenshot,
+                         "Write one picture (.png) instead of opening a window; needs no display");
+  screenshot->check([](const std::string& path) {
+    return std::filesystem::path(path).extension() == ".png" ? "" : "must end in .png";
+  });
+  command.add_option("--path", chosen.path, "How lamps move: a .json file (notes/viewer.md)");
+  CLI::Option* out = command.add_option(
+      "--out", chosen.out, "Write pictures frame_00000.png ... into this folder, without a window");
+  out->excludes(screenshot);
+  command.add_option("--frames", chosen.frames, "How many pictures")
+      ->check(CLI::Range(1, 1000000))
+      ->needs(out)
+      ->capture_default_str();
+  command.add_flag("--panels", chosen.panels, "Pictures show panels and handles too");
+}
+
+}  // namespace
+
+void add_view_command(CLI::App& app, const CommonOptions& options) {
+  auto chosen = std::make_shared<ViewOptions>();
+  CLI::App* command = app.add_subcommand("view", "Fly through a scene and move its lights");
+  command->add_option("file", chosen->file, "Transfer file")->required();
+  command->add_option("--lights", chosen->lights,
+                      "Lights: .json, or a .glb that has some; by default those of the scene, or "
+                      "one lamp if it has none");
+  command->add_option("--camera", chosen->camera, "Where to begin: as for render");
+  command->add_option("--size", chosen->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+  command->add_option("--show", chosen->show, "What to begin with: as for render")
+      ->check(CLI::IsMember(show_names()))
+      ->capture_default_str();
+  command->add_option("--exposure", chosen->exposure,
+                      "Stops; by default found from the first picture");
+  command->add_option("--method", chosen->method, "How to find the indirect light")
+      ->check(CLI::IsMember(method_names()))
+      ->capture_default_str();
+  command->add_option("--against", chosen->against, "Split the screen; this method on the right")
+      ->check(CLI::IsMember(method_names()));
+  command->add_option("--sweeps", chosen->sweeps, "Sweeps a frame, for iterative methods")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  command->add_flag("--cold", chosen->cold,
+                    "Iterative methods begin every frame anew, not from the one before");
+  add_picture_options(*command, *chosen);
+  command->callback([chosen, &options] { run(*chosen, options); });
+}
+
+}  // namespace rebounce::cli

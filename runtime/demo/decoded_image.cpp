@@ -1,0 +1,39 @@
+#include "decoded_image.h"
+
+#include <stb_image.h>
+
+#include <limits>
+#include <memory>
+#include <string>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr int kMaxSide = 16384;  // texels: 1 GiB decoded is the most one texture may ask for
+
+}  // namespace
+
+DecodedImage decode_image(const Texture& texture) {
+  const auto fail = [](const std::string& reason) -> Error {
+    return Error("texture: " + reason + "; precompute the scene again from a sound file");
+  };
+  if (texture.encoded.size() > std::numeric_limits<int>::max()) throw fail("too many bytes");
+  const auto* bytes = texture.encoded.data();
+  const int byte_count = static_cast<int>(texture.encoded.size());
+  DecodedImage base;
+  int channel_count = 0;
+  if (!stbi_info_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count)) {
+    throw fail("not a PNG or JPEG image");
+  }
+  if (base.width > kMaxSide || base.height > kMaxSide) throw fail("more than 16384 texels a side");
+  const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
+      stbi_load_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count, 3),
+      stbi_image_free);
+  if (!texels) throw fail("a damaged image");
+  base.rgb.assign(texels.get(), texels.get() + std::size_t{3} * base.width * base.height);
+  return base;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rebounce/transfer/scene_description.h"
+
+namespace rebounce {
+
+/// A texture's texels: 8-bit sRGB, rows from the top.
+struct DecodedImage {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgb{};  ///< [height][width][3]
+};
+
+/// Throws Error if the image cannot be decoded or is too large.
+DecodedImage decode_image(const Texture& texture);
+
+}  // namespace rebounce

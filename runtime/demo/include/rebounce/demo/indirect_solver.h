@@ -1,0 +1,55 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/solve_radiosity.h"
+#include "rebounce/transfer/form_factor_blocks.h"
+
+namespace rebounce {
+
+/// How a frame finds its indirect light.
+struct IndirectMethod {
+  std::optional<SolveMethod> iteration{};  ///< unset: one product with the stored operator
+  int sweeps = 1;                        ///< of an iteration, at least 1
+  bool warm = true;                      ///< an iteration starts from the frame before
+
+  bool operator==(const IndirectMethod&) const = default;
+};
+
+/// Finds the indirect light of a frame by any method; an iteration keeps its solution from frame to
+/// frame.
+class IndirectSolver {
+ public:
+  /// `data` must have an operator; it and `form_factors` must outlive the object.
+  IndirectSolver(const TransferData& data, const FormFactorBlocks& form_factors);
+
+  /// Takes another method; an iteration begins without a solution.
+  void choose(const IndirectMethod& method);
+  const IndirectMethod& method() const { return method_; }
+
+  /// H [n] in lx for `initial_exitance` [n] in lx; valid until the next call. Throws Error if the
+  /// method cannot be used.
+  std::span<const Float3> solve(std::span<const Float3> initial_exitance);
+
+  /// Of the last solve. An iteration ends with one gather more, which makes H from its radiosity
+  /// and is not counted.
+  double microseconds() const { return microseconds_; }
+
+ private:
+  void apply(std::span<const Float3> initial_exitance);
+  void iterate(std::span<const Float3> initial_exitance);
+
+  const TransferData& data_;
+  const FormFactorBlocks& form_factors_;
+  IndirectMethod method_;
+  std::unique_ptr<RadiositySolver> solver_;
+  std::vector<Float3> indirect_irradiance_;
+  std::vector<float> workspace_;
+  double microseconds_ = 0;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// A place on the display mesh.
+struct MeshPlace {
+  std::uint32_t triangle = kNone;
+  glm::vec3 weight{0, 0, 0};  ///< barycentric
+};
+
+/// The display mesh cut finer: each triangle into `divisions`² equal ones, without T-junctions.
+/// Triangles of one material are together and share vertices with each other only.
+struct SubdividedMesh {
+  struct Part {
+    std::uint32_t material = 0;
+    std::uint32_t triangle_begin = 0, triangle_end = 0;
+    std::uint32_t vertex_begin = 0, vertex_end = 0;
+  };
+
+  std::vector<MeshPlace> vertex;       ///< [v]
+  std::vector<Uint3> triangle;         ///< [t] vertices, counter-clockwise from the front
+  std::vector<std::uint32_t> display;  ///< [t] triangle of the display mesh that it is part of
+  std::vector<std::array<glm::vec3, 3>> corner;  ///< [t] barycentric weights in that triangle
+  std::vector<Part> part;                        ///< one for each material that is used
+};
+
+/// Cuts `mesh`; `divisions` at least 1.
+SubdividedMesh subdivide(const DisplayMesh& mesh, int divisions);
+
+}  // namespace rebounce

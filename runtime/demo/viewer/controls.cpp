@@ -1,0 +1,191 @@
+#include "controls.h"
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "rebounce/runtime/float3_glm.h"
+#include "srgb.h"
+
+namespace rebounce {
+namespace {
+
+constexpr float kHandleRadius = 9;  // pixels
+constexpr float kTurnPerPixel = 0.004F;
+constexpr float kCrossingSeconds = 6;  // to fly along the scene's diagonal
+constexpr float kHurry = 4;            // times faster with Shift
+
+glm::vec2 screen_size() {
+  const ImVec2 size = ImGui::GetIO().DisplaySize;
+  return {size.x, size.y};
+}
+
+bool has_place(const Light& light) {
+  return light.type != LightType::kDirectional;
+}
+
+// Metres along the view of one pixel at `depth` metres.
+float metres_per_pixel(const Camera& camera, float depth) {
+  return 2 * depth * std::tan(0.5F * camera.vertical_fov) / std::max(1.0F, screen_size().y);
+}
+
+float depth_of(const Camera& camera, const glm::vec3& point) {
+  return glm::dot(to_glm(camera.position) - point, to_glm(camera.backward));
+}
+
+// Where a point is on the screen; nothing if it is behind the camera.
+std::optional<glm::vec2> to_screen(const Camera& camera, const glm::vec3& point) {
+  const float depth = depth_of(camera, point);
+  if (depth <= 0) return std::nullopt;
+  const glm::vec3 way = point - to_glm(camera.position);
+  const float scale = 1 / metres_per_pixel(camera, depth);
+  return 0.5F * screen_size() +
+         scale * glm::vec2(glm::dot(way, to_glm(camera.right)), -glm::dot(way, to_glm(camera.up)));
+}
+
+ImU32 handle_color(const Float3& color) {
+  const float peak = std::max({color[0], color[1], color[2], 1e-6F});
+  const glm::vec3 shown = to_glm(color) / peak;
+  return ImGui::ColorConvertFloat4ToU32(
+      {linear_to_srgb(shown.r), linear_to_srgb(shown.g), linear_to_srgb(shown.b), 1});
+}
+
+Light light_now(const ViewerState& state, const ViewerLight& lamp) {
+  return moved(lamp.light, lamp.motion, state.time);
+}
+
+}  // namespace
+
+void shift_lamp(ViewerLight& lamp, const glm::vec3& shift) {
+  const auto move = [&](Float3& point) { point = to_float3(to_glm(point) + shift); };
+  move(lamp.light.position);
+  move(lamp.motion.center);
+  move(lamp.motion.from);
+  move(lamp.motion.to);
+  for (LightMotion::Key& key : lamp.motion.keys) move(key.position);
+}
+
+void Controls::update(ViewerState& state) {
+  if (!ImGui::GetIO().WantCaptureKeyboard) {
+    press_keys(state);
+    fly(state);
+  }
+  steer(state);
+}
+
+void Controls::press_keys(ViewerState& state) const {
+  static constexpr std::array kShown = {Show::kRadiosity, Show::kDirect, Show::kIndirect,
+                                        Show::kPatches, Show::kError};
+  for (int k = 0; k < static_cast<int>(kShown.size()); ++k) {
+    if (ImGui::IsKeyPressed(GLFW_KEY_1 + k, false))
+      state.show = kShown[static_cast<std::size_t>(k)];
+  }
+  if (ImGui::IsKeyPressed(GLFW_KEY_SPACE, false)) state.playing = !state.playing;
+  if (ImGui::IsKeyPressed(GLFW_KEY_TAB, false)) state.shows_panels = !state.shows_panels;
+  if (ImGui::IsKeyPressed(GLFW_KEY_F, false)) state.is_split = !state.is_split;
+  if (ImGui::IsKeyPressed(GLFW_KEY_X, false)) state.wants_exposure = true;
+}
+
+void Controls::fly(ViewerState& state) const {
+  const auto axis = [](int forth, int back) {
+    return static_cast<float>(ImGui::IsKeyDown(forth)) - static_cast<float>(ImGui::IsKeyDown(back));
+  };
+  const glm::vec3 way(axis(GLFW_KEY_D, GLFW_KEY_A), axis(GLFW_KEY_E, GLFW_KEY_Q),
+                      axis(GLFW_KEY_W, GLFW_KEY_S));
+  const ImGuiIO& io = ImGui::GetIO();
+  const float speed = bounds_.diagonal() / kCrossingSeconds * (io.KeyShift ? kHurry : 1);
+  state.camera.move(way * (speed * io.DeltaTime));
+}
+
+std::optional<std::size_t> Controls::lamp_under_mouse(const ViewerState& state) const {
+  const ImVec2 mouse = ImGui::GetIO().MousePos;
+  std::optional<std::size_t> nearest;
+  float least = 2 * kHandleRadius;
+  for (std::size_t k = 0; k < state.lights.size(); ++k) {
+    const Light light = light_now(state, state.lights[k]);
+    if (!has_place(light)) continue;
+    const auto at = to_screen(state.camera.camera(), to_glm(light.position));
+    if (!at) continue;
+    const float distance = glm::distance(*at, glm::vec2(mouse.x, mouse.y));
+    if (distance > least) continue;
+    least = distance;
+    nearest = k;
+  }
+  return nearest;
+}
+
+float Controls::distance_ahead(const FlyCamera& camera) const {
+  const std::array ray = {Ray{.origin = to_float3(camera.position()),
+                              .t_near = 0,
+                              .direction = to_float3(camera.forward()),
+                              .t_far = std::numeric_limits<float>::infinity()}};
+  std::array<Hit, 1> hit;
+  scene_.engine().tracer().intersect(ray, hit);
+  return hit[0].triangle == kNone ? 0.5F * bounds_.diagonal() : hit[0].t;
+}
+
+void Controls::drag_lamp(ViewerState& state) const {
+  ViewerLight& lamp = state.lights[state.selected];
+  const Camera camera = state.camera.camera();
+  const float depth = depth_of(camera, to_glm(light_now(state, lamp).position));
+  const ImGuiIO& io = ImGui::GetIO();
+  const float metres = metres_per_pixel(camera, depth);
+  // With Shift away from the camera and back, else in the plane of the view.
+  const glm::vec3 upwards = io.KeyShift ? -to_glm(camera.backward) : to_glm(camera.up);
+  shift_lamp(lamp, metres * (io.MouseDelta.x * to_glm(camera.right) - io.MouseDelta.y * upwards));
+}
+
+void Controls::steer(ViewerState& state) {
+  const ImGuiIO& io = ImGui::GetIO();
+  if (!io.WantCaptureMouse) {
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
+      const auto lamp = lamp_under_mouse(state);
+      dragging_lamp_ = lamp.has_value();
+      turning_ = !dragging_lamp_;
+      if (lamp) state.selected = *lamp;
+    }
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Right)) {
+      orbiting_ = true;
+      orbit_target_ =
+          state.camera.position() + distance_ahead(state.camera) * state.camera.forward();
+    }
+    if (io.MouseWheel != 0) {
+      state.camera.move({0, 0, 0.05F * io.MouseWheel * bounds_.diagonal()});
+    }
+  }
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragging_lamp_ = turning_ = false;
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Right)) orbiting_ = false;
+  const float left = kTurnPerPixel * io.MouseDelta.x, up = kTurnPerPixel * io.MouseDelta.y;
+  if (dragging_lamp_ && state.selected < state.lights.size()) drag_lamp(state);
+  if (turning_) state.camera.turn(left, up);
+  if (orbiting_) state.camera.orbit(orbit_target_, -left, -up);
+}
+
+void Controls::draw_handles(const ViewerState& state) const {
+  ImDrawList* const list = ImGui::GetBackgroundDrawList();
+  const Camera camera = state.camera.camera();
+  for (std::size_t k = 0; k < state.lights.size(); ++k) {
+    const Light light = light_now(state, state.lights[k]);
+    const auto at = has_place(light) ? to_screen(camera, to_glm(light.position)) : std::nullopt;
+    if (!at) continue;
+    const ImVec2 place(at->x, at->y);
+    const bool selected = k == state.selected;
+    if (state.lights[k].on) list->AddCircleFilled(place, kHandleRadius, handle_color(light.color));
+    list->AddCircle(place, kHandleRadius, IM_COL32(20, 20, 20, 255), 0, 3);
+    list->AddCircle(place, kHandleRadius + 1,
+                    selected ? IM_COL32(255, 170, 40, 255) : IM_COL32(240, 240, 240, 255), 0, 2);
+    if (light.type != LightType::kSpot) continue;
+    const glm::vec3 tip =
+        to_glm(light.position) + 0.08F * bounds_.diagonal() * to_glm(light.direction);
+    if (const auto end = to_screen(camera, tip)) {
+      list->AddLine(place, {end->x, end->y}, IM_COL32(240, 240, 240, 255), 2);
+    }
+  }
+}
+
+}  // namespace rebounce

@@ -1,0 +1,20 @@
+#pragma once
+
+namespace rebounce {
+
+/// An OpenGL 3.3 context without a window or display, current while the object lives. Through EGL,
+/// on the graphics card or, where there is none, Mesa's software renderer.
+class HeadlessContext {
+ public:
+  /// Throws Error if this machine has no such OpenGL.
+  HeadlessContext();
+  ~HeadlessContext();
+  HeadlessContext(const HeadlessContext&) = delete;
+  HeadlessContext& operator=(const HeadlessContext&) = delete;
+
+ private:
+  void* display_ = nullptr;
+  void* context_ = nullptr;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,79 @@
+#include "lit_scene.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "display_surface.h"
+#include "rebounce/demo/patch_errors.h"
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/transfer/area_norm.h"
+#include "vertex_light.h"
+
+namespace rebounce {
+
+LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference)
+    : data_(std::move(data)),
+      engine_(data_),
+      form_factors_(data_->exchange, data_->patches.area),
+      emitted_(irradiance_from_emitters(*data_)),
+      solver_{IndirectSolver(*data_, form_factors_), IndirectSolver(*data_, form_factors_)},
+      pictures_(*data_, engine_.tracer()),
+      reference_(std::move(reference)) {
+  for (auto& values : indirect_) values.resize(data_->patches.size());
+}
+
+void LitScene::relight(std::span<const Light> lights, const Sky& sky,
+                       std::span<const IndirectMethod, kSideCount> methods, bool both,
+                       StageTimes& times) {
+  const auto begin = std::chrono::steady_clock::now();
+  engine_.compute_direct(lights, sky);
+  engine_.compute_initial_exitance();
+  const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
+  times.direct = time.count();
+  for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {
+    IndirectSolver& solver = solver_[side];
+    if (solver.method() != methods[side]) solver.choose(methods[side]);
+    std::ranges::copy(solver.solve(engine_.initial_exitance()), indirect_[side].begin());
+    times.solve[side] = solver.microseconds();
+  }
+}
+
+std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const {
+  const glm::vec3 open = to_glm(sky.color) * sky.luminance * std::numbers::pi_v<float>;
+  std::vector<glm::vec3> value(emitted_.size());
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    value[i] = open * data_->patches.sky_visibility[i] + to_glm(emitted_[i]);
+  }
+  return reconstruct_at_vertices(data_->mesh, value);
+}
+
+std::vector<glm::vec3> LitScene::bounced_at_vertices(Side side) const {
+  const PictureLight light{.indirect_irradiance = indirect(side), .emitted_irradiance = emitted_};
+  return light_at_vertices(*data_, light).bounced;
+}
+
+std::vector<float> LitScene::patch_errors(Side side) {
+  if (!reference_) return {};
+  const auto exitance = engine_.initial_exitance();
+  if (!std::ranges::equal(exitance, reference_exitance_)) {
+    reference_indirect_ = reference_(exitance);
+    reference_exitance_.assign(exitance.begin(), exitance.end());
+  }
+  const PatchTable& patches = data_->patches;
+  error_[index(side)] = relative_difference(indirect(side), reference_indirect_, patches.area);
+  return rebounce::patch_errors(indirect(side), reference_indirect_, patches.area);
+}
+
+float LitScene::find_exposure(std::span<const Light> lights, const Sky& sky,
+                              const Camera& camera) const {
+  return exposure_for(pictures_,
+                      {.lights = lights,
+                       .sky = sky,
+                       .indirect_irradiance = indirect(Side::kFirst),
+                       .emitted_irradiance = emitted_},
+                      camera);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,206 @@
+#pragma once
+
+// The viewer's shaders, GLSL 3.30. Light is linear Rec.709, scaled by the exposure.
+
+namespace rebounce::shaders {
+
+/// Every pass over the scene places its vertices alike, to the bit, so that later ones can compare
+/// depths for equality.
+inline constexpr const char* kSceneVertex = R"(#version 330 core
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec3 vertex_color;
+layout(location = 3) in vec2 base_color_texcoord;
+layout(location = 4) in vec2 emissive_texcoord;
+layout(location = 5) in vec3 first_flight;  // sky and emitters, lx
+layout(location = 6) in vec3 bounced;       // lx
+uniform mat4 clip_from_world;
+out vec3 world_position, shading_normal, color, first_light, bounced_light;
+out vec2 base_uv, emissive_uv;
+invariant gl_Position;
+void main() {
+  world_position = position;
+  shading_normal = normal;
+  color = vertex_color;
+  base_uv = base_color_texcoord;
+  emissive_uv = emissive_texcoord;
+  first_light = first_flight;
+  bounced_light = bounced;
+  gl_Position = clip_from_world * vec4(position, 1);
+}
+)";
+
+/// What needs no shadow map: light from the vertices, and what shines by itself.
+inline constexpr const char* kAmbientFragment = R"(#version 330 core
+in vec3 color, first_light, bounced_light;
+in vec2 base_uv, emissive_uv;
+uniform sampler2D base_color_texture, emissive_texture;
+uniform vec3 base_color, emitted_luminance;
+uniform float first_part, bounced_part, exposure_scale;
+out vec4 result;
+void main() {
+  vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
+  vec3 irradiance = first_part * first_light + bounced_part * bounced_light;
+  vec3 emitted = first_part * emitted_luminance * texture(emissive_texture, emissive_uv).rgb *
+                 exposure_scale;
+  // Lamps no brighter than twice white, so that their edges are smooth.
+  float peak = max(max(emitted.r, emitted.g), emitted.b);
+  if (peak > 2) emitted *= 2 / peak;
+  result = vec4(albedo * max(irradiance, 0) * (exposure_scale / 3.14159265) + emitted, 1);
+}
+)";
+
+/// One lamp, added to what is there. Fall-off, range and cone as in light_sampling.cpp.
+inline constexpr const char* kLampFragment = R"(#version 330 core
+in vec3 world_position, shading_normal, color;
+in vec2 base_uv;
+uniform sampler2D base_color_texture;
+uniform vec3 base_color, eye;
+uniform float exposure_scale;
+uniform int lamp_type;  // 0 point, 1 spot, 2 directional
+uniform vec3 lamp_position, lamp_direction, lamp_color;
+uniform float lamp_range, cos_inner, cos_outer;
+uniform samplerCubeShadow cube_shadow;
+uniform sampler2DShadow plane_shadow;
+uniform mat4 plane_from_world;
+uniform vec2 near_far;
+uniform float texel;  // of the cube at unit distance; of the plane in metres
+uniform float smallest_offset;  // metres
+out vec4 result;
+
+const int kTaps = 16;
+const float kRadius = 1.5;  // texels
+
+// Evenly over a disc (H. Vogel, 1979).
+vec2 tap(int k) {
+  float angle = 2.39996323 * float(k);
+  return sqrt((float(k) + 0.5) / float(kTaps)) * vec2(cos(angle), sin(angle));
+}
+
+float cube_visibility(vec3 point, vec3 geometric_normal) {
+  vec3 way = point - lamp_position;
+  float along = max(max(abs(way.x), abs(way.y)), abs(way.z));
+  // Off the surface by what a slanted texel and the taps around it reach.
+  way += geometric_normal * (smallest_offset + (kRadius + 1) * texel * along);
+  vec3 side = normalize(cross(way, abs(way.y) < 0.9 * length(way) ? vec3(0, 1, 0) : vec3(1, 0, 0)));
+  vec3 up = normalize(cross(side, way));
+  float spread = kRadius * texel * along;
+  float sum = 0;
+  for (int k = 0; k < kTaps; ++k) {
+    vec2 shift = spread * tap(k);
+    vec3 to = way + shift.x * side + shift.y * up;
+    float z = max(max(abs(to.x), abs(to.y)), abs(to.z));
+    float depth = (near_far.y + near_far.x - 2 * near_far.x * near_far.y / z) /
+                  (near_far.y - near_far.x);
+    sum += texture(cube_shadow, vec4(to, 0.5 * depth + 0.5));
+  }
+  return sum / float(kTaps);
+}
+
+float plane_visibility(vec3 point, vec3 geometric_normal) {
+  vec3 off = point + geometric_normal * (smallest_offset + (kRadius + 1) * texel);
+  vec3 at = (plane_from_world * vec4(off, 1)).xyz * 0.5 + 0.5;
+  vec2 spread = kRadius / vec2(textureSize(plane_shadow, 0));
+  float sum = 0;
+  for (int k = 0; k < kTaps; ++k) sum += texture(plane_shadow, vec3(at.xy + spread * tap(k), at.z));
+  return sum / float(kTaps);
+}
+
+void main() {
+  vec3 to_lamp = lamp_type == 2 ? -lamp_direction : lamp_position - world_position;
+  float distance_squared = dot(to_lamp, to_lamp);
+  vec3 direction = to_lamp * inversesqrt(max(distance_squared, 1e-12));
+  vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
+  if (dot(geometric_normal, eye - world_position) < 0) geometric_normal = -geometric_normal;
+  float cosine = max(0, dot(normalize(shading_normal), direction));
+  if (dot(geometric_normal, direction) <= 0) cosine = 0;
+  float strength = cosine;
+  if (lamp_type != 2) {
+    strength /= max(distance_squared, 1e-12);
+    if (lamp_range > 0) {
+      float ratio = distance_squared / (lamp_range * lamp_range);
+      strength *= clamp(1 - ratio * ratio, 0, 1);
+    }
+  }
+  if (lamp_type == 1) {
+    float inside = (dot(-direction, lamp_direction) - cos_outer) / max(0.001, cos_inner - cos_outer);
+    inside = clamp(inside, 0, 1);
+    strength *= inside * inside;
+  }
+  if (strength <= 0) discard;
+  strength *= lamp_type == 2 ? plane_visibility(world_position, geometric_normal)
+                             : cube_visibility(world_position, geometric_normal);
+  vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
+  result = vec4(albedo * lamp_color * (strength * exposure_scale / 3.14159265), 0);
+}
+)";
+
+/// A colour for each patch, from a table.
+inline constexpr const char* kPatchFragment = R"(#version 330 core
+in vec3 world_position;
+uniform usamplerBuffer patch_of_triangle;
+uniform samplerBuffer color_of_patch;
+uniform int first_triangle;
+uniform vec3 eye, shading_direction;
+uniform float shading;  // 0: the colour alone
+out vec4 result;
+void main() {
+  uint patch_index = texelFetch(patch_of_triangle, first_triangle + gl_PrimitiveID).r;
+  vec3 color = vec3(0.02);
+  if (patch_index != 0xFFFFFFFFu) color = texelFetch(color_of_patch, int(patch_index)).rgb;
+  vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
+  if (dot(geometric_normal, eye - world_position) < 0) geometric_normal = -geometric_normal;
+  float facing = 0.75 + 0.25 * dot(geometric_normal, shading_direction);
+  result = vec4(color * mix(1, facing, shading), 1);
+}
+)";
+
+inline constexpr const char* kShadowVertex = R"(#version 330 core
+layout(location = 0) in vec3 position;
+uniform mat4 clip_from_world;
+void main() { gl_Position = clip_from_world * vec4(position, 1); }
+)";
+
+inline constexpr const char* kShadowFragment = R"(#version 330 core
+void main() {}
+)";
+
+/// One triangle that covers the screen.
+inline constexpr const char* kScreenVertex = R"(#version 330 core
+void main() {
+  vec2 corner = vec2(gl_VertexID == 1 ? 3 : -1, gl_VertexID == 2 ? 3 : -1);
+  gl_Position = vec4(corner, 0, 1);
+}
+)";
+
+/// Tone curve (tone_curve.h), dither (image_file.cpp) and sRGB encoding.
+inline constexpr const char* kScreenFragment = R"(#version 330 core
+uniform sampler2D light;
+uniform int display_referred, height;
+out vec4 result;
+
+vec3 tone_curve(vec3 color) {
+  const float kShoulder = 0.7, kDesaturation = 0.15, kRoom = 0.3;
+  float peak = max(max(color.r, color.g), color.b);
+  if (peak <= kShoulder) return color;
+  float new_peak = 1 - kRoom * kRoom / (peak + kRoom - kShoulder);
+  float white = 1 - 1 / (kDesaturation * (peak - new_peak) + 1);
+  return mix(color * (new_peak / peak), vec3(new_peak), white);
+}
+
+void main() {
+  vec3 color = texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb;
+  if (display_referred == 0) color = tone_curve(color);
+  color = clamp(color, 0, 1);
+  vec3 encoded = mix(12.92 * color, 1.055 * pow(max(color, 1e-6), vec3(1 / 2.4)) - 0.055,
+                     greaterThan(color, vec3(0.0031308)));
+  if (display_referred == 0) {
+    vec2 pixel = vec2(floor(gl_FragCoord.x), float(height) - 1 - floor(gl_FragCoord.y));
+    float noise = fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))));
+    encoded += (noise - 0.5) / 255;
+  }
+  result = vec4(encoded, 1);
+}
+)";
+
+}  // namespace rebounce::shaders

@@ -1,0 +1,155 @@
+#include "shadow_map.h"
+
+#include <algorithm>
+#include <array>
+#include <glm/gtc/matrix_transform.hpp>
+#include <limits>
+
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sampling.h"
+
+namespace rebounce {
+namespace {
+
+// Of the scene's diagonal: nearer than this nothing casts a shadow, as a lamp's own housing.
+constexpr float kNearPart = 1e-3F;
+// Likewise, receivers are lifted off their surface by at least this.
+constexpr float kOffsetPart = 1e-4F;
+
+struct CubeFace {
+  GLenum target;
+  glm::vec3 forward, up;
+};
+
+const std::array<CubeFace, 6> kFaces = {{
+    {GL_TEXTURE_CUBE_MAP_POSITIVE_X, {1, 0, 0}, {0, -1, 0}},
+    {GL_TEXTURE_CUBE_MAP_NEGATIVE_X, {-1, 0, 0}, {0, -1, 0}},
+    {GL_TEXTURE_CUBE_MAP_POSITIVE_Y, {0, 1, 0}, {0, 0, 1}},
+    {GL_TEXTURE_CUBE_MAP_NEGATIVE_Y, {0, -1, 0}, {0, 0, -1}},
+    {GL_TEXTURE_CUBE_MAP_POSITIVE_Z, {0, 0, 1}, {0, -1, 0}},
+    {GL_TEXTURE_CUBE_MAP_NEGATIVE_Z, {0, 0, -1}, {0, -1, 0}},
+}};
+
+void set_comparing(GLenum target) {
+  glTexParameteri(target, GL_TEXTURE_MIN_FILTER, GL_LINEAR);
+  glTexParameteri(target, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
+  glTexParameteri(target, GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
+  glTexParameteri(target, GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
+  glTexParameteri(target, GL_TEXTURE_COMPARE_MODE, GL_COMPARE_REF_TO_TEXTURE);
+  glTexParameteri(target, GL_TEXTURE_COMPARE_FUNC, GL_LEQUAL);
+}
+
+void allocate(GLenum target, int side) {
+  glTexImage2D(target, 0, GL_DEPTH_COMPONENT32F, side, side, 0, GL_DEPTH_COMPONENT, GL_FLOAT,
+               nullptr);
+}
+
+bool casts_alike(const Light& a, const Light& b) {
+  if (a.type != b.type) return false;
+  return a.type == LightType::kDirectional ? a.direction == b.direction : a.position == b.position;
+}
+
+std::array<glm::vec3, 8> corners_of(const SceneBounds& bounds) {
+  std::array<glm::vec3, 8> corners;
+  for (int k = 0; k < 8; ++k) {
+    corners[static_cast<std::size_t>(k)] = {(k & 1) != 0 ? bounds.high.x : bounds.low.x,
+                                            (k & 2) != 0 ? bounds.high.y : bounds.low.y,
+                                            (k & 4) != 0 ? bounds.high.z : bounds.low.z};
+  }
+  return corners;
+}
+
+}  // namespace
+
+ShadowMap::ShadowMap(int cube_side, int plane_side)
+    : cube_side_(cube_side), plane_side_(plane_side) {
+  glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
+  for (const CubeFace& face : kFaces) allocate(face.target, 1);
+  set_comparing(GL_TEXTURE_CUBE_MAP);
+  glBindTexture(GL_TEXTURE_2D, plane_.name());
+  allocate(GL_TEXTURE_2D, 1);
+  set_comparing(GL_TEXTURE_2D);
+}
+
+void ShadowMap::update(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
+                       const GlProgram& program) {
+  if (drawn_ && casts_alike(light, drawn_for_)) return;
+  smallest_offset_ = kOffsetPart * bounds.diagonal();
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
+  glDrawBuffer(GL_NONE);
+  glReadBuffer(GL_NONE);
+  glEnable(GL_DEPTH_TEST);
+  glDepthMask(GL_TRUE);
+  glDepthFunc(GL_LESS);
+  glDisable(GL_CULL_FACE);
+  glDisable(GL_BLEND);
+  program.use();
+  if (light.type == LightType::kDirectional) {
+    draw_plane(light, scene, bounds, program);
+  } else {
+    draw_cube(light, scene, bounds, program);
+  }
+  drawn_ = true;
+  drawn_for_ = light;
+}
+
+void ShadowMap::draw_cube(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
+                          const GlProgram& program) {
+  const bool first_cube = !drawn_ || drawn_for_.type == LightType::kDirectional;
+  glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
+  const glm::vec3 eye = to_glm(light.position);
+  const glm::vec3 centre = 0.5F * (bounds.low + bounds.high);
+  near_far_ = {kNearPart * bounds.diagonal(), bounds.diagonal() + glm::distance(eye, centre)};
+  texel_ = 2.0F / static_cast<float>(cube_side_);
+  const glm::mat4 projection =
+      glm::perspective(glm::radians(90.0F), 1.0F, near_far_.x, near_far_.y);
+  glViewport(0, 0, cube_side_, cube_side_);
+  for (const CubeFace& face : kFaces) {
+    if (first_cube) allocate(face.target, cube_side_);
+  }
+  for (const CubeFace& face : kFaces) {
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, face.target, cube_.name(), 0);
+    glClear(GL_DEPTH_BUFFER_BIT);
+    program.set("clip_from_world", projection * glm::lookAt(eye, eye + face.forward, face.up));
+    scene.draw_surface();
+  }
+}
+
+void ShadowMap::draw_plane(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
+                           const GlProgram& program) {
+  glBindTexture(GL_TEXTURE_2D, plane_.name());
+  if (!drawn_ || drawn_for_.type != LightType::kDirectional) allocate(GL_TEXTURE_2D, plane_side_);
+  const glm::mat3 frame(frame_around(-to_dvec3(light.direction)));
+  const glm::mat3 plane_axes = glm::transpose(frame);
+  glm::vec3 low(std::numeric_limits<float>::max()), high(-low);
+  for (const glm::vec3& corner : corners_of(bounds)) {
+    low = glm::min(low, plane_axes * corner);
+    high = glm::max(high, plane_axes * corner);
+  }
+  const float margin = 0.01F * bounds.diagonal();
+  plane_from_world_ = glm::ortho(low.x - margin, high.x + margin, low.y - margin, high.y + margin,
+                                 -high.z - margin, -low.z + margin) *
+                      glm::mat4(plane_axes);
+  texel_ =
+      (std::max(high.x - low.x, high.y - low.y) + 2 * margin) / static_cast<float>(plane_side_);
+  glViewport(0, 0, plane_side_, plane_side_);
+  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, plane_.name(), 0);
+  glClear(GL_DEPTH_BUFFER_BIT);
+  program.set("clip_from_world", plane_from_world_);
+  scene.draw_surface();
+}
+
+void ShadowMap::bind(const GlProgram& program) const {
+  glActiveTexture(GL_TEXTURE2);
+  glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
+  glActiveTexture(GL_TEXTURE3);
+  glBindTexture(GL_TEXTURE_2D, plane_.name());
+  program.set("cube_shadow", 2);
+  program.set("plane_shadow", 3);
+  program.set("plane_from_world", plane_from_world_);
+  program.set("near_far", near_far_);
+  program.set("texel", texel_);
+  program.set("smallest_offset", smallest_offset_);
+}
+
+}  // namespace rebounce

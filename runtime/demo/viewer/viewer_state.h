@@ -1,0 +1,43 @@
+#pragma once
+
+#include "fly_camera.h"
+#include "rebounce/demo/viewer.h"
+
+namespace rebounce {
+
+/// What the user steers.
+struct ViewerState {
+  explicit ViewerState(const ViewerSetup& setup)
+      : lights(setup.lights),
+        sky(setup.sky),
+        camera(setup.camera),
+        show(setup.show),
+        methods(setup.methods),
+        split(setup.split.value_or(0.5F)),
+        is_split(setup.split.has_value()) {}
+
+  /// The lamps that are on, where they are now.
+  std::vector<Light> lights_now() const {
+    std::vector<Light> now;
+    for (const ViewerLight& light : lights) {
+      if (light.on) now.push_back(moved(light.light, light.motion, time));
+    }
+    return now;
+  }
+
+  std::vector<ViewerLight> lights;
+  Sky sky;
+  FlyCamera camera;
+  Show show;
+  float exposure = 0;
+  std::array<IndirectMethod, 2> methods;
+  float split;
+  bool is_split;
+  float time = 0;  ///< seconds
+  bool playing = true;
+  bool wants_exposure = false;  ///< find the exposure anew
+  bool shows_panels = true;
+  std::size_t selected = 0;  ///< lamp
+};
+
+}  // namespace rebounce

@@ -1,0 +1,208 @@
+// The viewer by the pictures it draws without a window, and what it says where there is no display.
+
+#include <gtest/gtest.h>
+#include <stb_image.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "precompute/command_line.h"
+
+namespace rebounce {
+namespace {
+
+using nlohmann::json;
+using test::CommandLine;
+using test::kBadInput;
+using test::kDone;
+using test::kLights;
+using test::kScene;
+using test::kScenes;
+using test::kUsage;
+using test::Outcome;
+using test::Words;
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<int> rgb;
+
+  double mean(int channel) const {
+    double sum = 0;
+    for (std::size_t k = static_cast<std::size_t>(channel); k < rgb.size(); k += 3) sum += rgb[k];
+    return 3 * sum / static_cast<double>(rgb.size());
+  }
+};
+
+Image read_image(const std::string& path) {
+  Image image;
+  int channels = 0;
+  const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
+      stbi_load(path.c_str(), &image.width, &image.height, &channels, 3), stbi_image_free);
+  EXPECT_TRUE(texels) << path;
+  if (texels) image.rgb.assign(texels.get(), texels.get() + 3 * image.width * image.height);
+  return image;
+}
+
+struct Difference {
+  double mean = 0;
+  int largest = 0;
+};
+
+Difference difference(const Image& a, const Image& b) {
+  EXPECT_EQ(a.rgb.size(), b.rgb.size());
+  Difference d;
+  for (std::size_t k = 0; k < std::min(a.rgb.size(), b.rgb.size()); ++k) {
+    const int apart = std::abs(a.rgb[k] - b.rgb[k]);
+    d.mean += apart / static_cast<double>(a.rgb.size());
+    d.largest = std::max(d.largest, apart);
+  }
+  return d;
+}
+
+class ViewCommand : public CommandLine {
+ protected:
+  void SetUp() override {
+    if (run({"view", "--help"}).exit_code != kDone) {
+      GTEST_SKIP() << "this build has no viewer (REBOUNCE_BUILD_VIEWER)";
+    }
+    file_ = path("box.safetensors");
+    // As few patches as show colours bleed: it is the drawing that is looked at.
+    ASSERT_EQ(run({"precompute", kScene, "--patches", "120", "--quiet", "-o", file_}).exit_code,
+              kDone);
+    const Outcome outcome =
+        run({"view", file_, "--size", "16x16", "--screenshot", path("try.png")});
+    if (outcome.err.find("no OpenGL 3.3 without a window") != std::string::npos) {
+      GTEST_SKIP() << "no OpenGL here: " << outcome.err;
+    }
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  }
+
+  Image screenshot(Words options, const std::string& name = "picture.png") {
+    Words words = {"view", file_, "--size", "240x160", "--quiet", "--screenshot", path(name)};
+    words.insert(words.end(), options.begin(), options.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    return read_image(path(name));
+  }
+
+  std::string file_;
+};
+
+TEST_F(ViewCommand, DrawsALitScene) {
+  const Image image = screenshot({"--lights", kLights});
+  EXPECT_EQ(image.width, 240);
+  EXPECT_EQ(image.height, 160);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_GT(image.mean(c), 25);
+    EXPECT_LT(image.mean(c), 200);
+  }
+}
+
+TEST_F(ViewCommand, LooksAsThePictureOfRender) {
+  const Outcome outcome = run({"render", file_, "--lights", kLights, "--size", "240x160",
+                               "--exposure", "-4", "--quiet", "-o", path("render.png")});
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image image = screenshot({"--lights", kLights, "--exposure", "-4"});
+  // Shadow borders and edges may differ, and no more.
+  EXPECT_LT(difference(image, read_image(path("render.png"))).mean, 2.0);
+}
+
+TEST_F(ViewCommand, AddsUpDirectAndBouncedLight) {
+  const Words common = {"--lights", kScenes + "spot_on_red_wall.lights.json", "--exposure", "-5"};
+  const auto show = [&](const std::string& what) {
+    Words options = common;
+    options.insert(options.end(), {"--show", what});
+    return screenshot(options, what + ".png");
+  };
+  const Image all = show("radiosity"), direct = show("direct"), indirect = show("indirect");
+  EXPECT_GT(all.mean(0), direct.mean(0));
+  EXPECT_GT(all.mean(0), indirect.mean(0));
+  // The red wall colours what it sends on.
+  EXPECT_GT(indirect.mean(0), 1.15 * indirect.mean(2));
+  EXPECT_GT(difference(show("patches"), all).mean, 20);
+}
+
+TEST_F(ViewCommand, SplitsTheScreenBetweenMethods) {
+  const Words same = {"--lights", kLights, "--exposure", "-4", "--against", "refine"};
+  const Words poor = {"--lights", kLights, "--exposure", "-4", "--against", "gathering", "--cold"};
+  const Image exact = screenshot({"--lights", kLights, "--exposure", "-4"});
+  // Refinement of a dense operator gives what the product does, apart from the line between.
+  EXPECT_LT(difference(screenshot(same), exact).mean, 1.5);
+  const Image split = screenshot(poor);
+  double left = 0, right = 0;
+  for (int y = 0; y < split.height; ++y) {
+    for (int x = 0; x < split.width; ++x) {
+      if (std::abs(x - split.width / 2) < 3) continue;
+      const auto k = static_cast<std::size_t>(3 * (y * split.width + x));
+      (x < split.width / 2 ? left : right) += std::abs(split.rgb[k] - exact.rgb[k]);
+    }
+  }
+  EXPECT_LT(left, 0.01 * right);
+}
+
+TEST_F(ViewCommand, ShowsTheErrorOfAnIteration) {
+  const Image exact = screenshot({"--lights", kLights, "--show", "error", "--method", "gathering"});
+  EXPECT_GT(exact.mean(1), 10);
+}
+
+TEST_F(ViewCommand, DrawsPanels) {
+  const Image without = screenshot({"--lights", kLights});
+  EXPECT_GT(difference(screenshot({"--lights", kLights, "--panels"}), without).mean, 5);
+}
+
+TEST_F(ViewCommand, MovesLampsSmoothlyAlongAPath) {
+  const std::string motion = write("path.json",
+                                   R"({"frames_per_second": 50, "motions": [{"light": 0, "swing":
+          {"from": [0.2, 0.45, 0.2], "to": [0.35, 0.45, 0.3], "period": 2}}]})");
+  const json summary =
+      summary_of({"view", file_, "--lights", kLights, "--size", "120x80", "--show", "indirect",
+                  "--path", motion, "--frames", "6", "--out", path("film")});
+  EXPECT_EQ(summary["frames"], 6);
+  EXPECT_GT(summary["microseconds"]["draw"], 0);
+  const auto frame = [&](int k) {
+    return read_image(path("film/frame_0000" + std::to_string(k) + ".png"));
+  };
+  const Image begin = frame(0), end = frame(5);
+  EXPECT_GT(difference(begin, end).mean, 0.05);
+  for (int k = 0; k < 5; ++k) {
+    // No step is larger than a tenth of the screen's range, anywhere.
+    EXPECT_LT(difference(frame(k), frame(k + 1)).largest, 26) << "frame " << k;
+  }
+}
+
+TEST_F(ViewCommand, RefusesPathsThatMakeNoSense) {
+  const auto refused = [&](const std::string& text, const std::string& part) {
+    const std::string motion = write("path.json", text);
+    const Outcome outcome = run({"view", file_, "--lights", kLights, "--path", motion,
+                                 "--screenshot", path("no.png"), "--quiet"});
+    EXPECT_EQ(outcome.exit_code, kBadInput);
+    EXPECT_TRUE(test::is_one_line(outcome.err)) << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+  };
+  refused("{", "is not JSON");
+  refused(R"({"motion": []})", "unknown field");
+  refused(R"({"motions": [{"light": 7, "circle": {}}]})", "\"light\"");
+  refused(R"({"motions": [{"light": 0}]})", "must have one of");
+  refused(R"({"motions": [{"circle": {"period": 0}}]})", "period");
+  refused(R"({"motions": [{"circle": {"axis": [0, 0, 0]}}]})", "axis");
+  refused(R"({"motions": [{"keys": []}]})", "keys");
+  refused(R"({"motions": [{"keys": [{"time": 2}, {"time": 1}]}]})", "key 1: \"time\"");
+  refused(R"({"frames_per_second": 0})", "frames_per_second");
+}
+
+TEST_F(ViewCommand, SaysInOneLineThatThereIsNoDisplay) {
+  const Outcome outcome = test::Subprocess({"/usr/bin/env", "-u", "DISPLAY", "-u",
+                                            "WAYLAND_DISPLAY", REBOUNCE_PROGRAM, "view", file_},
+                                           printed_ / "out", printed_ / "err")
+                              .finish();
+  EXPECT_EQ(outcome.exit_code, kBadInput);
+  EXPECT_TRUE(test::is_one_line(outcome.err)) << outcome.err;
+  EXPECT_NE(outcome.err.find("cannot open a window"), std::string::npos) << outcome.err;
+  EXPECT_EQ(run({"view", file_, "--frames", "3"}).exit_code, kUsage);
+}
+
+}  // namespace
+}  // namespace rebounce
