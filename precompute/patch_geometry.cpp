@@ -16,12 +16,13 @@ namespace {
 // count as one plane's.
 constexpr double kFlatCosine = 0.999, kFlatThickness = 0.02;
 
-// Pairs with as few pairs of triangles as this are summed triangle by triangle.
-constexpr std::size_t kFewTrianglePairs = 16;
+// Pairs with as few pairs of triangles as this are summed triangle by triangle; near ones, where
+// sums over parts are coarser, with as many as that.
+constexpr std::size_t kFewTrianglePairs = 4, kFewNearTrianglePairs = 64;
 
 // Sums over 2^level parts each are taken while (sum of radii) / distance is below these: their
 // error goes with (that / sqrt(2)^level)^2. Measured: tests/precompute/test_patch_geometry.cpp.
-constexpr std::array<double, 4> kPartReach = {0.03, 0.15, 0.6, 0.9};
+constexpr std::array<double, 4> kPartReach = {0.02, 0.1, 0.4, 0.6};
 constexpr std::array<int, 4> kPartLevel = {0, 2, 4, 5};
 
 // A part whose vector area is this much of its area is about flat: within 45 degrees or so.
@@ -292,6 +293,7 @@ double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, st
     return between_parts(geometry.parts(i, std::max(kPartLevel[k], geometry.flat_level(i))),
                          geometry.parts(j, std::max(kPartLevel[k], geometry.flat_level(j))));
   }
+  if (a.size() * b.size() <= kFewNearTrianglePairs) return between_triangles(a, b, tolerance);
   return 0.5 * (parts_to_patch(geometry, i, j) + parts_to_patch(geometry, j, i));
 }
 

@@ -50,7 +50,9 @@ LightSetup lights_to_begin_with(const ViewOptions& chosen, const Engine& engine)
   if (!chosen.lights.empty() || !data.lights.empty() || emits(data)) {
     return choose_lights(chosen.lights, data);
   }
-  return {.lights = {make_key_light(data, engine.tracer())}, .sky = {}};
+  LightSetup setup;
+  setup.lights = {make_key_light(data, engine.tracer())};
+  return setup;
 }
 
 ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data) {
