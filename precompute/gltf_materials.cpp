@@ -198,6 +198,11 @@ float transmission(const tinygltf::Material& source) {
   return to_fraction(glass->second.Get("transmissionFactor").GetNumberAsDouble());
 }
 
+bool has_transmission_texture(const tinygltf::Material& source) {
+  const auto glass = source.extensions.find("KHR_materials_transmission");
+  return glass != source.extensions.end() && glass->second.Has("transmissionTexture");
+}
+
 Float3 emitted_luminance(const tinygltf::Material& source, Warnings& warnings) {
   std::vector<double> factor = source.emissiveFactor;
   const auto extension = source.extensions.find("KHR_materials_emissive_strength");
@@ -230,7 +235,7 @@ class MaterialImport {
     material.transmission = transmission(source);
     texcoords.uses_alpha = material.alpha_mode != AlphaMode::kOpaque;
     take_emission(source, material, texcoords.emissive);
-    warn_of_what_enters_as_opaque(source, material);
+    warn_of_what_is_simplified(source, material);
     return material;
   }
 
@@ -255,13 +260,18 @@ class MaterialImport {
     material.emissive_texture = resolve(reference(source.emissiveTexture), texcoord);
   }
 
-  void warn_of_what_enters_as_opaque(const tinygltf::Material& source, const Material& material) {
-    if (material.alpha_mode == AlphaMode::kBlend) {
-      warnings_.count("{} materials with alphaMode BLEND are taken as opaque");
+  void warn_of_what_is_simplified(const tinygltf::Material& source, const Material& material) {
+    if (source.extensions.contains("KHR_materials_unlit")) {
+      warnings_.count("{} unlit materials are lit like all others");
     }
-    if (material.transmission > 0 ||
-        source.extensions.contains("KHR_materials_diffuse_transmission")) {
-      warnings_.count("{} materials that transmit light are taken as opaque");
+    if (material.transmission > 0 && !is_black(material.emitted_luminance)) {
+      warnings_.count("{} materials that emit and transmit light are taken to transmit none");
+    }
+    if (has_transmission_texture(source)) {
+      warnings_.count("the transmission textures of {} materials are not used");
+    }
+    if (source.extensions.contains("KHR_materials_diffuse_transmission")) {
+      warnings_.count("{} materials that transmit light diffusely are taken as opaque");
     }
   }
 

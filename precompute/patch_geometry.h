@@ -33,7 +33,7 @@ struct PatchBounds {
 struct PatchPart {
   glm::dvec3 centroid{0};
   glm::dvec3 normal{0};  ///< unit
-  double area = 0;       ///< m²
+  double area = 0;       ///< m², of what stops light
 };
 
 /// The shapes of all patches. Immutable, usable from any number of threads.
@@ -49,7 +49,7 @@ class PatchGeometry {
   PatchGeometry(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed);
 
   std::size_t patch_count() const { return bounds_.size(); }
-  double area(std::size_t patch) const { return area_[patch]; }
+  double area(std::size_t patch) const { return area_[patch]; }  ///< of what stops light
   std::vector<double> areas() const { return area_; }
   const PatchBounds& bounds(std::size_t patch) const { return bounds_[patch]; }
 

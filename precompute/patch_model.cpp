@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "rebounce/precompute/lit_sides.h"
+#include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
@@ -17,8 +18,12 @@ class PatchModelBuilder {
   PatchModelBuilder(Scene scene, const SubdivisionSettings& settings) : scene_(std::move(scene)) {
     drop_slivers();
     model_.scene_triangle_count = scene_.triangle.size();
-    const std::vector<TriangleSides> sides =
-        find_lit_sides(scene_, RayTracer(scene_.position, scene_.triangle));
+    const OpacityMaps opacity = find_opacity_maps(scene_);
+    std::vector<TriangleSides> sides =
+        find_lit_sides(scene_, RayTracer(scene_.position, scene_.triangle, opacity));
+    for (std::uint32_t t = 0; t < sides.size(); ++t) {
+      if (opacity.stopping_part(t) == 0) sides[t] = {SideKind::kOpening, SideKind::kOpening};
+    }
     std::vector<std::uint8_t> patches_per_triangle;
     patches_per_triangle.reserve(sides.size());
     for (const TriangleSides& s : sides) {
@@ -32,9 +37,13 @@ class PatchModelBuilder {
   PatchModel build() {
     copy_surface();
     add_second_sides();
+    find_openings();
     for (std::uint32_t t = 0; t < model_.mesh.triangle.size(); ++t) {
       model_.mesh.triangle_patch.push_back(kNone);
       if (kind_[t] == SideKind::kLit) add_patch_of(t);
+    }
+    if (model_.patches.size() == 0) {
+      throw Error("scene " + scene_.name + " has nothing that light falls on");
     }
     find_shown_patches();
     if (clamped_count_ > 0) {
@@ -91,6 +100,16 @@ class PatchModelBuilder {
     }
   }
 
+  /// Finds what light passes through, now that the triangles are cut.
+  void find_openings() {
+    DisplayMesh& mesh = model_.mesh;
+    mesh.opacity =
+        find_opacity_maps(scene_, mesh.triangle, mesh.triangle_material, mesh.base_color_texcoord);
+    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+      if (mesh.opacity.stopping_part(t) == 0) kind_[t] = SideKind::kOpening;
+    }
+  }
+
   void add_patch_of(std::uint32_t t) {
     DisplayMesh& mesh = model_.mesh;
     PatchTable& patches = model_.patches;
@@ -100,7 +119,8 @@ class PatchModelBuilder {
     const glm::dvec3 p = to_dvec3(mesh.position[a]), q = to_dvec3(mesh.position[b]),
                      r = to_dvec3(mesh.position[c]);
     const glm::dvec3 cross = glm::cross(q - p, r - p);
-    patches.area.push_back(static_cast<float>(0.5 * glm::length(cross)));
+    patches.area.push_back(
+        static_cast<float>(0.5 * glm::length(cross) * mesh.opacity.stopping_part(t)));
     patches.centroid.push_back(to_float3((p + q + r) / 3.0));
     patches.normal.push_back(to_float3(glm::normalize(cross)));
 
@@ -111,7 +131,8 @@ class PatchModelBuilder {
         {mesh.vertex_color[a], mesh.vertex_color[b], mesh.vertex_color[c]});
     Float3 exitance = mean_emitted_luminance(
         scene_, material,
-        {mesh.emissive_texcoord[a], mesh.emissive_texcoord[b], mesh.emissive_texcoord[c]});
+        {mesh.emissive_texcoord[a], mesh.emissive_texcoord[b], mesh.emissive_texcoord[c]},
+        {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]});
     for (float& m : exitance) m *= std::numbers::pi_v<float>;
     if (std::ranges::any_of(reflectance, [](float rho) { return rho > kMaxReflectance; })) {
       ++clamped_count_;
@@ -146,7 +167,7 @@ class PatchModelBuilder {
   void find_shown_patches() {
     const DisplayMesh& mesh = model_.mesh;
     model_.shown_patch = mesh.triangle_patch;
-    const RayTracer tracer(mesh.position, std::span(mesh.triangle).first(mesh.surface_count()));
+    const RayTracer tracer = make_surface_tracer(mesh);
     std::vector<std::uint32_t> surface_of(mesh.triangle.size());
     for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
       surface_of[t] = t;
@@ -156,6 +177,8 @@ class PatchModelBuilder {
     std::vector<CoincidentSide> sides;
     for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
       model_.unlit_side_count += kind_[t] == SideKind::kUnlit ? 1 : 0;
+      model_.opening_side_count += kind_[t] == SideKind::kOpening ? 1 : 0;
+      model_.buried_side_count += kind_[t] == SideKind::kBuried ? 1 : 0;
       if (kind_[t] != SideKind::kCovered) continue;
       ++model_.covered_side_count;
       const auto [a, b, c] = mesh.triangle[t];

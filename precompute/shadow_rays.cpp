@@ -1,5 +1,7 @@
 #include "shadow_rays.h"
 
+#include <algorithm>
+
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
@@ -38,23 +40,28 @@ void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& faci
 }
 
 ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
-                                              std::span<const Ray> rays) const {
+                                              std::span<const float> transmitted) const {
   const std::uint64_t hash = pair_hash(i, j);
-  double sum = 0, sum_of_squares = 0, visible = 0, count = 0;
-  for (std::size_t k = 0; k < rays.size(); ++k) {
+  double sum = 0, sum_of_squares = 0;
+  double visible = 0, visible_squared = 0, unweighted = 0;
+  for (std::size_t k = 0; k < transmitted.size(); ++k) {
     const auto [x, y] = ray_ends(i, j, static_cast<std::uint32_t>(k), hash);
     const double weight = point_kernel(to_dvec3(x->position), to_dvec3(x->normal),
                                        to_dvec3(y->position), to_dvec3(y->normal));
-    const bool clear = !is_occluded(rays[k]);
+    const double part = transmitted[k];
     sum += weight;
     sum_of_squares += weight * weight;
-    visible += clear ? weight : 0;
-    count += clear ? 1 : 0;
+    visible += weight * part;
+    visible_squared += weight * part * part;
+    unweighted += part;
   }
-  const double part = sum > 0 ? visible / sum : count / static_cast<double>(rays.size());
+  if (sum <= 0) {
+    const double part = unweighted / static_cast<double>(transmitted.size());
+    return {part, part * (1 - part)};
+  }
   // As sure as that many rays of equal weight (Kish's effective sample size).
-  const double effective = sum > 0 ? sum * sum / sum_of_squares : 1;
-  return {part, part * (1 - part) / effective};
+  const double part = visible / sum, effective = sum * sum / sum_of_squares;
+  return {part, std::max(0.0, visible_squared / sum - part * part) / effective};
 }
 
 }  // namespace rebounce

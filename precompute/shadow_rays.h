@@ -45,9 +45,9 @@ class ShadowRays {
     double variance;  ///< of `part`
   };
 
-  /// What the traced `rays` of the pair (i, j) say of it: each is weighted by the kernel between
-  /// its ends.
-  Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const;
+  /// What the transmittances `transmitted` of the rays of the pair (i, j) say of it: each is
+  /// weighted by the kernel between its ends.
+  Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const float> transmitted) const;
 
  private:
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;

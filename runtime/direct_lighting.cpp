@@ -28,6 +28,7 @@ DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer
   const std::size_t n = data.patches.size();
   points_.resize(n * points_per_patch_);
   rays_.resize(n * points_per_patch_);
+  transmitted_.resize(n * points_per_patch_);
   contributions_.resize(n * points_per_patch_);
   const PatchTriangles triangles(data.mesh.triangle_patch, n);
 #pragma omp parallel for schedule(dynamic, 64)
@@ -76,11 +77,12 @@ void DirectLighting::add_light(const Light& light, std::size_t begin, std::size_
     ray.t_near = 0;
     ray.t_far = incident.distance * (1 - kLampGap);
   }
-  tracer_.occluded({rays, count});
+  float* const transmitted = &transmitted_[begin * points_per_patch_];
+  // Single holes are finer than patches.
+  tracer_.transmittance({rays, count}, PassageDetail::kTriangle, {transmitted, count});
   for (std::size_t k = 0; k < count; ++k) {
-    if (is_occluded(rays[k])) continue;
     Float3& e = direct_irradiance[contributions[k].patch];
-    for (int c = 0; c < kChannelCount; ++c) e[c] += contributions[k].irradiance[c];
+    for (int c = 0; c < kChannelCount; ++c) e[c] += transmitted[k] * contributions[k].irradiance[c];
   }
 }
 

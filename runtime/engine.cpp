@@ -8,8 +8,7 @@ namespace rebounce {
 
 Engine::Engine(std::shared_ptr<const TransferData> data, const DirectLightingSettings& settings)
     : data_(std::move(data)),
-      tracer_(data_->mesh.position,
-              std::span(data_->mesh.triangle).first(data_->mesh.surface_count())),
+      tracer_(make_surface_tracer(data_->mesh)),
       direct_lighting_(*data_, tracer_, settings) {
   if (!data_->transfer) throw Error("the transfer data have no operator");
   const std::size_t n = data_->patches.size();

@@ -38,6 +38,9 @@ class DisplaySurface {
   /// Linear diffuse reflectance, filtered over `width` metres of surface.
   glm::vec3 albedo(const SurfacePoint& point, float width) const;
 
+  /// The part of what meets the surface that does not pass through it, [0, 1]; 0 or 1 for masks.
+  float opacity(const SurfacePoint& point) const;
+
   /// Emitted luminance in cd/m², likewise.
   glm::vec3 emitted_luminance(const SurfacePoint& point, float width) const;
 
@@ -45,6 +48,7 @@ class DisplaySurface {
   const Material& material_of(const SurfacePoint& point) const;
   glm::vec3 texture_color(std::uint32_t texture, std::span<const Float2> texcoord,
                           const SurfacePoint& point, float width) const;
+  glm::vec2 texcoord_at(std::span<const Float2> texcoord, const SurfacePoint& point) const;
 
   const TransferData* data_;
   std::vector<std::unique_ptr<const FilteredTexture>> textures_;  // null where not used
@@ -53,8 +57,14 @@ class DisplaySurface {
 /// True if a ray does not see what it hit: the back of a one-sided surface.
 bool is_culled(const DisplayMesh& mesh, const Hit& hit);
 
-/// Finds the nearest surface that each ray sees, through culled ones. Returns in `hits` what
-/// RayTracer::intersect does; advances rays[k].t_near past each culled hit.
+/// Finds the nearest surface that each ray sees, through culled ones and through the holes of masks
+/// at the full resolution of their textures. What is opaque in part stops a part of the rays: of
+/// those whose ids are spread evenly over all 32 bits, the part that it is. Returns in `hits` what
+/// RayTracer::intersect does; advances rays[k].t_near.
+void intersect_visible(const RayTracer& tracer, const DisplaySurface& surface, std::span<Ray> rays,
+                       std::span<Hit> hits);
+
+/// The same with the opacity maps instead of textures.
 void intersect_visible(const RayTracer& tracer, const DisplayMesh& mesh, std::span<Ray> rays,
                        std::span<Hit> hits);
 

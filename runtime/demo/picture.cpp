@@ -23,8 +23,9 @@ constexpr int kTile = 16;  // pixels a side
 constexpr int kMaxSide = 32768;
 constexpr int kMaxSamplesPerAxis = 64;
 constexpr int kMaxEmitterSamples = 65536;
-constexpr float kBrightestEmitter = 2;  // where the tone curve takes 1 for white
-const glm::vec3 kNothing(0.02F);        // what is behind patches and errors
+constexpr std::uint32_t kGoldenStep = 0x9E3779B9;  // of 2^32: multiples are spread evenly
+constexpr float kBrightestEmitter = 2;             // where the tone curve takes 1 for white
+const glm::vec3 kNothing(0.02F);                   // what is behind patches and errors
 
 void check_setting(int value, int most, const char* name) {
   if (value >= 1 && value <= most) return;
@@ -116,6 +117,7 @@ class View {
       const float inside_y = (static_cast<float>(row) + hash_to_unit(seed, 4)) / n;
       tile.rays.push_back(
           ray_through(static_cast<float>(x) + inside_x, static_cast<float>(y) + inside_y));
+      tile.rays.back().id = hash(pixel) + index * kGoldenStep;
       tile.pixel.push_back(pixel);
       tile.index.push_back(index);
     }
@@ -320,7 +322,7 @@ std::vector<glm::vec3> paint_tiles(const RayTracer& tracer, const DisplaySurface
   for (int tile = 0; tile < columns * rows; ++tile) {
     CameraRays camera = view.rays_of_tile(tile % columns * kTile, tile / columns * kTile);
     std::vector<Hit> hits(camera.rays.size());
-    intersect_visible(tracer, surface.mesh(), camera.rays, hits);
+    intersect_visible(tracer, surface, camera.rays, hits);
     for (std::size_t k = 0; k < hits.size(); ++k) {
       if (hits[k].triangle == kNone) painter.paint_background(camera.pixel[k], weight, pixel);
     }
@@ -375,10 +377,6 @@ Picture PictureRenderer::render(const PictureLight& light, const PictureSettings
 Picture render_picture(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                        const PictureSettings& settings) {
   return PictureRenderer(data, tracer).render(light, settings);
-}
-
-RayTracer make_surface_tracer(const DisplayMesh& mesh) {
-  return {mesh.position, std::span(mesh.triangle).first(mesh.surface_count())};
 }
 
 }  // namespace rebounce

@@ -580,7 +580,7 @@ TEST_F(TexturedTriangle, EmissiveTextureMultipliesTheLuminance) {
   const Scene scene = import(triangle_);
   EXPECT_EQ(scene.materials[0].emissive_texture, 0U);
   const Float3 bright =
-      mean_emitted_luminance(scene, scene.materials[0], {{{0.8F, 0}, {1, 0}, {0.9F, 1}}});
+      mean_emitted_luminance(scene, scene.materials[0], {{{0.8F, 0}, {1, 0}, {0.9F, 1}}}, {});
   expect_near(bright, {100 * kGrey, 100 * kGrey, 100 * kGrey}, 0.1);
 }
 

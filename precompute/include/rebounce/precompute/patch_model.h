@@ -25,11 +25,13 @@ struct PatchModel {
   std::size_t sliver_count = 0;          ///< triangles thinner than rays are precise: dropped
   std::size_t unlit_side_count = 0;      ///< sides of display triangles that see nothing: no patch
   std::size_t covered_side_count = 0;  ///< sides that lie in another surface: no patch of their own
+  std::size_t opening_side_count = 0;  ///< sides that stop no light: no patch
+  std::size_t buried_side_count = 0;   ///< sides inside of something solid: no patch
   std::vector<std::string> warnings;
 };
 
 /// Subdivides the scene's triangles and makes every lit side of every one (lit_sides.h) a patch:
-/// reflectance and emission are means over the triangle, textures integrated. Double-sided
+/// area, reflectance and emission are of what stops light, textures integrated. Double-sided
 /// triangles get a second display triangle. The reconstruction weights are left to
 /// reconstruction_weights.h.
 PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);

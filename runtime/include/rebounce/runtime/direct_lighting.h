@@ -44,6 +44,7 @@ class DirectLighting {
   std::size_t points_per_patch_;
   std::vector<PatchPoint> points_;        ///< [n][points_per_patch], moved off the surface
   std::vector<Ray> rays_;                 ///< [n][points_per_patch] scratch
+  std::vector<float> transmitted_;        ///< [n][points_per_patch] scratch, beside rays_
   std::vector<ShadowRay> contributions_;  ///< [n][points_per_patch] scratch, beside rays_
 };
 

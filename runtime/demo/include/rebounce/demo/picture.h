@@ -77,7 +77,4 @@ class PictureRenderer {
 Picture render_picture(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                        const PictureSettings& settings);
 
-/// A ray tracer over the surface of `mesh`, as the renderer needs it.
-RayTracer make_surface_tracer(const DisplayMesh& mesh);
-
 }  // namespace rebounce
