@@ -224,8 +224,8 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   } else {
     impl_->attach_by_group(position, triangle, opacity);
   }
-  // High quality puts a triangle into several leaves, so that filters may be called for one hit
-  // more than once: products over the hits need each of them once.
+  // High quality may put a triangle into several leaves, and then filters are called for one hit
+  // more than once: transmittance() needs each of them once.
   rtcSetSceneBuildQuality(impl_->scene,
                           impl_->has_porous() ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   rtcCommitScene(impl_->scene);
@@ -253,8 +253,11 @@ void RayTracer::transmittance(std::span<Ray> rays, PassageDetail detail,
                               std::span<float> part) const {
   assert(rays.size() == part.size());
   if (rays.empty()) return;
+  // Coherent traversal calls filters more than once for the same hit (Embree 3.13).
   TraceContext trace = make_context(
-      impl_->groups, RTC_INTERSECT_CONTEXT_FLAG_COHERENT,
+      impl_->groups,
+      impl_->has_porous() ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
+                          : RTC_INTERSECT_CONTEXT_FLAG_COHERENT,
       detail == PassageDetail::kTriangle ? Rule::kTriangleMeans : Rule::kMicroTriangles);
   trace.transmitted = part.data();
   for (std::size_t k = 0; k < rays.size(); ++k) {
