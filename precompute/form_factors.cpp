@@ -96,14 +96,13 @@ class FormFactorAssembly {
     shadow_rays_.find_facing(i, scratch.facing, [](std::uint32_t) { return true; });
     trace(i, scratch.facing, settings_.probe_rays, scratch);
     scratch.mixed.clear();
-    const int probe = settings_.probe_rays;
+    const auto probe = static_cast<std::size_t>(settings_.probe_rays);
     for (std::size_t p = 0; p < scratch.facing.size(); ++p) {
-      const std::span part = std::span(scratch.transmitted).subspan(p * probe, probe);
-      if (std::ranges::all_of(part, [](float t) { return t == 1; })) {
-        append(row, scratch.facing[p], 1.0, 0.0);
-      } else if (std::ranges::any_of(part, [](float t) { return t > 0; })) {
-        scratch.mixed.push_back(scratch.facing[p]);
-      }
+      const auto agreement =
+          ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe),
+                                std::span(scratch.transmitted).subspan(p * probe, probe));
+      if (agreement == ShadowRays::Agreement::kClear) append(row, scratch.facing[p], 1.0, 0.0);
+      if (agreement == ShadowRays::Agreement::kMixed) scratch.mixed.push_back(scratch.facing[p]);
     }
     append_mixed(i, scratch, row);
     pair_count_ += scratch.facing.size();
@@ -124,9 +123,9 @@ class FormFactorAssembly {
     const int full = settings_.full_rays;
     trace(i, scratch.mixed, full, scratch);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
-      const std::span part = std::span(scratch.transmitted).subspan(p * full, full);
-      const ShadowRays::Visibility visible =
-          shadow_rays_.visibility(i, scratch.mixed[p].patch, part);
+      const ShadowRays::Visibility visible = shadow_rays_.visibility(
+          i, scratch.mixed[p].patch, std::span(scratch.rays).subspan(p * full, full),
+          std::span(scratch.transmitted).subspan(p * full, full));
       append(row, scratch.mixed[p], visible.part, visible.variance);
     }
     std::sort(row.begin(), row.end(),

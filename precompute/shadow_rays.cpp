@@ -17,48 +17,76 @@ std::pair<const PatchPoint*, const PatchPoint*> ShadowRays::ray_ends(std::uint32
                                                                      std::uint32_t j,
                                                                      std::uint32_t k,
                                                                      std::uint64_t hash) const {
+  const std::uint32_t round = k / kPointCount;
   const std::uint32_t a = (k + static_cast<std::uint32_t>(hash)) % kPointCount;
-  const std::uint32_t b = (19 * k + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
+  const std::uint32_t b =
+      (19 * k + 7 * round + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
   return {&geometry_.points(i)[a], &geometry_.points(j)[b]};
+}
+
+double ShadowRays::kernel(const PatchPoint& x, const PatchPoint& y) {
+  return point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
+                      to_dvec3(y.normal));
 }
 
 void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                            std::vector<Ray>& rays) const {
   rays.resize(facing.size() * count);
-  Ray* ray = rays.data();
-  for (const FacingPatch& other : facing) {
-    const std::uint64_t hash = pair_hash(i, other.patch);
-    for (int k = 0; k < count; ++k, ++ray) {
-      const auto [x, y] = ray_ends(i, other.patch, k, hash);
-      *ray = Ray{};
-      ray->origin = x->position;
-      ray->t_near = 0;
-      ray->direction = to_float3(to_glm(y->position) - to_glm(x->position));
-      ray->t_far = 1;
-    }
+  for (std::size_t p = 0; p < facing.size(); ++p) {
+    make_pair_rays(i, facing[p].patch, std::span(rays).subspan(p * count, count));
   }
 }
 
+void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const {
+  const std::uint64_t hash = pair_hash(i, j);
+  std::size_t made = 0;
+  for (std::uint32_t k = 0; k < kCandidateCount && made < rays.size(); ++k) {
+    const auto [x, y] = ray_ends(i, j, k, hash);
+    if (kernel(*x, *y) <= 0) continue;
+    Ray& ray = rays[made++];
+    ray = Ray{};
+    ray.origin = x->position;
+    ray.t_near = 0;
+    ray.direction = to_float3(to_glm(y->position) - to_glm(x->position));
+    ray.t_far = 1;
+    ray.id = k;
+  }
+  for (Ray& ray : rays.subspan(made)) {
+    ray = Ray{};
+    ray.mask = 0;
+    ray.t_near = ray.t_far = 0;
+    ray.direction = {1, 0, 0};
+    ray.id = kNone;
+  }
+}
+
+ShadowRays::Agreement ShadowRays::agreement(std::span<const Ray> rays,
+                                            std::span<const float> transmitted) {
+  bool all_clear = true, all_hidden = true;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    if (is_void(rays[k])) continue;
+    all_clear = all_clear && transmitted[k] == 1;
+    all_hidden = all_hidden && transmitted[k] == 0;
+  }
+  if (all_hidden) return Agreement::kHidden;
+  return all_clear ? Agreement::kClear : Agreement::kMixed;
+}
+
 ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
+                                              std::span<const Ray> rays,
                                               std::span<const float> transmitted) const {
   const std::uint64_t hash = pair_hash(i, j);
-  double sum = 0, sum_of_squares = 0;
-  double visible = 0, visible_squared = 0, unweighted = 0;
-  for (std::size_t k = 0; k < transmitted.size(); ++k) {
-    const auto [x, y] = ray_ends(i, j, static_cast<std::uint32_t>(k), hash);
-    const double weight = point_kernel(to_dvec3(x->position), to_dvec3(x->normal),
-                                       to_dvec3(y->position), to_dvec3(y->normal));
-    const double part = transmitted[k];
+  double sum = 0, sum_of_squares = 0, visible = 0, visible_squared = 0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    if (is_void(rays[k])) continue;
+    const auto [x, y] = ray_ends(i, j, rays[k].id, hash);
+    const double weight = kernel(*x, *y), part = transmitted[k];
     sum += weight;
     sum_of_squares += weight * weight;
     visible += weight * part;
     visible_squared += weight * part * part;
-    unweighted += part;
   }
-  if (sum <= 0) {
-    const double part = unweighted / static_cast<double>(transmitted.size());
-    return {part, part * (1 - part)};
-  }
+  if (sum <= 0) return {0, 1};
   // As sure as that many rays of equal weight (Kish's effective sample size).
   const double part = visible / sum, effective = sum * sum / sum_of_squares;
   return {part, std::max(0.0, visible_squared / sum - part * part) / effective};

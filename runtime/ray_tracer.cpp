@@ -260,13 +260,17 @@ void RayTracer::transmittance(std::span<Ray> rays, PassageDetail detail,
                           : RTC_INTERSECT_CONTEXT_FLAG_COHERENT,
       detail == PassageDetail::kTriangle ? Rule::kTriangleMeans : Rule::kMicroTriangles);
   trace.transmitted = part.data();
+  // The filter is to know the rays by number; their own ids wait in a field that nothing reads.
   for (std::size_t k = 0; k < rays.size(); ++k) {
+    rays[k].time = std::bit_cast<float>(rays[k].id);
     rays[k].id = static_cast<std::uint32_t>(k);
     part[k] = 1;
   }
   rtcOccluded1M(impl_->scene, &trace.context, reinterpret_cast<RTCRay*>(rays.data()),
                 static_cast<unsigned>(rays.size()), sizeof(Ray));
   for (std::size_t k = 0; k < rays.size(); ++k) {
+    rays[k].id = std::bit_cast<std::uint32_t>(rays[k].time);
+    rays[k].time = 0;
     if (is_occluded(rays[k])) part[k] = 0;
   }
 }

@@ -20,7 +20,7 @@ struct alignas(16) Ray {
   float time = 0;
   float t_far;
   std::uint32_t mask = 0xFFFFFFFFU;  // Debian's Embree is built with ray masks on
-  std::uint32_t id = 0;              // the caller's; transmittance() writes it
+  std::uint32_t id = 0;              // the caller's own
   std::uint32_t flags = 0;
 };
 
@@ -61,8 +61,8 @@ class RayTracer {
   void occluded(std::span<Ray> rays) const;
 
   /// Writes to `part` [rays] how much of the light along each ray gets through, [0, 1]: 0 where it
-  /// meets an opaque triangle, else the product over those with maps. Changes `rays` in ways that
-  /// mean nothing.
+  /// meets an opaque triangle, else the product over those with maps. Afterwards is_occluded()
+  /// tells which rays met an opaque one.
   void transmittance(std::span<Ray> rays, PassageDetail detail, std::span<float> part) const;
 
   /// Finds the nearest hit of every ray. hits.size() == rays.size().
