@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "rebounce/runtime/float3_glm.h"
-#include "sample_sequence.h"
 
 namespace rebounce {
 namespace {
@@ -109,7 +108,9 @@ glm::vec2 DisplaySurface::texcoord_at(std::span<const Float2> texcoord,
          point.weight.z * to_glm(texcoord[corner[2]]);
 }
 
-float DisplaySurface::opacity(const SurfacePoint& point) const {
+float DisplaySurface::opacity(const Hit& hit) const {
+  if (mesh().opacity.of_triangle(hit.triangle).empty()) return 1;
+  const SurfacePoint point = point_at(hit);
   const Material& material = material_of(point);
   float alpha = 1;
   if (material.alpha_mode != AlphaMode::kOpaque) {
@@ -142,33 +143,37 @@ glm::vec3 DisplaySurface::emitted_luminance(const SurfacePoint& point, float wid
          texture_color(material.emissive_texture, mesh().emissive_texcoord, point, width);
 }
 
+float beyond(const Hit& hit) {
+  return hit.t * (1 + 1e-6F);  // a few roundings further
+}
+
 bool is_culled(const DisplayMesh& mesh, const Hit& hit) {
   return hit.triangle != kNone && !hit.front && mesh.back_triangle[hit.triangle] == kNone;
 }
 
 namespace {
 
-// Finds the first hit of each ray that it does not pass, as `passes`(ray, hit) says.
+// Finds the first hit of each ray that it does not pass, as `passes`(hit) says.
 template <typename Passes>
 void intersect_past(const RayTracer& tracer, Passage passage, const Passes& passes,
                     std::span<Ray> rays, std::span<Hit> hits) {
   tracer.intersect(rays, hits, passage);
   std::vector<std::size_t> passed;
   for (std::size_t k = 0; k < hits.size(); ++k) {
-    if (passes(rays[k], hits[k])) passed.push_back(k);
+    if (passes(hits[k])) passed.push_back(k);
   }
   std::vector<Ray> onward;
   std::vector<Hit> next;
   for (int layer = 0; layer < kMaxPassedLayers && !passed.empty(); ++layer) {
     onward.clear();
     for (const std::size_t k : passed) {
-      rays[k].t_near = hits[k].t * (1 + 1e-6F);  // a few roundings further
+      rays[k].t_near = beyond(hits[k]);
       onward.push_back(rays[k]);
     }
     next.resize(onward.size());
     tracer.intersect(onward, next, passage);
     for (std::size_t k = 0; k < passed.size(); ++k) hits[passed[k]] = next[k];
-    std::erase_if(passed, [&](std::size_t k) { return !passes(rays[k], hits[k]); });
+    std::erase_if(passed, [&](std::size_t k) { return !passes(hits[k]); });
   }
   for (const std::size_t k : passed) hits[k] = {};
 }
@@ -177,20 +182,14 @@ void intersect_past(const RayTracer& tracer, Passage passage, const Passes& pass
 
 void intersect_visible(const RayTracer& tracer, const DisplayMesh& mesh, std::span<Ray> rays,
                        std::span<Hit> hits) {
-  const auto passes = [&](const Ray&, const Hit& hit) { return is_culled(mesh, hit); };
+  const auto passes = [&](const Hit& hit) { return is_culled(mesh, hit); };
   intersect_past(tracer, Passage::kHoles, passes, rays, hits);
 }
 
 void intersect_visible(const RayTracer& tracer, const DisplaySurface& surface, std::span<Ray> rays,
                        std::span<Hit> hits) {
-  const DisplayMesh& mesh = surface.mesh();
-  const auto passes = [&](const Ray& ray, const Hit& hit) {
-    if (hit.triangle == kNone) return false;
-    if (is_culled(mesh, hit)) return true;
-    if (mesh.opacity.of_triangle(hit.triangle).empty()) return false;
-    // Evenly spread ids stay so when each triangle turns them its own way.
-    const float share = static_cast<float>((ray.id + hash(hit.triangle)) >> 8) * 0x1p-24F;
-    return share >= surface.opacity(surface.point_at(hit));
+  const auto passes = [&](const Hit& hit) {
+    return is_culled(surface.mesh(), hit) || (hit.triangle != kNone && surface.opacity(hit) == 0);
   };
   intersect_past(tracer, Passage::kSolid, passes, rays, hits);
 }

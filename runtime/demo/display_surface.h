@@ -39,7 +39,7 @@ class DisplaySurface {
   glm::vec3 albedo(const SurfacePoint& point, float width) const;
 
   /// The part of what meets the surface that does not pass through it, [0, 1]; 0 or 1 for masks.
-  float opacity(const SurfacePoint& point) const;
+  float opacity(const Hit& hit) const;
 
   /// Emitted luminance in cd/m², likewise.
   glm::vec3 emitted_luminance(const SurfacePoint& point, float width) const;
@@ -54,13 +54,15 @@ class DisplaySurface {
   std::vector<std::unique_ptr<const FilteredTexture>> textures_;  // null where not used
 };
 
+/// The least t_near of a ray that goes on from `hit`.
+float beyond(const Hit& hit);
+
 /// True if a ray does not see what it hit: the back of a one-sided surface.
 bool is_culled(const DisplayMesh& mesh, const Hit& hit);
 
-/// Finds the nearest surface that each ray sees, through culled ones and through the holes of masks
-/// at the full resolution of their textures. What is opaque in part stops a part of the rays: of
-/// those whose ids are spread evenly over all 32 bits, the part that it is. Returns in `hits` what
-/// RayTracer::intersect does; advances rays[k].t_near.
+/// Finds the nearest surface that each ray sees, through culled ones and through what is clear at
+/// the full resolution of the textures. Returns in `hits` what RayTracer::intersect does; advances
+/// rays[k].t_near to beyond what was passed.
 void intersect_visible(const RayTracer& tracer, const DisplaySurface& surface, std::span<Ray> rays,
                        std::span<Hit> hits);
 

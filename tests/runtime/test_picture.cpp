@@ -304,7 +304,7 @@ TEST_F(PaneOverFloor, IsSeenThroughHoles) {
 
 TEST_F(PaneOverFloor, BlendsWithWhatIsBehind) {
   let_through(AlphaMode::kBlend, 0.25F);
-  EXPECT_NEAR(seen(), 0.25F * 5 + 0.75F, 0.05F) << "16 rays a pixel, evenly shared";
+  EXPECT_NEAR(seen(), 0.25F * 5 + 0.75F, 1e-4F);
 }
 
 TEST_F(PaneOverFloor, CastsAShadowAsDarkAsItsMap) {
