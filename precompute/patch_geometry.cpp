@@ -21,8 +21,8 @@ constexpr std::size_t kFewTrianglePairs = 16;
 
 // Sums over 2^level parts each are taken while (sum of radii) / distance is below these: their
 // error goes with (that / sqrt(2)^level)^2. Measured: tests/precompute/test_patch_geometry.cpp.
-constexpr std::array<double, 3> kPartReach = {0.03, 0.15, 0.6};
-constexpr std::array<int, 3> kPartLevel = {0, 2, 4};
+constexpr std::array<double, 4> kPartReach = {0.03, 0.15, 0.6, 0.9};
+constexpr std::array<int, 4> kPartLevel = {0, 2, 4, 5};
 
 // A part whose vector area is this much of its area is about flat: within 45 degrees or so.
 constexpr double kAboutFlat = 0.85;
