@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <map>
 #include <string_view>
 #include <unordered_map>
 #include <vector>
@@ -104,21 +106,20 @@ class TriangleSampler {
   const std::array<Float2, 3> texcoord_;
 };
 
-/// Puts the maps into one array, equal ones once; an empty or wholly opaque one is none.
-OpacityMaps collect(const std::vector<Map>& maps) {
+/// Puts the maps into one array, equal ones once; a wholly opaque one is none. `map_of`
+/// is the map of each triangle, or kNone.
+OpacityMaps collect(const std::vector<Map>& maps, std::span<const std::uint32_t> map_of) {
   OpacityMaps collected;
   std::unordered_map<std::string_view, std::uint32_t> known;
+  std::vector<std::uint32_t> place;  // of each map
   collected.begin = {0};
   for (const Map& map : maps) {
-    if (map.empty() || map == Map{OpacityMaps::kOpaque}) {
-      collected.triangle_map.push_back(kNone);
-      continue;
-    }
     const std::string_view bytes(reinterpret_cast<const char*>(map.data()), map.size());
-    const auto [entry, is_new] =
-        known.try_emplace(bytes, static_cast<std::uint32_t>(collected.map_count()));
-    collected.triangle_map.push_back(entry->second);
-    if (!is_new) continue;
+    const bool opaque = map == Map{OpacityMaps::kOpaque};
+    const auto next = opaque ? kNone : static_cast<std::uint32_t>(collected.map_count());
+    const auto [entry, is_new] = known.try_emplace(bytes, next);
+    place.push_back(entry->second);
+    if (!is_new || opaque) continue;
     if (collected.opacity.size() + map.size() >= kNone) {
       throw Error("the scene's masks need more than 4 GiB of opacity maps; ask for fewer patches");
     }
@@ -126,7 +127,20 @@ OpacityMaps collect(const std::vector<Map>& maps) {
     collected.begin.push_back(static_cast<std::uint32_t>(collected.opacity.size()));
   }
   if (collected.map_count() == 0) return {};
+  for (const std::uint32_t map : map_of) {
+    collected.triangle_map.push_back(map == kNone ? kNone : place[map]);
+  }
   return collected;
+}
+
+/// What decides a triangle's map: its material and the bits of its texture coordinates.
+std::array<std::uint32_t, 7> sampling_key(std::uint32_t material,
+                                          const std::array<Float2, 3>& texcoord) {
+  std::array<std::uint32_t, 7> key{material};
+  for (std::size_t k = 0; k < 6; ++k) {
+    key[k + 1] = std::bit_cast<std::uint32_t>(texcoord[k / 2][k % 2]);
+  }
+  return key;
 }
 
 }  // namespace
@@ -134,15 +148,24 @@ OpacityMaps collect(const std::vector<Map>& maps) {
 OpacityMaps find_opacity_maps(const Scene& scene, std::span<const Uint3> triangle,
                               std::span<const std::uint32_t> triangle_material,
                               std::span<const Float2> texcoord) {
-  std::vector<Map> maps(triangle.size());
-#pragma omp parallel for schedule(dynamic, 64)
+  // Instances share their maps: each is sampled once.
+  std::map<std::array<std::uint32_t, 7>, std::uint32_t> known;
+  std::vector<TriangleSampler> samplers;
+  std::vector<std::uint32_t> map_of(triangle.size(), kNone);
   for (std::size_t t = 0; t < triangle.size(); ++t) {
     const Material& material = scene.materials[triangle_material[t]];
     if (is_opaque(material)) continue;
     const auto [a, b, c] = triangle[t];
-    maps[t] = TriangleSampler(scene, material, {texcoord[a], texcoord[b], texcoord[c]}).sample();
+    const std::array<Float2, 3> corners{texcoord[a], texcoord[b], texcoord[c]};
+    const auto [entry, is_new] = known.try_emplace(sampling_key(triangle_material[t], corners),
+                                                   static_cast<std::uint32_t>(samplers.size()));
+    if (is_new) samplers.emplace_back(scene, material, corners);
+    map_of[t] = entry->second;
   }
-  return collect(maps);
+  std::vector<Map> maps(samplers.size());
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t k = 0; k < maps.size(); ++k) maps[k] = samplers[k].sample();
+  return collect(maps, map_of);
 }
 
 OpacityMaps find_opacity_maps(const Scene& scene) {
