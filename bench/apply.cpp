@@ -46,8 +46,7 @@ std::shared_ptr<const DenseOperator> to_f16(const DenseOperator& dense) {
 
 /// The light that the patches send out first under one point light in the free space of the scene.
 std::vector<Float3> light_one_lamp(const TransferData& data) {
-  const RayTracer tracer(data.mesh.position,
-                         std::span(data.mesh.triangle).first(data.mesh.surface_count()));
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   const std::vector<Light> lamp = random_point_lights(data, tracer, 1, 1);
   std::vector<Float3> exitance(data.patches.size());
   DirectLighting(data, tracer).compute(lamp, {}, exitance);

@@ -22,13 +22,15 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
   StageRays result;
   std::vector<FacingPatch> facing, mixed;
   std::vector<Ray> rays;
+  std::vector<float> transmitted;
   EscapeScratch escape;
   const auto add_shadow_stream = [&](std::uint32_t row, const std::vector<FacingPatch>& pairs,
                                      int count) {
     shadow_rays.make_rays(row, pairs, count, rays);
     result.shadow.push_back(rays);
     result.shadow_count += rays.size();
-    tracer.occluded(rays);
+    transmitted.resize(rays.size());
+    tracer.transmittance(rays, PassageDetail::kTriangle, transmitted);
     result.hidden_count += hidden_among(rays);
   };
   for (std::uint32_t row = 0; row < geometry.patch_count(); row += row_step) {
@@ -38,7 +40,8 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
     const auto probe_rays = static_cast<std::size_t>(settings.probe_rays);
     for (std::size_t p = 0; p < facing.size(); ++p) {
       const auto agreement =
-          ShadowRays::agreement(std::span(rays).subspan(p * probe_rays, probe_rays));
+          ShadowRays::agreement(std::span(rays).subspan(p * probe_rays, probe_rays),
+                                std::span(transmitted).subspan(p * probe_rays, probe_rays));
       if (agreement == ShadowRays::Agreement::kMixed) mixed.push_back(facing[p]);
     }
     add_shadow_stream(row, mixed, settings.full_rays);

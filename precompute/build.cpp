@@ -99,6 +99,8 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
   report.sliver_count = model.sliver_count;
   report.unlit_side_count = model.unlit_side_count;
   report.covered_side_count = model.covered_side_count;
+  report.opening_side_count = model.opening_side_count;
+  report.buried_side_count = model.buried_side_count;
   std::vector<float> size(model.patches.area);
   for (float& s : size) s = std::sqrt(s);
   std::ranges::sort(size);
@@ -152,6 +154,8 @@ std::string report_json(const BuildReport& report) {
                       {"slivers", report.sliver_count},
                       {"unlit_sides", report.unlit_side_count},
                       {"covered_sides", report.covered_side_count},
+                      {"opening_sides", report.opening_side_count},
+                      {"buried_sides", report.buried_side_count},
                       {"patch_size_min", report.patch_size_min},
                       {"patch_size_median", report.patch_size_median},
                       {"patch_size_max", report.patch_size_max},
@@ -233,8 +237,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   if (on_estimate) on_estimate(report.estimate);
   refuse_if_too_large(report.estimate, settings.memory_limit_bytes, report.triangle_count);
 
-  const RayTracer tracer(model.mesh.position,
-                         std::span(model.mesh.triangle).first(model.mesh.surface_count()));
+  const RayTracer tracer = make_surface_tracer(model.mesh);
   FormFactors form_factors = clock.run("form factors", [&](const Progress& part) {
     return compute_form_factors(model, tracer, settings.form_factors, part);
   });

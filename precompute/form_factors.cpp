@@ -63,6 +63,7 @@ class FormFactorAssembly {
   struct Scratch {
     std::vector<FacingPatch> facing, mixed;
     std::vector<Ray> rays;
+    std::vector<float> transmitted;  ///< of each ray
     EscapeScratch escape;
   };
 
@@ -93,12 +94,13 @@ class FormFactorAssembly {
 
   void compute_row(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
     shadow_rays_.find_facing(i, scratch.facing, [](std::uint32_t) { return true; });
-    trace(i, scratch.facing, settings_.probe_rays, scratch.rays);
+    trace(i, scratch.facing, settings_.probe_rays, scratch);
     scratch.mixed.clear();
     const auto probe = static_cast<std::size_t>(settings_.probe_rays);
     for (std::size_t p = 0; p < scratch.facing.size(); ++p) {
       const auto agreement =
-          ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe));
+          ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe),
+                                std::span(scratch.transmitted).subspan(p * probe, probe));
       if (agreement == ShadowRays::Agreement::kClear) append(row, scratch.facing[p], 1.0, 0.0);
       if (agreement == ShadowRays::Agreement::kMixed) scratch.mixed.push_back(scratch.facing[p]);
     }
@@ -118,23 +120,27 @@ class FormFactorAssembly {
 
   /// Traces all rays of scratch.mixed and adds what gets through to the row.
   void append_mixed(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
-    trace(i, scratch.mixed, settings_.full_rays, scratch.rays);
+    const int full = settings_.full_rays;
+    trace(i, scratch.mixed, full, scratch);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
-      const std::span rays(&scratch.rays[p * settings_.full_rays], settings_.full_rays);
-      const ShadowRays::Visibility visible =
-          shadow_rays_.visibility(i, scratch.mixed[p].patch, rays);
+      const ShadowRays::Visibility visible = shadow_rays_.visibility(
+          i, scratch.mixed[p].patch, std::span(scratch.rays).subspan(p * full, full),
+          std::span(scratch.transmitted).subspan(p * full, full));
       append(row, scratch.mixed[p], visible.part, visible.variance);
     }
     std::sort(row.begin(), row.end(),
               [](const ExchangeEntry& a, const ExchangeEntry& b) { return a.column < b.column; });
-    ray_count_ += scratch.mixed.size() * settings_.full_rays;
+    ray_count_ += scratch.mixed.size() * full;
   }
 
   /// Traces `count` rays for each pair of patch i, one pair after the other.
+  /// Where there are holes, a triangle's mean is all that patches resolve: taking it keeps the
+  /// noise of single holes out of F.
   void trace(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
-             std::vector<Ray>& rays) const {
-    shadow_rays_.make_rays(i, facing, count, rays);
-    tracer_.occluded(rays);
+             Scratch& scratch) const {
+    shadow_rays_.make_rays(i, facing, count, scratch.rays);
+    scratch.transmitted.resize(scratch.rays.size());
+    tracer_.transmittance(scratch.rays, PassageDetail::kTriangle, scratch.transmitted);
   }
 
   void append(std::vector<ExchangeEntry>& row, const FacingPatch& pair, double visible,

@@ -104,6 +104,20 @@ class TextureImport {
     return kNone;
   }
 
+  // The mean of the red channel of the asset's texture, a fraction; 1 where there is no picture.
+  double mean_red(int index) const {
+    const auto& texture = document_.model.textures.at(static_cast<std::size_t>(index));
+    for (const int source : sources_of(texture)) {
+      const auto image = decode(document_.images.at(static_cast<std::size_t>(source)), source);
+      if (!image) continue;
+      const std::vector<std::uint8_t>& rgba = image->image.rgba;
+      double sum = 0;
+      for (std::size_t k = 0; k < rgba.size(); k += 4) sum += rgba[k];
+      return sum / (255.0 * static_cast<double>(rgba.size() / 4));
+    }
+    return 1;
+  }
+
  private:
   std::uint32_t add(int source, TextureWrap wrap_s, TextureWrap wrap_t, bool is_last) {
     const EncodedImage& encoded = document_.images.at(static_cast<std::size_t>(source));
@@ -192,10 +206,19 @@ float alpha_cutoff(const tinygltf::Material& source) {
   return std::max(cutoff, 0.0F);
 }
 
-float transmission(const tinygltf::Material& source) {
+struct Transmission {
+  double factor = 0;
+  int texture = -1;
+};
+
+Transmission transmission(const tinygltf::Material& source) {
   const auto glass = source.extensions.find("KHR_materials_transmission");
-  if (glass == source.extensions.end() || !glass->second.Has("transmissionFactor")) return 0;
-  return to_fraction(glass->second.Get("transmissionFactor").GetNumberAsDouble());
+  if (glass == source.extensions.end() || !glass->second.Has("transmissionFactor")) return {};
+  Transmission result{glass->second.Get("transmissionFactor").GetNumberAsDouble()};
+  if (glass->second.Has("transmissionTexture")) {
+    result.texture = glass->second.Get("transmissionTexture").Get("index").GetNumberAsInt();
+  }
+  return result;
 }
 
 Float3 emitted_luminance(const tinygltf::Material& source, Warnings& warnings) {
@@ -227,10 +250,10 @@ class MaterialImport {
     material.alpha_mode = alpha_mode(source);
     material.alpha_cutoff = alpha_cutoff(source);
     material.base_alpha = color.alpha;
-    material.transmission = transmission(source);
+    take_transmission(source, material);
     texcoords.uses_alpha = material.alpha_mode != AlphaMode::kOpaque;
     take_emission(source, material, texcoords.emissive);
-    warn_of_what_enters_as_opaque(source, material);
+    warn_of_what_is_simplified(source, material);
     return material;
   }
 
@@ -241,6 +264,14 @@ class MaterialImport {
     texcoord = reference.texcoord;
     texcoord.used = texture != kNone;
     return texture;
+  }
+
+  void take_transmission(const tinygltf::Material& source, Material& material) {
+    const auto [factor, texture] = transmission(source);
+    material.transmission = to_fraction(factor);
+    if (material.transmission == 0 || texture < 0) return;
+    material.transmission *= static_cast<float>(textures_.mean_red(texture));
+    warnings_.count("the transmission textures of {} materials are taken for their mean");
   }
 
   void take_emission(const tinygltf::Material& source, Material& material,
@@ -255,13 +286,15 @@ class MaterialImport {
     material.emissive_texture = resolve(reference(source.emissiveTexture), texcoord);
   }
 
-  void warn_of_what_enters_as_opaque(const tinygltf::Material& source, const Material& material) {
-    if (material.alpha_mode == AlphaMode::kBlend) {
-      warnings_.count("{} materials with alphaMode BLEND are taken as opaque");
+  void warn_of_what_is_simplified(const tinygltf::Material& source, const Material& material) {
+    if (source.extensions.contains("KHR_materials_unlit")) {
+      warnings_.count("{} unlit materials are lit like all others");
     }
-    if (material.transmission > 0 ||
-        source.extensions.contains("KHR_materials_diffuse_transmission")) {
-      warnings_.count("{} materials that transmit light are taken as opaque");
+    if (material.transmission > 0 && !is_black(material.emitted_luminance)) {
+      warnings_.count("{} materials that emit and transmit light are taken to transmit none");
+    }
+    if (source.extensions.contains("KHR_materials_diffuse_transmission")) {
+      warnings_.count("{} materials that transmit light diffusely are taken as opaque");
     }
   }
 

@@ -357,7 +357,9 @@ class StructureCheck {
       real(*strength, "emissiveStrength", at + ".extensions.KHR_materials_emissive_strength");
     }
     if (json* glass = extension(item, "KHR_materials_transmission")) {
-      real(*glass, "transmissionFactor", at + ".extensions.KHR_materials_transmission");
+      const std::string place = at + ".extensions.KHR_materials_transmission";
+      real(*glass, "transmissionFactor", place);
+      texture_info(*glass, "transmissionTexture", place);
     }
     if (json* gloss = extension(item, "KHR_materials_pbrSpecularGlossiness")) {
       const std::string place = at + ".extensions.KHR_materials_pbrSpecularGlossiness";

@@ -13,37 +13,43 @@
 
 namespace rebounce {
 
-/// Fills `rays` with cosine-distributed rays, one from each of `points`; the directions are those
-/// of a low-discrepancy sequence shifted by `direction_shift`.
+/// Cosine-distributed ray k from `point`; the directions are those of a low-discrepancy sequence
+/// shifted by `direction_shift`.
+inline Ray make_hemisphere_ray(const PatchPoint& point, const RayTracer& tracer,
+                               const glm::dvec2& direction_shift, std::uint32_t k) {
+  // Other irrational steps than those of r2_point, so that points and directions do not march
+  // together.
+  const glm::dvec2 s =
+      glm::fract(direction_shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
+  Ray ray{};
+  ray.origin = tracer.offset_point(point.position, point.normal);
+  ray.direction = to_float3(frame_around(to_dvec3(point.normal)) * square_to_cosine_hemisphere(s));
+  ray.t_near = 0;
+  ray.t_far = std::numeric_limits<float>::infinity();
+  return ray;
+}
+
+/// Fills `rays` with one such ray from each of `points`.
 inline void make_hemisphere_rays(std::span<const PatchPoint> points, const RayTracer& tracer,
                                  const glm::dvec2& direction_shift, std::span<Ray> rays) {
   for (std::uint32_t k = 0; k < rays.size(); ++k) {
-    const auto& [position, normal] = points[k];
-    // Other irrational steps than those of r2_point, so that points and directions do not march
-    // together.
-    const glm::dvec2 s =
-        glm::fract(direction_shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
-    rays[k] = Ray{};
-    rays[k].origin = tracer.offset_point(position, normal);
-    rays[k].direction = to_float3(frame_around(to_dvec3(normal)) * square_to_cosine_hemisphere(s));
-    rays[k].t_near = 0;
-    rays[k].t_far = std::numeric_limits<float>::infinity();
+    rays[k] = make_hemisphere_ray(points[k], tracer, direction_shift, k);
   }
 }
 
-/// Fills `rays` with cosine-distributed rays from points spread over a triangle, on the side that
-/// `normal` points to. The same `seed` gives the same rays.
+/// Fills `rays` with such rays, from number `first` on, from points spread over a triangle, on the
+/// side that `normal` points to. The same `seed` gives the same rays.
 inline void make_hemisphere_rays(const std::array<glm::dvec3, 3>& triangle,
                                  const glm::dvec3& normal, const RayTracer& tracer,
-                                 std::uint64_t seed, std::span<Ray> rays) {
+                                 std::uint64_t seed, std::span<Ray> rays, std::uint32_t first = 0) {
   const glm::dvec2 point_shift = unit_square(mix_bits(seed));
-  std::vector<PatchPoint> points(rays.size());
+  const glm::dvec2 direction_shift = unit_square(mix_bits(seed + 1));
   for (std::uint32_t k = 0; k < rays.size(); ++k) {
-    const glm::dvec2 b = square_to_triangle(r2_point(k, point_shift));
+    const glm::dvec2 b = square_to_triangle(r2_point(first + k, point_shift));
     const glm::dvec3 origin = (1 - b.x - b.y) * triangle[0] + b.x * triangle[1] + b.y * triangle[2];
-    points[k] = {to_float3(origin), to_float3(normal)};
+    rays[k] = make_hemisphere_ray({to_float3(origin), to_float3(normal)}, tracer, direction_shift,
+                                  first + k);
   }
-  make_hemisphere_rays(points, tracer, unit_square(mix_bits(seed + 1)), rays);
 }
 
 }  // namespace rebounce

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <functional>
+#include <limits>
 
 #include "hemisphere_rays.h"
 
@@ -10,14 +11,26 @@ namespace rebounce {
 namespace {
 
 // A side that sees less than about one part in this many of other surfaces counts as seeing none.
-constexpr std::uint32_t kRaysPerSide = 256;
+// Most see one at once: the first batch of rays is small, and each is four times as many as before.
+constexpr std::uint32_t kRaysPerSide = 256, kFirstRays = 4;
+
+// Backs nearer than this part of the scene's diagonal may be of the solid that a side is in; those
+// farther off may be of a room that is lit.
+constexpr double kBuriedReach = 1.0 / 16;
 
 // Points at which a side is looked at for copies of itself.
 constexpr std::uint32_t kPointsPerSide = 32;
 
 class LitSides {
  public:
-  LitSides(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer) {}
+  LitSides(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer) {
+    glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
+    for (const Float3& p : scene.position) {
+      low = glm::min(low, to_dvec3(p));
+      high = glm::max(high, to_dvec3(p));
+    }
+    buried_reach_ = kBuriedReach * glm::distance(low, high);
+  }
 
   std::vector<TriangleSides> find() {
     sides_.resize(scene_.triangle.size());
@@ -27,11 +40,10 @@ class LitSides {
       Scratch scratch;
 #pragma omp for schedule(dynamic, 16)
       for (std::uint32_t t = 0; t < sides_.size(); ++t) {
-        if (is_double_sided(t)) {
-          const bool front = sees_a_surface(t, true, scratch);
-          const bool back = sees_a_surface(t, false, scratch);
-          sides_[t].front = front || !back ? SideKind::kLit : SideKind::kUnlit;
-          sides_[t].back = back ? SideKind::kLit : SideKind::kUnlit;
+        sides_[t].front = look_around(t, true, scratch);
+        if (is_double_sided(t)) sides_[t].back = look_around(t, false, scratch);
+        if (sides_[t].front == SideKind::kUnlit && sides_[t].back != SideKind::kLit) {
+          sides_[t].front = SideKind::kLit;
         }
         if (sides_[t].front == SideKind::kLit) {
           sides_[t].front = look_for_contact(t, true, scratch, front_cover[t]);
@@ -73,14 +85,26 @@ class LitSides {
     return side;
   }
 
-  bool sees_a_surface(std::uint32_t t, bool front, Scratch& scratch) const {
+  /// Tells by rays what a side sees: kLit if it sees a side of a surface, kBuried if near backs
+  /// only, else kUnlit. Stops as soon as that is certain; a one-sided triangle is only asked
+  /// whether it is buried.
+  SideKind look_around(std::uint32_t t, bool front, Scratch& scratch) const {
     const Side side = side_of(t, front);
-    make_hemisphere_rays(side.corner, side.normal, tracer_, mix_bits(t), scratch.rays);
-    scratch.hits.resize(scratch.rays.size());
-    tracer_.intersect(scratch.rays, scratch.hits);
-    return std::ranges::any_of(scratch.hits, [&](const Hit& hit) {
-      return hit.triangle != kNone && (hit.front || is_double_sided(hit.triangle));
-    });
+    bool buried = true;
+    for (std::uint32_t first = 0, end = kFirstRays; first < kRaysPerSide; first = end, end *= 4) {
+      const std::span rays = std::span(scratch.rays).first(end - first);
+      make_hemisphere_rays(side.corner, side.normal, tracer_, mix_bits(t), rays, first);
+      scratch.hits.resize(rays.size());
+      tracer_.intersect(rays, scratch.hits);
+      for (const Hit& hit : scratch.hits) {
+        if (hit.triangle != kNone && (hit.front || is_double_sided(hit.triangle))) {
+          return SideKind::kLit;
+        }
+        buried = buried && hit.triangle != kNone && hit.t < buried_reach_;
+      }
+      if (!buried && !is_double_sided(t)) return SideKind::kUnlit;
+    }
+    return buried ? SideKind::kBuried : SideKind::kUnlit;
   }
 
   /// Looks at points all over a side for other surfaces in the same place. Returns kUnlit if it
@@ -119,6 +143,7 @@ class LitSides {
 
   const Scene& scene_;
   const RayTracer& tracer_;
+  double buried_reach_ = 0;  ///< metres
   std::vector<TriangleSides> sides_;
 };
 

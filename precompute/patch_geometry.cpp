@@ -68,9 +68,9 @@ PatchBounds bounds_of(std::span<const FlatTriangle> triangles) {
 PatchPart whole_of(std::span<const FlatTriangle> triangles) {
   PatchPart part;
   for (const FlatTriangle& t : triangles) {
-    part.area += t.area;
-    part.centroid += t.area * t.centroid;
-    part.vector_area += t.area * t.normal;
+    part.area += t.stopping_area();
+    part.centroid += t.stopping_area() * t.centroid;
+    part.vector_area += t.stopping_area() * t.normal;
   }
   part.centroid /= part.area;
   for (const FlatTriangle& t : triangles) {
@@ -97,7 +97,9 @@ std::array<FlatTriangle, 2> bisect(const FlatTriangle& t) {
   }
   const glm::dvec3 a = t.vertex[longest], b = t.vertex[(longest + 1) % 3],
                    c = t.vertex[(longest + 2) % 3], middle = 0.5 * (a + b);
-  return {FlatTriangle(a, middle, c), FlatTriangle(middle, b, c)};
+  std::array<FlatTriangle, 2> halves = {FlatTriangle(a, middle, c), FlatTriangle(middle, b, c)};
+  for (FlatTriangle& half : halves) half.stopping_part = t.stopping_part;
+  return halves;
 }
 
 /// Sorts triangles along the axis in which `vector`(t) spreads most; returns how many make up half
@@ -109,14 +111,14 @@ std::size_t split_in_half(std::span<FlatTriangle> triangles, const Vector& vecto
   for (const FlatTriangle& t : triangles) {
     low = glm::min(low, vector(t));
     high = glm::max(high, vector(t));
-    area += t.area;
+    area += t.stopping_area();
   }
   const glm::dvec3 size = high - low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   std::ranges::stable_sort(triangles, {}, [&](const FlatTriangle& t) { return vector(t)[axis]; });
   std::size_t count = 0;
   for (double before = 0; count + 1 < triangles.size() && before < 0.5 * area; ++count) {
-    before += triangles[count].area;
+    before += triangles[count].stopping_area();
   }
   return std::max<std::size_t>(count, 1);
 }
@@ -175,7 +177,9 @@ double between_triangles(std::span<const FlatTriangle> a, std::span<const FlatTr
                          double tolerance) {
   double sum = 0;
   for (const FlatTriangle& x : a) {
-    for (const FlatTriangle& y : b) sum += unoccluded_exchange_area(x, y, tolerance);
+    for (const FlatTriangle& y : b) {
+      sum += x.stopping_part * y.stopping_part * unoccluded_exchange_area(x, y, tolerance);
+    }
   }
   return sum;
 }
@@ -186,12 +190,12 @@ double part_to_triangle(const PatchPart& part, const glm::dvec3& normal, const F
   const double height = glm::dot(t.normal, d);
   if (height <= 1e-6 * t.radius) return 0;
   if (t.radius * t.radius < kPointLike * kPointLike * glm::dot(d, d)) {
-    return t.area * point_kernel(part.centroid, normal, t.centroid, t.normal);
+    return t.stopping_area() * point_kernel(part.centroid, normal, t.centroid, t.normal);
   }
   // Relative to the part, so that single precision is enough.
   const std::array<glm::vec3, 3> corner = {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid,
                                            t.vertex[2] - part.centroid};
-  return point_to_polygon_form_factor({0, 0, 0}, normal, corner);
+  return t.stopping_part * point_to_polygon_form_factor({0, 0, 0}, normal, corner);
 }
 
 /// From the parts of patch i to patch j: to its parts where they are far for their size, else to
@@ -247,6 +251,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
       triangle_.emplace_back(to_dvec3(model.mesh.position[v[0]]),
                              to_dvec3(model.mesh.position[v[1]]),
                              to_dvec3(model.mesh.position[v[2]]));
+      triangle_.back().stopping_part = model.mesh.opacity.stopping_part(t);
     }
     begin_.push_back(static_cast<std::uint32_t>(triangle_.size()));
   }
@@ -258,7 +263,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
   flat_level_.resize(n);
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t i = 0; i < n; ++i) {
-    for (const FlatTriangle& t : triangles(i)) area_[i] += t.area;
+    for (const FlatTriangle& t : triangles(i)) area_[i] += t.stopping_area();
     bounds_[i] = bounds_of(triangles(i));
     const std::span<PatchPoint> points(&points_[i * kPointCount], kPointCount);
     spread_points(model.mesh, patches[i], unit_square(mix_bits(seed ^ mix_bits(i))), points);

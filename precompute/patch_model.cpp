@@ -8,6 +8,7 @@
 
 #include "rebounce/precompute/element_clusters.h"
 #include "rebounce/precompute/lit_sides.h"
+#include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
@@ -21,8 +22,12 @@ class PatchModelBuilder {
       : scene_(std::move(scene)), settings_(settings) {
     drop_slivers();
     model_.scene_triangle_count = scene_.triangle.size();
-    const std::vector<TriangleSides> sides =
-        find_lit_sides(scene_, RayTracer(scene_.position, scene_.triangle));
+    const OpacityMaps opacity = find_opacity_maps(scene_);
+    std::vector<TriangleSides> sides =
+        find_lit_sides(scene_, RayTracer(scene_.position, scene_.triangle, opacity));
+    for (std::uint32_t t = 0; t < sides.size(); ++t) {
+      if (opacity.stopping_part(t) == 0) sides[t] = {SideKind::kOpening, SideKind::kOpening};
+    }
     std::vector<std::uint8_t> patches_per_triangle;
     patches_per_triangle.reserve(sides.size());
     for (const TriangleSides& s : sides) {
@@ -36,8 +41,8 @@ class PatchModelBuilder {
   PatchModel build() {
     copy_surface();
     add_second_sides();
-    const RayTracer tracer(model_.mesh.position,
-                           std::span(model_.mesh.triangle).first(model_.mesh.surface_count()));
+    find_openings();
+    const RayTracer tracer = make_surface_tracer(model_.mesh);
     make_patches(tracer);
     find_shown_patches(tracer);
     if (clamped_count_ > 0) {
@@ -97,6 +102,16 @@ class PatchModelBuilder {
     }
   }
 
+  /// Finds what light passes through, now that the triangles are cut.
+  void find_openings() {
+    DisplayMesh& mesh = model_.mesh;
+    mesh.opacity =
+        find_opacity_maps(scene_, mesh.triangle, mesh.triangle_material, mesh.base_color_texcoord);
+    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+      if (mesh.opacity.stopping_part(t) == 0) kind_[t] = SideKind::kOpening;
+    }
+  }
+
   std::array<glm::dvec3, 3> corners(std::uint32_t t) const {
     const DisplayMesh& mesh = model_.mesh;
     const auto [a, b, c] = mesh.triangle[t];
@@ -119,7 +134,8 @@ class PatchModelBuilder {
     const auto [a, b, c] = mesh.triangle[t];
     Float3 exitance = mean_emitted_luminance(
         scene_, scene_.materials[mesh.triangle_material[t]],
-        {mesh.emissive_texcoord[a], mesh.emissive_texcoord[b], mesh.emissive_texcoord[c]});
+        {mesh.emissive_texcoord[a], mesh.emissive_texcoord[b], mesh.emissive_texcoord[c]},
+        {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]});
     for (float& m : exitance) m *= std::numbers::pi_v<float>;
     return exitance;
   }
@@ -131,6 +147,7 @@ class PatchModelBuilder {
     }
     const std::vector<std::uint32_t> position = weld_positions(model_.mesh.position).id;
     const std::size_t count = element_triangle_.size();
+    if (count == 0) throw Error("scene " + scene_.name + " has nothing that light falls on");
     elements_.resize(count);
     exitance_.resize(count);
 #pragma omp parallel for schedule(dynamic, 256)
@@ -145,7 +162,8 @@ class PatchModelBuilder {
       elements_.low[e] = to_float3(glm::min(p, glm::min(q, r)));
       elements_.high[e] = to_float3(glm::max(p, glm::max(q, r)));
       elements_.normal[e] = to_float3(glm::normalize(cross));
-      elements_.area[e] = static_cast<float>(0.5 * glm::length(cross));
+      elements_.area[e] =
+          static_cast<float>(0.5 * glm::length(cross) * model_.mesh.opacity.stopping_part(t));
       elements_.reflectance[e] = mean_reflectance(t);
       exitance_[e] = mean_exitance(t);
       elements_.emits[e] = std::ranges::any_of(exitance_[e], [](float m) { return m > 0; });
@@ -231,6 +249,8 @@ class PatchModelBuilder {
     std::vector<CoincidentSide> sides;
     for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
       model_.unlit_side_count += kind_[t] == SideKind::kUnlit ? 1 : 0;
+      model_.opening_side_count += kind_[t] == SideKind::kOpening ? 1 : 0;
+      model_.buried_side_count += kind_[t] == SideKind::kBuried ? 1 : 0;
       if (kind_[t] != SideKind::kCovered) continue;
       ++model_.covered_side_count;
       const auto [p, q, r] = corners(t);

@@ -60,29 +60,36 @@ void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray>
   }
 }
 
-ShadowRays::Agreement ShadowRays::agreement(std::span<const Ray> rays) {
-  const auto count = rays.size() - static_cast<std::size_t>(std::ranges::count_if(rays, is_void));
-  const auto hidden = static_cast<std::size_t>(std::ranges::count_if(rays, is_occluded));
-  if (hidden == count) return Agreement::kHidden;
-  return hidden == 0 ? Agreement::kClear : Agreement::kMixed;
+ShadowRays::Agreement ShadowRays::agreement(std::span<const Ray> rays,
+                                            std::span<const float> transmitted) {
+  bool all_clear = true, all_hidden = true;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    if (is_void(rays[k])) continue;
+    all_clear = all_clear && transmitted[k] == 1;
+    all_hidden = all_hidden && transmitted[k] == 0;
+  }
+  if (all_hidden) return Agreement::kHidden;
+  return all_clear ? Agreement::kClear : Agreement::kMixed;
 }
 
 ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
-                                              std::span<const Ray> rays) const {
+                                              std::span<const Ray> rays,
+                                              std::span<const float> transmitted) const {
   const std::uint64_t hash = pair_hash(i, j);
-  double sum = 0, sum_of_squares = 0, visible = 0;
-  for (const Ray& ray : rays) {
-    if (is_void(ray)) continue;
-    const auto [x, y] = ray_ends(i, j, ray.id, hash);
-    const double weight = kernel(*x, *y);
+  double sum = 0, sum_of_squares = 0, visible = 0, visible_squared = 0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    if (is_void(rays[k])) continue;
+    const auto [x, y] = ray_ends(i, j, rays[k].id, hash);
+    const double weight = kernel(*x, *y), part = transmitted[k];
     sum += weight;
     sum_of_squares += weight * weight;
-    if (!is_occluded(ray)) visible += weight;
+    visible += weight * part;
+    visible_squared += weight * part * part;
   }
   if (sum <= 0) return {0, 1};
   // As sure as that many rays of equal weight (Kish's effective sample size).
   const double part = visible / sum, effective = sum * sum / sum_of_squares;
-  return {part, part * (1 - part) / effective};
+  return {part, std::max(0.0, visible_squared / sum - part * part) / effective};
 }
 
 }  // namespace rebounce

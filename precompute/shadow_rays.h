@@ -41,9 +41,9 @@ class ShadowRays {
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
 
-  /// What the traced rays of a pair agree on.
+  /// What the `rays` of a pair agree on, whose transmittances are `transmitted`.
   enum class Agreement : std::uint8_t { kClear, kHidden, kMixed };
-  static Agreement agreement(std::span<const Ray> rays);
+  static Agreement agreement(std::span<const Ray> rays, std::span<const float> transmitted);
 
   /// True for a ray that stands for none.
   static bool is_void(const Ray& ray) { return ray.id == kNone; }
@@ -53,9 +53,10 @@ class ShadowRays {
     double variance;  ///< of `part`
   };
 
-  /// What the traced `rays` of the pair (i, j) say of it: each is weighted by the kernel between
-  /// its ends.
-  Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const;
+  /// What the `rays` of the pair (i, j) and their transmittances `transmitted` say of it: each is
+  /// weighted by the kernel between its ends.
+  Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
+                        std::span<const float> transmitted) const;
 
  private:
   // Pairs of points that are looked at for rays, at most.

@@ -147,10 +147,14 @@ Sum stratified_mean(int n, const Value& value) {
   return sum / (static_cast<double>(n) * n);
 }
 
-template <typename Value>
-Float3 mean_color(int n, const Value& value) {
-  return to_float3(stratified_mean<glm::dvec3>(
-      n, [&](const std::array<double, 3>& place) { return to_dvec3(value(place)); }));
+// The mean of `value` weighted by `weight`; the plain mean where that is 0 everywhere.
+template <typename Value, typename Weight>
+Float3 mean_color(int n, const Value& value, const Weight& weight) {
+  constexpr double kLeast = 1e-6;
+  const auto sum = stratified_mean<glm::dvec4>(n, [&](const std::array<double, 3>& place) {
+    return (weight(place) + kLeast) * glm::dvec4(to_dvec3(value(place)), 1);
+  });
+  return to_float3(glm::dvec3(sum) / sum.w);
 }
 
 Float3 product(const Float3& a, const Float3& b) {
@@ -158,6 +162,19 @@ Float3 product(const Float3& a, const Float3& b) {
 }
 
 constexpr std::array<double, 3> kCentroid{1.0 / 3, 1.0 / 3, 1.0 / 3};
+
+bool has_uniform_opacity(const Material& material) {
+  return material.alpha_mode == AlphaMode::kOpaque || material.base_color_texture == kNone;
+}
+
+// The opacity at a place of the triangle with these base colour texture coordinates.
+auto opacity_over(const Scene& scene, const Material& material,
+                  const std::array<Float2, 3>& texcoord) {
+  return [&](const std::array<double, 3>& place) -> double {
+    if (has_uniform_opacity(material)) return 1;
+    return opacity_at(scene, material, interpolated(texcoord, place));
+  };
+}
 
 }  // namespace
 
@@ -178,23 +195,26 @@ Float3 mean_base_color(const Scene& scene, const Material& material,
   }
   const Texture& texture = scene.textures.at(material.base_color_texture);
   const Image& image = scene.images.at(material.base_color_texture);
+  const auto color = [&](const std::array<double, 3>& place) {
+    return product(sample_texture(texture, image, interpolated(texcoord, place)),
+                   interpolated(vertex_color, place));
+  };
   const Float3 mean =
-      mean_color(subdivision(image, texcoord), [&](const std::array<double, 3>& place) {
-        return product(sample_texture(texture, image, interpolated(texcoord, place)),
-                       interpolated(vertex_color, place));
-      });
+      mean_color(subdivision(image, texcoord), color, opacity_over(scene, material, texcoord));
   return product(material.base_color, mean);
 }
 
 Float3 mean_emitted_luminance(const Scene& scene, const Material& material,
-                              const std::array<Float2, 3>& texcoord) {
+                              const std::array<Float2, 3>& texcoord,
+                              const std::array<Float2, 3>& base_color_texcoord) {
   if (material.emissive_texture == kNone) return material.emitted_luminance;
   const Texture& texture = scene.textures.at(material.emissive_texture);
   const Image& image = scene.images.at(material.emissive_texture);
-  const Float3 mean =
-      mean_color(subdivision(image, texcoord), [&](const std::array<double, 3>& place) {
-        return sample_texture(texture, image, interpolated(texcoord, place));
-      });
+  const auto color = [&](const std::array<double, 3>& place) {
+    return sample_texture(texture, image, interpolated(texcoord, place));
+  };
+  const Float3 mean = mean_color(subdivision(image, texcoord), color,
+                                 opacity_over(scene, material, base_color_texcoord));
   return product(material.emitted_luminance, mean);
 }
 
@@ -211,9 +231,7 @@ float opacity_at(const Scene& scene, const Material& material, Float2 texcoord) 
 
 float mean_opacity(const Scene& scene, const Material& material,
                    const std::array<Float2, 3>& texcoord) {
-  const bool is_uniform =
-      material.alpha_mode == AlphaMode::kOpaque || material.base_color_texture == kNone;
-  if (is_uniform) return opacity_at(scene, material, texcoord[0]);
+  if (has_uniform_opacity(material)) return opacity_at(scene, material, texcoord[0]);
   const Image& image = scene.images.at(material.base_color_texture);
   return static_cast<float>(stratified_mean<double>(
       subdivision(image, texcoord), [&](const std::array<double, 3>& place) {

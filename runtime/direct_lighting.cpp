@@ -66,10 +66,11 @@ class ShadowBatch {
   }
 
   void flush() {
-    tracer_.occluded({rays_.data(), count_});
-    for (std::size_t k = 0; k < count_; ++k) {
-      if (!is_occluded(rays_[k])) irradiance_[patch_[k]] += carried_[k];
-    }
+    // Single holes are finer than patches.
+    tracer_.transmittance({rays_.data(), count_}, PassageDetail::kTriangle,
+                          {transmitted_.data(), count_});
+    for (std::size_t k = 0; k < count_; ++k)
+      irradiance_[patch_[k]] += transmitted_[k] * carried_[k];
     count_ = 0;
   }
 
@@ -78,6 +79,7 @@ class ShadowBatch {
   std::span<float> irradiance_;
   std::size_t count_ = 0;
   std::array<Ray, kBatch> rays_;
+  std::array<float, kBatch> transmitted_;
   std::array<std::uint32_t, kBatch> patch_;
   std::array<float, kBatch> carried_;
 };

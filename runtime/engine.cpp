@@ -19,9 +19,7 @@ std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> 
 #if REBOUNCE_WITH_EMBREE
 Engine::Engine(std::shared_ptr<const TransferData> data, const DirectLightingSettings& settings)
     : data_(checked(std::move(data))),
-      tracer_(std::make_shared<const RayTracer>(
-          data_->mesh.position,
-          std::span(data_->mesh.triangle).first(data_->mesh.surface_count()))),
+      tracer_(std::make_shared<const RayTracer>(make_surface_tracer(data_->mesh))),
       direct_lighting_(*data_, *tracer_, settings) {
   make_room();
 }

@@ -22,6 +22,30 @@ PatchTriangles::PatchTriangles(std::span<const std::uint32_t> triangle_patch,
   }
 }
 
+namespace {
+
+/// What points may lie on: an opaque triangle, or a micro-triangle of one with a map.
+struct Place {
+  std::uint32_t triangle;
+  std::uint32_t micro_triangle;
+};
+
+/// The places of `triangle`, whose area is `area`, each as likely as it stops light.
+void add_places(const OpacityMaps& opacity, std::uint32_t triangle, double area,
+                std::vector<Place>& places, CumulativeChoice& choice) {
+  const std::span<const std::uint8_t> map = opacity.of_triangle(triangle);
+  if (map.empty()) {
+    places.push_back({triangle, 0});
+    choice.add(area);
+  }
+  for (std::uint32_t k = 0; k < map.size(); ++k) {
+    places.push_back({triangle, k});
+    choice.add(area * map[k] / (OpacityMaps::kOpaque * static_cast<double>(map.size())));
+  }
+}
+
+}  // namespace
+
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                    const glm::dvec2& shift, std::span<PatchPoint> points) {
   const auto corner = [&](std::uint32_t t, int k) {
@@ -30,8 +54,11 @@ void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> trian
   const auto cross = [&](std::uint32_t t) {
     return glm::cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
   };
+  std::vector<Place> places;
   CumulativeChoice choice;
-  for (const std::uint32_t t : triangles) choice.add(glm::length(cross(t)));
+  for (const std::uint32_t t : triangles) {
+    add_places(mesh.opacity, t, glm::length(cross(t)), places, choice);
+  }
   if (choice.total() <= 0) {
     std::ranges::fill(points, PatchPoint{});
     return;
@@ -39,10 +66,12 @@ void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> trian
   for (std::uint32_t k = 0; k < points.size(); ++k) {
     const glm::dvec2 square = r2_point(k, shift);
     const auto [index, rest] = choice.choose(square.x);
-    const std::uint32_t t = triangles[index];
+    const auto [t, micro_triangle] = places[index];
     const glm::dvec2 b = square_to_triangle({rest, square.y});
+    const auto [u, v] = place_in_micro_triangle(
+        opacity_map_level(mesh.opacity.of_triangle(t).size()), micro_triangle, {b.x, b.y});
     const glm::dvec3 a = corner(t, 0);
-    const glm::dvec3 position = a + b.x * (corner(t, 1) - a) + b.y * (corner(t, 2) - a);
+    const glm::dvec3 position = a + u * (corner(t, 1) - a) + v * (corner(t, 2) - a);
     points[k] = {to_float3(position), to_float3(glm::normalize(cross(t)))};
   }
 }

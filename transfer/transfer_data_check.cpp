@@ -33,6 +33,7 @@ class Checker {
     check_sizes();
     check_patches();
     check_mesh();
+    check_opacity();
     check_weights();
     check_materials();
     check_cameras();
@@ -161,6 +162,23 @@ class Checker {
       if (back < mesh.surface_count()) {
         refuse_entry("mesh.back_triangle", t, std::to_string(back), "after the surface");
       }
+    }
+  }
+
+  void check_opacity() const {
+    const OpacityMaps& maps = data_.mesh.opacity;
+    if (maps.empty()) return;
+    rows(tensor::kOpacityMap, maps.triangle_map.size(), data_.mesh.triangle.size());
+    if (maps.begin.empty()) refuse("mesh.opacity_begin", "0 rows, not at least 1");
+    begins<std::uint32_t>("mesh.opacity_begin", maps.begin, maps.opacity.size());
+    for (std::size_t k = 0; k < maps.map_count(); ++k) {
+      const std::uint32_t size = maps.begin[k + 1] - maps.begin[k];
+      if (is_opacity_map_size(size)) continue;
+      refuse_entry("mesh.opacity_begin", k, "of a map of " + std::to_string(size),
+                   "a power of 4 up to 1024");
+    }
+    for (std::size_t t = 0; t < maps.triangle_map.size(); ++t) {
+      index_or_none(tensor::kOpacityMap, t, maps.triangle_map[t], maps.map_count());
     }
   }
 

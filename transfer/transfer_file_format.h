@@ -28,6 +28,7 @@ inline constexpr char kNames[] = "names";
 }  // namespace key
 
 namespace tensor {
+inline constexpr char kOpacityMap[] = "mesh.opacity_map";  // a file without it has no opacity maps
 inline constexpr char kRowBegin[] = "form_factor.row_begin";
 inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
@@ -115,6 +116,13 @@ void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
   visit("probe.entry_begin", probes.entry_begin);
   visit("probe.entry_patch", probes.entry_patch);
   visit("probe.entry_weight", probes.entry_weight);
+}
+
+template <typename Maps, typename Visit>
+void visit_tensors_of_opacity(Maps& maps, Visit&& visit) {
+  visit(tensor::kOpacityMap, maps.triangle_map);
+  visit("mesh.opacity_begin", maps.begin);
+  visit("mesh.opacity", maps.opacity);
 }
 
 // visit(name, items, member) for each tensor that is a member of every item of an array.

@@ -307,6 +307,9 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   TransferData data;
   visit_tensors_of_patches(data.patches, TensorReader(file));
   visit_tensors_of_mesh(data.mesh, TensorReader(file));
+  if (file.tensors().contains(tensor::kOpacityMap)) {
+    visit_tensors_of_opacity(data.mesh.opacity, TensorReader(file));
+  }
   read_scene(file, data);
   read_probes(file, data);
   data.exchange = read_exchange(file);

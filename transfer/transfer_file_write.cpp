@@ -158,6 +158,7 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   TensorCollector collector;
   visit_tensors_of_patches(data.patches, collector);
   visit_tensors_of_mesh(data.mesh, collector);
+  if (!data.mesh.opacity.empty()) visit_tensors_of_opacity(data.mesh.opacity, collector);
   visit_tensors_of_scene(data, collector);
   collect_textures(data.textures, collector);
   collect_probes(data.probes, collector);

@@ -11,10 +11,12 @@ namespace {
 double mean_luminance(const SceneSurface& surface, std::uint32_t triangle) {
   const Scene& scene = surface.scene();
   const Uint3& corner = scene.triangle[triangle];
-  const auto& texcoord = scene.emissive_texcoord;
+  const auto corners_of = [&](const std::vector<Float2>& texcoord) {
+    return std::array{texcoord[corner[0]], texcoord[corner[1]], texcoord[corner[2]]};
+  };
   const Float3 mean =
-      mean_emitted_luminance(scene, surface.material(triangle),
-                             {texcoord[corner[0]], texcoord[corner[1]], texcoord[corner[2]]});
+      mean_emitted_luminance(scene, surface.material(triangle), corners_of(scene.emissive_texcoord),
+                             corners_of(scene.base_color_texcoord));
   return (static_cast<double>(mean[0]) + mean[1] + mean[2]) / kChannelCount;
 }
 

@@ -14,6 +14,7 @@
 #include <limits>
 #include <numbers>
 
+#include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/transfer/error.h"
@@ -356,7 +357,7 @@ std::uint32_t rounded_up(std::uint32_t samples) {
 }  // namespace
 
 RayTracer make_scene_tracer(const Scene& scene) {
-  return {scene.position, scene.triangle};
+  return {scene.position, scene.triangle, find_opacity_maps(scene)};
 }
 
 IrradianceEstimate indirect_irradiance(const LitScene& lit_scene,

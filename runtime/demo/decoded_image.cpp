@@ -2,6 +2,7 @@
 
 #include <stb_image.h>
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <string>
@@ -29,10 +30,17 @@ DecodedImage decode_image(const Texture& texture) {
   }
   if (base.width > kMaxSide || base.height > kMaxSide) throw fail("more than 16384 texels a side");
   const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
-      stbi_load_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count, 3),
+      stbi_load_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count, 4),
       stbi_image_free);
   if (!texels) throw fail("a damaged image");
-  base.rgb.assign(texels.get(), texels.get() + std::size_t{3} * base.width * base.height);
+  const std::size_t count = std::size_t{1} * base.width * base.height;
+  base.rgb.reserve(3 * count);
+  base.alpha.reserve(count);
+  for (const stbi_uc* texel = texels.get(); texel != texels.get() + 4 * count; texel += 4) {
+    base.rgb.insert(base.rgb.end(), texel, texel + 3);
+    base.alpha.push_back(texel[3]);
+  }
+  if (std::ranges::all_of(base.alpha, [](std::uint8_t a) { return a == 255; })) base.alpha = {};
   return base;
 }
 

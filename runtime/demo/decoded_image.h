@@ -11,7 +11,8 @@ namespace rebounce {
 struct DecodedImage {
   int width = 0;
   int height = 0;
-  std::vector<std::uint8_t> rgb{};  ///< [height][width][3]
+  std::vector<std::uint8_t> rgb{};    ///< [height][width][3]
+  std::vector<std::uint8_t> alpha{};  ///< [height][width], or empty: opaque
 };
 
 /// Throws Error if the image cannot be decoded or is too large.

@@ -22,9 +22,10 @@ class ShadowRays {
 
   // Adds what arrives to its receivers, in the order of `add`, and forgets all rays.
   void deliver(const RayTracer& tracer) {
-    tracer.occluded(rays_);
+    transmitted_.resize(rays_.size());
+    tracer.transmittance(rays_, PassageDetail::kMicroTriangle, transmitted_);
     for (std::size_t k = 0; k < rays_.size(); ++k) {
-      if (!is_occluded(rays_[k])) arrivals_[k].receiver->irradiance += arrivals_[k].irradiance;
+      arrivals_[k].receiver->irradiance += transmitted_[k] * arrivals_[k].irradiance;
     }
     rays_.clear();
     arrivals_.clear();
@@ -36,6 +37,7 @@ class ShadowRays {
     glm::vec3 irradiance;
   };
   std::vector<Ray> rays_;
+  std::vector<float> transmitted_;
   std::vector<Arrival> arrivals_;
 };
 

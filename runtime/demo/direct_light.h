@@ -15,6 +15,7 @@ namespace rebounce {
 struct CameraSample {
   std::uint32_t pixel = 0;  ///< y * width + x
   std::uint32_t index = 0;  ///< among the camera samples of its pixel
+  float weight = 0;         ///< of the pixel's colour
   SurfacePoint point{};
   float footprint = 0;            ///< metres of surface between neighbouring samples
   glm::vec3 irradiance{0, 0, 0};  ///< lx

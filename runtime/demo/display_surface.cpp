@@ -8,8 +8,8 @@
 namespace rebounce {
 namespace {
 
-// Culled layers that a camera ray may cross; more than any sensible scene has.
-constexpr int kMaxCulledLayers = 256;
+// Layers that a camera ray may pass; more than any sensible scene has.
+constexpr int kMaxPassedLayers = 256;
 
 struct Corners {
   glm::dvec3 a, b, c;
@@ -96,12 +96,33 @@ const Material& DisplaySurface::material_of(const SurfacePoint& point) const {
 glm::vec3 DisplaySurface::texture_color(std::uint32_t texture, std::span<const Float2> texcoord,
                                         const SurfacePoint& point, float width) const {
   if (texture == kNone) return glm::vec3(1);
-  const Uint3& corner = mesh().triangle[point.triangle];
-  const glm::vec2 at = point.weight.x * to_glm(texcoord[corner[0]]) +
-                       point.weight.y * to_glm(texcoord[corner[1]]) +
-                       point.weight.z * to_glm(texcoord[corner[2]]);
-  return textures_[texture]->sample(at,
+  return textures_[texture]->sample(texcoord_at(texcoord, point),
                                     width * texcoord_per_metre(mesh(), texcoord, point.triangle));
+}
+
+glm::vec2 DisplaySurface::texcoord_at(std::span<const Float2> texcoord,
+                                      const SurfacePoint& point) const {
+  const Uint3& corner = mesh().triangle[point.triangle];
+  return point.weight.x * to_glm(texcoord[corner[0]]) +
+         point.weight.y * to_glm(texcoord[corner[1]]) +
+         point.weight.z * to_glm(texcoord[corner[2]]);
+}
+
+float DisplaySurface::opacity(const Hit& hit) const {
+  if (mesh().opacity.of_triangle(hit.triangle).empty()) return 1;
+  const SurfacePoint point = point_at(hit);
+  const Material& material = material_of(point);
+  float alpha = 1;
+  if (material.alpha_mode != AlphaMode::kOpaque) {
+    alpha = material.base_alpha;
+    const std::uint32_t texture = material.base_color_texture;
+    if (texture != kNone) {
+      alpha *= textures_[texture]->alpha(texcoord_at(mesh().base_color_texcoord, point));
+    }
+    if (material.alpha_mode == AlphaMode::kMask) alpha = alpha >= material.alpha_cutoff ? 1 : 0;
+  }
+  const bool emits = material.emitted_luminance != Float3{0, 0, 0};
+  return emits ? alpha : alpha * (1 - material.transmission);
 }
 
 glm::vec3 DisplaySurface::albedo(const SurfacePoint& point, float width) const {
@@ -125,31 +146,55 @@ glm::vec3 DisplaySurface::emitted_luminance(const SurfacePoint& point, float wid
          texture_color(material.emissive_texture, mesh().emissive_texcoord, point, width);
 }
 
+float beyond(const Hit& hit) {
+  return hit.t * (1 + 1e-6F);  // a few roundings further
+}
+
 bool is_culled(const DisplayMesh& mesh, const Hit& hit) {
   return hit.triangle != kNone && !hit.front && mesh.back_triangle[hit.triangle] == kNone;
 }
 
-void intersect_visible(const RayTracer& tracer, const DisplayMesh& mesh, std::span<Ray> rays,
-                       std::span<Hit> hits) {
-  tracer.intersect(rays, hits);
-  std::vector<std::size_t> culled;
+namespace {
+
+// Finds the first hit of each ray that it does not pass, as `passes`(hit) says.
+template <typename Passes>
+void intersect_past(const RayTracer& tracer, Passage passage, const Passes& passes,
+                    std::span<Ray> rays, std::span<Hit> hits) {
+  tracer.intersect(rays, hits, passage);
+  std::vector<std::size_t> passed;
   for (std::size_t k = 0; k < hits.size(); ++k) {
-    if (is_culled(mesh, hits[k])) culled.push_back(k);
+    if (passes(hits[k])) passed.push_back(k);
   }
   std::vector<Ray> onward;
   std::vector<Hit> next;
-  for (int layer = 0; layer < kMaxCulledLayers && !culled.empty(); ++layer) {
+  for (int layer = 0; layer < kMaxPassedLayers && !passed.empty(); ++layer) {
     onward.clear();
-    for (const std::size_t k : culled) {
-      rays[k].t_near = hits[k].t * (1 + 1e-6F);  // a few roundings further
+    for (const std::size_t k : passed) {
+      rays[k].t_near = beyond(hits[k]);
       onward.push_back(rays[k]);
     }
     next.resize(onward.size());
-    tracer.intersect(onward, next);
-    for (std::size_t k = 0; k < culled.size(); ++k) hits[culled[k]] = next[k];
-    std::erase_if(culled, [&](std::size_t k) { return !is_culled(mesh, hits[k]); });
+    tracer.intersect(onward, next, passage);
+    for (std::size_t k = 0; k < passed.size(); ++k) hits[passed[k]] = next[k];
+    std::erase_if(passed, [&](std::size_t k) { return !passes(hits[k]); });
   }
-  for (const std::size_t k : culled) hits[k] = {};
+  for (const std::size_t k : passed) hits[k] = {};
+}
+
+}  // namespace
+
+void intersect_visible(const RayTracer& tracer, const DisplayMesh& mesh, std::span<Ray> rays,
+                       std::span<Hit> hits) {
+  const auto passes = [&](const Hit& hit) { return is_culled(mesh, hit); };
+  intersect_past(tracer, Passage::kHoles, passes, rays, hits);
+}
+
+void intersect_visible(const RayTracer& tracer, const DisplaySurface& surface, std::span<Ray> rays,
+                       std::span<Hit> hits) {
+  const auto passes = [&](const Hit& hit) {
+    return is_culled(surface.mesh(), hit) || (hit.triangle != kNone && surface.opacity(hit) == 0);
+  };
+  intersect_past(tracer, Passage::kSolid, passes, rays, hits);
 }
 
 std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,

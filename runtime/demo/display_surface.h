@@ -41,6 +41,9 @@ class DisplaySurface {
   /// The same without the texture.
   glm::vec3 untextured_albedo(const SurfacePoint& point) const;
 
+  /// The part of what meets the surface that does not pass through it, [0, 1]; 0 or 1 for masks.
+  float opacity(const Hit& hit) const;
+
   /// Emitted luminance in cd/m², filtered likewise.
   glm::vec3 emitted_luminance(const SurfacePoint& point, float width) const;
 
@@ -48,16 +51,25 @@ class DisplaySurface {
   const Material& material_of(const SurfacePoint& point) const;
   glm::vec3 texture_color(std::uint32_t texture, std::span<const Float2> texcoord,
                           const SurfacePoint& point, float width) const;
+  glm::vec2 texcoord_at(std::span<const Float2> texcoord, const SurfacePoint& point) const;
 
   const TransferData* data_;
   std::vector<std::unique_ptr<const FilteredTexture>> textures_;  // null where not used
 };
 
+/// The least t_near of a ray that goes on from `hit`.
+float beyond(const Hit& hit);
+
 /// True if a ray does not see what it hit: the back of a one-sided surface.
 bool is_culled(const DisplayMesh& mesh, const Hit& hit);
 
-/// Finds the nearest surface that each ray sees, through culled ones. Returns in `hits` what
-/// RayTracer::intersect does; advances rays[k].t_near past each culled hit.
+/// Finds the nearest surface that each ray sees, through culled ones and through what is clear at
+/// the full resolution of the textures. Returns in `hits` what RayTracer::intersect does; advances
+/// rays[k].t_near to beyond what was passed.
+void intersect_visible(const RayTracer& tracer, const DisplaySurface& surface, std::span<Ray> rays,
+                       std::span<Hit> hits);
+
+/// The same with the opacity maps instead of textures.
 void intersect_visible(const RayTracer& tracer, const DisplayMesh& mesh, std::span<Ray> rays,
                        std::span<Hit> hits);
 

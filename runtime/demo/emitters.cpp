@@ -28,7 +28,7 @@ Corners corners_of(const DisplayMesh& mesh, std::uint32_t triangle) {
 double power_of(const TransferData& data, std::uint32_t triangle) {
   const std::uint32_t patch = data.mesh.triangle_patch[triangle];
   if (patch == kNone) return 0;
-  return area_of(corners_of(data.mesh, triangle)) *
+  return area_of(corners_of(data.mesh, triangle)) * data.mesh.opacity.stopping_part(triangle) *
          luminance(to_glm(data.patches.emitted_exitance[patch]));
 }
 
@@ -65,6 +65,7 @@ void Emitters::add_pieces(const DisplaySurface& surface, std::uint32_t triangle,
     }
     weights = std::move(finer);
   }
+  const auto solid_part = static_cast<float>(surface.mesh().opacity.stopping_part(triangle));
   for (const Corners& weight : weights) {
     EmitterPiece piece;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -75,7 +76,7 @@ void Emitters::add_pieces(const DisplaySurface& surface, std::uint32_t triangle,
     piece.centroid = middle.position;
     piece.normal = middle.geometric_normal;
     piece.area = static_cast<float>(area_of(piece.corner));
-    piece.luminance = surface.emitted_luminance(middle, std::sqrt(piece.area));
+    piece.luminance = solid_part * surface.emitted_luminance(middle, std::sqrt(piece.area));
     if (piece.luminance != glm::vec3(0)) pieces_.push_back(piece);
   }
 }

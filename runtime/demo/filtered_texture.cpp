@@ -38,6 +38,7 @@ float reduced(float texcoord, TextureWrap wrap) {
 FilteredTexture::FilteredTexture(const Texture& texture)
     : wrap_s_(texture.wrap_s), wrap_t_(texture.wrap_t) {
   DecodedImage image = decode_image(texture);
+  alpha_ = std::move(image.alpha);
   levels_.push_back({image.width, image.height, std::move(image.rgb)});
   while (levels_.back().width > 1 || levels_.back().height > 1) {
     levels_.push_back(half_size(levels_.back()));
@@ -65,19 +66,33 @@ FilteredTexture::Level FilteredTexture::half_size(const Level& level) {
   return half;
 }
 
-glm::vec3 FilteredTexture::bilinear(const Level& level, const glm::vec2& texcoord) const {
+template <typename TexelValue>
+auto FilteredTexture::bilinear(const Level& level, const glm::vec2& texcoord,
+                               const TexelValue& texel) const {
   const float x = reduced(texcoord.x, wrap_s_) * static_cast<float>(level.width) - 0.5F;
   const float y = reduced(texcoord.y, wrap_t_) * static_cast<float>(level.height) - 0.5F;
   const int left = static_cast<int>(std::floor(x)), top = static_cast<int>(std::floor(y));
-  const auto texel = [&](int column, int row) {
+  const auto at = [&](int column, int row) {
     column = wrapped(column, level.width, wrap_s_);
     row = wrapped(row, level.height, wrap_t_);
-    const std::uint8_t* rgb = &level.rgb[std::size_t{3} * row * level.width + 3 * column];
-    return glm::vec3(byte_to_linear(rgb[0]), byte_to_linear(rgb[1]), byte_to_linear(rgb[2]));
+    return texel(static_cast<std::size_t>(row) * level.width + column);
   };
   const float fx = x - static_cast<float>(left), fy = y - static_cast<float>(top);
-  return glm::mix(glm::mix(texel(left, top), texel(left + 1, top), fx),
-                  glm::mix(texel(left, top + 1), texel(left + 1, top + 1), fx), fy);
+  return glm::mix(glm::mix(at(left, top), at(left + 1, top), fx),
+                  glm::mix(at(left, top + 1), at(left + 1, top + 1), fx), fy);
+}
+
+glm::vec3 FilteredTexture::bilinear_color(const Level& level, const glm::vec2& texcoord) const {
+  return bilinear(level, texcoord, [&](std::size_t index) {
+    const std::uint8_t* rgb = &level.rgb[3 * index];
+    return glm::vec3(byte_to_linear(rgb[0]), byte_to_linear(rgb[1]), byte_to_linear(rgb[2]));
+  });
+}
+
+float FilteredTexture::alpha(const glm::vec2& texcoord) const {
+  if (alpha_.empty()) return 1;
+  return bilinear(levels_[0], texcoord,
+                  [&](std::size_t index) { return static_cast<float>(alpha_[index]) / 255; });
 }
 
 glm::vec3 FilteredTexture::sample(const glm::vec2& texcoord, float texcoord_width) const {
@@ -87,9 +102,9 @@ glm::vec3 FilteredTexture::sample(const glm::vec2& texcoord, float texcoord_widt
   const float level = std::clamp(std::log2(texels), 0.0F, top_level);
   const auto fine = static_cast<std::size_t>(level);
   const float between = level - static_cast<float>(fine);
-  const glm::vec3 sharp = bilinear(levels_[fine], texcoord);
+  const glm::vec3 sharp = bilinear_color(levels_[fine], texcoord);
   if (between == 0) return sharp;
-  return glm::mix(sharp, bilinear(levels_[fine + 1], texcoord), between);
+  return glm::mix(sharp, bilinear_color(levels_[fine + 1], texcoord), between);
 }
 
 }  // namespace rebounce

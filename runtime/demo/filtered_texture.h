@@ -18,6 +18,9 @@ class FilteredTexture {
   /// (in units of texture coordinates).
   glm::vec3 sample(const glm::vec2& texcoord, float texcoord_width) const;
 
+  /// Alpha in [0, 1] at `texcoord`, bilinearly filtered; 1 if the image has none.
+  float alpha(const glm::vec2& texcoord) const;
+
  private:
   struct Level {
     int width = 0;
@@ -26,9 +29,14 @@ class FilteredTexture {
   };
 
   static Level half_size(const Level& level);
-  glm::vec3 bilinear(const Level& level, const glm::vec2& texcoord) const;
+
+  /// What `texel`(index) gives for the four texels of `level` around `texcoord`, mixed.
+  template <typename TexelValue>
+  auto bilinear(const Level& level, const glm::vec2& texcoord, const TexelValue& texel) const;
+  glm::vec3 bilinear_color(const Level& level, const glm::vec2& texcoord) const;
 
   std::vector<Level> levels_;
+  std::vector<std::uint8_t> alpha_;  ///< of the finest level; empty if it is 255 everywhere
   TextureWrap wrap_s_, wrap_t_;
 };
 

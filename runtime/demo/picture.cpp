@@ -25,6 +25,7 @@ constexpr int kTile = 16;  // pixels a side
 constexpr int kMaxSide = 32768;
 constexpr int kMaxSamplesPerAxis = 64;
 constexpr int kMaxEmitterSamples = 65536;
+constexpr int kMaxLayers = 16;    // that a camera ray sees through; the next is opaque
 const glm::vec3 kNothing(0.02F);  // what is behind patches and errors
 
 void check_setting(int value, int most, const char* name) {
@@ -50,6 +51,7 @@ struct CameraRays {
   std::vector<Ray> rays;
   std::vector<std::uint32_t> pixel;
   std::vector<std::uint32_t> index;
+  std::vector<float> weight;  // of the pixel's colour
 };
 
 class View {
@@ -58,8 +60,6 @@ class View {
       : settings_(settings),
         pixel_width_(2 * std::tan(0.5F * settings.camera.vertical_fov) /
                      static_cast<float>(settings.height)) {}
-
-  int samples_per_pixel() const { return settings_.samples_per_axis * settings_.samples_per_axis; }
 
   // Metres between neighbouring samples at ray parameter t.
   float footprint(float t) const {
@@ -88,6 +88,7 @@ class View {
       const float inside_y = (static_cast<float>(row) + hash_to_unit(seed, 4)) / n;
       tile.rays.push_back(
           ray_through(static_cast<float>(x) + inside_x, static_cast<float>(y) + inside_y));
+      tile.weight.push_back(1.0F / static_cast<float>(n * n));
       tile.pixel.push_back(pixel);
       tile.index.push_back(index);
     }
@@ -108,20 +109,31 @@ class View {
   float pixel_width_;  // at unit distance along the axis
 };
 
-std::vector<CameraSample> seen_surface(const CameraRays& tile, std::span<const Hit> hits,
+// Takes away from the rays what stops at their hits, and returns it; the rest of them goes on.
+std::vector<CameraSample> seen_surface(CameraRays& tile, std::span<const Hit> hits, bool last_layer,
                                        const DisplaySurface& surface, const View& view) {
   std::vector<CameraSample> samples;
   samples.reserve(hits.size());
+  CameraRays onward;
   for (std::size_t k = 0; k < hits.size(); ++k) {
     if (hits[k].triangle == kNone) continue;
+    const float opacity = last_layer ? 1 : surface.opacity(hits[k]);
     CameraSample sample{.pixel = tile.pixel[k], .index = tile.index[k]};
+    sample.weight = opacity * tile.weight[k];
     sample.point = surface.point_at(hits[k]);
     const glm::vec3 direction = glm::normalize(to_glm(tile.rays[k].direction));
     // A slanted surface spreads the footprint in one direction; its mean width is what counts.
     const float cosine = std::abs(glm::dot(direction, sample.point.geometric_normal));
     sample.footprint = view.footprint(hits[k].t) / std::sqrt(std::max(cosine, 0.01F));
     samples.push_back(sample);
+    if (opacity == 1) continue;
+    onward.rays.push_back(tile.rays[k]);
+    onward.rays.back().t_near = beyond(hits[k]);
+    onward.pixel.push_back(tile.pixel[k]);
+    onward.index.push_back(tile.index[k]);
+    onward.weight.push_back((1 - opacity) * tile.weight[k]);
   }
+  tile = std::move(onward);
   return samples;
 }
 
@@ -133,8 +145,8 @@ class Painter {
   // Adds to `pixel` what a camera ray of this `weight` sees where there is no surface.
   virtual void paint_background(std::uint32_t index, float weight, std::span<glm::vec3> pixel) = 0;
 
-  // Adds the colours of `samples` to their pixels, each times `weight`.
-  virtual void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) = 0;
+  // Adds the colours of `samples` to their pixels, each times its weight.
+  virtual void paint(std::span<CameraSample> samples, std::span<glm::vec3> pixel) = 0;
 };
 
 // What shines by itself, apart from what is lit: its mean where it covers a pixel.
@@ -177,19 +189,19 @@ class LightPainter final : public Painter {
     shining_.add(index, to_glm(light_.sky.color) * light_.sky.luminance, weight);
   }
 
-  void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) override {
+  void paint(std::span<CameraSample> samples, std::span<glm::vec3> pixel) override {
     if (settings_.show != Show::kIndirect) add_direct_light(samples);
     if (settings_.show != Show::kDirect) add_bounced_light(samples);
     for (const CameraSample& sample : samples) {
       const glm::vec3 emitted = surface_.emitted_luminance(sample.point, sample.footprint);
       const glm::vec3 reflected = surface_.albedo(sample.point, sample.footprint) *
                                   sample.irradiance * std::numbers::inv_pi_v<float>;
-      pixel[sample.pixel] += weight * reflected;
+      pixel[sample.pixel] += sample.weight * reflected;
       if (emitted == glm::vec3(0)) {
-        reflected_[sample.pixel] += weight * luminance(reflected);
-        coverage_[sample.pixel] += weight;
+        reflected_[sample.pixel] += sample.weight * luminance(reflected);
+        coverage_[sample.pixel] += sample.weight;
       } else if (settings_.show != Show::kIndirect) {
-        shining_.add(sample.pixel, emitted, weight);
+        shining_.add(sample.pixel, emitted, sample.weight);
       }
     }
   }
@@ -254,9 +266,9 @@ class PatchPainter final : public Painter {
     pixel[index] += weight * kNothing;
   }
 
-  void paint(std::span<CameraSample> samples, float weight, std::span<glm::vec3> pixel) override {
+  void paint(std::span<CameraSample> samples, std::span<glm::vec3> pixel) override {
     for (const CameraSample& sample : samples) {
-      pixel[sample.pixel] += weight * color_of(sample.point);
+      pixel[sample.pixel] += sample.weight * color_of(sample.point);
     }
   }
 
@@ -280,7 +292,6 @@ class PatchPainter final : public Painter {
 std::vector<glm::vec3> paint_tiles(const RayTracer& tracer, const DisplaySurface& surface,
                                    const PictureSettings& settings, Painter& painter) {
   const View view(settings);
-  const float weight = 1.0F / static_cast<float>(view.samples_per_pixel());
   const int columns = (settings.width + kTile - 1) / kTile;
   const int rows = (settings.height + kTile - 1) / kTile;
   std::vector<glm::vec3> pixel(static_cast<std::size_t>(settings.width) * settings.height,
@@ -288,13 +299,17 @@ std::vector<glm::vec3> paint_tiles(const RayTracer& tracer, const DisplaySurface
 #pragma omp parallel for schedule(dynamic)
   for (int tile = 0; tile < columns * rows; ++tile) {
     CameraRays camera = view.rays_of_tile(tile % columns * kTile, tile / columns * kTile);
-    std::vector<Hit> hits(camera.rays.size());
-    intersect_visible(tracer, surface.mesh(), camera.rays, hits);
-    for (std::size_t k = 0; k < hits.size(); ++k) {
-      if (hits[k].triangle == kNone) painter.paint_background(camera.pixel[k], weight, pixel);
+    for (int layer = 0; layer <= kMaxLayers && !camera.rays.empty(); ++layer) {
+      std::vector<Hit> hits(camera.rays.size());
+      intersect_visible(tracer, surface, camera.rays, hits);
+      for (std::size_t k = 0; k < hits.size(); ++k) {
+        if (hits[k].triangle != kNone) continue;
+        painter.paint_background(camera.pixel[k], camera.weight[k], pixel);
+      }
+      std::vector<CameraSample> samples =
+          seen_surface(camera, hits, layer == kMaxLayers, surface, view);
+      painter.paint(samples, pixel);
     }
-    std::vector<CameraSample> samples = seen_surface(camera, hits, surface, view);
-    painter.paint(samples, weight, pixel);
   }
   return pixel;
 }
@@ -361,10 +376,6 @@ std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
   FormFactorRows(data.exchange, data.patches.area)
       .gather(data.patches.emitted_exitance, irradiance);
   return irradiance;
-}
-
-RayTracer make_surface_tracer(const DisplayMesh& mesh) {
-  return {mesh.position, std::span(mesh.triangle).first(mesh.surface_count())};
 }
 
 }  // namespace rebounce

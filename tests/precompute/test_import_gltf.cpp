@@ -430,8 +430,8 @@ TEST_F(ImportGltf, EmissionIsInNits) {
   triangle_.root["materials"][0]["extensions"]["KHR_materials_unlit"] = json::object();
   scene = import(triangle_);
   EXPECT_EQ(scene.materials[0].emitted_luminance, (Float3{0, 0, 0}));
-  ASSERT_EQ(scene.warnings.size(), 1U);
-  EXPECT_NE(scene.warnings[0].find("unlit"), std::string::npos);
+  ASSERT_EQ(scene.warnings.size(), 2U);
+  EXPECT_NE(scene.warnings[0].find("emission of 1 unlit"), std::string::npos);
 }
 
 TEST_F(ImportGltf, NegativeFactorsAreClampedWithAWarning) {
@@ -469,9 +469,30 @@ TEST_F(ImportGltf, AlphaAndTransmissionAreTaken) {
   EXPECT_EQ(scene.materials[3].base_alpha, 1);
   EXPECT_EQ(scene.materials[3].alpha_cutoff, 0);
   EXPECT_EQ(scene.materials[3].transmission, 0);
+  EXPECT_TRUE(scene.warnings.empty());
+}
+
+TEST_F(ImportGltf, WhatIsSimplifiedOfTransmissionIsCounted) {
+  const json glass = {{"transmissionFactor", 0.9}};
+  triangle_.add("materials", {{"emissiveFactor", {1, 1, 1}},
+                              {"extensions", {{"KHR_materials_transmission", glass}}}});
+  triangle_.add("materials",
+                {{"extensions", {{"KHR_materials_diffuse_transmission", json::object()}}}});
+  const Scene scene = import(triangle_);
   ASSERT_EQ(scene.warnings.size(), 2U);
-  EXPECT_TRUE(scene.warnings[0].starts_with("1 materials with alphaMode BLEND"));
-  EXPECT_TRUE(scene.warnings[1].starts_with("1 materials that transmit"));
+  EXPECT_TRUE(scene.warnings[0].starts_with("1 materials that emit and transmit"));
+  EXPECT_TRUE(scene.warnings[1].starts_with("1 materials that transmit light diffusely"));
+}
+
+TEST_F(ImportGltf, UnlitMaterialsAreLitLikeOthers) {
+  triangle_.add("materials", {{"pbrMetallicRoughness", {{"baseColorFactor", {0.25, 0.5, 1, 1}}}},
+                              {"extensions", {{"KHR_materials_unlit", json::object()}}}});
+  triangle_.primitive()["material"] = 0;
+  const Scene scene = import(triangle_);
+  EXPECT_EQ(scene.materials[0].base_color, (Float3{0.25F, 0.5F, 1}));
+  EXPECT_EQ(scene.materials[0].emitted_luminance, (Float3{0, 0, 0}));
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_EQ(scene.warnings[0], "1 unlit materials are lit like all others");
 }
 
 TEST_F(ImportGltf, AlphaOfVertexColoursIsIgnoredWithAWarningWhereItWouldCount) {
@@ -580,7 +601,7 @@ TEST_F(TexturedTriangle, EmissiveTextureMultipliesTheLuminance) {
   const Scene scene = import(triangle_);
   EXPECT_EQ(scene.materials[0].emissive_texture, 0U);
   const Float3 bright =
-      mean_emitted_luminance(scene, scene.materials[0], {{{0.8F, 0}, {1, 0}, {0.9F, 1}}});
+      mean_emitted_luminance(scene, scene.materials[0], {{{0.8F, 0}, {1, 0}, {0.9F, 1}}}, {});
   expect_near(bright, {100 * kGrey, 100 * kGrey, 100 * kGrey}, 0.1);
 }
 

@@ -78,6 +78,37 @@ TEST(PatchModel, BottomOfABoxOnTheFloorHasNoPatch) {
   EXPECT_NEAR(down, 20, 1e-4) << "the ceiling only";
 }
 
+TEST(PatchModel, SidesInsideOfSomethingSolidHaveNoPatch) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {8, 6, 10}, true);
+  test::add_box(scene, {1, 0.2, 1}, {1.4, 0.6, 1.4}, false);
+  test::add_box(scene, {1.1, 0.3, 1.1}, {1.2, 0.4, 1.2}, false);  // inside the other
+  const PatchModel model = make_patch_model(scene, {.patch_count = 400});
+  double area = 0;
+  for (const float a : model.patches.area) area += a;
+  EXPECT_NEAR(area, 2 * (48 + 60 + 80) + 6 * 0.16, 1e-3);
+  EXPECT_GE(model.buried_side_count, 12U);
+  // Of double-sided surfaces no side is within anything.
+  EXPECT_EQ(make_patch_model(double_sided(scene), {.patch_count = 400}).buried_side_count, 0U);
+}
+
+TEST(PatchModel, ARoomSeenFromItsBacksIsNotSolid) {
+  // A lamp may hang in there.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, false);
+  test::add_box(scene, {1, 1, 1}, {2, 2, 2}, false);
+  EXPECT_EQ(make_patch_model(scene, {.patch_count = 100}).buried_side_count, 0U);
+}
+
+TEST(PatchModel, ACellarUnderTheSkyIsNotBuried) {
+  // Of the box all but the top is below a one-sided ground, whose back it sees, and the sky.
+  Scene scene = test::empty_scene();
+  const std::vector<glm::dvec3> ground = {{-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
+  test::add_polygon(scene, ground);
+  test::add_box(scene, {-0.05, -0.1, -0.05}, {0.05, 0.05, 0.05}, false);
+  EXPECT_EQ(make_patch_model(scene, {.patch_count = 100}).buried_side_count, 0U);
+}
+
 TEST(PatchModel, DropsSliversBelowThePrecisionOfRays) {
   Scene scene = test::empty_scene();
   test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);

@@ -90,7 +90,7 @@ inline void add_ball(Scene& scene, int longitudes, int latitudes, bool inwards,
 }
 
 inline RayTracer make_tracer(const PatchModel& model) {
-  return {model.mesh.position, std::span(model.mesh.triangle).first(model.mesh.surface_count())};
+  return make_surface_tracer(model.mesh);
 }
 
 /// The material of a patch's triangles.

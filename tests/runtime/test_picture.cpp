@@ -181,6 +181,66 @@ TEST(Picture, CameraSeesThroughTheBackOfOneSidedSurfacesOnly) {
   EXPECT_NEAR(render(scene.data(), {}, settings).pixel[4][0], 5, 1e-5F);
 }
 
+// A dark floor that shines with 1 and above it a ceiling with 5, which faces up; the camera looks
+// down on both.
+class PaneOverFloor : public ::testing::Test {
+ protected:
+  PaneOverFloor() {
+    scene_.add_rectangle(floor_corners(1), scene_.add_material({0, 0, 0}, {1, 1, 1}));
+    pane_ = scene_.add_material({0, 0, 0}, {5, 5, 5});
+    scene_.add_rectangle({{{-1, 1, 1}, {1, 1, 1}, {1, 1, -1}, {-1, 1, -1}}}, pane_);
+    settings_ = close_up({0, 0, 0}, Show::kRadiosity);
+    settings_.camera = look_at({0.1F, 3, 0.2F}, {0.1F, 0, 0.2F}, 0.02F);
+    settings_.exposure = -4;
+  }
+
+  void let_through(AlphaMode mode, float alpha) {
+    Material& material = scene_.data().materials[pane_];
+    material.alpha_mode = mode;
+    material.base_alpha = alpha;
+    scene_.data().mesh.opacity = {{kNone, kNone, 0, 0}, {0, 1}, {128}};
+  }
+
+  float seen() {
+    double sum = 0;
+    for (const Float3& pixel : render(scene_.data(), {}, settings_).pixel) sum += pixel[0];
+    return static_cast<float>(sum / 9);
+  }
+
+  SceneBuilder scene_;
+  std::uint32_t pane_ = 0;
+  PictureSettings settings_;
+};
+
+TEST_F(PaneOverFloor, IsSeenThroughHoles) {
+  EXPECT_NEAR(seen(), 5, 1e-4F);
+  let_through(AlphaMode::kMask, 0.7F);
+  EXPECT_NEAR(seen(), 5, 1e-4F);
+  let_through(AlphaMode::kMask, 0.3F);
+  EXPECT_NEAR(seen(), 1, 1e-4F) << "the texture's alpha decides, not the map's half";
+}
+
+TEST_F(PaneOverFloor, BlendsWithWhatIsBehind) {
+  let_through(AlphaMode::kBlend, 0.25F);
+  EXPECT_NEAR(seen(), 0.25F * 5 + 0.75F, 1e-4F);
+}
+
+TEST_F(PaneOverFloor, CastsAShadowAsDarkAsItsMap) {
+  SceneBuilder scene;
+  scene.add_rectangle(floor_corners(1), scene.add_material({1, 1, 1}));
+  const std::uint32_t glass = scene.add_material({1, 1, 1});
+  scene.add_rectangle({{{-1, 1, 1}, {1, 1, 1}, {1, 1, -1}, {-1, 1, -1}}}, glass);
+  scene.data().materials[glass].transmission = 0.75F;
+  scene.data().mesh.opacity = {{kNone, kNone, 0, 0}, {0, 1}, {64}};
+  Light lamp;
+  lamp.position = {0, 2, 0};
+  lamp.intensity = 100;
+  const std::vector<Light> lights{lamp};
+  const Picture picture =
+      render(scene.data(), {.lights = lights}, close_up({0, 0, 0}, Show::kDirect));
+  EXPECT_NEAR(picture.pixel[4][0], 25 * (1 - 64 / 255.0F) / kPi, 0.01F);
+}
+
 TEST(Picture, SecondSideIsShadedByItsOwnPatch) {
   SceneBuilder scene;
   scene.add_rectangle(floor_corners(1), scene.add_material({1, 1, 1}));

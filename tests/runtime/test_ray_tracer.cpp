@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/glm.hpp>
 #include <limits>
@@ -72,6 +74,34 @@ Mesh random_triangles(RandomNumbers& random, int count, float scale) {
   return mesh;
 }
 
+bool is_near_micro_edge(int level, double u, double v) {
+  const double scale = 1 << level;
+  for (const double x : {u, v, 1 - u - v}) {
+    if (std::abs(x * scale - std::round(x * scale)) < 1e-3 * scale) return true;
+  }
+  return false;
+}
+
+// A map for every other triangle, of levels 0 to 3, with values from `values`.
+OpacityMaps random_maps(RandomNumbers& random, std::size_t triangle_count,
+                        const std::vector<std::uint8_t>& values) {
+  OpacityMaps maps;
+  maps.begin = {0};
+  for (std::size_t t = 0; t < triangle_count; ++t) {
+    if (t % 2 == 1) {
+      maps.triangle_map.push_back(kNone);
+      continue;
+    }
+    maps.triangle_map.push_back(static_cast<std::uint32_t>(maps.map_count()));
+    for (int k = 0; k < 1 << (t % 8); ++k) {
+      const float place = random.uniform(0, static_cast<float>(values.size()));
+      maps.opacity.push_back(values[std::min(values.size() - 1, static_cast<std::size_t>(place))]);
+    }
+    maps.begin.push_back(static_cast<std::uint32_t>(maps.opacity.size()));
+  }
+  return maps;
+}
+
 struct ExactHit {
   double t = std::numeric_limits<double>::infinity();
   double u = 0, v = 0;
@@ -80,8 +110,9 @@ struct ExactHit {
   bool near_edge = false;  // float and double may disagree about this one
 };
 
-// Moeller and Trumbore's test in double precision over all triangles.
-ExactHit brute_force(const Mesh& mesh, const Ray& ray) {
+// Moeller and Trumbore's test in double precision over all triangles; holes are let through.
+ExactHit brute_force(const Mesh& mesh, const Ray& ray, const OpacityMaps& opacity = {},
+                     double* transmitted = nullptr) {
   constexpr double kEdge = 1e-4;
   ExactHit nearest;
   bool near_edge = false;
@@ -100,7 +131,17 @@ ExactHit brute_force(const Mesh& mesh, const Ray& ray) {
     const double edge = std::min({u, v, 1 - u - v});
     if (t < -kEdge || t > ray.t_far || edge < -kEdge) continue;
     near_edge |= edge < kEdge || std::abs(t) < kEdge;
-    if (edge < 0 || t < 0 || t >= nearest.t) continue;
+    if (edge < 0 || t < 0) continue;
+    const auto map = opacity.of_triangle(static_cast<std::uint32_t>(k));
+    if (!map.empty()) {
+      const int level = opacity_map_level(map.size());
+      near_edge |= is_near_micro_edge(level, u, v);
+      const std::uint8_t here =
+          map[micro_triangle_at(level, static_cast<float>(u), static_cast<float>(v))];
+      if (transmitted != nullptr) *transmitted *= 1 - here / 255.0;
+      if (here == 0) continue;
+    }
+    if (t >= nearest.t) continue;
     nearest = {t, u, v, static_cast<std::uint32_t>(k), determinant > 0, false};
   }
   nearest.near_edge = near_edge;
@@ -140,6 +181,109 @@ TEST(RayTracer, AgreesWithBruteForce) {
   EXPECT_GT(compared_count - hit_count, 2000);
   EXPECT_GT(front_count, hit_count / 4);
   EXPECT_GT(hit_count - front_count, hit_count / 4);
+}
+
+TEST(RayTracer, GoesThroughTheHolesOfMaps) {
+  RandomNumbers random(20261120);
+  const Mesh mesh = random_triangles(random, 200, 1);
+  const OpacityMaps maps = random_maps(random, mesh.triangle.size(), {0, 0, 255});
+  const RayTracer tracer(mesh.position, mesh.triangle, maps);
+  std::vector<Ray> rays;
+  for (int k = 0; k < 10000; ++k) {
+    const Float3 origin = random.in_box(1.5F);
+    rays.push_back(make_ray(origin, random.in_box(2)));
+  }
+  std::vector<Hit> hits(rays.size()), solid_hits(rays.size()), all;
+  tracer.intersect(rays, hits);
+  tracer.intersect(rays, solid_hits, Passage::kSolid);
+  std::vector<Ray> shadow = rays;
+  tracer.occluded(shadow);
+  int compared_count = 0, porous_count = 0, passed_count = 0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    const ExactHit exact = brute_force(mesh, rays[k], maps);
+    if (exact.near_edge) continue;
+    ++compared_count;
+    ASSERT_EQ(hits[k].triangle, exact.triangle) << "ray " << k;
+    ASSERT_EQ(is_occluded(shadow[k]), exact.triangle != kNone) << "ray " << k;
+    ASSERT_EQ(solid_hits[k].triangle, brute_force(mesh, rays[k]).triangle) << "ray " << k;
+    all.clear();
+    tracer.intersect_all(rays[k], all);
+    ASSERT_EQ(all.empty(), exact.triangle == kNone);
+    porous_count += exact.triangle != kNone && exact.triangle % 2 == 0;
+    passed_count += solid_hits[k].triangle != exact.triangle;
+  }
+  EXPECT_GT(compared_count, 8000);
+  EXPECT_GT(porous_count, 300);
+  EXPECT_GT(passed_count, 500);
+}
+
+TEST(RayTracer, TransmittanceIsTheProductOfWhatIsCrossed) {
+  RandomNumbers random(20261121);
+  const Mesh mesh = random_triangles(random, 300, 1);
+  OpacityMaps maps = random_maps(random, mesh.triangle.size(), {20, 60, 100, 200});
+  for (std::uint32_t t = 1; t < 280; t += 2) maps.triangle_map[t] = 0;  // few opaque ones are left
+  const RayTracer tracer(mesh.position, mesh.triangle, maps);
+  std::vector<Ray> rays;
+  for (int k = 0; k < 4000; ++k) rays.push_back(make_ray(random.in_box(1.5F), random.in_box(2)));
+  std::vector<float> part(rays.size()), mean_part(rays.size());
+  std::vector<Ray> traced = rays;
+  tracer.transmittance(traced, PassageDetail::kMicroTriangle, part);
+  traced = rays;
+  tracer.transmittance(traced, PassageDetail::kTriangle, mean_part);
+  OpacityMaps means = maps;
+  for (std::size_t k = 0; k < maps.map_count(); ++k) {
+    const auto mean = mean_opacity(maps.map(static_cast<std::uint32_t>(k)));
+    for (std::uint32_t m = maps.begin[k]; m < maps.begin[k + 1]; ++m) {
+      means.opacity[m] = static_cast<std::uint8_t>(std::lround(255 * mean));
+    }
+  }
+  Mesh opaque{mesh.position, {}};
+  for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
+    if (maps.triangle_map[t] == kNone) opaque.triangle.push_back(mesh.triangle[t]);
+  }
+  const auto expected = [&](const Ray& ray, const OpacityMaps& opacity, bool& near_edge) {
+    double transmitted = 1;
+    near_edge = brute_force(mesh, ray, opacity, &transmitted).near_edge;
+    return brute_force(opaque, ray).triangle == kNone ? transmitted : 0.0;
+  };
+  int compared_count = 0, between_count = 0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    bool near_edge = false;
+    const double exact = expected(rays[k], maps, near_edge);
+    if (near_edge) continue;
+    ASSERT_NEAR(part[k], exact, 1e-5) << "ray " << k;
+    ASSERT_NEAR(mean_part[k], expected(rays[k], means, near_edge), 0.03) << "ray " << k;
+    ++compared_count;
+    between_count += exact > 0 && exact < 1;
+  }
+  EXPECT_GT(compared_count, 2500);
+  EXPECT_GT(between_count, 1000);
+}
+
+TEST(RayTracer, WhatIsOpaqueInPartStopsThatPartOfTheRays) {
+  RandomNumbers random(20261122);
+  // Two panes, one behind the other: what they stop must not go together.
+  const std::vector<Float3> position{{-9, -9, 0},  {9, -9, 0},  {0, 9, 0},
+                                     {-9, -9, -1}, {9, -9, -1}, {0, 9, -1}};
+  const std::vector<Uint3> triangle{{0, 1, 2}, {3, 4, 5}};
+  const RayTracer tracer(position, triangle, {{0, 0}, {0, 1}, {102}});  // 0.4 each
+  std::vector<Ray> rays;
+  for (int k = 0; k < 20000; ++k)
+    rays.push_back(make_ray({0, 0, 1}, {random.uniform(-1, 1), random.uniform(-1, 1), -1}));
+  std::vector<Hit> hits(rays.size()), again(rays.size());
+  tracer.intersect(rays, hits);
+  tracer.intersect(rays, again);
+  std::vector<Ray> shadow = rays;
+  tracer.occluded(shadow);
+  std::array<int, 2> stopped{};
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    EXPECT_EQ(hits[k].triangle, again[k].triangle);
+    EXPECT_EQ(hits[k].triangle != kNone, is_occluded(shadow[k]));
+    if (hits[k].triangle != kNone) ++stopped[hits[k].triangle];
+  }
+  // Within four deviations.
+  EXPECT_NEAR(stopped[0], 8000, 280);
+  EXPECT_NEAR(stopped[1], 4800, 250);
 }
 
 TEST(RayTracer, FrontIsTheCounterClockwiseSide) {

@@ -53,6 +53,7 @@ DisplayMesh sample_mesh() {
       .triangle_patch = {0, 1, kNone},
       .triangle_material = {1, 0, 0},
       .back_triangle = {kNone, 2},
+      .opacity = {{0, kNone, 1}, {0, 4, 5}, {0, 255, 128, 1, 25}},
       .weight_begin = {0, 2, 2, 3, 4},
       .weight_patch = {0, 2, 1, 2},
       .weight = {0.25F, 0.75F, 1, 1},
@@ -181,6 +182,9 @@ void expect_equal(const DisplayMesh& a, const DisplayMesh& b) {
   EXPECT_EQ(a.triangle_patch, b.triangle_patch);
   EXPECT_EQ(a.triangle_material, b.triangle_material);
   EXPECT_EQ(a.back_triangle, b.back_triangle);
+  EXPECT_EQ(a.opacity.triangle_map, b.opacity.triangle_map);
+  EXPECT_EQ(a.opacity.begin, b.opacity.begin);
+  EXPECT_EQ(a.opacity.opacity, b.opacity.opacity);
   EXPECT_EQ(a.weight_begin, b.weight_begin);
   EXPECT_EQ(a.weight_patch, b.weight_patch);
   EXPECT_EQ(a.weight, b.weight);
@@ -471,6 +475,19 @@ TEST(TransferFile, RefusesAnImpossibleMesh) {
       {"mesh.back_triangle: entry 0 is 1, not after the surface",
        mesh([](auto& m) { m.back_triangle[0] = 1; })},
       {"mesh.back_triangle", mesh([](auto& m) { m.back_triangle.resize(4, kNone); })},
+      {"mesh.opacity_map: 2 rows, not 3", mesh([](auto& m) { m.opacity.triangle_map.pop_back(); })},
+      {"mesh.opacity_map: entry 0 is 2, not below 2",
+       mesh([](auto& m) { m.opacity.triangle_map[0] = 2; })},
+      {"mesh.opacity_begin: 0 rows", mesh([](auto& m) { m.opacity.begin.clear(); })},
+      {"mesh.opacity_begin: does not begin", mesh([](auto& m) { m.opacity.begin[0] = 1; })},
+      {"mesh.opacity_begin: descends", mesh([](auto& m) { m.opacity.begin[1] = 6; })},
+      {"mesh.opacity_begin: does not end", mesh([](auto& m) { m.opacity.opacity.pop_back(); })},
+      {"mesh.opacity_begin: entry 0 is of a map of 3, not a power of 4",
+       mesh([](auto& m) { m.opacity.begin[1] = 3; })},
+      {"mesh.opacity_begin: entry 1 is of a map of 0", mesh([](auto& m) {
+         m.opacity.begin = {0, 4, 4};
+         m.opacity.opacity.pop_back();
+       })},
       {"mesh.weight_begin: does not begin", mesh([](auto& m) { m.weight_begin[0] = 1; })},
       {"mesh.weight_begin: descends at entry 2", mesh([](auto& m) { m.weight_begin[1] = 3; })},
       {"mesh.weight_begin: does not end", mesh([](auto& m) { m.weight_begin[4] = 5; })},

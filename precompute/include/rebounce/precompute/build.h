@@ -59,7 +59,8 @@ struct BuildReport {
   std::size_t display_triangle_count = 0;
   std::size_t patch_count = 0;
   std::size_t sliver_count = 0;
-  std::size_t unlit_side_count = 0, covered_side_count = 0;
+  std::size_t unlit_side_count = 0, covered_side_count = 0, opening_side_count = 0,
+              buried_side_count = 0;
   float patch_size_min = 0, patch_size_median = 0, patch_size_max = 0;  ///< sqrt(area), metres
   std::vector<std::string> warnings;
   std::vector<std::pair<std::string, double>> seconds;  ///< by phase, in order

@@ -19,7 +19,7 @@ struct Elements {
   std::vector<Float3> centroid;         ///< metres
   std::vector<Float3> low, high;        ///< box around it, metres
   std::vector<Float3> normal;           ///< unit
-  std::vector<float> area;              ///< m², > 0
+  std::vector<float> area;              ///< m² of what stops light, > 0
   std::vector<Float3> reflectance;      ///< [0, 1]
   std::vector<std::uint8_t> emits;      ///< 1 if it does
 

@@ -13,13 +13,16 @@ namespace rebounce {
 /// A flat triangle as the kernel wants it; the front side is where it is counter-clockwise.
 struct FlatTriangle {
   std::array<glm::dvec3, 3> vertex;
-  glm::dvec3 normal{0};    ///< unit
-  glm::dvec3 centroid{0};  ///< metres
-  double area = 0;         ///< m²
-  double radius = 0;       ///< of the sphere around the centroid, metres
+  glm::dvec3 normal{0};      ///< unit
+  glm::dvec3 centroid{0};    ///< metres
+  double area = 0;           ///< m²
+  double radius = 0;         ///< of the sphere around the centroid, metres
+  double stopping_part = 1;  ///< of the area; the rest lets light through. The kernels ignore it
 
   FlatTriangle() = default;
   FlatTriangle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
+
+  double stopping_area() const { return area * stopping_part; }
 };
 
 /// True if some point on the front of each triangle is before the front of the other.

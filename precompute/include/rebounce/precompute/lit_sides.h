@@ -13,6 +13,8 @@ enum class SideKind : std::uint8_t {
   kLit,      ///< it has a patch
   kUnlit,    ///< it sees nothing that lights it, or is the back of a one-sided triangle
   kCovered,  ///< another triangle that faces the same way lies in the same place, and has the patch
+  kBuried,   ///< it lies inside of something solid: all around are backs of one-sided surfaces
+  kOpening,  ///< light passes through it as if nothing were there
 };
 
 /// Front and back of one triangle.
@@ -31,10 +33,14 @@ struct TriangleSides {
 ///   nothing. One side is kept for that matter.
 /// - A side that lies flat on the front of another surface (the bottom of a box on a floor) sees
 ///   nothing either, and rays from it would begin beyond that surface.
+/// - A side that sees nothing but backs of one-sided surfaces, all of them near (a sixteenth of the
+///   scene's diagonal), is inside of something: a leg of a table in the wall. Backs absorb what
+///   meets them, so leaving it out changes nothing but for lamps that hang in there. Surfaces that
+///   are double-sided have no inside, and nothing is buried in them.
 /// - Of copies that lie in one another (z-fighting) only one can be seen, and shadow rays between
 ///   points cannot tell which: a side that is covered all over by others gives way to them.
 ///
-/// `tracer` holds all triangles of the scene. Deterministic.
+/// kOpening is not found here. `tracer` holds all triangles of the scene. Deterministic.
 std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer);
 
 /// A side that lies where a point of a surface is.

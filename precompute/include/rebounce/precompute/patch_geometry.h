@@ -34,7 +34,7 @@ struct PatchBounds {
 struct PatchPart {
   glm::dvec3 centroid{0};
   glm::dvec3 vector_area{0};  ///< m²: the sum of area x normal
-  double area = 0;            ///< m²
+  double area = 0;            ///< m², of what stops light
   double radius = 0;          ///< of the sphere around the centroid, metres
 };
 
@@ -51,7 +51,7 @@ class PatchGeometry {
   PatchGeometry(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed);
 
   std::size_t patch_count() const { return bounds_.size(); }
-  double area(std::size_t patch) const { return area_[patch]; }
+  double area(std::size_t patch) const { return area_[patch]; }  ///< of what stops light
   std::vector<double> areas() const { return area_; }
   const PatchBounds& bounds(std::size_t patch) const { return bounds_[patch]; }
 

@@ -26,13 +26,15 @@ struct PatchModel {
   std::size_t sliver_count = 0;          ///< triangles thinner than rays are precise: dropped
   std::size_t unlit_side_count = 0;      ///< sides of display triangles that see nothing: no patch
   std::size_t covered_side_count = 0;  ///< sides that lie in another surface: no patch of their own
+  std::size_t opening_side_count = 0;  ///< sides that stop no light: no patch
+  std::size_t buried_side_count = 0;   ///< sides inside of something solid: no patch
   std::vector<std::string> warnings;
 };
 
 /// Subdivides the scene's large triangles (subdivision.h) and merges small ones: every lit side
-/// (lit_sides.h) is an element of one patch (element_clusters.h). Reflectance and emission are
-/// means over the patch, textures integrated. Double-sided triangles get a second display triangle.
-/// The reconstruction weights are left to reconstruction_weights.h.
+/// (lit_sides.h) is an element of one patch (element_clusters.h). Area, reflectance and emission are
+/// of what stops light (opacity_maps.h), textures integrated. Double-sided triangles get a second
+/// display triangle. The reconstruction weights are left to reconstruction_weights.h.
 PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);
 
 }  // namespace rebounce

@@ -12,14 +12,17 @@ float srgb_to_linear(std::uint8_t value);
 Float3 sample_texture(const Texture& texture, const Image& image, Float2 texcoord);
 
 /// Base colour (linear: factor x texture x vertex colour) averaged over the triangle with these
-/// texture coordinates and vertex colours: stratified samples, more where more texels are covered.
+/// texture coordinates and vertex colours: stratified samples, more where more texels are covered,
+/// weighted by opacity_at().
 Float3 mean_base_color(const Scene& scene, const Material& material,
                        const std::array<Float2, 3>& texcoord,
                        const std::array<Float3, 3>& vertex_color);
 
-/// Emitted luminance in cd/m² averaged over the triangle, likewise.
+/// Emitted luminance in cd/m² averaged over the triangle, likewise; `texcoord` are those of the
+/// emissive texture.
 Float3 mean_emitted_luminance(const Scene& scene, const Material& material,
-                              const std::array<Float2, 3>& texcoord);
+                              const std::array<Float2, 3>& texcoord,
+                              const std::array<Float2, 3>& base_color_texcoord);
 
 /// How much of the light that meets the surface where its base colour's texture coordinate is
 /// `texcoord` does not pass through, in [0, 1]: 1 for opaque materials; 0 or 1 by the cutoff for

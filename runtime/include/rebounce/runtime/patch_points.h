@@ -34,9 +34,10 @@ struct PatchPoint {
   Float3 normal{0, 0, 0};    ///< unit, of the flat triangle
 };
 
-/// Writes points spread evenly by area over `triangles` of `mesh`: the R2 sequence, shifted by
-/// `shift`, whose first coordinate also chooses the triangle. Every prefix is well spread. Where
-/// the triangles have no area the points have no normal.
+/// Writes points spread evenly by area over what of `triangles` of `mesh` stops light: the R2
+/// sequence, shifted by `shift`, whose first coordinate also chooses the triangle, or the
+/// micro-triangle of its opacity map, whose order keeps neighbours together. Every prefix is well
+/// spread. Where the triangles stop nothing the points have no normal.
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                    const glm::dvec2& shift, std::span<PatchPoint> points);
 

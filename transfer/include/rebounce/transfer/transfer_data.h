@@ -11,6 +11,7 @@
 
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/light_probes.h"
+#include "rebounce/transfer/opacity_maps.h"
 #include "rebounce/transfer/scene_description.h"
 #include "rebounce/transfer/transfer_operator.h"
 #include "rebounce/transfer/types.h"
@@ -21,7 +22,7 @@ class HierarchicalOperator;
 
 /// Per-patch quantities, each of n entries.
 struct PatchTable {
-  std::vector<float> area;               ///< m², > 0
+  std::vector<float> area;               ///< m², > 0; of what stops light
   std::vector<Float3> centroid;          ///< metres
   std::vector<Float3> normal;            ///< unit
   std::vector<Float3> reflectance;       ///< 0 <= rho < 1
@@ -45,6 +46,7 @@ struct DisplayMesh {
   std::vector<std::uint32_t> triangle_patch;  ///< [t] patch, or kNone for a side that sees nothing
   std::vector<std::uint32_t> triangle_material;  ///< [t]
   std::vector<std::uint32_t> back_triangle;  ///< [surface_count] second side, or kNone if one-sided
+  OpacityMaps opacity;                       ///< what light passes through; of all triangles
 
   /// Reconstruction: the value at vertex v is the sum of weight x patch value over
   /// [weight_begin[v], weight_begin[v + 1]). The sum of weight x (1 - absorbed) is 1,

@@ -84,7 +84,4 @@ float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
 /// F M_e [n] in lx: what arrives straight from the scene's own emitters, for PictureLight.
 std::vector<Float3> irradiance_from_emitters(const TransferData& data);
 
-/// A ray tracer over the surface of `mesh`, as the renderer needs it.
-RayTracer make_surface_tracer(const DisplayMesh& mesh);
-
 }  // namespace rebounce
