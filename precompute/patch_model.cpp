@@ -4,6 +4,7 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "contact_cuts.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
@@ -17,6 +18,7 @@ class PatchModelBuilder {
   PatchModelBuilder(Scene scene, const SubdivisionSettings& settings) : scene_(std::move(scene)) {
     drop_slivers();
     model_.scene_triangle_count = scene_.triangle.size();
+    cut_at_contacts(scene_, settings);
     const std::vector<TriangleSides> sides =
         find_lit_sides(scene_, RayTracer(scene_.position, scene_.triangle));
     std::vector<std::uint8_t> patches_per_triangle;
