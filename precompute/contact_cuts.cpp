@@ -9,7 +9,6 @@
 #include <array>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <optional>
 #include <span>
 #include <unordered_map>
 #include <utility>
@@ -24,9 +23,12 @@ namespace {
 
 // All in units of the patch size, the root of a patch's area.
 constexpr double kShortestContact = 0.5;
-constexpr double kLongestEdge = 2.9;      // what subdivision leaves of large polygons at most
-constexpr double kTolerance = 1.0 / 256;  // far below what a patch resolves, far above rounding
-constexpr double kGap = 1.0 / 8;          // light that gets through below does not get far
+constexpr double kTolerance = 1.0 / 1024;  // far below what a patch resolves
+constexpr double kGap = 1.0 / 8;           // light that gets through below does not get far
+
+// The tolerance is never less than this part of the largest coordinate, which is some tens of its
+// rounding errors: a vertex put on a line must count as lying there.
+constexpr double kRounding = 1.0 / (1 << 18);
 
 // A cut that passes an end of an edge by less than this part of the edge moves that end.
 constexpr double kSnap = 0.2;
@@ -34,24 +36,23 @@ constexpr double kSnap = 0.2;
 // Such a move may leave of a triangle's area this part at least.
 constexpr double kLeastArea = 0.4;
 
-double scene_area(const Scene& scene) {
-  double area = 0;
-  for (const auto& [a, b, c] : scene.triangle) {
-    const glm::dvec3 p = to_dvec3(scene.position[a]);
-    area += 0.5 * glm::length(
-                      glm::cross(to_dvec3(scene.position[b]) - p, to_dvec3(scene.position[c]) - p));
+double largest_coordinate(const Scene& scene) {
+  double largest = 0;
+  for (const auto& [x, y, z] : scene.position) {
+    largest = std::max<double>({largest, std::abs(x), std::abs(y), std::abs(z)});
   }
-  return area;
+  return largest;
 }
 
 class ContactCuts {
  public:
-  ContactCuts(Scene& scene, std::vector<Contact> contacts, double patch_size)
+  ContactCuts(Scene& scene, std::vector<Contact> contacts, double patch_size, double tolerance)
       : scene_(scene),
         mesh_(scene),
         contacts_(std::move(contacts)),
         is_free_(scene.position.size(), false),
-        patch_size_(patch_size) {
+        patch_size_(patch_size),
+        tolerance_(tolerance) {
     for (const Contact& contact : contacts_) pieces_[contact.triangle] = {contact.triangle};
     std::ranges::stable_sort(contacts_, [](const Contact& a, const Contact& b) {
       return a.line.length() > b.line.length();
@@ -146,8 +147,7 @@ class ContactCuts {
   void hold_vertices_on(const Contact& contact) {
     for (const std::uint32_t t : pieces_of(contact)) {
       for (const std::uint32_t v : scene_.triangle[t]) {
-        if (std::abs(contact.line.across(position(v))) <= kTolerance * patch_size_)
-          is_free_[v] = false;
+        if (std::abs(contact.line.across(position(v))) <= tolerance_) is_free_[v] = false;
       }
     }
   }
@@ -205,7 +205,7 @@ class ContactCuts {
     for (int k = 0; k < 3; ++k) {
       const std::uint32_t v = scene_.triangle[t][k];
       across[k] = line.across(position(v));
-      if (!is_free_[v] && std::abs(across[k]) <= kTolerance * patch_size_) across[k] = 0;
+      if (!is_free_[v] && std::abs(across[k]) <= tolerance_) across[k] = 0;
     }
     return across;
   }
@@ -213,7 +213,7 @@ class ContactCuts {
   bool is_crossed(std::uint32_t t, const ContactLine& line) const {
     const Uint3& v = scene_.triangle[t];
     return line.crosses({position(v[0]), position(v[1]), position(v[2])}, distances(t, line),
-                        kTolerance * patch_size_);
+                        tolerance_);
   }
 
   Scene& scene_;
@@ -221,24 +221,27 @@ class ContactCuts {
   std::vector<Contact> contacts_;  ///< longest first
   /// What became of each triangle with contacts.
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> pieces_;
-  std::vector<bool> is_free_;  ///< vertices inside of a triangle that lie on no contact yet
-  double patch_size_;          ///< metres
+  std::vector<bool> is_free_;      ///< vertices inside of a triangle that lie on no contact yet
+  double patch_size_, tolerance_;  ///< metres
 };
 
 }  // namespace
 
 void cut_at_contacts(Scene& scene, const SubdivisionSettings& settings) {
-  const double area = scene_area(scene);
-  double patch_size = settings.patch_size / kLongestEdge;
-  if (settings.patch_count > 0) {
-    patch_size = std::max(patch_size, std::sqrt(area / static_cast<double>(settings.patch_count)));
-  }
+  const std::vector<std::uint8_t> one_each(scene.triangle.size(), 1);
+  const double scene_size = mean_patch_size(scene, one_each, 1);
+  const double mean = scene_size / std::sqrt(static_cast<double>(settings.patch_count));
+  const double patch_size =
+      std::max(settings.patch_size / kLongestEdge, settings.patch_count > 0 ? mean : 0.0);
   if (patch_size == 0) return;
-  std::vector<Contact> contacts = find_contacts(
-      scene, {kShortestContact * patch_size, kTolerance * patch_size, kGap * patch_size});
+  const double tolerance = std::max(kTolerance * patch_size, kRounding * largest_coordinate(scene));
+  std::vector<Contact> contacts =
+      find_contacts(scene, {.shortest = kShortestContact * patch_size,
+                            .tolerance = tolerance,
+                            .gap = std::max(kGap * patch_size, tolerance)});
   if (contacts.empty()) return;
-  const double wanted_patches = area / (patch_size * patch_size);
-  ContactCuts(scene, std::move(contacts), patch_size)
+  const double wanted_patches = std::pow(scene_size / patch_size, 2);
+  ContactCuts(scene, std::move(contacts), patch_size, tolerance)
       .run(static_cast<std::size_t>(wanted_patches / 2));
 }
 

@@ -13,6 +13,9 @@
 namespace rebounce {
 namespace {
 
+// Lines this many tolerances apart are one: two would leave a strip of slivers between them.
+constexpr double kSameLine = 8;
+
 using Corners = std::array<glm::dvec3, 3>;
 using Heights = std::array<double, 3>;      // of the corners of a triangle above a plane, metres
 using Segment = std::array<glm::dvec3, 2>;  // its ends
@@ -172,7 +175,7 @@ class ContactFinder {
     const ContactLine& shorter = a.length() > b.length() ? b : a;
     const glm::dvec3 begin = shorter.begin(), end = shorter.end();
     const double farthest = std::max(std::abs(longer.across(begin)), std::abs(longer.across(end)));
-    if (farthest > settings_.tolerance) return {};
+    if (farthest > kSameLine * settings_.tolerance) return {};
     const auto [low, high] = std::minmax({longer.along(begin), longer.along(end)});
     if (high < -settings_.tolerance || low > longer.length() + settings_.tolerance) return {};
     const glm::dvec3 direction = (longer.end() - longer.begin()) / longer.length();

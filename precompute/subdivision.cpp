@@ -1,10 +1,14 @@
 #include "rebounce/precompute/subdivision.h"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
+#include <glm/glm.hpp>
 #include <queue>
 #include <unordered_map>
 
 #include "conforming_mesh.h"
+#include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
 namespace {
@@ -34,9 +38,12 @@ class Subdivision {
   }
 
   void run(const SubdivisionSettings& settings) {
+    const double longest =
+        kLongestEdge * mean_patch_size(mesh_.scene(), patches_per_triangle_, settings.patch_count);
     while (!queue_.empty()) {
       const QueuedEdge edge = queue_.top();
-      const bool enough = settings.patch_count > 0 && patch_count_ >= settings.patch_count;
+      const bool enough = settings.patch_count > 0 && patch_count_ >= settings.patch_count &&
+                          edge.length_squared <= longest * longest;
       const bool fine = settings.patch_size > 0 &&
                         edge.length_squared <= settings.patch_size * settings.patch_size;
       if (enough || fine) break;
@@ -84,6 +91,19 @@ WeldedPositions weld_positions(std::span<const Float3> position) {
   }
   welded.count = static_cast<std::uint32_t>(id_of.size());
   return welded;
+}
+
+double mean_patch_size(const Scene& scene, std::span<const std::uint8_t> patches_per_triangle,
+                       std::size_t patch_count) {
+  double area = 0;
+  for (std::size_t t = 0; t < scene.triangle.size(); ++t) {
+    const auto [a, b, c] = scene.triangle[t];
+    const glm::dvec3 p = to_dvec3(scene.position[a]);
+    area +=
+        0.5 * patches_per_triangle[t] *
+        glm::length(glm::cross(to_dvec3(scene.position[b]) - p, to_dvec3(scene.position[c]) - p));
+  }
+  return std::sqrt(area / static_cast<double>(std::max<std::size_t>(patch_count, 1)));
 }
 
 std::vector<std::uint32_t> subdivide(Scene& scene,

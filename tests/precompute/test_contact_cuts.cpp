@@ -113,7 +113,7 @@ TEST(ContactCuts, NoPatchLiesOnTwoSidesOfAWall) {
   std::mt19937 engine(seed);
   std::uniform_real_distribution<double> place(-3.5, 3.5), sink(-0.5, 0.5);
   int straddled_before = 0, walls = 0;
-  for (int round = 0; round < 60; ++round) {
+  for (int round = 0; round < 45; ++round) {
     Scene scene = test::empty_scene();
     add_floor(scene, 4);
     std::vector<std::array<glm::dvec3, 2>> feet;
@@ -142,8 +142,43 @@ TEST(ContactCuts, NoPatchLiesOnTwoSidesOfAWall) {
     }
     ASSERT_GT(smallest_height(scene), 1e-4) << "round " << round;
   }
-  EXPECT_GT(walls, 100);
+  EXPECT_GT(walls, 70);
   EXPECT_GT(straddled_before, walls / 2) << "there was something to cut";
+}
+
+TEST(ContactCuts, NoMergedPatchLiesOnTwoSidesOfAWall) {
+  const unsigned seed = 23;
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937 engine(seed);
+  std::uniform_real_distribution<double> place(-1.4, 1.8);
+  std::size_t merged = 0;
+  for (int round = 0; round < 12; ++round) {
+    Scene scene = test::empty_scene();
+    test::add_ball(scene, 24, 12, false);
+    for (Float3& p : scene.position) p = {0.2F * p[0], 0.2F * p[1] + 1.5F, 0.2F * p[2] - 1.7F};
+    test::add_box(scene, {-2, 0, -2}, {2, 2, 2}, true);
+    // From wall to wall, so that every floor patch is on one side.
+    const glm::dvec3 a(-2, 0, place(engine)), b(2, 0, place(engine));
+    add_wall(scene, a, b, 2);
+    make_all_double_sided(scene);
+    const PatchModel model = make_patch_model(scene, {.patch_count = 300});
+    merged += model.element_count - model.patches.size();
+    const glm::dvec3 across = glm::normalize(glm::dvec3(a.z - b.z, 0, b.x - a.x));
+    std::vector<double> left(model.patches.size(), 0.0), right = left;
+    const DisplayMesh& mesh = model.mesh;
+    for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
+      if (mesh.triangle_patch[t] == kNone) continue;
+      for (const std::uint32_t v : mesh.triangle[t]) {
+        const double d = glm::dot(to_dvec3(mesh.position[v]) - a, across);
+        left[mesh.triangle_patch[t]] = std::max(left[mesh.triangle_patch[t]], d);
+        right[mesh.triangle_patch[t]] = std::max(right[mesh.triangle_patch[t]], -d);
+      }
+    }
+    for (std::size_t i = 0; i < left.size(); ++i) {
+      EXPECT_LT(std::min(left[i], right[i]), 0.002) << "round " << round;
+    }
+  }
+  EXPECT_GT(merged, 50U);
 }
 
 TEST(ContactCuts, ClosedBoxesStayClosed) {
@@ -299,6 +334,16 @@ TEST(ContactCuts, LeaveAloneWhatNeedsNoCut) {
   EXPECT_EQ(count_after(legs), 12U + 8 * 12) << "legs of a chair";
 }
 
+TEST(ContactCuts, EndFarFromTheOriginAndBelowRounding) {
+  // A kilometre away, coordinates are rounded to some 0.1 mm, about what the patches measure.
+  Scene scene = test::empty_scene();
+  add_floor(scene, 0.01);
+  test::add_box(scene, {-0.004, 0, -0.003}, {0.005, 0.006, 0.004}, false);
+  for (Float3& p : scene.position) p[0] += 1000;
+  cut_at_contacts(scene, {.patch_count = 5000});
+  EXPECT_LT(scene.triangle.size(), 10000U);
+}
+
 TEST(ContactCuts, ManyContactsDoNotShredTheFloor) {
   Scene scene = test::empty_scene();
   add_floor(scene, 2);
@@ -363,7 +408,9 @@ TEST_P(TwoRooms, ExchangeNoLight) {
   EXPECT_GT(first, 100U);
   EXPECT_LT(first, model.patches.size() - 100);
   EXPECT_EQ(leak, 0);
-  EXPECT_LT(f.closure.row_sum_error_before, 1e-3);
+  // Between merged triangles that touch, what is exact for single ones is a quadrature.
+  const bool merged = model.element_count > model.patches.size();
+  EXPECT_LT(f.closure.row_sum_error_before, merged ? 2e-3 : 1e-3);
 }
 
 INSTANTIATE_TEST_SUITE_P(WallThickness, TwoRooms, ::testing::Values(0.0, 0.02, 0.15));
