@@ -6,6 +6,7 @@
 #include <numeric>
 #include <unordered_map>
 
+#include "contact_cuts.h"
 #include "rebounce/precompute/element_clusters.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/opacity_sampling.h"
@@ -22,6 +23,7 @@ class PatchModelBuilder {
       : scene_(std::move(scene)), settings_(settings) {
     drop_slivers();
     model_.scene_triangle_count = scene_.triangle.size();
+    cut_at_contacts(scene_, settings);
     const OpacityMaps opacity = find_opacity_maps(scene_);
     std::vector<TriangleSides> sides =
         find_lit_sides(scene_, RayTracer(scene_.position, scene_.triangle, opacity));

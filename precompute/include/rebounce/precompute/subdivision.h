@@ -16,6 +16,15 @@ struct SubdivisionSettings {
   float patch_size = 0;
 };
 
+/// A mesh of nothing but large triangles, bisected until there are enough, has no edge longer than
+/// this many mean patch sizes.
+inline constexpr double kLongestEdge = 2.9;
+
+/// The root of the mean area of `patch_count` patches (at least one), metres.
+/// `patches_per_triangle` as for subdivide().
+double mean_patch_size(const Scene& scene, std::span<const std::uint8_t> patches_per_triangle,
+                       std::size_t patch_count);
+
 /// Splits the scene's triangles until there are as many elements as patches are wanted and none is
 /// much larger than a mean patch (small triangles are merged afterwards: element_clusters.h), or
 /// until no edge is longer than patch_size. Returns for each triangle the index of the triangle it
