@@ -162,7 +162,8 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->add_option(
           "--precision", chosen->precision,
           "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q8 "
-          "for two thirds of those; by default f16 for a hierarchical operator, f32 for a "
+          "for two thirds of those where the tolerance is 1 % or more; by default f16 for a "
+          "hierarchical operator, f32 for a "
           "dense one")
       ->check(CLI::IsMember({"f16", "f32", "q8"}));
   command
