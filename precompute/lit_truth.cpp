@@ -1,0 +1,53 @@
+#include "lit_truth.h"
+
+#include <cmath>
+
+#include "rebounce/transfer/area_norm.h"
+
+namespace rebounce {
+namespace {
+
+std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
+  std::vector<float> workspace(transfer.workspace_size());
+  std::vector<Float3> result(light.size());
+  transfer.apply(light, result, workspace);
+  return result;
+}
+
+}  // namespace
+
+LitTruth::LitTruth(const DenseOperator& dense, std::span<const std::vector<Float3>> lights)
+    : area_(dense.storage().area) {
+  for (const std::vector<Float3>& light : lights) {
+    if (area_norm(light, area_) == 0) continue;
+    lights_.push_back(light);
+    truths_.push_back(product(dense, light));
+  }
+}
+
+std::vector<double> LitTruth::errors(const TransferOperator& transfer) const {
+  std::vector<double> errors;
+  errors.reserve(lights_.size());
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    errors.push_back(relative_difference(product(transfer, lights_[k]), truths_[k], area_));
+  }
+  return errors;
+}
+
+Eigen::MatrixXd LitTruth::normalised_lights(std::span<const std::uint32_t> patch,
+                                            std::size_t position_count) const {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(position_count),
+                                                 static_cast<Eigen::Index>(lights_.size()));
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    const double norm = area_norm(truths_[k], area_);
+    if (norm == 0) continue;
+    for (std::size_t i = 0; i < patch.size(); ++i) {
+      const Float3& m0 = lights_[k][patch[i]];
+      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          std::sqrt(area_[patch[i]]) * (m0[0] + m0[1] + m0[2]) / (kChannelCount * norm);
+    }
+  }
+  return result;
+}
+
+}  // namespace rebounce

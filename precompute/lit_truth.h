@@ -1,0 +1,34 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "rebounce/transfer/dense_operator.h"
+
+namespace rebounce {
+
+/// Lights, and what a dense operator, taken as exact, makes of them: what operators that are made
+/// from it are judged by.
+class LitTruth {
+ public:
+  /// `lights`: initial exitances [n] in lx. Those that reach no patch are left out.
+  LitTruth(const DenseOperator& dense, std::span<const std::vector<Float3>> lights);
+
+  std::size_t light_count() const { return lights_.size(); }
+
+  /// The relative area-weighted L2 error of `transfer` under each light.
+  std::vector<double> errors(const TransferOperator& transfer) const;
+
+  /// The lights in the coordinates of Yhat, A^1/2 M0 averaged over the channels, [positions][light
+  /// count], patch[k] at position k and zero beyond; each so strong that its indirect light has
+  /// norm 1.
+  Eigen::MatrixXd normalised_lights(std::span<const std::uint32_t> patch,
+                                    std::size_t position_count) const;
+
+ private:
+  const std::vector<float>& area_;
+  std::vector<std::vector<Float3>> lights_, truths_;
+};
+
+}  // namespace rebounce
