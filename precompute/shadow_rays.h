@@ -5,8 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "rebounce/precompute/form_factor_kernel.h"
-#include "rebounce/precompute/patch_model.h"
+#include "patch_geometry.h"
 #include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
@@ -21,19 +20,18 @@ struct FacingPatch {
 /// pair's exchange gets through. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
-  /// Sample points per patch, and with it the most rays that a pair can have; a power of two.
-  static constexpr std::uint32_t kPointCount = 64;
+  /// The most rays that a pair can have.
+  static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
 
-  /// Spreads the sample points. `tracer` holds the scene that the rays are for. `kernel_tolerance`
-  /// is that of unoccluded_exchange_area().
-  ShadowRays(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed,
-             double kernel_tolerance);
+  /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
+  /// `kernel_tolerance` is that of unoccluded_exchange_area().
+  ShadowRays(const PatchGeometry& geometry, std::uint64_t seed, double kernel_tolerance)
+      : geometry_(geometry), seed_(seed), kernel_tolerance_(kernel_tolerance) {}
 
-  std::size_t patch_count() const { return triangles_.size(); }
-  const FlatTriangle& triangle(std::size_t patch) const { return triangles_[patch]; }
+  const PatchGeometry& geometry() const { return geometry_; }
 
-  /// Writes to `facing` the patches j > i that patch i would exchange light with, if `wanted`(j),
-  /// in ascending order.
+  /// Writes to `facing` the patches j >= i that patch i would exchange light with, if `wanted`(j),
+  /// in ascending order. Patch i itself is among them if it is not flat.
   template <typename Wanted>
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
@@ -53,26 +51,25 @@ class ShadowRays {
 
  private:
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
-  std::pair<const Float3*, const Float3*> ray_ends(std::uint32_t i, std::uint32_t j,
-                                                   std::uint32_t k, std::uint64_t hash) const;
+  std::pair<const PatchPoint*, const PatchPoint*> ray_ends(std::uint32_t i, std::uint32_t j,
+                                                           std::uint32_t k,
+                                                           std::uint64_t hash) const;
 
+  const PatchGeometry& geometry_;
   std::uint64_t seed_;
   double kernel_tolerance_;
-  std::vector<FlatTriangle> triangles_;  ///< [n]
-  std::vector<Float3> points_;           ///< [n][kPointCount], moved off the surface
 };
 
 template <typename Wanted>
 void ShadowRays::find_facing(std::uint32_t i, std::vector<FacingPatch>& facing,
                              const Wanted& wanted) const {
   facing.clear();
-  const FlatTriangle& a = triangles_[i];
-  for (std::uint32_t j = i + 1; j < triangles_.size(); ++j) {
+  const PatchBounds& a = geometry_.bounds(i);
+  for (std::uint32_t j = a.is_flat() ? i + 1 : i; j < geometry_.patch_count(); ++j) {
     if (!wanted(j)) continue;
-    const FlatTriangle& b = triangles_[j];
-    const glm::dvec3 d = b.centroid - a.centroid;
-    if (glm::dot(a.normal, d) + b.radius <= 0 || a.radius - glm::dot(b.normal, d) <= 0) continue;
-    const double exchange = unoccluded_exchange_area(a, b, kernel_tolerance_);
+    const PatchBounds& b = geometry_.bounds(j);
+    if (!a.may_face(b.centre, b.radius) || !b.may_face(a.centre, a.radius)) continue;
+    const double exchange = unoccluded_exchange_area(geometry_, i, j, kernel_tolerance_);
     if (exchange > 0) facing.push_back({j, exchange});
   }
 }
