@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "single_threaded_blas.h"
+
 namespace rebounce {
 namespace {
 
@@ -66,6 +68,7 @@ void ClusterWeight::take_away(MatrixXd& basis) const {
 
 std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const MatrixXd& sample) {
   const double background = kBackground * sample.squaredNorm() / static_cast<double>(sample.rows());
+  const SingleThreadedBlas single_threaded;
   std::vector<Principal> principal(tree.clusters.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < tree.clusters.size(); ++k) {

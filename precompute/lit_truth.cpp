@@ -1,11 +1,16 @@
 #include "lit_truth.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "dense_product.h"
 #include "rebounce/transfer/area_norm.h"
 
 namespace rebounce {
 namespace {
+
+// Lights that the dense operator is read for at a time.
+constexpr std::size_t kBatch = 64;
 
 std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
   std::vector<float> workspace(transfer.workspace_size());
@@ -19,9 +24,30 @@ std::vector<Float3> product(const TransferOperator& transfer, const std::vector<
 LitTruth::LitTruth(const DenseOperator& dense, std::span<const std::vector<Float3>> lights)
     : area_(dense.storage().area) {
   for (const std::vector<Float3>& light : lights) {
-    if (area_norm(light, area_) == 0) continue;
-    lights_.push_back(light);
-    truths_.push_back(product(dense, light));
+    if (area_norm(light, area_) > 0) lights_.push_back(light);
+  }
+  truths_.assign(lights_.size(), std::vector<Float3>(area_.size()));
+  for (int channel = 0; channel < kChannelCount; ++channel) {
+    for (std::size_t begin = 0; begin < lights_.size(); begin += kBatch) {
+      light_channel(dense, channel, begin, std::min(lights_.size(), begin + kBatch));
+    }
+  }
+}
+
+void LitTruth::light_channel(const DenseOperator& dense, int channel, std::size_t begin,
+                             std::size_t end) {
+  Eigen::MatrixXf x(area_.size(), end - begin);
+  for (std::size_t k = begin; k < end; ++k) {
+    for (std::size_t i = 0; i < area_.size(); ++i) {
+      x(i, k - begin) = std::sqrt(area_[i]) * lights_[k][i][channel];
+    }
+  }
+  const Eigen::MatrixXf y =
+      multiply_symmetric(dense, dense.storage().channel_matrix[channel], x);
+  for (std::size_t k = begin; k < end; ++k) {
+    for (std::size_t i = 0; i < area_.size(); ++i) {
+      truths_[k][i][channel] = y(i, k - begin) / std::sqrt(area_[i]);
+    }
   }
 }
 

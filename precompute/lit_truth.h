@@ -12,7 +12,7 @@ namespace rebounce {
 /// from it are judged by.
 class LitTruth {
  public:
-  /// `lights`: initial exitances [n] in lx. Those that reach no patch are left out.
+  /// `dense` is in f32. `lights`: initial exitances [n] in lx. Those that reach no patch are left out.
   LitTruth(const DenseOperator& dense, std::span<const std::vector<Float3>> lights);
 
   std::size_t light_count() const { return lights_.size(); }
@@ -27,7 +27,10 @@ class LitTruth {
                                     std::size_t position_count) const;
 
  private:
-  const std::vector<float>& area_;
+  /// Fills in one channel of the truths of lights [begin, end).
+  void light_channel(const DenseOperator& dense, int channel, std::size_t begin, std::size_t end);
+
+  std::vector<float> area_;
   std::vector<std::vector<Float3>> lights_, truths_;
 };
 

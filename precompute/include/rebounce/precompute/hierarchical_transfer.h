@@ -19,11 +19,12 @@ struct HierarchicalSettings {
 };
 
 /// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
-/// Frobenius norm of Yhat, in which what uniform light does counts more than the rest, is worth
+/// Frobenius norm of Yhat, with the weights that `test_lights` give (light_weights.h), is worth
 /// 1 / `price` stored values. Throws Cancelled if asked to stop.
 HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
-                                                const PatchTable& patches, double price,
-                                                const Progress& progress = {});
+                                                const PatchTable& patches,
+                                                std::span<const std::vector<Float3>> test_lights,
+                                                double price, const Progress& progress = {});
 
 /// The smallest such operator whose errors under `test_lights`, each an initial exitance [n] in lx,
 /// are well within the tolerance in the mean, and within three times of it at most, found in a few
