@@ -160,8 +160,7 @@ double value_count(const LowRankBlock& block) {
 }  // namespace
 
 std::optional<LowRankBlock> compress_block(const WideBlock& block, const CompressionCost& cost,
-                                           double limit, Index largest_rank,
-                                           std::uint64_t seed) {
+                                           double limit, Index largest_rank, std::uint64_t seed) {
   const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
   const Spectrum rows = left_spectrum(block.entries, largest, seed);
   LowRankBlock result;

@@ -4,6 +4,7 @@
 
 #include <omp.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <atomic>
 #include <optional>
@@ -47,6 +48,16 @@ void append_columns(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
 
 void append_rows(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
   append_columns(matrix.transpose(), values);
+}
+
+/// Makes the columns of `basis` orthonormal, by Householder QR; returns R, basis before = after R.
+Eigen::MatrixXd make_orthonormal(Eigen::MatrixXd& basis) {
+  const Index rank = basis.cols();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
+  const Eigen::MatrixXd factor =
+      qr.matrixQR().topRows(rank).template triangularView<Eigen::Upper>();
+  basis = qr.householderQ() * Eigen::MatrixXd::Identity(basis.rows(), rank);
+  return factor;
 }
 
 /// Compresses one square of the matrix, below or on the diagonal.
@@ -120,8 +131,7 @@ class PieceCompressor {
     const double zero_cost = cost.total(block.entries.squaredNorm(), kBlockOverhead);
     const double overhead = price_ * kBlockOverhead;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
-    const std::uint64_t seed =
-        (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
+    const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
     const bool leaves = rows.is_leaf() && columns.is_leaf();
     const Index smooth = std::min(block.rows(), block.columns()) / kSmoothPart;
     if (!leaves && smooth > 0) {
@@ -131,8 +141,7 @@ class PieceCompressor {
     }
     Part best = leaves ? dense_part(place) : compress_children(row, column);
     if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
-    const auto low_rank =
-        compress_block(block, cost, best.cost - overhead, block.rows(), seed);
+    const auto low_rank = compress_block(block, cost, best.cost - overhead, block.rows(), seed);
     return low_rank ? low_rank_part(place, *low_rank, row, column, cost) : best;
   }
 
@@ -166,10 +175,22 @@ class PieceCompressor {
     return part;
   }
 
+  /// Of the weighted block's factors those of the block itself. Bases are made orthonormal again,
+  /// so that neither they nor the cores leave the range of half precision.
+  void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
+    weights_[row].take_away(block.row_basis);
+    const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);
+    Eigen::MatrixXd column_factor = row_factor;
+    if (row != column) {
+      weights_[column].take_away(block.column_basis);
+      column_factor = make_orthonormal(block.column_basis);
+    }
+    for (Eigen::MatrixXd& core : block.cores) core = row_factor * core * column_factor.transpose();
+  }
+
   Part low_rank_part(TransferBlock place, LowRankBlock block, std::uint32_t row,
                      std::uint32_t column, const CompressionCost& cost) const {
-    weights_[row].take_away(block.row_basis);
-    if (!place.on_diagonal()) weights_[column].take_away(block.column_basis);
+    take_weights_away(block, row, column);
     place.kind = TransferBlock::Kind::kLowRank;
     place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
     place.column_rank = place.on_diagonal() ? place.row_rank
@@ -225,9 +246,8 @@ HierarchicalOperator::Storage BlockTreeCompressor::compress(double price,
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < pieces_.size(); ++k) {
     if (stop) continue;
-    parts[k] =
-        PieceCompressor(dense_, tree_, weights_, price, pieces_[k].row, pieces_[k].column)
-            .compress();
+    parts[k] = PieceCompressor(dense_, tree_, weights_, price, pieces_[k].row, pieces_[k].column)
+                   .compress();
     const double fraction = static_cast<double>(++done) / static_cast<double>(pieces_.size());
     if (progress && omp_get_thread_num() == 0 && !progress(fraction)) stop = true;
   }

@@ -38,5 +38,4 @@ class BlockTreeCompressor {
   std::vector<Piece> pieces_;  ///< in the order of traversal
 };
 
-
 }  // namespace rebounce

@@ -24,7 +24,8 @@ MatrixXf multiply_symmetric(const DenseOperator& dense, std::uint32_t matrix, co
   const auto n = static_cast<Index>(dense.patch_count());
   const Index side = (n + kTile - 1) / kTile;
   const float* const tiles =
-      storage.tiles_f32.data() + matrix * DenseOperator::tile_count(dense.patch_count()) * kTile * kTile;
+      storage.tiles_f32.data() +
+      matrix * DenseOperator::tile_count(dense.patch_count()) * kTile * kTile;
   const auto tile = [&](Index row, Index column) {
     return Eigen::Map<const Tile>(tiles + (row * (row + 1) / 2 + column) * kTile * kTile);
   };

@@ -25,7 +25,7 @@ constexpr double kLargestOverMean = 3;
 
 // What one value per patch is worth at the tolerance, to begin the search with: measured over
 // scenes and sizes, notes/operator.md.
-constexpr double kFirstPrice = 0.02;
+constexpr double kFirstPrice = 2.5;
 
 using Exitances = std::span<const std::vector<Float3>>;
 
@@ -35,8 +35,8 @@ class Compression {
   Compression(const DenseOperator& dense, const PatchTable& patches, const LitTruth& truth)
       : tree_(build_cluster_tree(patches, kLeafSize)),
         weights_(make_cluster_weights(
-            tree_, truth.normalised_lights(
-                       tree_.patch, HierarchicalOperator::position_count(patches.size())))),
+            tree_, truth.normalised_lights(tree_.patch,
+                                           HierarchicalOperator::position_count(patches.size())))),
         compressor_(dense, tree_, weights_) {}
 
   HierarchicalOperator::Storage at(double price, const Progress& progress) const {

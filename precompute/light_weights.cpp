@@ -20,7 +20,7 @@ constexpr Index kDirectionCount = 8;
 
 // The part of the mean energy of the sample at one position that is taken for the variance of
 // lights in any direction. Measured: notes/operator.md.
-constexpr double kBackground = 1;
+constexpr double kBackground = 0.1;
 
 struct Principal {
   MatrixXd directions;

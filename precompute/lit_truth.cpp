@@ -42,8 +42,7 @@ void LitTruth::light_channel(const DenseOperator& dense, int channel, std::size_
       x(i, k - begin) = std::sqrt(area_[i]) * lights_[k][i][channel];
     }
   }
-  const Eigen::MatrixXf y =
-      multiply_symmetric(dense, dense.storage().channel_matrix[channel], x);
+  const Eigen::MatrixXf y = multiply_symmetric(dense, dense.storage().channel_matrix[channel], x);
   for (std::size_t k = begin; k < end; ++k) {
     for (std::size_t i = 0; i < area_.size(); ++i) {
       truths_[k][i][channel] = y(i, k - begin) / std::sqrt(area_[i]);

@@ -12,7 +12,8 @@ namespace rebounce {
 /// from it are judged by.
 class LitTruth {
  public:
-  /// `dense` is in f32. `lights`: initial exitances [n] in lx. Those that reach no patch are left out.
+  /// `dense` is in f32. `lights`: initial exitances [n] in lx. Those that reach no patch are left
+  /// out.
   LitTruth(const DenseOperator& dense, std::span<const std::vector<Float3>> lights);
 
   std::size_t light_count() const { return lights_.size(); }

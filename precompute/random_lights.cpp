@@ -103,10 +103,14 @@ bool is_open(const PatchTable& patches) {
 
 std::string_view name(LightKind kind) {
   switch (kind) {
-    case LightKind::kPoint: return "point";
-    case LightKind::kSpot: return "spot";
-    case LightKind::kPatch: return "patch";
-    case LightKind::kSky: break;
+    case LightKind::kPoint:
+      return "point";
+    case LightKind::kSpot:
+      return "spot";
+    case LightKind::kPatch:
+      return "patch";
+    case LightKind::kSky:
+      break;
   }
   return "sky";
 }
@@ -139,9 +143,12 @@ std::vector<Exitance> random_initial_exitances(const TransferData& data, const R
   switch (kind) {
     case LightKind::kPoint:
       return lit_by(data, tracer, random_point_lights(data, tracer, count, seed));
-    case LightKind::kSpot: return lit_by(data, tracer, random_spots(data, tracer, count, seed));
-    case LightKind::kPatch: return random_patches(data.patches, count, seed);
-    case LightKind::kSky: break;
+    case LightKind::kSpot:
+      return lit_by(data, tracer, random_spots(data, tracer, count, seed));
+    case LightKind::kPatch:
+      return random_patches(data.patches, count, seed);
+    case LightKind::kSky:
+      break;
   }
   if (count == 0 || !is_open(data.patches)) return {};
   return lit_by(data, tracer, random_suns(count - 1, seed), {.luminance = 1});

@@ -81,6 +81,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
     settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
+  if (chosen.operator_kind == "low-rank") settings.operator_kind = OperatorKind::kLowRank;
+  if (chosen.operator_kind == "first-bounce") settings.operator_kind = OperatorKind::kFirstBounce;
   if (chosen.operator_kind == "hierarchical" ||
       (chosen.operator_kind.empty() && chosen.tolerance_given)) {
     settings.operator_kind = OperatorKind::kHierarchical;
@@ -141,7 +143,12 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
           "--operator", chosen->operator_kind,
           "Kind of the operator; by default hierarchical if a tolerance is given or there are "
           "more than 5000 patches, otherwise dense")
-      ->check(CLI::IsMember({"hierarchical", "dense"}));
+      ->check(CLI::IsMember({"hierarchical", "low-rank", "first-bounce", "dense"}));
+  command
+      ->add_option("--rank", chosen->settings.rank,
+                   "Rank of a low-rank or first-bounce operator; bytes and time grow with it")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   command
       ->add_option(
           "--tolerance", chosen->settings.tolerance,
@@ -151,8 +158,8 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->capture_default_str();
   command
       ->add_option("--precision", chosen->precision,
-                   "Numbers of the operator: f32, or f16 for half the bytes; by default f16 for a "
-                   "hierarchical operator, f32 for a dense one")
+                   "Numbers of the operator: f32, or f16 for half the bytes; by default f32 for a "
+                   "dense operator, f16 for others")
       ->check(CLI::IsMember({"f16", "f32"}));
   command
       ->add_option("--memory-limit", chosen->memory_limit_gib,

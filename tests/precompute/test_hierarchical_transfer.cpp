@@ -131,14 +131,16 @@ TEST(HierarchicalTransfer, SaysWhatItMissesByItsError) {
 
 TEST(HierarchicalTransfer, NearlyEverythingIsExactAtALowPrice) {
   const Room& room = furnished_room();
-  const HierarchicalOperator transfer(compress_transfer(*room.dense, room.patches, 1e-16));
+  const HierarchicalOperator transfer(
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-16));
   EXPECT_LT(entry_error(*room.dense, transfer), 1e-5);
 }
 
 TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
   const Room& room = furnished_room();
   for (const double price : {1e-5, 1e-9}) {
-    const HierarchicalOperator transfer(compress_transfer(*room.dense, room.patches, price));
+    const HierarchicalOperator transfer(
+        compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), price));
     const std::size_t positions = HierarchicalOperator::position_count(room.patches.size()) /
                                   HierarchicalOperator::kAlignment;
     std::vector<int> covered(positions * positions, 0);
@@ -160,9 +162,11 @@ TEST(HierarchicalTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = furnished_room();
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
-  const auto one = compress_transfer(*room.dense, room.patches, 1e-7);
+  const auto one =
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
   omp_set_num_threads(4);
-  const auto four = compress_transfer(*room.dense, room.patches, 1e-7);
+  const auto four =
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
   omp_set_num_threads(before);
   EXPECT_TRUE(std::ranges::equal(one.values_f32, four.values_f32));
   EXPECT_EQ(one.patch, four.patch);
@@ -187,7 +191,8 @@ TEST(HierarchicalTransfer, LightsOnBlackPatchesAreCarriedToo) {
 
 TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   const Room room = make_room(furnished_scene(true), 800);
-  const HierarchicalOperator grey(compress_transfer(*room.dense, room.patches, 1e-7));
+  const HierarchicalOperator grey(
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7));
   EXPECT_EQ(grey.storage().matrix_count, 1U);
   // The same matrix three times over has the same bases, thrice the cores and dense blocks.
   DenseOperator::Storage thrice = room.dense->storage();
@@ -198,7 +203,8 @@ TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   thrice.tiles_f32 = SharedArray(std::move(tiles));
   thrice.matrix_count = 3;
   thrice.channel_matrix = {0, 1, 2};
-  const HierarchicalOperator rgb(compress_transfer(DenseOperator(thrice), room.patches, 3 * 1e-7));
+  const HierarchicalOperator rgb(compress_transfer(DenseOperator(thrice), room.patches,
+                                                   lights_in(room.patches, 16, 1), 3 * 1e-7));
   EXPECT_EQ(rgb.storage().matrix_count, 3U);
   EXPECT_LT(grey.bytes(), rgb.bytes());
 }
@@ -217,7 +223,8 @@ TEST(HierarchicalTransfer, TakesOnePatchAndNoLights) {
 
 TEST(HierarchicalTransfer, StopsWhenAsked) {
   const Room& room = furnished_room();
-  EXPECT_THROW(compress_transfer(*room.dense, room.patches, 1e-7, [](double) { return false; }),
+  EXPECT_THROW(compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7,
+                                 [](double) { return false; }),
                Cancelled);
 }
 

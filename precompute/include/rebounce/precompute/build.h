@@ -22,6 +22,8 @@ enum class OperatorKind : std::uint8_t {
   kAutomatic,  ///< dense up to kDensePatchCount patches, hierarchical above
   kDense,
   kHierarchical,
+  kLowRank,      ///< one rank for the whole scene: low_rank_operator.h
+  kFirstBounce,  ///< the same after a first bounce through F
 };
 
 /// Up to this many patches the dense operator, which is exact to rounding, is small enough to have
@@ -34,8 +36,9 @@ struct BuildSettings {
   FormFactorSettings form_factors;
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
-  /// kF16: half the bytes, an error of some 1e-4. By default that for the hierarchical operator,
-  /// and f32 for the dense one.
+  std::size_t rank = 256;    ///< of kLowRank and kFirstBounce: see LowRankSettings
+  /// kF16: half the bytes, an error of some 1e-4. By default that for all but the dense operator,
+  /// which is f32.
   std::optional<Precision> precision;
   std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
 };
