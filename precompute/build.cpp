@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "rebounce/precompute/dense_transfer.h"
@@ -23,9 +24,9 @@
 namespace rebounce {
 namespace {
 
-// Lights of each kind that the hierarchical operator is fitted to; a dense operator is their truth,
-// so that they cost little.
-constexpr int kFittingLightCount = 128;
+// Lights that the hierarchical operator is fitted to; a dense operator is their truth.
+constexpr int kShapingPointCount = 128, kShapingSpotCount = 32, kShapingSunCount = 32;
+constexpr int kJudgingLightCount = 64;
 
 // A residual above this is not rounding but a mistake; f32 and f16 entries.
 constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
@@ -195,11 +196,19 @@ std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
     return build_low_rank_transfer(dense, data.exchange,
                                    {settings.rank, *settings.precision, first_bounce}, progress);
   }
-  const std::uint64_t seed = mix_bits(settings.form_factors.seed);
-  const auto lights = [&](LightKind kind) {
-    return random_initial_exitances(data, tracer, kind, kFittingLightCount, seed);
+  std::vector<std::vector<Float3>> shaping;
+  std::uint64_t seed = settings.form_factors.seed;
+  const auto draw = [&](LightKind kind, int count) {
+    seed = mix_bits(seed);
+    return random_initial_exitances(data, tracer, kind, count, seed);
   };
-  return build_hierarchical_transfer(dense, data.patches, lights(LightKind::kPoint),
+  for (const auto& [kind, count] : {std::pair(LightKind::kPoint, kShapingPointCount),
+                                    std::pair(LightKind::kSpot, kShapingSpotCount),
+                                    std::pair(LightKind::kSky, kShapingSunCount)}) {
+    std::ranges::move(draw(kind, count), std::back_inserter(shaping));
+  }
+  const auto judging = draw(LightKind::kPoint, kJudgingLightCount);
+  return build_hierarchical_transfer(dense, data.patches, {shaping, judging},
                                      {settings.tolerance, *settings.precision}, progress);
 }
 

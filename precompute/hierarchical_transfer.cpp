@@ -27,27 +27,10 @@ constexpr double kLargestOverMean = 3;
 // scenes and sizes, notes/operator.md.
 constexpr double kFirstPrice = 2.5;
 
+// From one round to the next, the strength of a shaping light changes by a factor between these.
+constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
+
 using Exitances = std::span<const std::vector<Float3>>;
-
-/// A compressor with all that it looks at.
-class Compression {
- public:
-  Compression(const DenseOperator& dense, const PatchTable& patches, const LitTruth& truth)
-      : tree_(build_cluster_tree(patches, kLeafSize)),
-        weights_(make_cluster_weights(
-            tree_, truth.normalised_lights(tree_.patch,
-                                           HierarchicalOperator::position_count(patches.size())))),
-        compressor_(dense, tree_, weights_) {}
-
-  HierarchicalOperator::Storage at(double price, const Progress& progress) const {
-    return compressor_.compress(price, progress);
-  }
-
- private:
-  ClusterTree tree_;
-  std::vector<ClusterWeight> weights_;
-  BlockTreeCompressor compressor_;
-};
 
 LitTruth make_truth(const DenseOperator& dense, Exitances lights) {
   LitTruth truth(dense, lights);
@@ -57,11 +40,46 @@ LitTruth make_truth(const DenseOperator& dense, Exitances lights) {
   return {dense, uniform};
 }
 
+double mean(const std::vector<double>& errors) {
+  return std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+}
+
+/// A compressor with all that it looks at.
+class Compression {
+ public:
+  Compression(const DenseOperator& dense, const PatchTable& patches, Exitances shaping)
+      : dense_(dense),
+        truth_(make_truth(dense, shaping)),
+        tree_(build_cluster_tree(patches, kLeafSize)),
+        sample_(truth_.normalised_lights(tree_.patch,
+                                         HierarchicalOperator::position_count(patches.size()))) {}
+
+  HierarchicalOperator::Storage at(double price, const Progress& progress) const {
+    const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_);
+    return BlockTreeCompressor(dense_, tree_, weights).compress(price, progress);
+  }
+
+  /// Gives the shaping lights weight by the errors that they have with `transfer`.
+  void emphasise(const TransferOperator& transfer) {
+    const std::vector<double> errors = truth_.errors(transfer);
+    const double usual = mean(errors);
+    if (usual == 0) return;
+    for (std::size_t k = 0; k < errors.size(); ++k) {
+      sample_.col(static_cast<Eigen::Index>(k)) *=
+          std::clamp(errors[k] / usual, kLeastEmphasis, kMostEmphasis);
+    }
+  }
+
+ private:
+  const DenseOperator& dense_;
+  LitTruth truth_;
+  ClusterTree tree_;
+  Eigen::MatrixXd sample_;
+};
+
 /// The mean error, or the largest by kLargestOverMean if that is more.
 double judge(const std::vector<double>& errors) {
-  const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
-  return std::max(sum / static_cast<double>(errors.size()),
-                  std::ranges::max(errors) / kLargestOverMean);
+  return std::max(mean(errors), std::ranges::max(errors) / kLargestOverMean);
 }
 
 /// The best operator that the search has met: the smallest within the limit, or the most exact.
@@ -88,16 +106,16 @@ class Best {
 }  // namespace
 
 HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
-                                                const PatchTable& patches, Exitances test_lights,
+                                                const PatchTable& patches, Exitances shaping,
                                                 double price, const Progress& progress) {
-  return Compression(dense, patches, make_truth(dense, test_lights)).at(price, progress);
+  return Compression(dense, patches, shaping).at(price, progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
-    const DenseOperator& dense, const PatchTable& patches, Exitances test_lights,
+    const DenseOperator& dense, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress) {
-  const LitTruth truth = make_truth(dense, test_lights);
-  const Compression compression(dense, patches, truth);
+  const LitTruth judging = make_truth(dense, lights.judging);
+  Compression compression(dense, patches, lights.shaping);
   const double tolerance = settings.tolerance;
   PriceSearch search(kFirstPrice * tolerance * tolerance / static_cast<double>(patches.size()),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});
@@ -107,10 +125,11 @@ std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
     if (progress) part = [&](double done) { return progress((round + done) / kMostRounds); };
     HierarchicalOperator::Storage storage = compression.at(search.price(), part);
     if (settings.precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
-    auto candidate = std::make_shared<const HierarchicalOperator>(std::move(storage));
-    const double error = judge(truth.errors(*candidate));
-    best.offer(std::move(candidate), error);
+    const auto candidate = std::make_shared<const HierarchicalOperator>(std::move(storage));
+    const double error = judge(judging.errors(*candidate));
+    best.offer(candidate, error);
     search.report(error);
+    if (!search.done()) compression.emphasise(*candidate);
   }
   return best.take();
 }

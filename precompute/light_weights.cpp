@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "single_threaded_blas.h"
 
@@ -67,7 +68,10 @@ void ClusterWeight::take_away(MatrixXd& basis) const {
 }
 
 std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const MatrixXd& sample) {
-  const double background = kBackground * sample.squaredNorm() / static_cast<double>(sample.rows());
+  // Lights without any indirect light leave nothing to weigh.
+  const double background =
+      std::max(kBackground * sample.squaredNorm() / static_cast<double>(sample.rows()),
+               std::numeric_limits<double>::min());
   const SingleThreadedBlas single_threaded;
   std::vector<Principal> principal(tree.clusters.size());
 #pragma omp parallel for schedule(dynamic, 1)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <optional>
 
 #include "error_bound.h"
 #include "lit_truth.h"
@@ -49,7 +50,8 @@ KindError summary(LightKind kind, const std::vector<double>& errors) {
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress) {
-  const ReferenceSolver reference(data.exchange, data.patches);
+  std::optional<ReferenceSolver> reference;
+  if (exact == nullptr) reference.emplace(data.exchange, data.patches);
   std::vector<KindError> result;
   for (std::size_t k = 0; k < kLightKinds.size(); ++k) {
     const Progress part = [&](double done) {
@@ -61,7 +63,7 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
         random_initial_exitances(data, tracer, kind, light_count(kind, exact != nullptr), seed);
     const std::vector<double> errors = exact != nullptr
                                            ? LitTruth(*exact, lights).errors(*data.transfer)
-                                           : errors_by_reference(data, reference, lights, part);
+                                           : errors_by_reference(data, *reference, lights, part);
     if (!errors.empty()) result.push_back(summary(kind, errors));
   }
   return result;

@@ -100,12 +100,13 @@ double entry_error(const DenseOperator& dense, const TransferOperator& transfer)
 
 TEST(HierarchicalTransfer, KeepsEveryTolerance) {
   const Room& room = furnished_room();
-  const auto probes = lights_in(room.patches, 12, 1), others = lights_in(room.patches, 24, 2);
+  const auto probes = lights_in(room.patches, 12, 1), judges = lights_in(room.patches, 12, 3),
+             others = lights_in(room.patches, 24, 2);
   double previous_error = 1;
   std::size_t previous_bytes = 0;
   for (const double tolerance : {0.04, 0.01, 0.002}) {
-    const auto transfer =
-        build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = tolerance});
+    const auto transfer = build_hierarchical_transfer(*room.dense, room.patches, {probes, judges},
+                                                      {.tolerance = tolerance});
     const double error = mean_error(room, *transfer, others);
     // Under lights that the build has not seen.
     EXPECT_LT(error, tolerance);
@@ -123,7 +124,7 @@ TEST(HierarchicalTransfer, SaysWhatItMissesByItsError) {
   const Room& room = furnished_room();
   const auto probes = lights_in(room.patches, 4, 1);
   const auto transfer =
-      build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = 1e-6});
+      build_hierarchical_transfer(*room.dense, room.patches, {probes, probes}, {.tolerance = 1e-6});
   const double error = mean_error(room, *transfer, probes);
   EXPECT_GT(error, 1e-6);
   EXPECT_LT(error, 1e-3);
@@ -176,8 +177,8 @@ TEST(HierarchicalTransfer, LightsOnBlackPatchesAreCarriedToo) {
   // Black patches may emit: their columns are as good as the others'.
   const Room& room = furnished_room();
   const auto probes = lights_in(room.patches, 12, 1);
-  const auto transfer =
-      build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = 0.005});
+  const auto transfer = build_hierarchical_transfer(*room.dense, room.patches, {probes, probes},
+                                                    {.tolerance = 0.005});
   std::vector<Float3> light(room.patches.size());
   int black = 0;
   for (std::size_t i = 0; i < light.size(); ++i) {
