@@ -1,6 +1,7 @@
 #include "rebounce/precompute/hierarchical_transfer.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
 #include "block_tree.h"
@@ -30,14 +31,22 @@ constexpr double kFirstPrice = 2.5;
 // From one round to the next, the strength of a shaping light changes by a factor between these.
 constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 
+// The uniform light's part of the energy of all shaping lights: what makes black surfaces, which
+// reflect no light, good enough as lamps.
+constexpr double kUniformShare = 0.1;
+
 using Exitances = std::span<const std::vector<Float3>>;
 
-LitTruth make_truth(const DenseOperator& dense, Exitances lights) {
+/// The lights after one with which every patch gives off the same, black ones too.
+std::vector<std::vector<Float3>> with_uniform(std::size_t patch_count, Exitances lights) {
+  std::vector<std::vector<Float3>> all(1, std::vector<Float3>(patch_count, Float3{1, 1, 1}));
+  all.insert(all.end(), lights.begin(), lights.end());
+  return all;
+}
+
+LitTruth judging_truth(const DenseOperator& dense, Exitances lights) {
   LitTruth truth(dense, lights);
-  if (truth.light_count() > 0) return truth;
-  const std::vector<std::vector<Float3>> uniform(
-      1, std::vector<Float3>(dense.patch_count(), Float3{1, 1, 1}));
-  return {dense, uniform};
+  return truth.light_count() > 0 ? truth : LitTruth(dense, with_uniform(dense.patch_count(), {}));
 }
 
 double mean(const std::vector<double>& errors) {
@@ -49,10 +58,12 @@ class Compression {
  public:
   Compression(const DenseOperator& dense, const PatchTable& patches, Exitances shaping)
       : dense_(dense),
-        truth_(make_truth(dense, shaping)),
+        truth_(dense, with_uniform(dense.patch_count(), shaping)),
         tree_(build_cluster_tree(patches, kLeafSize)),
         sample_(truth_.normalised_lights(tree_.patch,
-                                         HierarchicalOperator::position_count(patches.size()))) {}
+                                         HierarchicalOperator::position_count(patches.size()))) {
+    sample_.col(0) *= std::sqrt(kUniformShare * static_cast<double>(sample_.cols()));
+  }
 
   HierarchicalOperator::Storage at(double price, const Progress& progress) const {
     const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_);
@@ -114,7 +125,7 @@ HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
     const DenseOperator& dense, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress) {
-  const LitTruth judging = make_truth(dense, lights.judging);
+  const LitTruth judging = judging_truth(dense, lights.judging);
   Compression compression(dense, patches, lights.shaping);
   const double tolerance = settings.tolerance;
   PriceSearch search(kFirstPrice * tolerance * tolerance / static_cast<double>(patches.size()),

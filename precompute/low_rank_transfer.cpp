@@ -22,10 +22,10 @@ using Eigen::MatrixXf;
 // Up to this many patches all eigenvectors are found: seconds at most.
 constexpr Index kDenseSize = 700;
 
-// Columns beyond the rank, and multiplications by sum W². The spectrum falls slowly (corners), so
-// that the subspace has to be turned towards its leading part.
-constexpr Index kOversampling = 16;
-constexpr int kIterations = 2;
+// Columns beyond the rank, a half of it and some, and multiplications by sum W². The spectrum falls
+// slowly (corners): with fewer of either the subspace is some per cent off the best.
+constexpr Index kOversamplingPart = 2, kOversampling = 8;
+constexpr int kIterations = 3;
 
 /// W of each matrix as a product: Yhat, or Yhat - G.
 class Remainder {
@@ -144,9 +144,10 @@ std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperat
     if (progress && !progress(done)) throw Cancelled();
   };
   report(0);
+  const Index columns = rank + rank / kOversamplingPart + kOversampling;
   MatrixXf basis = MatrixXf::Identity(n, n);
-  if (n > kDenseSize && rank + kOversampling < n) {
-    basis = orthonormal(random_start(n, rank + kOversampling));
+  if (n > kDenseSize && columns < n) {
+    basis = orthonormal(random_start(n, columns));
     for (int k = 0; k < kIterations; ++k) {
       basis = iterate(remainder, basis);
       report((k + 1.0) / (kIterations + 1));

@@ -46,7 +46,7 @@ const Room& small_room() {
 }
 
 const Room& grey_room() {
-  static const Room room = make_room(1000, {0.6F, 0.6F, 0.6F});
+  static const Room room = make_room(760, {0.6F, 0.6F, 0.6F});
   return room;
 }
 
@@ -115,14 +115,15 @@ TEST(LowRankTransfer, AFullRankIsExact) {
 }
 
 TEST(LowRankTransfer, NoOtherOfItsRankIsNearer) {
-  // A grey room has one matrix, for which the optimum is known; 1,000 patches take the sketch.
+  // A grey room has one matrix, for which the optimum is known; 760 patches take the sketch.
   const Room& room = grey_room();
   const Eigen::MatrixXd y = symmetric(*room.dense, room.patches, 0);
   for (const bool bounce : {false, true}) {
     const auto transfer = room.low_rank({64, Precision::kF32, bounce});
     const double error = (symmetric(*transfer, room.patches, 0) - y).norm();
     const double least = least_error(bounce ? Eigen::MatrixXd(y - first_bounce(room)) : y, 64);
-    EXPECT_LT(error, 1.01 * least + 1e-5 * y.norm());
+    // What subspace iteration misses among eigenvalues that are nearly equal.
+    EXPECT_LT(error, 1.02 * least + 1e-5 * y.norm());
     EXPECT_GT(error, 0.99 * least);
   }
 }

@@ -67,7 +67,7 @@ void compress(Built& built, double tolerance) {
 
 TEST(MeasuredError, AThousandOtherLightsOfEachKindStayBelowTheBound) {
   for (const bool open : {false, true}) {
-    Built built = build(open ? yard() : room(), 700);
+    Built built = build(open ? yard() : room(), 400);
     compress(built, 0.02);
     const auto measured = measure_error(built.data, built.tracer, built.dense.get(), kSeed);
     ASSERT_EQ(measured.size(), open ? 4U : 3U);

@@ -20,7 +20,7 @@ struct HierarchicalSettings {
 
 /// Lights that the operator is fitted to, each an initial exitance [n] in lx.
 struct FittingLights {
-  /// What light patches receive: errors in what such lights do weigh more than others.
+  /// What light patches give off: errors in what such lights do weigh more than others.
   std::span<const std::vector<Float3>> shaping;
   /// Those that the tolerance is held under. Others than the first, or the error looks smaller than
   /// it is.
@@ -29,7 +29,7 @@ struct FittingLights {
 
 /// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
 /// Frobenius norm of Yhat, with the weights that the `shaping` lights give (light_weights.h), is
-/// worth 1 / `price` stored values. Without lights that reach the patches, a uniform one is taken.
+/// worth 1 / `price` stored values. A uniform light is always among them.
 /// Throws Cancelled if asked to stop.
 HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
                                                 const PatchTable& patches,
