@@ -25,7 +25,7 @@ constexpr Index kDenseSize = 700;
 // Columns beyond the rank, a half of it and some, and multiplications by sum W². The spectrum falls
 // slowly (corners): with fewer of either the subspace is some per cent off the best.
 constexpr Index kOversamplingPart = 2, kOversampling = 8;
-constexpr int kIterations = 3;
+constexpr int kIterations = 4;
 
 /// W of each matrix as a product: Yhat, or Yhat - G.
 class Remainder {

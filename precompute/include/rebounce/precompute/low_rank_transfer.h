@@ -19,7 +19,8 @@ struct LowRankSettings {
 };
 
 /// The operator of low rank that is nearest to a dense one (f32) in the Frobenius norm of Yhat, all
-/// channels together, up to what a randomised method misses.
+/// channels together, up to the few per cent of its error that a randomised method may add where
+/// the spectrum is flat.
 ///
 /// With W = Yhat, or W = Yhat - G = G rho Yhat for the rest after the first bounce, the basis is
 /// that of the leading eigenvectors of sum W_c², each channel's core V^T W_c V. G rho Yhat is
