@@ -207,7 +207,10 @@ std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
                                     std::pair(LightKind::kSky, kShapingSunCount)}) {
     std::ranges::move(draw(kind, count), std::back_inserter(shaping));
   }
-  const auto judging = draw(LightKind::kPoint, kJudgingLightCount);
+  auto judging = draw(LightKind::kPoint, kJudgingLightCount);
+  // The scene's own lamps are sure to be used.
+  shaping.push_back(data.patches.emitted_exitance);
+  judging.push_back(data.patches.emitted_exitance);
   return build_hierarchical_transfer(dense, data.patches, {shaping, judging},
                                      {settings.tolerance, *settings.precision}, progress);
 }
