@@ -14,7 +14,7 @@ constexpr double kOtherLights = 1000, kConfidence = 0.95;
 constexpr double kNormalQuantile = 1.645;
 
 // The tail is this part of the sample, and no fewer than kLeastTail.
-constexpr std::size_t kTailPart = 8, kLeastTail = 8;
+constexpr std::size_t kTailPart = 16, kLeastTail = 8;
 
 }  // namespace
 

@@ -15,12 +15,7 @@ namespace {
 
 using Exitances = std::vector<std::vector<Float3>>;
 
-constexpr int kReferenceLightCount = 16, kLightCount = 128, kPatchCount = 256;
-
-int light_count(LightKind kind, bool exact) {
-  if (!exact) return kReferenceLightCount;
-  return kind == LightKind::kPatch ? kPatchCount : kLightCount;
-}
+constexpr int kReferenceLightCount = 16, kLightCount = 256;
 
 /// Against Gauss-Seidel. Throws Cancelled if asked to stop.
 std::vector<double> errors_by_reference(const TransferData& data, const ReferenceSolver& reference,
@@ -59,8 +54,8 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
     };
     if (!part(0)) throw Cancelled();
     const LightKind kind = kLightKinds[k];
-    const Exitances lights =
-        random_initial_exitances(data, tracer, kind, light_count(kind, exact != nullptr), seed);
+    const Exitances lights = random_initial_exitances(
+        data, tracer, kind, exact != nullptr ? kLightCount : kReferenceLightCount, seed);
     const std::vector<double> errors = exact != nullptr
                                            ? LitTruth(*exact, lights).errors(*data.transfer)
                                            : errors_by_reference(data, *reference, lights, part);

@@ -14,7 +14,7 @@
 namespace rebounce {
 namespace {
 
-constexpr int kTrialCount = 200, kSampleSize = 128, kOthers = 1000;
+constexpr int kTrialCount = 200, kSampleSize = 256, kOthers = 1000;
 
 /// The part of trials in which one of 1,000 new errors is above the bound.
 double broken_part(const std::function<double(std::mt19937_64&)>& draw) {

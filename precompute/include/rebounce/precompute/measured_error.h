@@ -23,7 +23,7 @@ struct KindError {
 /// Measures data.transfer under random lights of every kind that the scene has.
 ///
 /// With `exact`, the operator in f32 that data.transfer was made from, the truth is what that one
-/// gives, and lights are many: 128 of a kind, 256 single patches. Without it, the truth is
+/// gives, and there are 256 lights of a kind. Without it, the truth is
 /// Gauss-Seidel in double precision under 16 lights of a kind.
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const DenseOperator* exact, std::uint64_t seed,
