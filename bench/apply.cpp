@@ -11,7 +11,7 @@
 #include "read_buffer.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/dense_transfer.h"
-#include "rebounce/precompute/measured_error.h"
+#include "rebounce/precompute/random_lights.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/gauss_seidel_solver.h"

@@ -33,6 +33,9 @@ inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
+inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
+inline constexpr char kLowRankCore[] = "transfer.low_rank.core";
+inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matrix";
 }  // namespace tensor
 
 /// The tensors of a hierarchical operator.

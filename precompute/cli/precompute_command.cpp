@@ -90,6 +90,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
     if (chosen.precision == precision_name(precision)) settings.precision = precision;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
+  if (chosen.operator_kind == "low-rank") settings.operator_kind = OperatorKind::kLowRank;
+  if (chosen.operator_kind == "first-bounce") settings.operator_kind = OperatorKind::kFirstBounce;
   if (chosen.operator_kind == "hierarchical" ||
       (chosen.operator_kind.empty() && chosen.tolerance_given)) {
     settings.operator_kind = OperatorKind::kHierarchical;
@@ -150,7 +152,12 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
           "--operator", chosen->operator_kind,
           "Kind of the operator; by default hierarchical if a tolerance is given or there are "
           "more than 5000 patches, otherwise dense")
-      ->check(CLI::IsMember({"hierarchical", "dense"}));
+      ->check(CLI::IsMember({"hierarchical", "low-rank", "first-bounce", "dense"}));
+  command
+      ->add_option("--rank", chosen->settings.rank,
+                   "Rank of a low-rank or first-bounce operator; bytes and time grow with it")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   command
       ->add_option(
           "--tolerance", chosen->settings.tolerance,
@@ -162,9 +169,8 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->add_option(
           "--precision", chosen->precision,
           "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q8 "
-          "for two thirds of those where the tolerance is 1 % or more; by default f16 for a "
-          "hierarchical operator, f32 for a "
-          "dense one")
+          "for two thirds of those where the tolerance is 1 % or more; by default f32 for a "
+          "dense operator, f16 for others")
       ->check(CLI::IsMember({"f16", "f32", "q8"}));
   command
       ->add_option(
