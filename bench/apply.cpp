@@ -17,6 +17,7 @@
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 #include "tile_product.h"
 #include "timing.h"
