@@ -75,13 +75,21 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
 }
 
-/// The file is written all the same, with the error that it has.
-void check_tolerance(const BuildRecord& record) {
-  if (record.tolerance == 0 || record.error_mean <= record.tolerance) return;
-  throw Error(fmt::format(
-      "the operator misses its tolerance: the mean error is {:.2g} and {:.2g} was asked for; "
-      "ask for less, or for --precision f32 or --operator dense",
-      record.error_mean, record.tolerance));
+/// The file is written all the same, with the errors that it has.
+void check_tolerances(const BuildRecord& record, const BuildReport& report,
+                      double form_factor_tolerance) {
+  if (record.tolerance > 0 && record.error_mean > record.tolerance) {
+    throw Error(fmt::format(
+        "the operator misses its tolerance: the mean error is {:.2g} and {:.2g} was asked for; "
+        "ask for less, or for --precision f32 or --operator dense",
+        record.error_mean, record.tolerance));
+  }
+  if (report.form_factor_error && report.form_factor_error->mean > form_factor_tolerance) {
+    throw Error(fmt::format(
+        "the compressed form factors miss their tolerance: the mean error is {:.2g} and {:.2g} was "
+        "asked for; ask for less with --compress-form-factors, or go without",
+        report.form_factor_error->mean, form_factor_tolerance));
+  }
 }
 
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
@@ -120,7 +128,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   } else if (!options.quiet) {
     print_summary(data, report, file_bytes);
   }
-  check_tolerance(data.record);
+  check_tolerances(data.record, report, settings.form_factor_tolerance);
 }
 
 }  // namespace

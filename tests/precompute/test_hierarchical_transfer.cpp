@@ -212,6 +212,22 @@ TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   EXPECT_LT(grey.bytes(), rgb.bytes());
 }
 
+TEST(HierarchicalTransfer, TheBrightestRoomFitsHalfPrecision) {
+  // Light is reflected a hundred times, and a coarse operator has it all in few, large cores.
+  for (const float reflectance : {0.9F, 0.99F}) {
+    Scene scene = test::empty_scene({reflectance, reflectance, reflectance});
+    test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
+    const Room room = make_room(scene, 300);
+    const auto lights = lights_in(room.patches, 12, 1);
+    for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
+      const auto transfer = build_hierarchical_transfer(
+          *room.dense, room.patches, {lights, lights}, {.tolerance = 0.03, .precision = precision});
+      EXPECT_LT(mean_error(room, *transfer, lights), 0.03);
+      EXPECT_LT(transfer->bytes(), room.dense->bytes() / 4);
+    }
+  }
+}
+
 TEST(HierarchicalTransfer, TakesOnePatchAndNoLights) {
   PatchTable patches;
   patches.area = {2};
