@@ -12,7 +12,7 @@ namespace rebounce {
 
 struct LowRankSettings {
   std::size_t rank = 256;  ///< at least 1; more than there are patches is as many as there are
-  Precision precision = Precision::kF16;
+  Precision precision = Precision::kF16;  ///< or kF32
   /// Takes the first bounce through F, and the rank for what is left: several times more exact at
   /// the same rank, and an apply reads F as well.
   bool first_bounce = false;
