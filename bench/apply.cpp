@@ -11,12 +11,14 @@
 #include "read_buffer.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/dense_transfer.h"
-#include "rebounce/precompute/measured_error.h"
+#include "rebounce/precompute/random_lights.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "tile_product.h"
 #include "timing.h"
 
@@ -67,10 +69,6 @@ struct Measure {
   TimedCase timed;
 };
 
-const char* name(Precision precision) {
-  return precision == Precision::kF16 ? "f16" : "f32";
-}
-
 class ApplyBenchmark {
  public:
   ApplyBenchmark(const TransferData& data, const CommonOptions& options)
@@ -98,7 +96,11 @@ class ApplyBenchmark {
     measures_.clear();
     if (stored_->kind() != "dense") {
       add_read(read_stored_, stored_->bytes());
-      add_product("apply " + stored_->kind(), {}, *stored_);
+      const auto* blocks = dynamic_cast<const HierarchicalOperator*>(stored_.get());
+      const std::string precision = blocks ? precision_name(blocks->storage().precision) : "";
+      add_product("apply " + stored_->kind(), precision, *stored_);
+      add_batch(precision, *stored_);
+      if (blocks) add_receivers(precision, *blocks);
     }
     for (const auto& dense : {f32_, f16_}) add_dense(*dense);
     add_gather();
@@ -140,10 +142,63 @@ class ApplyBenchmark {
                          .timed = {.work = apply}});
   }
 
+  /// kBatch lights at once; the error is that of the last.
+  void add_batch(const std::string& precision, const TransferOperator& transfer) {
+    constexpr std::size_t kBatch = 4;
+    struct Batch {
+      std::vector<Float3> light, result;
+      std::vector<float> workspace;
+    };
+    const auto batch = std::make_shared<Batch>();
+    for (std::size_t k = 0; k < kBatch; ++k) {
+      batch->light.insert(batch->light.end(), initial_exitance_.begin(), initial_exitance_.end());
+    }
+    batch->result.resize(batch->light.size());
+    batch->workspace.resize(transfer.batch_workspace_size(kBatch));
+    const auto apply = [batch, &transfer] {
+      transfer.apply_batch(kBatch, batch->light, batch->result, batch->workspace);
+    };
+    const auto error = [this, apply, batch] {
+      apply();
+      return error_of(std::span(batch->result).last(patches_.size()));
+    };
+    measures_.push_back({.name = "batch of 4",
+                         .instruction_set = dense_kernels().instruction_set,
+                         .precision = precision,
+                         .bytes = transfer.bytes(),
+                         .error = error,
+                         .timed = {.work = apply}});
+  }
+
+  /// To an eighth of the patches, neighbours all; the error counts the others as found.
+  void add_receivers(const std::string& precision, const HierarchicalOperator& blocks) {
+    const std::vector<std::uint32_t>& order = blocks.storage().patch;
+    const auto receivers = std::make_shared<HierarchicalOperator::Receivers>(
+        blocks.receivers(std::span(order).first((order.size() + 7) / 8)));
+    const std::uint64_t whole = blocks.receivers(order).value_count();
+    const auto apply = [this, receivers, &blocks] {
+      blocks.apply_to(*receivers, initial_exitance_, result_, workspace_);
+    };
+    const auto error = [this, apply] {
+      result_ = truth_;
+      apply();
+      return error_of(result_);
+    };
+    measures_.push_back(
+        {.name = "apply to 1/8",
+         .instruction_set = dense_kernels().instruction_set,
+         .precision = precision,
+         .bytes = static_cast<std::size_t>(static_cast<double>(blocks.bytes()) *
+                                           static_cast<double>(receivers->value_count()) /
+                                           static_cast<double>(whole)),
+         .error = error,
+         .timed = {.work = apply}});
+  }
+
   void add_dense(const DenseOperator& dense) {
     const Precision precision = dense.storage().precision;
     add_read(precision == Precision::kF16 ? read_f16_ : read_f32_, dense.bytes());
-    add_product("apply dense", name(precision), dense);
+    add_product("apply dense", precision_name(precision), dense);
     for (const DenseKernels* kernels : available_kernels()) add_tiles(dense, *kernels);
   }
 
@@ -153,7 +208,7 @@ class ApplyBenchmark {
     const auto error = [this, product] { return error_of(product->indirect_irradiance()); };
     measures_.push_back({.name = "tiles alone",
                          .instruction_set = kernels.instruction_set,
-                         .precision = name(dense.storage().precision),
+                         .precision = precision_name(dense.storage().precision),
                          .bytes = dense.bytes(),
                          .error = error,
                          .timed = {.work = multiply}});

@@ -2,7 +2,7 @@
 
 #include <glm/glm.hpp>
 
-#include "rebounce/precompute/measured_error.h"
+#include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/area_norm.h"

@@ -12,8 +12,8 @@
 #include "light_changes.h"
 #include "program.h"
 #include "read_buffer.h"
+#include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
-#include "rebounce/precompute/measured_error.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
@@ -44,12 +44,15 @@ struct Form {
 std::shared_ptr<const HierarchicalOperator> compressed(const TransferData& data,
                                                        const BuildSettings& settings) {
   if (data.compressed_form_factors) return data.compressed_form_factors;
-  constexpr int kLights = 64;
   const RayTracer tracer(data.mesh.position,
                          std::span(data.mesh.triangle).first(data.mesh.surface_count()));
-  const auto lights = random_initial_exitances(data, tracer, kLights, 1);
+  const DrawnLights lights = draw_fitting_lights(data, tracer, 1);
+  const auto radiosities = [&](const std::vector<std::vector<Float3>>& exitances) {
+    return radiosities_of(*data.transfer, data.patches.reflectance, exitances);
+  };
+  const DrawnLights fitting{radiosities(lights.shaping), radiosities(lights.judging)};
   return compress_form_factors(
-      data.exchange, data.patches, radiosities_of(*data.transfer, data.patches.reflectance, lights),
+      data.exchange, data.patches, fitting.view(),
       {.tolerance = settings.form_factor_tolerance, .precision = Precision::kF16});
 }
 

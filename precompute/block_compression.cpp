@@ -160,8 +160,8 @@ double value_count(const LowRankBlock& block) {
 }  // namespace
 
 std::optional<LowRankBlock> compress_block(const WideBlock& block, const CompressionCost& cost,
-                                           double limit, std::uint64_t seed) {
-  const Index largest = largest_worthwhile_rank(block, cost, limit);
+                                           double limit, Index largest_rank, std::uint64_t seed) {
+  const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
   const Spectrum rows = left_spectrum(block.entries, largest, seed);
   LowRankBlock result;
   if (block.on_diagonal) {

@@ -45,8 +45,10 @@ struct CompressionCost {
 /// The bases are leading singular vectors, from the Gram matrix of a small block and from a random
 /// sketch of a large one: N. Halko, P. G. Martinsson and J. A. Tropp, "Finding structure with
 /// randomness", 2011, algorithm 4.1, whose error is then known exactly, as the bases are
-/// orthonormal. `limit` bounds the rank that is worth having and so the sketch.
+/// orthonormal. `limit` bounds the rank that is worth having and so the sketch; no rank is above
+/// `largest_rank`.
 std::optional<LowRankBlock> compress_block(const WideBlock& block, const CompressionCost& cost,
-                                           double limit, std::uint64_t seed);
+                                           double limit, Eigen::Index largest_rank,
+                                           std::uint64_t seed);
 
 }  // namespace rebounce

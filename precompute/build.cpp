@@ -9,25 +9,23 @@
 #include <nlohmann/json.hpp>
 
 #include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/low_rank_transfer.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/reconstruction_weights.h"
 #include "rebounce/precompute/winding.h"
-#include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
 
 namespace rebounce {
 namespace {
 
+// Lights that compressed form factors are measured under.
 constexpr int kTestLightCount = 16;
-
-// Lights that the hierarchical operator is fitted to; a dense operator is their truth, so that they
-// cost little.
-constexpr int kFittingLightCount = 64;
 
 // A residual above this is not rounding but a mistake; f32 and f16 entries.
 constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
@@ -118,19 +116,35 @@ BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
   }
   const bool dense = settings.operator_kind == OperatorKind::kDense;
   if (!settings.precision) settings.precision = dense ? Precision::kF32 : Precision::kF16;
-  if (dense && settings.precision == Precision::kQ8) {
-    throw Error("8 bits are not precise enough for a dense operator; use f16 or f32");
+  if (settings.precision == Precision::kQ8 &&
+      settings.operator_kind != OperatorKind::kHierarchical) {
+    throw Error("8 bits are for hierarchical operators alone; use f16 or f32, or ask for one");
   }
-  if (dense) settings.tolerance = 0;
+  if (settings.operator_kind != OperatorKind::kHierarchical) settings.tolerance = 0;
   return settings;
+}
+
+const char* name(OperatorKind kind) {
+  switch (kind) {
+    case OperatorKind::kHierarchical:
+      return "hierarchical";
+    case OperatorKind::kLowRank:
+      return "low-rank";
+    case OperatorKind::kFirstBounce:
+      return "first-bounce";
+    case OperatorKind::kAutomatic:
+    case OperatorKind::kDense:
+      break;
+  }
+  return "dense";
 }
 
 std::string settings_json(const BuildSettings& settings) {
   const FormFactorSettings& f = settings.form_factors;
-  const bool dense = settings.operator_kind == OperatorKind::kDense;
-  return nlohmann::json{{"operator", dense ? "dense" : "hierarchical"},
+  return nlohmann::json{{"operator", name(settings.operator_kind)},
                         {"tolerance", settings.tolerance},
                         {"form_factor_tolerance", settings.form_factor_tolerance},
+                        {"rank", settings.rank},
                         {"scale", settings.scale},
                         {"precision", precision_name(*settings.precision)},
                         {"patches", settings.subdivision.patch_count},
@@ -147,7 +161,12 @@ std::string settings_json(const BuildSettings& settings) {
 }
 
 /// The part of the report that is the same in every run: it goes into the file, times do not.
-std::string report_json(const BuildReport& report) {
+std::string report_json(const BuildReport& report, const std::vector<KindError>& errors) {
+  nlohmann::json by_kind = nlohmann::json::object();
+  for (const KindError& e : errors) {
+    by_kind[std::string(name(e.kind))] = {
+        {"lights", e.light_count}, {"mean", e.mean}, {"max", e.max}, {"bound", e.bound}};
+  }
   nlohmann::json json{{"triangles", report.triangle_count},
                       {"degenerate_triangles", report.degenerate_triangle_count},
                       {"display_triangles", report.display_triangle_count},
@@ -165,6 +184,7 @@ std::string report_json(const BuildReport& report) {
                       {"row_sum_error_before", report.closure.row_sum_error_before},
                       {"row_sum_error_after", report.closure.row_sum_error_after},
                       {"closure_change", report.closure.relative_change},
+                      {"errors", by_kind},
                       {"warnings", report.warnings}};
   if (report.form_factor_error) {
     json["form_factor_error_mean"] = report.form_factor_error->mean;
@@ -182,21 +202,48 @@ void check_residual(double residual, Precision precision) {
                   residual, largest));
 }
 
+std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
+                                                 const TransferData& data, const RayTracer& tracer,
+                                                 const BuildSettings& settings,
+                                                 const Progress& progress) {
+  if (settings.operator_kind != OperatorKind::kHierarchical) {
+    const bool first_bounce = settings.operator_kind == OperatorKind::kFirstBounce;
+    return build_low_rank_transfer(dense, data.exchange,
+                                   {settings.rank, *settings.precision, first_bounce}, progress);
+  }
+  const DrawnLights lights = draw_fitting_lights(data, tracer, settings.form_factors.seed);
+  return build_hierarchical_transfer(dense, data.patches, lights.view(),
+                                     {settings.tolerance, *settings.precision}, progress);
+}
+
 /// Compresses the form factors of `data` and measures how well, with data.transfer as it is.
 void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
                               const BuildSettings& settings, BuildReport& report,
                               const Progress& progress) {
-  const std::uint64_t seed = mix_bits(settings.form_factors.seed);
-  const auto radiosities = [&](int count, std::uint64_t light_seed) {
-    return radiosities_of(*data.transfer, data.patches.reflectance,
-                          random_initial_exitances(data, tracer, count, light_seed));
+  const std::uint64_t seed = settings.form_factors.seed;
+  const auto radiosities = [&](std::span<const std::vector<Float3>> lights) {
+    return radiosities_of(*data.transfer, data.patches.reflectance, lights);
   };
+  const DrawnLights lights = draw_fitting_lights(data, tracer, seed);
+  const DrawnLights fitting{radiosities(lights.shaping), radiosities(lights.judging)};
   data.compressed_form_factors =
-      compress_form_factors(data.exchange, data.patches, radiosities(kFittingLightCount, seed),
+      compress_form_factors(data.exchange, data.patches, fitting.view(),
                             {settings.form_factor_tolerance, Precision::kF16}, progress);
   report.form_factor_error =
       form_factor_error(*data.compressed_form_factors, data.exchange, data.patches,
-                        radiosities(kTestLightCount, seed + 1));
+                        radiosities(random_initial_exitances(data, tracer, LightKind::kPoint,
+                                                             kTestLightCount, seed)));
+}
+
+/// Mean and largest are those of point lights, which the tolerance is about; the bound holds for
+/// every kind.
+void record_errors(const std::vector<KindError>& errors, BuildRecord& record) {
+  for (const KindError& e : errors) {
+    record.error_bound = std::max(record.error_bound, e.bound);
+    if (e.kind != LightKind::kPoint) continue;
+    record.error_mean = e.mean;
+    record.error_max = e.max;
+  }
 }
 
 // The scene of a file, with what is plainly seen from behind made double-sided.
@@ -233,6 +280,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
     return make_patch_model(std::move(scene), settings.subdivision);
   });
   describe_patches(model, report);
+  const BuildSettings decided = decide(settings, model.patches.size());
   report.estimate = estimate_cost(model.patches, settings.form_factors.probe_rays);
   if (on_estimate) on_estimate(report.estimate);
   refuse_if_too_large(report.estimate, settings.memory_limit_bytes, report.triangle_count);
@@ -260,8 +308,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
     });
   }
 
-  const BuildSettings decided = decide(settings, data.patches.size());
-  const bool compressed = decided.operator_kind == OperatorKind::kHierarchical;
+  const bool compressed = decided.operator_kind != OperatorKind::kDense;
   const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
   const auto dense = clock.run("operator", [&](const Progress& part) {
     return build_dense_transfer(data.exchange, data.patches, dense_precision, part);
@@ -270,10 +317,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.transfer = dense;
   if (compressed) {
     data.transfer = clock.run("compression", [&](const Progress& part) {
-      const auto lights = random_initial_exitances(data, tracer, kFittingLightCount,
-                                                   mix_bits(settings.form_factors.seed));
-      return build_hierarchical_transfer(*dense, data.patches, lights,
-                                         {decided.tolerance, *decided.precision}, part);
+      return compress(*dense, data, tracer, decided, part);
     });
   }
   if (decided.form_factor_tolerance > 0) {
@@ -282,16 +326,15 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
       return true;
     });
   }
-  const MeasuredError error = clock.run("check", [&](const Progress& part) {
+  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
     data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
-    return measure_error(data, tracer, kTestLightCount, settings.form_factors.seed, part);
+    return measure_error(data, tracer, compressed ? dense.get() : nullptr,
+                         settings.form_factors.seed, part);
   });
+  record_errors(errors, data.record);
   data.record.tolerance = decided.tolerance;
-  data.record.error_mean = error.mean;
-  data.record.error_max = error.max;
-  data.record.error_bound = 2 * error.max;
   data.record.settings_json = settings_json(decided);
-  data.record.report_json = report_json(report);
+  data.record.report_json = report_json(report, errors);
   return data;
 }
 

@@ -2,26 +2,25 @@
 
 #include <algorithm>
 
+#include "matrix_compression.h"
 #include "rebounce/transfer/area_norm.h"
-#include "symmetric_matrix.h"
 
 namespace rebounce {
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const ExchangeMatrix& exchange, const PatchTable& patches,
-    std::span<const std::vector<Float3>> test_radiosities, const HierarchicalSettings& settings,
-    const Progress& progress) {
-  return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, test_radiosities,
+    const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
+    const HierarchicalSettings& settings, const Progress& progress) {
+  return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, radiosities,
                                settings, progress);
 }
 
-MeasuredError form_factor_error(const HierarchicalOperator& compressed,
-                                const ExchangeMatrix& exchange, const PatchTable& patches,
-                                std::span<const std::vector<Float3>> radiosities) {
+FormFactorError form_factor_error(const HierarchicalOperator& compressed,
+                                  const ExchangeMatrix& exchange, const PatchTable& patches,
+                                  std::span<const std::vector<Float3>> radiosities) {
   const FormFactorRows rows(exchange, patches.area);
   std::vector<float> workspace(compressed.workspace_size());
   std::vector<Float3> truth(patches.size()), gathered(patches.size());
-  MeasuredError error;
+  FormFactorError error;
   for (const std::vector<Float3>& radiosity : radiosities) {
     rows.gather(radiosity, truth);
     compressed.apply(radiosity, gathered, workspace);

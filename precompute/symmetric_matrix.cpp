@@ -1,50 +1,76 @@
+#define EIGEN_USE_BLAS
+#define EIGEN_DONT_PARALLELIZE
 #include "symmetric_matrix.h"
 
+#include <cassert>
 #include <cmath>
 
+#include "single_threaded_blas.h"
+
 namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXf;
+
+constexpr Index kTile = DenseOperator::kTile;
+using Tile = Eigen::Matrix<float, kTile, kTile, Eigen::RowMajor>;
+using RowMajorMatrixXf = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+}  // namespace
 
 void DenseMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                           std::span<const std::uint32_t> columns,
-                          Eigen::Ref<Eigen::MatrixXf> entries) const {
+                          Eigen::Ref<MatrixXf> entries) const {
   for (std::size_t j = 0; j < columns.size(); ++j) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      entries(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) =
+      entries(static_cast<Index>(i), static_cast<Index>(j)) =
           dense_.symmetric_entry(matrix, rows[i], columns[j]);
     }
   }
 }
 
-double DenseMatrix::norm_squared() const {
-  const std::size_t n = dense_.patch_count();
-  double sum = 0;
-  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) {
-        const double entry = dense_.symmetric_entry(m, i, j);
-        sum += (i == j ? 1 : 2) * entry * entry;
+MatrixXf DenseMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) const {
+  const DenseOperator::Storage& storage = dense_.storage();
+  assert(storage.precision == Precision::kF32);
+  const SingleThreadedBlas single_threaded;
+  const auto n = static_cast<Index>(dense_.patch_count());
+  const Index side = (n + kTile - 1) / kTile;
+  const float* const tiles =
+      storage.tiles_f32.data() +
+      matrix * DenseOperator::tile_count(dense_.patch_count()) * kTile * kTile;
+  const auto tile = [&](Index row, Index column) {
+    return Eigen::Map<const Tile>(tiles + (row * (row + 1) / 2 + column) * kTile * kTile);
+  };
+  MatrixXf padded = MatrixXf::Zero(side * kTile, x.cols());
+  padded.topRows(n) = x;
+  MatrixXf result(side * kTile, x.cols());
+  // Each tile is read once for all vectors.
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Index i = 0; i < side; ++i) {
+    MatrixXf sum = MatrixXf::Zero(kTile, x.cols());
+    for (Index j = 0; j < side; ++j) {
+      const auto part = padded.middleRows(j * kTile, kTile);
+      if (j <= i) {
+        sum.noalias() += tile(i, j) * part;
+      } else {
+        sum.noalias() += tile(j, i).transpose() * part;
       }
     }
+    result.middleRows(i * kTile, kTile) = sum;
   }
-  return sum;
-}
-
-std::vector<Float3> DenseMatrix::multiply(std::span<const Float3> light) const {
-  std::vector<float> workspace(dense_.workspace_size());
-  std::vector<Float3> result(light.size());
-  dense_.apply(light, result, workspace);
-  return result;
+  return result.topRows(n);
 }
 
 FormFactorMatrix::FormFactorMatrix(const ExchangeMatrix& exchange, std::span<const float> area)
-    : exchange_(exchange), rows_(exchange, area) {
+    : area_(area), rows_(exchange, area) {
   root_area_.reserve(area.size());
   for (const float a : area) root_area_.push_back(std::sqrt(a));
 }
 
 void FormFactorMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::uint32_t> rows,
                                std::span<const std::uint32_t> columns,
-                               Eigen::Ref<Eigen::MatrixXf> entries) const {
+                               Eigen::Ref<MatrixXf> entries) const {
   std::vector<std::uint32_t> place(root_area_.size(), kNone);  // of a patch among the columns
   for (std::size_t j = 0; j < columns.size(); ++j)
     place[columns[j]] = static_cast<std::uint32_t>(j);
@@ -55,27 +81,25 @@ void FormFactorMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::ui
     const auto form_factor = rows_.form_factors(row);
     for (std::size_t k = 0; k < seen.size(); ++k) {
       if (place[seen[k]] == kNone) continue;
-      entries(static_cast<Eigen::Index>(i), place[seen[k]]) =
+      entries(static_cast<Index>(i), place[seen[k]]) =
           static_cast<float>(form_factor[k] * root_area_[row] / root_area_[seen[k]]);
     }
   }
 }
 
-double FormFactorMatrix::norm_squared() const {
-  double sum = 0;
+MatrixXf FormFactorMatrix::multiply(std::uint32_t /*matrix*/, const MatrixXf& x) const {
+  const RowMajorMatrixXf by_patch = x;
+  RowMajorMatrixXf result(x.rows(), x.cols());
+#pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t i = 0; i < root_area_.size(); ++i) {
-    for (std::uint64_t k = exchange_.row_begin[i]; k < exchange_.row_begin[i + 1]; ++k) {
-      const double entry =
-          exchange_.exchange_area[k] / (root_area_[i] * root_area_[exchange_.column[k]]);
-      sum += (exchange_.column[k] == i ? 1 : 2) * entry * entry;
+    const auto seen = rows_.columns(i);
+    const auto form_factor = rows_.form_factors(i);
+    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(x.cols());
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      sum += form_factor[k] / root_area_[seen[k]] * by_patch.row(seen[k]).cast<double>();
     }
+    result.row(static_cast<Index>(i)) = (root_area_[i] * sum).cast<float>();
   }
-  return sum;
-}
-
-std::vector<Float3> FormFactorMatrix::multiply(std::span<const Float3> light) const {
-  std::vector<Float3> result(light.size());
-  rows_.gather(light, result);
   return result;
 }
 

@@ -36,6 +36,9 @@ inline constexpr char kProbePosition[] = "probe.position";
 inline constexpr char kProbeGrid[] = "probe.grid";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
+inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
+inline constexpr char kLowRankCore[] = "transfer.low_rank.core";
+inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matrix";
 }  // namespace tensor
 
 /// The tensors of a hierarchical operator.

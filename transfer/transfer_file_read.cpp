@@ -8,6 +8,7 @@
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/low_rank_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "transfer_data_check.h"
 #include "transfer_file_format.h"
@@ -268,11 +269,45 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   }
 }
 
+std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsFile& file,
+                                                              const TransferData& data,
+                                                              bool first_bounce) {
+  LowRankOperator::Storage storage;
+  storage.area = data.patches.area;
+  const TensorInfo& basis = file.info(tensor::kLowRankBasis);
+  const TensorShape shape{LowRankOperator::tile_count(storage.area.size()), kAnySize,
+                          LowRankOperator::kTile};
+  if (basis.type == TensorType::kF16) {
+    storage.precision = Precision::kF16;
+    storage.basis_f16 = file.tensor<std::uint16_t>(tensor::kLowRankBasis, shape, TensorType::kF16);
+  } else {
+    storage.basis_f32 = file.tensor<float>(tensor::kLowRankBasis, shape);
+  }
+  storage.rank = basis.shape[1];
+  storage.core = file.tensor<float>(tensor::kLowRankCore, {kAnySize, storage.rank, storage.rank});
+  storage.matrix_count = static_cast<std::uint32_t>(file.info(tensor::kLowRankCore).shape[0]);
+  storage.channel_matrix =
+      read_channel_matrix(file, tensor::kLowRankChannelMatrix, storage.matrix_count);
+  std::shared_ptr<const FormFactorOperator> gather;
+  if (first_bounce) {
+    gather = std::make_shared<const FormFactorBlocks>(data.exchange, data.patches.area);
+  }
+  try {
+    return std::make_shared<const LowRankOperator>(std::move(storage), std::move(gather));
+  } catch (const Error& error) {
+    refuse(file, error.what());
+  }
+}
+
 std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& file,
-                                                      const std::vector<float>& area) {
+                                                      const TransferData& data) {
+  const std::vector<float>& area = data.patches.area;
   const std::string& kind = metadata(file, key::kOperator);
   if (kind == "dense") return read_dense_operator(file, area);
   if (kind == "hierarchical") return read_hierarchical_operator(file, kHierarchicalTransfer, area);
+  if (kind == "low-rank" || kind == "first-bounce") {
+    return read_low_rank_operator(file, data, kind == "first-bounce");
+  }
   refuse(file, "the operator is of a kind that this program does not know");
 }
 
@@ -315,7 +350,7 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   data.exchange = read_exchange(file);
   data.record = read_record(file);
   check_transfer_data(data, file.name());
-  data.transfer = read_operator(file, data.patches.area);
+  data.transfer = read_operator(file, data);
   data.compressed_form_factors = read_compressed_form_factors(file, data.patches.area);
   return data;
 }

@@ -5,6 +5,7 @@
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/low_rank_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "shortest_decimal.h"
 #include "transfer_file_format.h"
@@ -101,14 +102,31 @@ void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
   }
 }
 
+void collect_low_rank_operator(const LowRankOperator::Storage& storage,
+                               TensorCollector& collector) {
+  const TensorShape shape{LowRankOperator::tile_count(storage.area.size()), storage.rank,
+                          LowRankOperator::kTile};
+  if (storage.precision == Precision::kF16) {
+    collector.add(tensor::kLowRankBasis, shape, storage.basis_f16.span(), TensorType::kF16);
+  } else {
+    collector.add(tensor::kLowRankBasis, shape, storage.basis_f32.span());
+  }
+  collector.add(tensor::kLowRankCore, {storage.matrix_count, storage.rank, storage.rank},
+                storage.core.span());
+  collector.add<std::uint32_t>(tensor::kLowRankChannelMatrix, {storage.channel_matrix.size()},
+                               storage.channel_matrix);
+}
+
 void collect_operator(const TransferOperator* transfer, TensorCollector& collector) {
   if (const auto* dense = dynamic_cast<const DenseOperator*>(transfer)) {
     collect_dense_operator(dense->storage(), collector);
   } else if (const auto* blocks = dynamic_cast<const HierarchicalOperator*>(transfer)) {
     collect_hierarchical_operator(blocks->storage(), kHierarchicalTransfer, collector);
+  } else if (const auto* low_rank = dynamic_cast<const LowRankOperator*>(transfer)) {
+    collect_low_rank_operator(low_rank->storage(), collector);
   } else {
     throw Error(
-        "a transfer file cannot hold this kind of operator; give it a dense or hierarchical one");
+        "a transfer file cannot hold this kind of operator; give it one that the library has");
   }
 }
 

@@ -78,13 +78,21 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
 }
 
-/// The file is written all the same, with the error that it has.
-void check_tolerance(const BuildRecord& record) {
-  if (record.tolerance == 0 || record.error_mean <= record.tolerance) return;
-  throw Error(fmt::format(
-      "the operator misses its tolerance: the mean error is {:.2g} and {:.2g} was asked for; "
-      "ask for less, or for --precision f32 or --operator dense",
-      record.error_mean, record.tolerance));
+/// The file is written all the same, with the errors that it has.
+void check_tolerances(const BuildRecord& record, const BuildReport& report,
+                      double form_factor_tolerance) {
+  if (record.tolerance > 0 && record.error_mean > record.tolerance) {
+    throw Error(fmt::format(
+        "the operator misses its tolerance: the mean error is {:.2g} and {:.2g} was asked for; "
+        "ask for less, or for --precision f32 or --operator dense",
+        record.error_mean, record.tolerance));
+  }
+  if (report.form_factor_error && report.form_factor_error->mean > form_factor_tolerance) {
+    throw Error(fmt::format(
+        "the compressed form factors miss their tolerance: the mean error is {:.2g} and {:.2g} was "
+        "asked for; ask for less with --compress-form-factors, or go without",
+        report.form_factor_error->mean, form_factor_tolerance));
+  }
 }
 
 /// --probes NX,NY,NZ or --probes SPACING.
@@ -107,6 +115,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
     if (chosen.precision == precision_name(precision)) settings.precision = precision;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
+  if (chosen.operator_kind == "low-rank") settings.operator_kind = OperatorKind::kLowRank;
+  if (chosen.operator_kind == "first-bounce") settings.operator_kind = OperatorKind::kFirstBounce;
   if (chosen.operator_kind == "hierarchical" ||
       (chosen.operator_kind.empty() && chosen.tolerance_given)) {
     settings.operator_kind = OperatorKind::kHierarchical;
@@ -135,7 +145,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   } else if (!options.quiet) {
     print_summary(data, report, file_bytes);
   }
-  check_tolerance(data.record);
+  check_tolerances(data.record, report, settings.form_factor_tolerance);
 }
 
 }  // namespace
@@ -167,7 +177,12 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
           "--operator", chosen->operator_kind,
           "Kind of the operator; by default hierarchical if a tolerance is given or there are "
           "more than 5000 patches, otherwise dense")
-      ->check(CLI::IsMember({"hierarchical", "dense"}));
+      ->check(CLI::IsMember({"hierarchical", "low-rank", "first-bounce", "dense"}));
+  command
+      ->add_option("--rank", chosen->settings.rank,
+                   "Rank of a low-rank or first-bounce operator; bytes and time grow with it")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
   command
       ->add_option(
           "--tolerance", chosen->settings.tolerance,
@@ -179,8 +194,8 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->add_option(
           "--precision", chosen->precision,
           "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q8 "
-          "for two thirds of those; by default f16 for a hierarchical operator, f32 for a "
-          "dense one")
+          "for two thirds of those where the tolerance is 1 % or more; by default f32 for a "
+          "dense operator, f16 for others")
       ->check(CLI::IsMember({"f16", "f32", "q8"}));
   command
       ->add_option(

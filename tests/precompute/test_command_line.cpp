@@ -228,6 +228,45 @@ TEST_F(CommandLine, AMissedToleranceFails) {
   EXPECT_GT(summary_of({"info", path("box.safetensors")})["error_mean"].get<double>(), 1e-5);
 }
 
+TEST_F(CommandLine, FormFactorsThatMissTheirToleranceFail) {
+  const Outcome outcome = run({"precompute", kScene, "--patches", "300", "--compress-form-factors",
+                               "0.00001", "-o", path("box.safetensors"), "--quiet"});
+  EXPECT_EQ(outcome.exit_code, kBadInput);
+  EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+  EXPECT_NE(outcome.err.find("miss their tolerance"), std::string::npos) << outcome.err;
+  const json report = summary_of({"info", path("box.safetensors")})["report"];
+  EXPECT_GT(report["form_factor_error_mean"].get<double>(), 1e-5);
+}
+
+TEST_F(CommandLine, EightBitsAreRefusedBeforeAnythingIsComputed) {
+  for (const std::string kind : {"dense", "low-rank", "first-bounce"}) {
+    const Outcome outcome = run({"precompute", kScene, "--patches", "300", "--operator", kind,
+                                 "--precision", "q8", "-o", path("box.safetensors")});
+    EXPECT_EQ(outcome.exit_code, kBadInput);
+    // The estimate, which comes before the form factors, would be a line of its own.
+    EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+    EXPECT_NE(outcome.err.find("hierarchical"), std::string::npos) << outcome.err;
+  }
+}
+
+TEST_F(CommandLine, RelightsByOperatorsOfLowRank) {
+  const std::string exact = path("exact.csv"), nearly = path("nearly.csv");
+  summary_of({"solve", precompute("dense.safetensors"), "-o", exact});
+  // The largest difference at a patch; without the first bounce it is that of the corners.
+  for (const auto& [kind, largest] :
+       {std::pair("low-rank", 0.7), std::pair("first-bounce", 0.05)}) {
+    const std::string file = precompute(kind, {"--operator", kind, "--rank", "64"});
+    const json info = summary_of({"info", file});
+    EXPECT_EQ(info["operator"], kind);
+    EXPECT_EQ(info["tolerance"], 0);
+    EXPECT_EQ(info["settings"]["rank"], 64);
+    EXPECT_GT(info["error_mean"].get<double>(), 1e-4);
+    EXPECT_GT(info["error_bound"].get<double>(), info["error_max"].get<double>());
+    summary_of({"solve", file, "-o", nearly});
+    EXPECT_LT(difference(read_csv(exact), read_csv(nearly), 3), largest);
+  }
+}
+
 TEST_F(CommandLine, MeetsThePatchSize) {
   const json made = summary_of(
       {"precompute", kScene, "--patch-size", "0.1", "-o", path("box.safetensors"), "--quiet"});

@@ -100,12 +100,13 @@ double entry_error(const DenseOperator& dense, const TransferOperator& transfer)
 
 TEST(HierarchicalTransfer, KeepsEveryTolerance) {
   const Room& room = furnished_room();
-  const auto probes = lights_in(room.patches, 12, 1), others = lights_in(room.patches, 24, 2);
+  const auto probes = lights_in(room.patches, 12, 1), judges = lights_in(room.patches, 12, 3),
+             others = lights_in(room.patches, 24, 2);
   double previous_error = 1;
   std::size_t previous_bytes = 0;
   for (const double tolerance : {0.04, 0.01, 0.002}) {
-    const auto transfer =
-        build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = tolerance});
+    const auto transfer = build_hierarchical_transfer(*room.dense, room.patches, {probes, judges},
+                                                      {.tolerance = tolerance});
     const double error = mean_error(room, *transfer, others);
     // Under lights that the build has not seen.
     EXPECT_LT(error, tolerance);
@@ -123,7 +124,7 @@ TEST(HierarchicalTransfer, SaysWhatItMissesByItsError) {
   const Room& room = furnished_room();
   const auto probes = lights_in(room.patches, 4, 1);
   const auto transfer =
-      build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = 1e-6});
+      build_hierarchical_transfer(*room.dense, room.patches, {probes, probes}, {.tolerance = 1e-6});
   const double error = mean_error(room, *transfer, probes);
   EXPECT_GT(error, 1e-6);
   EXPECT_LT(error, 1e-3);
@@ -131,14 +132,16 @@ TEST(HierarchicalTransfer, SaysWhatItMissesByItsError) {
 
 TEST(HierarchicalTransfer, NearlyEverythingIsExactAtALowPrice) {
   const Room& room = furnished_room();
-  const HierarchicalOperator transfer(compress_transfer(*room.dense, room.patches, 1e-16));
+  const HierarchicalOperator transfer(
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-16));
   EXPECT_LT(entry_error(*room.dense, transfer), 1e-5);
 }
 
 TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
   const Room& room = furnished_room();
   for (const double price : {1e-5, 1e-9}) {
-    const HierarchicalOperator transfer(compress_transfer(*room.dense, room.patches, price));
+    const HierarchicalOperator transfer(
+        compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), price));
     const std::size_t positions = HierarchicalOperator::position_count(room.patches.size()) /
                                   HierarchicalOperator::kAlignment;
     std::vector<int> covered(positions * positions, 0);
@@ -160,20 +163,19 @@ TEST(HierarchicalTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = furnished_room();
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
-  const auto one = compress_transfer(*room.dense, room.patches, 1e-7);
+  const auto one =
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
   omp_set_num_threads(4);
-  const auto four = compress_transfer(*room.dense, room.patches, 1e-7);
+  const auto four =
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
   omp_set_num_threads(before);
   EXPECT_TRUE(std::ranges::equal(one.values_f32, four.values_f32));
   EXPECT_EQ(one.patch, four.patch);
 }
 
-TEST(HierarchicalTransfer, LightsOnBlackPatchesAreCarriedToo) {
-  // Black patches may emit: their columns are as good as the others'.
+TEST(HierarchicalTransfer, BlackLampsAreCarriedWhereTheyAreNamed) {
+  // No lamp's light leaves black patches, so that nothing else says that they matter.
   const Room& room = furnished_room();
-  const auto probes = lights_in(room.patches, 12, 1);
-  const auto transfer =
-      build_hierarchical_transfer(*room.dense, room.patches, probes, {.tolerance = 0.005});
   std::vector<Float3> light(room.patches.size());
   int black = 0;
   for (std::size_t i = 0; i < light.size(); ++i) {
@@ -182,12 +184,18 @@ TEST(HierarchicalTransfer, LightsOnBlackPatchesAreCarriedToo) {
     ++black;
   }
   ASSERT_GT(black, 20);
-  EXPECT_LT(mean_error(room, *transfer, {light}), 0.01);
+  auto lights = lights_in(room.patches, 12, 1);
+  lights.push_back(light);
+  constexpr double kTolerance = 0.01;
+  const auto transfer = build_hierarchical_transfer(*room.dense, room.patches, {lights, lights},
+                                                    {.tolerance = kTolerance});
+  EXPECT_LT(mean_error(room, *transfer, {light}), 3 * kTolerance);
 }
 
 TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   const Room room = make_room(furnished_scene(true), 800);
-  const HierarchicalOperator grey(compress_transfer(*room.dense, room.patches, 1e-7));
+  const HierarchicalOperator grey(
+      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7));
   EXPECT_EQ(grey.storage().matrix_count, 1U);
   // The same matrix three times over has the same bases, thrice the cores and dense blocks.
   DenseOperator::Storage thrice = room.dense->storage();
@@ -198,9 +206,26 @@ TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   thrice.tiles_f32 = SharedArray(std::move(tiles));
   thrice.matrix_count = 3;
   thrice.channel_matrix = {0, 1, 2};
-  const HierarchicalOperator rgb(compress_transfer(DenseOperator(thrice), room.patches, 3 * 1e-7));
+  const HierarchicalOperator rgb(compress_transfer(DenseOperator(thrice), room.patches,
+                                                   lights_in(room.patches, 16, 1), 3 * 1e-7));
   EXPECT_EQ(rgb.storage().matrix_count, 3U);
   EXPECT_LT(grey.bytes(), rgb.bytes());
+}
+
+TEST(HierarchicalTransfer, TheBrightestRoomFitsHalfPrecision) {
+  // Light is reflected a hundred times, and a coarse operator has it all in few, large cores.
+  for (const float reflectance : {0.9F, 0.99F}) {
+    Scene scene = test::empty_scene({reflectance, reflectance, reflectance});
+    test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
+    const Room room = make_room(scene, 300);
+    const auto lights = lights_in(room.patches, 12, 1);
+    for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
+      const auto transfer = build_hierarchical_transfer(
+          *room.dense, room.patches, {lights, lights}, {.tolerance = 0.03, .precision = precision});
+      EXPECT_LT(mean_error(room, *transfer, lights), 0.03);
+      EXPECT_LT(transfer->bytes(), room.dense->bytes() / 4);
+    }
+  }
 }
 
 TEST(HierarchicalTransfer, TakesOnePatchAndNoLights) {
@@ -217,7 +242,8 @@ TEST(HierarchicalTransfer, TakesOnePatchAndNoLights) {
 
 TEST(HierarchicalTransfer, StopsWhenAsked) {
   const Room& room = furnished_room();
-  EXPECT_THROW(compress_transfer(*room.dense, room.patches, 1e-7, [](double) { return false; }),
+  EXPECT_THROW(compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7,
+                                 [](double) { return false; }),
                Cancelled);
 }
 

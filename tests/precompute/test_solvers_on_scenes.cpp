@@ -252,7 +252,7 @@ TEST(RefinementOnScenes, AThreePerCentOperatorNeedsAHandfulOfSteps) {
     std::vector<std::vector<Float3>> lights;
     for (std::uint64_t seed = 20; seed < 28; ++seed) lights.push_back(lamp_light(n, seed));
     const auto transfer = build_hierarchical_transfer(
-        *dense, room->patches, lights, {.tolerance = 0.03, .precision = Precision::kF32});
+        *dense, room->patches, {lights, lights}, {.tolerance = 0.03, .precision = Precision::kF32});
     for (std::uint64_t seed = 30; seed < 34; ++seed) {
       const std::vector<Float3> m0 = lamp_light(n, seed);
       const auto solver = make_solver(SolveMethod::kRefine, *room->blocks,
@@ -278,7 +278,7 @@ struct CompressedRoom {
     }
     const auto radiosities = radiosities_of(*room.transfer, room.patches.reflectance, lights);
     form_factors = std::make_unique<CompressedFormFactors>(
-        compress_form_factors(room.exchange, room.patches, radiosities,
+        compress_form_factors(room.exchange, room.patches, {radiosities, radiosities},
                               {.tolerance = tolerance, .precision = precision}));
   }
 

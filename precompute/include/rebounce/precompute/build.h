@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
+#include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/light_probes.h"
-#include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/subdivision.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/transfer_data.h"
@@ -24,6 +24,8 @@ enum class OperatorKind : std::uint8_t {
   kAutomatic,  ///< dense up to kDensePatchCount patches, hierarchical above
   kDense,
   kHierarchical,
+  kLowRank,      ///< one rank for the whole scene: low_rank_operator.h
+  kFirstBounce,  ///< the same after a first bounce through F
 };
 
 /// Up to this many patches the dense operator, which is exact to rounding, is small enough to have
@@ -37,8 +39,9 @@ struct BuildSettings {
   ProbeSettings probes;  ///< by default none
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
-  /// kF16: half the bytes, an error of some 1e-4. By default that for the hierarchical operator,
-  /// and f32 for the dense one.
+  std::size_t rank = 256;    ///< of kLowRank and kFirstBounce: see LowRankSettings
+  /// kF16: half the bytes, an error of some 1e-4. By default that for all but the dense operator,
+  /// which is f32.
   std::optional<Precision> precision;
   /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are
   /// compressed for iterative solvers; 0: they are not. Less: more bytes, fewer errors.
@@ -68,7 +71,7 @@ struct BuildReport {
   ClosureReport closure;
   /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
   /// were not fitted to.
-  std::optional<MeasuredError> form_factor_error;
+  std::optional<FormFactorError> form_factor_error;
   CostEstimate estimate;
 };
 

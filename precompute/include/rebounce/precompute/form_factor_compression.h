@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "rebounce/precompute/hierarchical_transfer.h"
-#include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/hierarchical_operator.h"
@@ -13,20 +12,24 @@
 
 namespace rebounce {
 
-/// Compresses the form factors as build_hierarchical_transfer compresses Y: G = A^1/2 F A^-1/2, one
-/// matrix for the three channels. The error that `settings.tolerance` bounds is that of F B,
-/// relative and area-weighted L2, in the mean over `test_radiosities`, each B [n] in lx. If that is
-/// not reached, the result is the most exact that was found: measure it. Throws Cancelled if asked
-/// to stop.
-std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const ExchangeMatrix& exchange, const PatchTable& patches,
-    std::span<const std::vector<Float3>> test_radiosities, const HierarchicalSettings& settings,
-    const Progress& progress = {});
+/// Relative area-weighted L2 errors of the light that is gathered, F B.
+struct FormFactorError {
+  double mean = 0;
+  double max = 0;
+};
 
-/// Relative area-weighted L2 errors of `compressed` form factors, in F B for each of these B.
-MeasuredError form_factor_error(const HierarchicalOperator& compressed,
-                                const ExchangeMatrix& exchange, const PatchTable& patches,
-                                std::span<const std::vector<Float3>> radiosities);
+/// Compresses the form factors as build_hierarchical_transfer compresses Y: G = A^1/2 F A^-1/2, one
+/// matrix for the three channels. What lights are there are radiosities B here, [n] in lx, and the
+/// error that `settings.tolerance` bounds is that of F B. If it is not reached, the result is the
+/// most exact that was found: measure it. Throws Cancelled if asked to stop.
+std::shared_ptr<const HierarchicalOperator> compress_form_factors(
+    const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
+    const HierarchicalSettings& settings, const Progress& progress = {});
+
+/// Errors of `compressed` form factors over these B.
+FormFactorError form_factor_error(const HierarchicalOperator& compressed,
+                                  const ExchangeMatrix& exchange, const PatchTable& patches,
+                                  std::span<const std::vector<Float3>> radiosities);
 
 /// The radiosities B = M0 + rho Y M0 [n] in lx that `initial_exitances` M0 give rise to.
 std::vector<std::vector<Float3>> radiosities_of(

@@ -18,20 +18,30 @@ struct HierarchicalSettings {
   Precision precision = Precision::kF16;  ///< kF32: twice the bytes, no less error worth mention
 };
 
-/// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
-/// Frobenius norm of Yhat, in which what uniform light does counts more than the rest, is worth
-/// 1 / `price` stored values. Throws Cancelled if asked to stop.
-HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
-                                                const PatchTable& patches, double price,
-                                                const Progress& progress = {});
+/// Lights that the operator is fitted to, each an initial exitance [n] in lx.
+struct FittingLights {
+  /// What light patches give off: errors in what such lights do weigh more than others.
+  std::span<const std::vector<Float3>> shaping;
+  /// Those that the tolerance is held under. Others than the first, or the error looks smaller than
+  /// it is.
+  std::span<const std::vector<Float3>> judging;
+};
 
-/// The smallest such operator whose errors under `test_lights`, each an initial exitance [n] in lx,
-/// are well within the tolerance in the mean, and within three times of it at most, found in a few
-/// rounds. If none of them is, the most exact one: measure it. Without lights that reach the
-/// patches, uniform ones are taken.
+/// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
+/// Frobenius norm of Yhat, with the weights that the `shaping` lights give (light_weights.h), is
+/// worth 1 / `price` stored values. A uniform light is always among them.
+/// Throws Cancelled if asked to stop.
+HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
+                                                const PatchTable& patches,
+                                                std::span<const std::vector<Float3>> shaping,
+                                                double price, const Progress& progress = {});
+
+/// The smallest such operator whose errors under the judging lights are well within the tolerance
+/// in the mean, and within three times of it at most, found in a few rounds. From round to round,
+/// shaping lights that came out badly get more weight. If no operator is within, the most exact
+/// one: measure it.
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
-    const DenseOperator& dense, const PatchTable& patches,
-    std::span<const std::vector<Float3>> test_lights, const HierarchicalSettings& settings,
-    const Progress& progress = {});
+    const DenseOperator& dense, const PatchTable& patches, const FittingLights& lights,
+    const HierarchicalSettings& settings, const Progress& progress = {});
 
 }  // namespace rebounce

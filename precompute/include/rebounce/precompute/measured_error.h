@@ -4,31 +4,29 @@
 #include <vector>
 
 #include "rebounce/precompute/progress.h"
+#include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
 
-/// Relative area-weighted L2 errors of the operator's indirect irradiance against the
-/// double-precision solution, one for each of a number of random lights.
-struct MeasuredError {
+/// Relative area-weighted L2 errors of the indirect irradiance under random lights of one kind.
+struct KindError {
+  LightKind kind = LightKind::kPoint;
+  int light_count = 0;
   double mean = 0;
   double max = 0;
+  double bound = 0;  ///< with 95 % probability above those of 1,000 more lights: error_bound.h
 };
 
-/// `count` point lights at random places in the free space of the scene: on the way of a
-/// cosine-distributed ray from a random patch to what it hits. The same `seed`, the same lights.
-std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
-                                       std::uint64_t seed);
-
-/// What such lights, one at a time, make the patches give off for the first time: initial exitances
-/// [count][n] in lx.
-std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& data,
-                                                          const RayTracer& tracer, int count,
-                                                          std::uint64_t seed);
-
-/// Measures data.transfer under `light_count` such lights.
-MeasuredError measure_error(const TransferData& data, const RayTracer& tracer, int light_count,
-                            std::uint64_t seed, const Progress& progress = {});
+/// Measures data.transfer under random lights of every kind that the scene has.
+///
+/// With `exact`, the operator in f32 that data.transfer was made from, the truth is what that one
+/// gives, and there are 256 lights of a kind. Without it, the truth is
+/// Gauss-Seidel in double precision under 16 lights of a kind.
+std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
+                                     const DenseOperator* exact, std::uint64_t seed,
+                                     const Progress& progress = {});
 
 }  // namespace rebounce

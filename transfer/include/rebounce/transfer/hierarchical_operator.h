@@ -54,8 +54,10 @@ class HierarchicalOperator final : public TransferOperator {
   static constexpr std::size_t kPadding = 16;
 
   /// In half precision, dense entries and cores are stored times this, so that small ones stay
-  /// normal numbers; bases are stored as they are.
-  static constexpr float kHalfScale = DenseOperator::kHalfScale;
+  /// normal numbers; bases are stored as they are. With orthonormal bases no core has an entry
+  /// above the norm of Yhat, 1 / (1 - reflectance): up to 0.99, the most that patches have, all of
+  /// them fit.
+  static constexpr float kHalfScale = 512;
 
   /// In 8 bits, a basis holds its vectors times numbers of their own such that their largest
   /// entries are +-127; cores are divided by them, with this for 1 at each end.

@@ -22,7 +22,8 @@ class TransferOperator {
   /// Bytes of the stored operator, all three channels.
   virtual std::size_t bytes() const = 0;
 
-  /// The kind as the command line names it: "dense", "hierarchical".
+  /// The kind as the command line names it: "dense", "hierarchical", "low-rank",
+  /// "first-bounce".
   virtual std::string kind() const = 0;
 
   /// Floats of workspace that `apply` needs.

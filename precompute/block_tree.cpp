@@ -1,0 +1,273 @@
+#define EIGEN_USE_BLAS
+#define EIGEN_DONT_PARALLELIZE
+#include "block_tree.h"
+
+#include <omp.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <atomic>
+#include <optional>
+
+#include "block_compression.h"
+#include "rebounce/transfer/error.h"
+#include "single_threaded_blas.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+
+// What a block costs beside its values, in values: its description, and the start of its loops.
+constexpr double kBlockOverhead = 32;
+
+// Pieces of work: the matrix is gathered and compressed in squares of at most this many rows, and
+// of an eighth of all where that is smaller, so that there are enough of them to share.
+constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
+
+// A block whose best ranks stay below this part of its sides is smooth: cutting it would only store
+// the same few functions several times over. Measured: notes/operator.md.
+constexpr Index kSmoothPart = 16;
+
+/// A part of the operator: blocks in the order of traversal and what they hold.
+struct Part {
+  std::vector<TransferBlock> blocks;
+  std::vector<float> values;
+  double cost = 0;
+
+  void append(Part&& other) {
+    blocks.insert(blocks.end(), other.blocks.begin(), other.blocks.end());
+    values.insert(values.end(), other.values.begin(), other.values.end());
+    cost += other.cost;
+  }
+};
+
+void append_columns(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
+  for (Index k = 0; k < matrix.size(); ++k) values.push_back(static_cast<float>(matrix.data()[k]));
+}
+
+void append_rows(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
+  append_columns(matrix.transpose(), values);
+}
+
+/// Makes the columns of `basis` orthonormal, by Householder QR; returns R, basis before = after R.
+Eigen::MatrixXd make_orthonormal(Eigen::MatrixXd& basis) {
+  const Index rank = basis.cols();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
+  const Eigen::MatrixXd factor =
+      qr.matrixQR().topRows(rank).template triangularView<Eigen::Upper>();
+  basis = qr.householderQ() * Eigen::MatrixXd::Identity(basis.rows(), rank);
+  return factor;
+}
+
+/// Compresses one square of the matrix, below or on the diagonal.
+class PieceCompressor {
+ public:
+  PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
+                  const std::vector<ClusterWeight>& weights, double price, std::uint32_t row,
+                  std::uint32_t column)
+      : tree_(tree),
+        weights_(weights),
+        price_(price),
+        row_(row),
+        column_(column),
+        row_begin_(tree.clusters[row].begin),
+        column_begin_(tree.clusters[column].begin) {
+    for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) gather(matrix, m);
+  }
+
+  Part compress() const { return compress(row_, column_); }
+
+ private:
+  void gather(const SymmetricMatrix& matrix, std::uint32_t m) {
+    const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
+    const auto rows = patches_of(row), columns = patches_of(column);
+    Eigen::MatrixXf& entries =
+        matrices_.emplace_back(Eigen::MatrixXf::Zero(row.count, column.count));
+    matrix.entries(
+        m, rows, columns,
+        entries.topLeftCorner(static_cast<Index>(rows.size()), static_cast<Index>(columns.size())));
+  }
+
+  /// Those of a cluster's positions that hold one.
+  std::span<const std::uint32_t> patches_of(const Cluster& cluster) const {
+    const std::size_t end =
+        std::min<std::size_t>(cluster.begin + cluster.count, tree_.patch.size());
+    return {tree_.patch.data() + cluster.begin, tree_.patch.data() + end};
+  }
+
+  Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
+
+  WideBlock wide_block(const TransferBlock& place) const {
+    WideBlock block;
+    block.matrix_count = matrix_count();
+    block.on_diagonal = place.on_diagonal();
+    block.entries.resize(place.row_count, matrix_count() * place.column_count);
+    for (Index m = 0; m < matrix_count(); ++m) {
+      block.entries.middleCols(m * place.column_count, place.column_count) =
+          matrices_[m]
+              .block(place.row_begin - row_begin_, place.column_begin - column_begin_,
+                     place.row_count, place.column_count)
+              .cast<double>();
+    }
+    return block;
+  }
+
+  WideBlock weighted_block(const TransferBlock& place, std::uint32_t row,
+                           std::uint32_t column) const {
+    WideBlock block = wide_block(place);
+    weights_[row].put_left(block.entries);
+    for (Index m = 0; m < matrix_count(); ++m) {
+      weights_[column].put_right(
+          block.entries.middleCols(m * place.column_count, place.column_count));
+    }
+    return block;
+  }
+
+  Part compress(std::uint32_t row, std::uint32_t column) const {
+    const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
+    const TransferBlock place{.row_begin = rows.begin,
+                              .row_count = rows.count,
+                              .column_begin = columns.begin,
+                              .column_count = columns.count};
+    const WideBlock block = weighted_block(place, row, column);
+    const CompressionCost cost{price_, place.on_diagonal() ? 1.0 : 2.0};
+    const double zero_cost = cost.total(block.entries.squaredNorm(), kBlockOverhead);
+    const double overhead = price_ * kBlockOverhead;
+    if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
+    const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
+    const bool leaves = rows.is_leaf() && columns.is_leaf();
+    const Index smooth = std::min(block.rows(), block.columns()) / kSmoothPart;
+    if (!leaves && smooth > 0) {
+      const auto low_rank = compress_block(block, cost, zero_cost - overhead, smooth, seed);
+      if (low_rank && low_rank->row_basis.cols() < smooth && low_rank->column_basis.cols() < smooth)
+        return low_rank_part(place, *low_rank, row, column, cost);
+    }
+    Part best = leaves ? dense_part(place) : compress_children(row, column);
+    if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
+    const auto low_rank = compress_block(block, cost, best.cost - overhead, block.rows(), seed);
+    return low_rank ? low_rank_part(place, *low_rank, row, column, cost) : best;
+  }
+
+  Part compress_children(std::uint32_t row, std::uint32_t column) const {
+    Part part;
+    const auto child = [&](std::uint32_t cluster, std::uint32_t k) {
+      const Cluster& c = tree_.clusters[cluster];
+      return c.is_leaf() ? cluster : c.first_child + k;
+    };
+    const std::uint32_t row_children = tree_.clusters[row].is_leaf() ? 1 : 2;
+    const std::uint32_t column_children = tree_.clusters[column].is_leaf() ? 1 : 2;
+    for (std::uint32_t r = 0; r < row_children; ++r) {
+      for (std::uint32_t c = 0; c < column_children; ++c) {
+        if (row == column && c > r) continue;
+        part.append(compress(child(row, r), child(column, c)));
+      }
+    }
+    return part;
+  }
+
+  static Part zero_part(TransferBlock place, double cost) {
+    place.kind = TransferBlock::Kind::kLowRank;
+    return {{place}, {}, cost};
+  }
+
+  Part dense_part(const TransferBlock& place) const {
+    const WideBlock block = wide_block(place);
+    Part part{{place}, {}, 0};
+    for (Index m = 0; m < block.matrix_count; ++m) append_rows(block.matrix(m), part.values);
+    part.cost = price_ * (kBlockOverhead + static_cast<double>(part.values.size()));
+    return part;
+  }
+
+  /// Of the weighted block's factors those of the block itself. Bases are made orthonormal again,
+  /// so that neither they nor the cores leave the range of half precision.
+  void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
+    weights_[row].take_away(block.row_basis);
+    const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);
+    Eigen::MatrixXd column_factor = row_factor;
+    if (row != column) {
+      weights_[column].take_away(block.column_basis);
+      column_factor = make_orthonormal(block.column_basis);
+    }
+    for (Eigen::MatrixXd& core : block.cores) core = row_factor * core * column_factor.transpose();
+  }
+
+  Part low_rank_part(TransferBlock place, LowRankBlock block, std::uint32_t row,
+                     std::uint32_t column, const CompressionCost& cost) const {
+    take_weights_away(block, row, column);
+    place.kind = TransferBlock::Kind::kLowRank;
+    place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
+    place.column_rank = place.on_diagonal() ? place.row_rank
+                                            : static_cast<std::uint32_t>(block.column_basis.cols());
+    Part part{{place}, {}, 0};
+    append_columns(block.row_basis, part.values);
+    append_columns(block.column_basis, part.values);
+    for (const Eigen::MatrixXd& core : block.cores) append_rows(core, part.values);
+    part.cost =
+        cost.total(block.error_squared, kBlockOverhead + static_cast<double>(part.values.size()));
+    return part;
+  }
+
+  const ClusterTree& tree_;
+  const std::vector<ClusterWeight>& weights_;
+  double price_;
+  std::uint32_t row_, column_, row_begin_, column_begin_;
+  std::vector<Eigen::MatrixXf> matrices_;
+};
+
+}  // namespace
+
+BlockTreeCompressor::BlockTreeCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
+                                         const std::vector<ClusterWeight>& weights)
+    : matrix_(matrix), tree_(tree), weights_(weights) {
+  add_pieces(0, 0, std::clamp(tree.clusters.front().count / 8, kSmallestPiece, kLargestPiece));
+}
+
+void BlockTreeCompressor::add_pieces(std::uint32_t row, std::uint32_t column,
+                                     std::uint32_t largest) {
+  const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
+  const bool split_row = rows.count > largest && !rows.is_leaf();
+  const bool split_column = columns.count > largest && !columns.is_leaf();
+  if (!split_row && !split_column) {
+    pieces_.push_back({row, column});
+    return;
+  }
+  for (std::uint32_t r = 0; r < (split_row ? 2U : 1U); ++r) {
+    for (std::uint32_t c = 0; c < (split_column ? 2U : 1U); ++c) {
+      if (row == column && c > r) continue;
+      add_pieces(split_row ? rows.first_child + r : row,
+                 split_column ? columns.first_child + c : column, largest);
+    }
+  }
+}
+
+HierarchicalOperator::Storage BlockTreeCompressor::compress(double price,
+                                                            const Progress& progress) const {
+  const SingleThreadedBlas single_threaded;
+  std::vector<Part> parts(pieces_.size());
+  std::atomic<std::size_t> done = 0;
+  std::atomic<bool> stop = false;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t k = 0; k < pieces_.size(); ++k) {
+    if (stop) continue;
+    parts[k] = PieceCompressor(matrix_, tree_, weights_, price, pieces_[k].row, pieces_[k].column)
+                   .compress();
+    const double fraction = static_cast<double>(++done) / static_cast<double>(pieces_.size());
+    if (progress && omp_get_thread_num() == 0 && !progress(fraction)) stop = true;
+  }
+  if (stop || (progress && !progress(1))) throw Cancelled();
+
+  Part whole;
+  for (Part& part : parts) whole.append(std::move(part));
+  whole.values.resize(whole.values.size() + HierarchicalOperator::kPadding, 0.0F);
+  HierarchicalOperator::Storage storage;
+  storage.area.assign(matrix_.area().begin(), matrix_.area().end());
+  storage.patch = tree_.patch;
+  storage.channel_matrix = matrix_.channel_matrix();
+  storage.matrix_count = matrix_.matrix_count();
+  storage.blocks = std::move(whole.blocks);
+  storage.values_f32 = SharedArray(std::move(whole.values));
+  return storage;
+}
+
+}  // namespace rebounce

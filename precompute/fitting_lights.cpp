@@ -1,0 +1,37 @@
+#include "rebounce/precompute/fitting_lights.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "rebounce/precompute/random_lights.h"
+#include "rebounce/runtime/sampling.h"
+
+namespace rebounce {
+namespace {
+
+// Measured: notes/operator.md.
+constexpr int kShapingPointCount = 128, kShapingSpotCount = 32, kShapingSunCount = 32;
+constexpr int kJudgingLightCount = 64;
+
+}  // namespace
+
+DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
+                                std::uint64_t seed) {
+  const auto draw = [&](LightKind kind, int count) {
+    seed = mix_bits(seed);
+    return random_initial_exitances(data, tracer, kind, count, seed);
+  };
+  DrawnLights lights;
+  for (const auto& [kind, count] : {std::pair(LightKind::kPoint, kShapingPointCount),
+                                    std::pair(LightKind::kSpot, kShapingSpotCount),
+                                    std::pair(LightKind::kSky, kShapingSunCount)}) {
+    std::ranges::move(draw(kind, count), std::back_inserter(lights.shaping));
+  }
+  lights.judging = draw(LightKind::kPoint, kJudgingLightCount);
+  // The scene's own lamps are sure to be used.
+  lights.shaping.push_back(data.patches.emitted_exitance);
+  lights.judging.push_back(data.patches.emitted_exitance);
+  return lights;
+}
+
+}  // namespace rebounce

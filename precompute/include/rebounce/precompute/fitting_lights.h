@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "rebounce/precompute/hierarchical_transfer.h"
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// Lights drawn to fit an operator to, each an initial exitance [n] in lx.
+struct DrawnLights {
+  std::vector<std::vector<Float3>> shaping, judging;
+
+  /// Valid as long as this lives and stays as it is.
+  FittingLights view() const { return {shaping, judging}; }
+};
+
+/// Draws the lights that the operator of a scene is fitted to: points, spots and, where it is open,
+/// suns to shape it, other points to judge it, and for both the light of the scene's own lamps. The
+/// same `seed`, the same lights.
+DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
+                                std::uint64_t seed);
+
+}  // namespace rebounce

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// The kinds of light that an operator is measured under.
+enum class LightKind : std::uint8_t {
+  kPoint,  ///< a point light in the free space of the scene
+  kSpot,   ///< the same with a cone of 10 to 60 degrees from its axis, in any direction
+  kPatch,  ///< one patch that emits, drawn by area
+  kSky,    ///< where the scene is open: first a uniform sky, then suns in any direction
+};
+
+inline constexpr std::array kLightKinds{LightKind::kPoint, LightKind::kSpot, LightKind::kPatch,
+                                        LightKind::kSky};
+
+/// "point", "spot", "patch", "sky".
+std::string_view name(LightKind kind);
+
+/// `count` point lights at random places in the free space of the scene: on the way of a
+/// cosine-distributed ray from a random patch to what it hits, between a twentieth and nineteen
+/// twentieths of it. The same `seed`, the same lights.
+std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
+                                       std::uint64_t seed);
+
+/// What `count` random lights of a kind, one at a time, make the patches give off for the first
+/// time: initial exitances [at most count][n] in lx. Those that reach no patch are left out, which
+/// can be all of them.
+std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& data,
+                                                          const RayTracer& tracer, LightKind kind,
+                                                          int count, std::uint64_t seed);
+
+}  // namespace rebounce

@@ -1,0 +1,91 @@
+#define EIGEN_USE_BLAS
+#define EIGEN_DONT_PARALLELIZE
+#include "light_weights.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "single_threaded_blas.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Directions of a cluster that are told from the rest. Measured: notes/operator.md.
+constexpr Index kDirectionCount = 8;
+
+// The part of the mean energy of the sample at one position that is taken for the variance of
+// lights in any direction. Measured: notes/operator.md.
+constexpr double kBackground = 0.1;
+
+struct Principal {
+  MatrixXd directions;
+  VectorXd energies;
+};
+
+/// The leading eigenvectors of sample sample^T and their eigenvalues.
+Principal principal_directions(const MatrixXd& sample) {
+  const bool tall = sample.rows() > sample.cols();
+  const MatrixXd gram =
+      tall ? MatrixXd(sample.transpose() * sample) : MatrixXd(sample * sample.transpose());
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
+  const Index count = std::min(kDirectionCount, gram.rows());
+  Principal result;
+  result.energies = solver.eigenvalues().tail(count).cwiseMax(0);
+  const auto vectors = solver.eigenvectors().rightCols(count);
+  if (!tall) {
+    result.directions = vectors;
+    return result;
+  }
+  // Where there is no energy there is no direction either, and none is needed.
+  const VectorXd scale = result.energies.unaryExpr(
+      [&](double e) { return e > 1e-12 * result.energies.maxCoeff() ? 1 / std::sqrt(e) : 0.0; });
+  result.directions = sample * vectors * scale.asDiagonal();
+  return result;
+}
+
+}  // namespace
+
+void ClusterWeight::put_left(Eigen::Ref<MatrixXd> matrix) const {
+  const MatrixXd part = strength_.asDiagonal() * (directions_.transpose() * matrix);
+  matrix.noalias() += directions_ * part;
+}
+
+void ClusterWeight::put_right(Eigen::Ref<MatrixXd> matrix) const {
+  const MatrixXd part = (matrix * directions_) * strength_.asDiagonal();
+  matrix.noalias() += part * directions_.transpose();
+}
+
+void ClusterWeight::take_away(MatrixXd& basis) const {
+  const VectorXd inverse = (strength_.array() / (1 + strength_.array())).matrix();
+  const MatrixXd part = inverse.asDiagonal() * (directions_.transpose() * basis);
+  basis.noalias() -= directions_ * part;
+}
+
+std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const MatrixXd& sample) {
+  // Lights without any indirect light leave nothing to weigh.
+  const double background =
+      std::max(kBackground * sample.squaredNorm() / static_cast<double>(sample.rows()),
+               std::numeric_limits<double>::min());
+  const SingleThreadedBlas single_threaded;
+  std::vector<Principal> principal(tree.clusters.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t k = 0; k < tree.clusters.size(); ++k) {
+    const Cluster& cluster = tree.clusters[k];
+    principal[k] = principal_directions(sample.middleRows(cluster.begin, cluster.count));
+  }
+  std::vector<ClusterWeight> weights;
+  weights.reserve(principal.size());
+  for (Principal& p : principal) {
+    VectorXd strength = (1 + p.energies.array() / background).sqrt() - 1;
+    weights.emplace_back(std::move(p.directions), std::move(strength));
+  }
+  return weights;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,77 @@
+#include "lit_truth.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rebounce/transfer/area_norm.h"
+
+namespace rebounce {
+namespace {
+
+// Lights that the matrix is read for at a time.
+constexpr std::size_t kBatch = 64;
+
+std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
+  std::vector<float> workspace(transfer.workspace_size());
+  std::vector<Float3> result(light.size());
+  transfer.apply(light, result, workspace);
+  return result;
+}
+
+}  // namespace
+
+LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights)
+    : area_(matrix.area().begin(), matrix.area().end()) {
+  for (const std::vector<Float3>& light : lights) {
+    if (area_norm(light, area_) > 0) lights_.push_back(light);
+  }
+  truths_.assign(lights_.size(), std::vector<Float3>(area_.size()));
+  for (int channel = 0; channel < kChannelCount; ++channel) {
+    for (std::size_t begin = 0; begin < lights_.size(); begin += kBatch) {
+      light_channel(matrix, channel, begin, std::min(lights_.size(), begin + kBatch));
+    }
+  }
+}
+
+void LitTruth::light_channel(const SymmetricMatrix& matrix, int channel, std::size_t begin,
+                             std::size_t end) {
+  Eigen::MatrixXf x(area_.size(), end - begin);
+  for (std::size_t k = begin; k < end; ++k) {
+    for (std::size_t i = 0; i < area_.size(); ++i) {
+      x(i, k - begin) = std::sqrt(area_[i]) * lights_[k][i][channel];
+    }
+  }
+  const Eigen::MatrixXf y = matrix.multiply(matrix.channel_matrix()[channel], x);
+  for (std::size_t k = begin; k < end; ++k) {
+    for (std::size_t i = 0; i < area_.size(); ++i) {
+      truths_[k][i][channel] = y(i, k - begin) / std::sqrt(area_[i]);
+    }
+  }
+}
+
+std::vector<double> LitTruth::errors(const TransferOperator& transfer) const {
+  std::vector<double> errors;
+  errors.reserve(lights_.size());
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    errors.push_back(relative_difference(product(transfer, lights_[k]), truths_[k], area_));
+  }
+  return errors;
+}
+
+Eigen::MatrixXd LitTruth::normalised_lights(std::span<const std::uint32_t> patch,
+                                            std::size_t position_count) const {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(position_count),
+                                                 static_cast<Eigen::Index>(lights_.size()));
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    const double norm = area_norm(truths_[k], area_);
+    if (norm == 0) continue;
+    for (std::size_t i = 0; i < patch.size(); ++i) {
+      const Float3& m0 = lights_[k][patch[i]];
+      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          std::sqrt(area_[patch[i]]) * (m0[0] + m0[1] + m0[2]) / (kChannelCount * norm);
+    }
+  }
+  return result;
+}
+
+}  // namespace rebounce

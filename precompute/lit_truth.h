@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "rebounce/transfer/transfer_operator.h"
+#include "symmetric_matrix.h"
+
+namespace rebounce {
+
+/// Lights, and what a matrix, taken as exact, makes of them: what operators that are made from it
+/// are judged by.
+class LitTruth {
+ public:
+  /// `lights`: what the matrix multiplies, initial exitances [n] in lx. Those that are zero are
+  /// left out.
+  LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights);
+
+  std::size_t light_count() const { return lights_.size(); }
+
+  /// The relative area-weighted L2 error of `transfer` under each light.
+  std::vector<double> errors(const TransferOperator& transfer) const;
+
+  /// The lights in the coordinates of the symmetric form, A^1/2 M0 averaged over the channels,
+  /// [positions][light count], patch[k] at position k and zero beyond; each so strong that its
+  /// indirect light has norm 1.
+  Eigen::MatrixXd normalised_lights(std::span<const std::uint32_t> patch,
+                                    std::size_t position_count) const;
+
+ private:
+  /// Fills in one channel of the truths of lights [begin, end).
+  void light_channel(const SymmetricMatrix& matrix, int channel, std::size_t begin,
+                     std::size_t end);
+
+  std::vector<float> area_;
+  std::vector<std::vector<Float3>> lights_, truths_;
+};
+
+}  // namespace rebounce

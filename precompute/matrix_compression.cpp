@@ -1,0 +1,147 @@
+#include "matrix_compression.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "block_tree.h"
+#include "cluster_tree.h"
+#include "light_weights.h"
+#include "lit_truth.h"
+#include "price_search.h"
+
+namespace rebounce {
+namespace {
+
+// Measured: notes/operator.md.
+constexpr std::uint32_t kLeafSize = 32;
+
+// The search for the price ends with an error between these parts of the tolerance: other lights
+// than those that it sees may do a little worse.
+constexpr int kMostRounds = 8;
+constexpr double kLeast = 0.65, kAim = 0.72, kMost = 0.8;
+
+// The largest error may be this many times the tolerance: gates of 0.5 % and 1.5 %.
+constexpr double kLargestOverMean = 3;
+
+// What one value per patch is worth at the tolerance, to begin the search with: measured over
+// scenes and sizes, notes/operator.md.
+constexpr double kFirstPrice = 2.5;
+
+// From one round to the next, the strength of a shaping light changes by a factor between these.
+constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
+
+// The uniform light's part of the energy of all shaping lights: what makes black surfaces, which
+// reflect no light, good enough as lamps.
+constexpr double kUniformShare = 0.1;
+
+using Exitances = std::span<const std::vector<Float3>>;
+
+/// The lights after one with which every patch gives off the same, black ones too.
+std::vector<std::vector<Float3>> with_uniform(std::size_t patch_count, Exitances lights) {
+  std::vector<std::vector<Float3>> all(1, std::vector<Float3>(patch_count, Float3{1, 1, 1}));
+  all.insert(all.end(), lights.begin(), lights.end());
+  return all;
+}
+
+LitTruth judging_truth(const SymmetricMatrix& matrix, Exitances lights) {
+  LitTruth truth(matrix, lights);
+  return truth.light_count() > 0 ? truth : LitTruth(matrix, with_uniform(matrix.area().size(), {}));
+}
+
+double mean(const std::vector<double>& errors) {
+  return std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
+}
+
+/// A compressor with all that it looks at.
+class Compression {
+ public:
+  Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping)
+      : matrix_(matrix),
+        truth_(matrix, with_uniform(patches.size(), shaping)),
+        tree_(build_cluster_tree(patches, kLeafSize)),
+        sample_(truth_.normalised_lights(tree_.patch,
+                                         HierarchicalOperator::position_count(patches.size()))) {
+    sample_.col(0) *= std::sqrt(kUniformShare * static_cast<double>(sample_.cols()));
+  }
+
+  HierarchicalOperator::Storage at(double price, const Progress& progress) const {
+    const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_);
+    return BlockTreeCompressor(matrix_, tree_, weights).compress(price, progress);
+  }
+
+  /// Gives the shaping lights weight by the errors that they have with `transfer`.
+  void emphasise(const TransferOperator& transfer) {
+    const std::vector<double> errors = truth_.errors(transfer);
+    const double usual = mean(errors);
+    if (usual == 0) return;
+    for (std::size_t k = 0; k < errors.size(); ++k) {
+      sample_.col(static_cast<Eigen::Index>(k)) *=
+          std::clamp(errors[k] / usual, kLeastEmphasis, kMostEmphasis);
+    }
+  }
+
+ private:
+  const SymmetricMatrix& matrix_;
+  LitTruth truth_;
+  ClusterTree tree_;
+  Eigen::MatrixXd sample_;
+};
+
+/// The mean error, or the largest by kLargestOverMean if that is more.
+double judge(const std::vector<double>& errors) {
+  return std::max(mean(errors), std::ranges::max(errors) / kLargestOverMean);
+}
+
+/// The best operator that the search has met: the smallest within the limit, or the most exact.
+class Best {
+ public:
+  explicit Best(double limit) : limit_(limit) {}
+
+  void offer(std::shared_ptr<const HierarchicalOperator> candidate, double error) {
+    const bool within = error <= limit_, best_within = best_ && error_ <= limit_;
+    const bool better = within && best_within ? candidate->bytes() < best_->bytes()
+                                              : within || (!best_within && error < error_);
+    if (best_ && !better) return;
+    best_ = std::move(candidate);
+    error_ = error;
+  }
+
+  std::shared_ptr<const HierarchicalOperator> take() { return std::move(best_); }
+
+ private:
+  double limit_, error_ = 0;
+  std::shared_ptr<const HierarchicalOperator> best_;
+};
+
+}  // namespace
+
+HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
+                                              const PatchTable& patches, Exitances shaping,
+                                              double price, const Progress& progress) {
+  return Compression(matrix, patches, shaping).at(price, progress);
+}
+
+std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
+    const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
+    const HierarchicalSettings& settings, const Progress& progress) {
+  const LitTruth judging = judging_truth(matrix, lights.judging);
+  Compression compression(matrix, patches, lights.shaping);
+  const double tolerance = settings.tolerance;
+  PriceSearch search(kFirstPrice * tolerance * tolerance / static_cast<double>(patches.size()),
+                     {kLeast * tolerance, kAim * tolerance, kMost * tolerance});
+  Best best(kMost * tolerance);
+  for (int round = 0; round < kMostRounds && !search.done(); ++round) {
+    Progress part;
+    if (progress) part = [&](double done) { return progress((round + done) / kMostRounds); };
+    const auto candidate = std::make_shared<const HierarchicalOperator>(
+        HierarchicalOperator::encode(compression.at(search.price(), part), settings.precision));
+    const double error = judge(judging.errors(*candidate));
+    best.offer(candidate, error);
+    search.report(error);
+    if (!search.done()) compression.emphasise(*candidate);
+  }
+  return best.take();
+}
+
+}  // namespace rebounce

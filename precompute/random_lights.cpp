@@ -1,0 +1,157 @@
+#include "rebounce/precompute/random_lights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <limits>
+#include <numbers>
+
+#include "hemisphere_rays.h"
+#include "rebounce/runtime/direct_lighting.h"
+#include "rebounce/transfer/area_norm.h"
+
+namespace rebounce {
+namespace {
+
+using Exitance = std::vector<Float3>;
+
+constexpr float kDegree = std::numbers::pi_v<float> / 180;
+
+// How near a point light comes to the surfaces, as a part of the free way between them.
+constexpr double kLeastPart = 0.05;
+
+/// Lights of different kinds are drawn apart from the same seed.
+std::uint64_t bits_of(LightKind kind, std::uint64_t seed, int k) {
+  return mix_bits(mix_bits(seed + static_cast<std::uint64_t>(kind)) + 0x51ED270BULL * k);
+}
+
+glm::dvec3 corner(const DisplayMesh& mesh, bool high) {
+  glm::dvec3 result = to_dvec3(mesh.position.front());
+  for (const Float3& p : mesh.position) {
+    result = high ? glm::max(result, to_dvec3(p)) : glm::min(result, to_dvec3(p));
+  }
+  return result;
+}
+
+Float3 random_direction(std::uint64_t bits) {
+  const glm::dvec2 s = unit_square(bits);
+  const double z = 1 - 2 * s.x, r = std::sqrt(std::max(0.0, 1 - z * z));
+  const double phi = 2 * std::numbers::pi * s.y;
+  return to_float3(glm::dvec3(r * std::cos(phi), r * std::sin(phi), z));
+}
+
+std::vector<Light> random_spots(const TransferData& data, const RayTracer& tracer, int count,
+                                std::uint64_t seed) {
+  std::vector<Light> lights =
+      random_point_lights(data, tracer, count, bits_of(LightKind::kSpot, seed, 0));
+  for (int k = 0; k < count; ++k) {
+    const std::uint64_t bits = bits_of(LightKind::kSpot, seed, k);
+    const glm::dvec2 s = unit_square(bits);
+    lights[k].type = LightType::kSpot;
+    lights[k].direction = random_direction(mix_bits(bits));
+    lights[k].outer_cone_angle = kDegree * static_cast<float>(10 + 50 * s.x);
+    lights[k].inner_cone_angle = static_cast<float>(s.y) * lights[k].outer_cone_angle;
+  }
+  return lights;
+}
+
+std::vector<Light> random_suns(int count, std::uint64_t seed) {
+  std::vector<Light> lights(count);
+  for (int k = 0; k < count; ++k) {
+    lights[k].type = LightType::kDirectional;
+    lights[k].direction = random_direction(bits_of(LightKind::kSky, seed, k));
+  }
+  return lights;
+}
+
+/// One patch that gives off 1 lx for each of `count` lights.
+std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::uint64_t seed) {
+  std::vector<double> sum(patches.size());
+  double total = 0;
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] = total += patches.area[i];
+  std::vector<Exitance> exitances(count, Exitance(patches.size(), Float3{0, 0, 0}));
+  for (int k = 0; k < count; ++k) {
+    const double x = total * unit_square(bits_of(LightKind::kPatch, seed, k)).x;
+    exitances[k][std::ranges::upper_bound(sum, x) - sum.begin()] = {1, 1, 1};
+  }
+  return exitances;
+}
+
+/// Direct light of each of `lights`, and of the sky before them if it has any luminance.
+std::vector<Exitance> lit_by(const TransferData& data, const RayTracer& tracer,
+                             std::span<const Light> lights, const Sky& sky = {}) {
+  DirectLighting direct_lighting(data, tracer);
+  std::vector<Exitance> exitances;
+  const auto add = [&](std::span<const Light> light, const Sky& with_sky) {
+    Exitance exitance(data.patches.size());
+    direct_lighting.compute(light, with_sky, exitance);
+    for (std::size_t i = 0; i < exitance.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
+    }
+    if (area_norm(exitance, data.patches.area) > 0) exitances.push_back(std::move(exitance));
+  };
+  if (sky.luminance > 0) add({}, sky);
+  for (const Light& light : lights) add({&light, 1}, {});
+  return exitances;
+}
+
+bool is_open(const PatchTable& patches) {
+  return std::ranges::any_of(patches.sky_visibility, [](float v) { return v > 0; });
+}
+
+}  // namespace
+
+std::string_view name(LightKind kind) {
+  switch (kind) {
+    case LightKind::kPoint:
+      return "point";
+    case LightKind::kSpot:
+      return "spot";
+    case LightKind::kPatch:
+      return "patch";
+    case LightKind::kSky:
+      break;
+  }
+  return "sky";
+}
+
+std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
+                                       std::uint64_t seed) {
+  const DisplayMesh& mesh = data.mesh;
+  const double open_reach = 0.25 * glm::distance(corner(mesh, false), corner(mesh, true));
+  const PatchTriangles triangles(mesh.triangle_patch, data.patches.size());
+  std::vector<Light> lights(count);
+  for (int k = 0; k < count; ++k) {
+    const std::uint64_t bits = mix_bits(seed + 0x51ED270BULL * k);
+    const auto patch = static_cast<std::uint32_t>(bits % data.patches.size());
+    std::array<PatchPoint, 1> point;
+    std::array<Ray, 1> ray;
+    std::array<Hit, 1> hit;
+    spread_points(mesh, triangles[patch], unit_square(mix_bits(bits + 1)), point);
+    make_hemisphere_rays(point, tracer, unit_square(mix_bits(bits + 2)), ray);
+    tracer.intersect(ray, hit);
+    const double reach = hit[0].triangle == kNone ? open_reach : hit[0].t;
+    const double part = kLeastPart + (1 - 2 * kLeastPart) * unit_square(mix_bits(bits)).x;
+    lights[k].position =
+        to_float3(to_dvec3(ray[0].origin) + part * reach * to_dvec3(ray[0].direction));
+  }
+  return lights;
+}
+
+std::vector<Exitance> random_initial_exitances(const TransferData& data, const RayTracer& tracer,
+                                               LightKind kind, int count, std::uint64_t seed) {
+  switch (kind) {
+    case LightKind::kPoint:
+      return lit_by(data, tracer, random_point_lights(data, tracer, count, seed));
+    case LightKind::kSpot:
+      return lit_by(data, tracer, random_spots(data, tracer, count, seed));
+    case LightKind::kPatch:
+      return random_patches(data.patches, count, seed);
+    case LightKind::kSky:
+      break;
+  }
+  if (count == 0 || !is_open(data.patches)) return {};
+  return lit_by(data, tracer, random_suns(count - 1, seed), {.luminance = 1});
+}
+
+}  // namespace rebounce

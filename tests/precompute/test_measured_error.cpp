@@ -1,0 +1,145 @@
+// What the check says of an operator, against lights that it has not seen.
+
+#include "rebounce/precompute/measured_error.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+
+#include "lit_truth.h"
+#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/hierarchical_transfer.h"
+#include "rebounce/transfer/area_norm.h"
+#include "test_scenes.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::uint64_t kSeed = 11, kOtherSeed = 4711;
+
+struct Built {
+  TransferData data;
+  RayTracer tracer;
+  std::shared_ptr<const DenseOperator> dense;
+};
+
+Built build(const Scene& scene, std::size_t patch_count) {
+  PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
+  RayTracer tracer = test::make_tracer(model);
+  FormFactors f = compute_form_factors(model, tracer);
+  TransferData data;
+  data.patches = std::move(model.patches);
+  data.patches.sky_visibility = std::move(f.sky_visibility);
+  data.patches.absorbed = std::move(f.absorbed);
+  data.mesh = std::move(model.mesh);
+  data.exchange = std::move(f.exchange);
+  auto dense = build_dense_transfer(data.exchange, data.patches, Precision::kF32);
+  data.transfer = dense;
+  return {std::move(data), std::move(tracer), std::move(dense)};
+}
+
+Scene room() {
+  Scene scene = test::empty_scene({0.7F, 0.5F, 0.3F});
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
+  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 0);
+  return scene;
+}
+
+/// A block under the open sky.
+Scene yard() {
+  Scene scene = test::empty_scene({0.6F, 0.6F, 0.6F});
+  const glm::dvec3 ground[] = {{0, 0, 0}, {0, 0, 6}, {6, 0, 6}, {6, 0, 0}};
+  test::add_polygon(scene, ground);
+  test::add_box(scene, {2, 0, 2}, {3, 2, 3.5}, false, 0);
+  return scene;
+}
+
+void compress(Built& built, double tolerance) {
+  const auto lights = [&](std::uint64_t seed) {
+    return random_initial_exitances(built.data, built.tracer, LightKind::kPoint, 32, seed);
+  };
+  const auto shaping = lights(kSeed + 1), judging = lights(kSeed + 2);
+  built.data.transfer = build_hierarchical_transfer(*built.dense, built.data.patches,
+                                                    {shaping, judging}, {.tolerance = tolerance});
+}
+
+TEST(MeasuredError, AThousandOtherLightsOfEachKindStayBelowTheBound) {
+  for (const bool open : {false, true}) {
+    Built built = build(open ? yard() : room(), 400);
+    compress(built, 0.02);
+    const auto measured = measure_error(built.data, built.tracer, built.dense.get(), kSeed);
+    ASSERT_EQ(measured.size(), open ? 4U : 3U);
+    for (const KindError& kind : measured) {
+      SCOPED_TRACE(name(kind.kind));
+      const auto others =
+          random_initial_exitances(built.data, built.tracer, kind.kind, 1000, kOtherSeed);
+      ASSERT_GT(others.size(), 300U);  // most suns shine from below
+      const std::vector<double> errors =
+          LitTruth(DenseMatrix(*built.dense), others).errors(*built.data.transfer);
+      const double largest = std::ranges::max(errors);
+      std::printf("%s: mean %.4f max %.4f bound %.4f, others at most %.4f\n",
+                  std::string(name(kind.kind)).c_str(), kind.mean, kind.max, kind.bound, largest);
+      EXPECT_LT(largest, kind.bound);
+      EXPECT_GT(largest, 0.5 * kind.max) << "the lights are not alike";
+      EXPECT_LE(kind.max, kind.bound);
+      EXPECT_LE(kind.mean, kind.max);
+    }
+  }
+}
+
+TEST(MeasuredError, TheDenseOperatorIsJudgedByGaussSeidel) {
+  const Built built = build(room(), 300);
+  const auto measured = measure_error(built.data, built.tracer, nullptr, kSeed);
+  ASSERT_EQ(measured.size(), 3U);
+  for (const KindError& kind : measured) {
+    EXPECT_GT(kind.light_count, 10);  // a spot may light nothing
+    EXPECT_LE(kind.light_count, 16);
+    EXPECT_GT(kind.mean, 0);
+    EXPECT_LT(kind.max, 1e-5);
+  }
+}
+
+TEST(MeasuredError, BothTruthsAgree) {
+  Built built = build(room(), 300);
+  compress(built, 0.02);
+  const auto by_dense = measure_error(built.data, built.tracer, built.dense.get(), kSeed);
+  const auto by_reference = measure_error(built.data, built.tracer, nullptr, kSeed);
+  for (std::size_t k = 0; k < by_dense.size(); ++k) {
+    EXPECT_NEAR(by_dense[k].mean, by_reference[k].mean, 0.7 * by_dense[k].mean);
+  }
+}
+
+TEST(RandomLights, AreTheSameForASeedAndOthersForAnother) {
+  const Built built = build(yard(), 200);
+  for (const LightKind kind : kLightKinds) {
+    const auto lights = [&](std::uint64_t seed) {
+      return random_initial_exitances(built.data, built.tracer, kind, 12, seed);
+    };
+    EXPECT_EQ(lights(1), lights(1));
+    EXPECT_NE(lights(1), lights(2));
+    for (const auto& light : lights(1)) EXPECT_GT(area_norm(light, built.data.patches.area), 0);
+  }
+}
+
+TEST(RandomLights, SinglePatchesAreDrawnByArea) {
+  const Built built = build(room(), 200);
+  const auto lights =
+      random_initial_exitances(built.data, built.tracer, LightKind::kPatch, 4000, kSeed);
+  const std::vector<float>& area = built.data.patches.area;
+  double total = 0, squares = 0, drawn = 0;
+  for (const float a : area) {
+    total += a;
+    squares += static_cast<double>(a) * a;
+  }
+  for (const auto& light : lights) {
+    const auto lit = std::ranges::find_if(light, [](const Float3& m) { return m[0] > 0; });
+    drawn += area[lit - light.begin()];
+  }
+  // A patch drawn by area has this area in the mean.
+  EXPECT_NEAR(drawn / static_cast<double>(lights.size()), squares / total, 0.03 * squares / total);
+}
+
+}  // namespace
+}  // namespace rebounce

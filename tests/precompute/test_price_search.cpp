@@ -1,0 +1,74 @@
+// The search for the price against error curves of known shapes.
+
+#include "price_search.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace rebounce {
+namespace {
+
+constexpr PriceSearch::Range kWanted{0.65, 0.72, 0.8};
+
+struct Found {
+  double error = 0;
+  int rounds = 0;
+};
+
+Found search(double first_price, const std::function<double(double)>& error_of) {
+  PriceSearch search(first_price, kWanted);
+  Found found;
+  while (!search.done() && found.rounds < 50) {
+    found.error = error_of(search.price());
+    search.report(found.error);
+    ++found.rounds;
+  }
+  return found;
+}
+
+void expect_good(const Found& found, int most_rounds) {
+  EXPECT_GE(found.error, kWanted.least);
+  EXPECT_LE(found.error, kWanted.most);
+  EXPECT_LE(found.rounds, most_rounds);
+}
+
+TEST(PriceSearch, FindsARootInOneStepFromAnywhereWithinReach) {
+  for (const double first : {0.001, 1.0, 500.0}) {
+    expect_good(search(first, [](double price) { return std::sqrt(price); }), 2);
+  }
+}
+
+TEST(PriceSearch, LearnsAnotherSlope) {
+  for (const double power : {0.3, 0.4, 0.7, 0.9}) {
+    for (const double first : {1e-3, 1e3}) {
+      SCOPED_TRACE(power);
+      expect_good(search(first, [=](double price) { return std::pow(price, power); }), 6);
+    }
+  }
+}
+
+TEST(PriceSearch, CrossesManyOrdersOfMagnitude) {
+  expect_good(search(1e-12, [](double price) { return std::sqrt(price); }), 6);
+  expect_good(search(1e12, [](double price) { return std::sqrt(price); }), 6);
+}
+
+TEST(PriceSearch, BendsWithAFloorAndACeiling) {
+  // As operators do: rounding below, everything left out above.
+  const auto error = [](double price) { return std::clamp(3 * std::pow(price, 0.6), 0.2, 100.0); };
+  for (const double first : {1e-6, 1e-2, 1.0, 1e4}) expect_good(search(first, error), 8);
+}
+
+TEST(PriceSearch, StopsAtAJumpThatHasNoGoodError) {
+  const Found found = search(1, [](double price) { return price < 7 ? 0.1 : 5.0; });
+  EXPECT_LT(found.rounds, 40);
+}
+
+TEST(PriceSearch, LeavesAnErrorOfNothing) {
+  expect_good(search(1e-9, [](double price) { return price < 1e-3 ? 0 : std::sqrt(price); }), 10);
+}
+
+}  // namespace
+}  // namespace rebounce

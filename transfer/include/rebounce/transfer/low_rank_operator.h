@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/shared_array.h"
+#include "rebounce/transfer/transfer_operator.h"
+
+namespace rebounce {
+
+/// Y of one low rank for the whole scene, in its symmetric form Yhat = A^1/2 Y A^-1/2:
+///
+///   low-rank      Yhat ~ V S V^T
+///   first-bounce  Yhat ~ G + V S V^T with G = A^1/2 F A^-1/2: light that has met one surface is
+///                 gathered through F and exact, the rest, which is smoother, is of low rank
+///
+/// The channels share the basis V, whose columns are orthonormal, and have a symmetric core S each.
+class LowRankOperator final : public TransferOperator {
+ public:
+  /// The basis is kept in tiles of this many patches, so that threads share the patches out.
+  static constexpr std::size_t kTile = 256;
+
+  struct Storage {
+    std::vector<float> area;                                    ///< [n] m²
+    std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
+    std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
+    std::size_t rank = 0;                                       ///< at most n
+    Precision precision = Precision::kF32;                      ///< of the basis
+    SharedArray<float> basis_f32;  ///< [tile_count(n)][rank][kTile], if kF32; zero past patch n
+    SharedArray<std::uint16_t> basis_f16;  ///< the same as IEEE half-precision bits, if kF16
+    SharedArray<float> core;               ///< [matrix_count][rank][rank]
+  };
+
+  static std::size_t tile_count(std::size_t patch_count);
+
+  /// The same with the basis as half-precision numbers.
+  static Storage encode_half(const Storage& storage);
+
+  /// Takes over `storage`. With `first_bounce`, that is F and the core is what is missing from it.
+  /// Throws Error if sizes do not agree.
+  explicit LowRankOperator(Storage storage,
+                           std::shared_ptr<const FormFactorOperator> first_bounce = nullptr);
+
+  const Storage& storage() const { return storage_; }
+
+  std::size_t patch_count() const override { return storage_.area.size(); }
+  /// With F where it is used: an apply reads it too.
+  std::size_t bytes() const override;
+  std::string kind() const override { return first_bounce_ ? "first-bounce" : "low-rank"; }
+  std::size_t workspace_size() const override;
+  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+             std::span<float> workspace) const override;
+
+ private:
+  std::size_t stride() const { return tile_count(patch_count()) * kTile; }
+  /// Ranks of the three channels, each rounded up to whole vectors.
+  std::size_t coefficient_size() const { return kChannelCount * rank_stride_; }
+  /// coefficient[c] = core V^T x_c, by way of one set of coefficients for each tile.
+  void project(const float* x, float* tile_coefficient, float* coefficient) const;
+  void multiply_cores(const float* in, float* out) const;
+  void expand_tiles(const float* coefficient, float* y) const;
+
+  Storage storage_;
+  std::shared_ptr<const FormFactorOperator> first_bounce_;
+  std::vector<float> sqrt_area_;  ///< [n]
+  std::size_t rank_stride_ = 0;
+};
+
+}  // namespace rebounce

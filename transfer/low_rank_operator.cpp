@@ -1,0 +1,173 @@
+#include "rebounce/transfer/low_rank_operator.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+
+#include "block_kernels.h"
+#include "half_float.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kTile = LowRankOperator::kTile;
+
+// Ranks are padded to whole vectors of the widest instruction set.
+constexpr std::size_t kVector = 16;
+
+[[noreturn]] void refuse(const std::string& reason) {
+  throw Error("low-rank operator: " + reason + "; make the file again");
+}
+
+}  // namespace
+
+std::size_t LowRankOperator::tile_count(std::size_t patch_count) {
+  return (patch_count + kTile - 1) / kTile;
+}
+
+LowRankOperator::Storage LowRankOperator::encode_half(const Storage& storage) {
+  Storage half = storage;
+  half.precision = Precision::kF16;
+  half.basis_f32 = {};
+  std::vector<std::uint16_t> values(storage.basis_f32.size());
+  // A basis is orthonormal: no entry is above 1.
+  std::ranges::transform(storage.basis_f32, values.begin(), float_to_half);
+  half.basis_f16 = SharedArray(std::move(values));
+  return half;
+}
+
+LowRankOperator::LowRankOperator(Storage storage,
+                                 std::shared_ptr<const FormFactorOperator> first_bounce)
+    : storage_(std::move(storage)), first_bounce_(std::move(first_bounce)) {
+  const std::size_t n = patch_count(), rank = storage_.rank;
+  if (n == 0) refuse("there are no patches");
+  if (rank > n) refuse("its rank is above the number of patches");
+  if (storage_.matrix_count < 1 || storage_.matrix_count > kChannelCount) {
+    refuse("not 1, 2 or 3 matrices");
+  }
+  for (const std::uint32_t matrix : storage_.channel_matrix) {
+    if (matrix >= storage_.matrix_count) refuse("a channel has no matrix");
+  }
+  const bool half = storage_.precision == Precision::kF16;
+  const std::size_t basis = half ? storage_.basis_f16.size() : storage_.basis_f32.size();
+  if (basis != tile_count(n) * rank * kTile) refuse("the basis is of another size");
+  if (storage_.core.size() != storage_.matrix_count * rank * rank) {
+    refuse("the cores are of another size");
+  }
+  if (first_bounce_ && first_bounce_->patch_count() != n) {
+    refuse("the form factors are those of another scene");
+  }
+  sqrt_area_.reserve(n);
+  for (const float area : storage_.area) sqrt_area_.push_back(std::sqrt(area));
+  rank_stride_ = (rank + kVector - 1) / kVector * kVector;
+}
+
+std::size_t LowRankOperator::bytes() const {
+  return storage_.basis_f32.size_bytes() + storage_.basis_f16.size_bytes() +
+         storage_.core.size_bytes() + (first_bounce_ ? first_bounce_->bytes() : 0);
+}
+
+std::size_t LowRankOperator::workspace_size() const {
+  const std::size_t own =
+      kChannelCount * stride() + (tile_count(patch_count()) + 2) * coefficient_size();
+  return std::max(own,
+                  first_bounce_ ? kChannelCount * stride() + first_bounce_->workspace_size() : 0);
+}
+
+void LowRankOperator::project(const float* x, float* tile_coefficient, float* coefficient) const {
+  const std::size_t tiles = tile_count(patch_count()), rank = storage_.rank;
+  const BlockKernelSet& kernels = block_kernels();
+#pragma omp parallel for schedule(static)
+  for (std::size_t t = 0; t < tiles; ++t) {
+    const std::size_t begin = t * rank * kTile;
+    const PlanarVectors<const float> in{x + t * kTile, stride(), kChannelCount};
+    const PlanarVectors<float> out{tile_coefficient + t * coefficient_size(), rank_stride_,
+                                   kChannelCount};
+    if (storage_.precision == Precision::kF16) {
+      kernels.bases_f16.project(storage_.basis_f16.data() + begin, rank, kTile, in, out);
+    } else {
+      kernels.bases_f32.project(storage_.basis_f32.data() + begin, rank, kTile, in, out);
+    }
+  }
+  std::fill_n(coefficient, coefficient_size(), 0.0F);
+  for (std::size_t t = 0; t < tiles; ++t) {
+    const float* const part = tile_coefficient + t * coefficient_size();
+    for (int c = 0; c < kChannelCount; ++c) {
+      for (std::size_t r = 0; r < storage_.rank; ++r) {
+        coefficient[c * rank_stride_ + r] += part[c * rank_stride_ + r];
+      }
+    }
+  }
+}
+
+void LowRankOperator::multiply_cores(const float* in, float* out) const {
+  const std::size_t rank = storage_.rank;
+  const auto rows = static_cast<std::int64_t>(kChannelCount * rank);
+#pragma omp parallel for schedule(static)
+  for (std::int64_t k = 0; k < rows; ++k) {
+    const std::size_t channel = k / rank, row = k % rank;
+    const float* const core =
+        storage_.core.data() + (storage_.channel_matrix[channel] * rank + row) * rank;
+    const float* const x = in + channel * rank_stride_;
+    // Sums of their own for neighbouring entries, so that the loop becomes vectors.
+    std::array<float, kVector> sum{};
+    std::size_t j = 0;
+    for (; j + kVector <= rank; j += kVector) {
+      for (std::size_t v = 0; v < kVector; ++v) sum[v] += core[j + v] * x[j + v];
+    }
+    for (std::size_t v = 0; j + v < rank; ++v) sum[v] += core[j + v] * x[j + v];
+    float total = 0;
+    for (const float s : sum) total += s;
+    out[channel * rank_stride_ + row] = total;
+  }
+}
+
+void LowRankOperator::expand_tiles(const float* coefficient, float* y) const {
+  const std::size_t tiles = tile_count(patch_count()), rank = storage_.rank;
+  const BlockKernelSet& kernels = block_kernels();
+  const PlanarVectors<const float> in{coefficient, rank_stride_, kChannelCount};
+#pragma omp parallel for schedule(static)
+  for (std::size_t t = 0; t < tiles; ++t) {
+    for (int c = 0; c < kChannelCount; ++c) std::fill_n(y + c * stride() + t * kTile, kTile, 0.0F);
+    const std::size_t begin = t * rank * kTile;
+    const PlanarVectors<float> out{y + t * kTile, stride(), kChannelCount};
+    if (storage_.precision == Precision::kF16) {
+      kernels.bases_f16.expand(storage_.basis_f16.data() + begin, rank, kTile, kTile, in, out);
+    } else {
+      kernels.bases_f32.expand(storage_.basis_f32.data() + begin, rank, kTile, kTile, in, out);
+    }
+  }
+}
+
+void LowRankOperator::apply(std::span<const Float3> initial_exitance,
+                            std::span<Float3> indirect_irradiance,
+                            std::span<float> workspace) const {
+  const std::size_t n = patch_count();
+  assert(initial_exitance.size() == n && indirect_irradiance.size() == n);
+  assert(workspace.size() >= workspace_size());
+  float* const x = workspace.data();
+  float* const coefficient = x + kChannelCount * stride();
+  float* const multiplied = coefficient + coefficient_size();
+  for (int c = 0; c < kChannelCount; ++c) {
+    float* const xc = x + c * stride();
+    for (std::size_t i = 0; i < n; ++i) xc[i] = sqrt_area_[i] * initial_exitance[i][c];
+    std::fill(xc + n, xc + stride(), 0.0F);
+  }
+  project(x, multiplied + coefficient_size(), coefficient);
+  multiply_cores(coefficient, multiplied);
+  expand_tiles(multiplied, x);
+  if (first_bounce_) {
+    first_bounce_->gather(initial_exitance, indirect_irradiance,
+                          workspace.subspan(kChannelCount * stride()));
+  } else {
+    std::ranges::fill(indirect_irradiance, Float3{0, 0, 0});
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      indirect_irradiance[i][c] += x[c * stride() + i] / sqrt_area_[i];
+    }
+  }
+}
+
+}  // namespace rebounce
