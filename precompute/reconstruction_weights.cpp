@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "element_neighbours.h"
+#include "local_max_entropy.h"
 #include "point_finder.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
@@ -35,8 +36,13 @@ constexpr std::size_t kSampleCount = 16;
 // that.
 constexpr float kReach = 1.1F, kFartherReach = 2, kPlaneReach = 0.25F;
 
-// Patches that give to a vertex, at most.
+// How firmly the mean place of a vertex's patches is drawn to the vertex: a compromise of what is
+// best at edges and what leaves a vertex with many patches to average (notes/patches.md).
+constexpr double kRidge = 0.1;
+
+// Patches that give to a vertex, at most, and the part of its value below which one is left out.
 constexpr std::size_t kMostGivers = 16;
+constexpr float kNegligible = 1e-3F;
 
 /// How a triangle lies among the surfaces close above it.
 enum class Exposure : std::uint8_t { kOpen, kMixed, kCovered };
@@ -111,7 +117,7 @@ class ReconstructionWeights {
         tracer_(tracer),
         mesh_(mesh),
         triangles_(mesh.triangle_patch, absorbed.size()) {
-    find_exposures();
+    measure_patches();
     make_samples();
     make_receivers();
   }
@@ -121,7 +127,9 @@ class ReconstructionWeights {
     std::vector<std::vector<Giver>> givers(count);
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t v = 0; v < count; ++v) {
-      if (receivers_[v].is_shown) givers[v] = find_givers(static_cast<std::uint32_t>(v));
+      if (!receivers_[v].is_shown) continue;
+      givers[v] = find_givers(static_cast<std::uint32_t>(v));
+      centre_weights(receivers_[v], givers[v]);
     }
     mesh_.weight_begin.assign(1, 0);
     mesh_.weight_patch.clear();
@@ -133,22 +141,27 @@ class ReconstructionWeights {
   }
 
  private:
-  /// A patch is mixed if the open and the covered part of its area are both worth the name.
-  void find_exposures() {
+  /// Measures the patches. One is mixed if the open and the covered part of its area are both worth
+  /// the name.
+  void measure_patches() {
     const std::size_t n = triangles_.patch_count();
     area_.resize(n);
+    centroid_.resize(n);
     exposure_.resize(n);
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::size_t i = 0; i < n; ++i) {
       std::array<double, 3> area{};
+      glm::dvec3 moment(0);
       for (const std::uint32_t t : triangles_[i]) {
         const std::array<glm::dvec3, 3> p = corners_of(mesh_, mesh_.triangle[t]);
         const double size = 0.5 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
         area[static_cast<std::size_t>(find_exposure(p, tracer_))] += size;
+        moment += size / 3 * (p[0] + p[1] + p[2]);
       }
       const double whole = area[0] + area[1] + area[2];
       const double covered = area[2] + 0.5 * area[1];
       area_[i] = static_cast<float>(whole);
+      centroid_[i] = glm::vec3(moment / whole);
       exposure_[i] = covered < kLittle * whole         ? Exposure::kOpen
                      : covered > (1 - kLittle) * whole ? Exposure::kCovered
                                                        : Exposure::kMixed;
@@ -285,6 +298,23 @@ class ReconstructionWeights {
                         {to_float3(giver.position), to_float3(giver.normal)}, tracer_) == kNone;
   }
 
+  /// Shifts the weights so that the centroids of the patches balance about the vertex.
+  void centre_weights(const Receiver& receiver, std::vector<Giver>& givers) const {
+    if (givers.empty() || receiver.reach <= 0) return;
+    const glm::dmat3 frame = frame_around(receiver.normal);
+    std::vector<double> prior;
+    std::vector<glm::dvec2> place;
+    for (const Giver& giver : givers) {
+      const glm::dvec3 offset(centroid_[giver.patch] - receiver.position);
+      prior.push_back(giver.weight);
+      place.push_back(glm::dvec2(offset * frame) / static_cast<double>(receiver.reach));
+    }
+    const std::vector<double> weight = max_entropy_weights(prior, place, kRidge);
+    for (std::size_t k = 0; k < givers.size(); ++k)
+      givers[k].weight = static_cast<float>(weight[k]);
+    std::erase_if(givers, [](const Giver& giver) { return giver.weight < kNegligible; });
+  }
+
   void append_weights(const std::vector<Giver>& givers) {
     double sum = 0;
     for (const Giver& giver : givers) sum += giver.weight * (1.0 - absorbed_[giver.patch]);
@@ -300,10 +330,11 @@ class ReconstructionWeights {
   const RayTracer& tracer_;
   DisplayMesh& mesh_;
   const PatchTriangles triangles_;
-  std::vector<float> area_;         ///< [n] m²
-  std::vector<Exposure> exposure_;  ///< [n]
-  std::vector<Sample> samples_;     ///< [n][kSampleCount]
-  std::vector<Float3> positions_;   ///< theirs
+  std::vector<float> area_;          ///< [n] m²
+  std::vector<glm::vec3> centroid_;  ///< [n]
+  std::vector<Exposure> exposure_;   ///< [n]
+  std::vector<Sample> samples_;      ///< [n][kSampleCount]
+  std::vector<Float3> positions_;    ///< theirs
   std::optional<PointFinder> finder_;
   std::vector<Receiver> receivers_;                      ///< [v]
   std::vector<std::vector<std::uint32_t>> own_patches_;  ///< [v]
