@@ -10,6 +10,7 @@
 
 #include "element_neighbours.h"
 #include "local_max_entropy.h"
+#include "mean_preservation.h"
 #include "point_finder.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
@@ -34,7 +35,7 @@ constexpr std::size_t kSampleCount = 16;
 // How far a vertex looks for patches, in mean sizes of its own: chosen with bench_truth
 // (notes/patches.md). Farther where all near ones are mixed; how far off its plane, in parts of
 // that.
-constexpr float kReach = 1.1F, kFartherReach = 2, kPlaneReach = 0.25F;
+constexpr float kReach = 1, kFartherReach = 2, kPlaneReach = 0.25F;
 
 // How firmly the mean place of a vertex's patches is drawn to the vertex: a compromise of what is
 // best at edges and what leaves a vertex with many patches to average (notes/patches.md).
@@ -43,6 +44,9 @@ constexpr double kRidge = 0.1;
 // Patches that give to a vertex, at most, and the part of its value below which one is left out.
 constexpr std::size_t kMostGivers = 16;
 constexpr float kNegligible = 1e-3F;
+
+// What a vertex takes away of patches beyond its own, at most, for the sake of the patches' means.
+constexpr double kMostNegative = 0.5;
 
 /// How a triangle lies among the surfaces close above it.
 enum class Exposure : std::uint8_t { kOpen, kMixed, kCovered };
@@ -124,20 +128,16 @@ class ReconstructionWeights {
 
   void compute() {
     const std::size_t count = mesh_.position.size();
-    std::vector<std::vector<Giver>> givers(count);
+    std::vector<VertexWeights> weights(count);
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t v = 0; v < count; ++v) {
       if (!receivers_[v].is_shown) continue;
-      givers[v] = find_givers(static_cast<std::uint32_t>(v));
-      centre_weights(receivers_[v], givers[v]);
+      std::vector<Giver> givers = find_givers(static_cast<std::uint32_t>(v));
+      centre_weights(receivers_[v], givers);
+      weights[v] = open_weights(givers);
     }
-    mesh_.weight_begin.assign(1, 0);
-    mesh_.weight_patch.clear();
-    mesh_.weight.clear();
-    for (const std::vector<Giver>& of_vertex : givers) {
-      append_weights(of_vertex);
-      mesh_.weight_begin.push_back(static_cast<std::uint32_t>(mesh_.weight.size()));
-    }
+    preserve_patch_means(mesh_, triangles_, good_patches(), {kMostNegative, kMostGivers}, weights);
+    write_weights(weights);
   }
 
  private:
@@ -315,13 +315,41 @@ class ReconstructionWeights {
     std::erase_if(givers, [](const Giver& giver) { return giver.weight < kNegligible; });
   }
 
-  void append_weights(const std::vector<Giver>& givers) {
+  /// Those in the open, whose means can be trusted.
+  std::vector<std::uint8_t> good_patches() const {
+    std::vector<std::uint8_t> good(exposure_.size());
+    for (std::size_t i = 0; i < good.size(); ++i) {
+      const bool is_good = exposure_[i] == Exposure::kOpen && absorbed_[i] <= kMostlyCovered;
+      good[i] = is_good ? 1 : 0;
+    }
+    return good;
+  }
+
+  /// What the givers say of light in the open, of which a patch shows the part that is not
+  /// absorbed.
+  VertexWeights open_weights(const std::vector<Giver>& givers) const {
     double sum = 0;
     for (const Giver& giver : givers) sum += giver.weight * (1.0 - absorbed_[giver.patch]);
-    if (sum <= 0) return;
+    VertexWeights weight;
+    if (sum <= 0) return weight;
     for (const Giver& giver : givers) {
-      mesh_.weight_patch.push_back(giver.patch);
-      mesh_.weight.push_back(static_cast<float>(giver.weight / sum));
+      weight.push_back({giver.patch, giver.weight * (1.0 - absorbed_[giver.patch]) / sum});
+    }
+    return weight;
+  }
+
+  void write_weights(const std::vector<VertexWeights>& weights) {
+    mesh_.weight_begin.assign(1, 0);
+    mesh_.weight_patch.clear();
+    mesh_.weight.clear();
+    for (const VertexWeights& of_vertex : weights) {
+      for (const auto& [patch, weight] : of_vertex) {
+        const double open = 1.0 - absorbed_[patch];
+        if (open <= 0) continue;
+        mesh_.weight_patch.push_back(patch);
+        mesh_.weight.push_back(static_cast<float>(weight / open));
+      }
+      mesh_.weight_begin.push_back(static_cast<std::uint32_t>(mesh_.weight.size()));
     }
   }
 
