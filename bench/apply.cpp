@@ -3,9 +3,9 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <functional>
 
+#include "input.h"
 #include "instruction_sets.h"
 #include "program.h"
 #include "read_buffer.h"
@@ -17,7 +17,6 @@
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
-#include "rebounce/transfer/transfer_file.h"
 #include "tile_product.h"
 #include "timing.h"
 
@@ -29,14 +28,6 @@ struct ApplyOptions {
   BuildSettings settings;
   CommonOptions common{.repeats = 51};
 };
-
-TransferData load_or_build(const std::string& input, const BuildSettings& settings) {
-  if (std::filesystem::path(input).extension() == ".safetensors") {
-    return load_transfer_file(input);
-  }
-  BuildReport report;
-  return build_transfer_data(input, settings, report);
-}
 
 /// The operator of `data` in f32, built anew if the data hold another.
 std::shared_ptr<const DenseOperator> operator_f32(const TransferData& data) {
@@ -84,7 +75,7 @@ const char* name(Precision precision) {
 class ApplyBenchmark {
  public:
   ApplyBenchmark(const TransferData& data, const CommonOptions& options)
-      : scene_(std::filesystem::path(data.record.scene_name).stem().string()),
+      : scene_(scene_name(data)),
         patches_(data.patches),
         options_(options),
         f32_(operator_f32(data)),

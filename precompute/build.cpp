@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/measured_error.h"
@@ -115,6 +116,9 @@ BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
   }
   const bool dense = settings.operator_kind == OperatorKind::kDense;
   if (!settings.precision) settings.precision = dense ? Precision::kF32 : Precision::kF16;
+  if (dense && settings.precision == Precision::kQ8) {
+    throw Error("8 bits are not precise enough for a dense operator; use f16 or f32");
+  }
   if (dense) settings.tolerance = 0;
   return settings;
 }
@@ -124,8 +128,9 @@ std::string settings_json(const BuildSettings& settings) {
   const bool dense = settings.operator_kind == OperatorKind::kDense;
   return nlohmann::json{{"operator", dense ? "dense" : "hierarchical"},
                         {"tolerance", settings.tolerance},
+                        {"form_factor_tolerance", settings.form_factor_tolerance},
                         {"scale", settings.scale},
-                        {"precision", settings.precision == Precision::kF16 ? "f16" : "f32"},
+                        {"precision", precision_name(*settings.precision)},
                         {"patches", settings.subdivision.patch_count},
                         {"patch_size", settings.subdivision.patch_size},
                         {"seed", f.seed},
@@ -138,23 +143,27 @@ std::string settings_json(const BuildSettings& settings) {
 
 /// The part of the report that is the same in every run: it goes into the file, times do not.
 std::string report_json(const BuildReport& report) {
-  return nlohmann::json{{"triangles", report.triangle_count},
-                        {"degenerate_triangles", report.degenerate_triangle_count},
-                        {"display_triangles", report.display_triangle_count},
-                        {"slivers", report.sliver_count},
-                        {"unlit_sides", report.unlit_side_count},
-                        {"covered_sides", report.covered_side_count},
-                        {"patch_size_min", report.patch_size_min},
-                        {"patch_size_median", report.patch_size_median},
-                        {"patch_size_max", report.patch_size_max},
-                        {"rays", report.ray_count},
-                        {"pairs", report.pair_count},
-                        {"form_factors", report.form_factor_count},
-                        {"row_sum_error_before", report.closure.row_sum_error_before},
-                        {"row_sum_error_after", report.closure.row_sum_error_after},
-                        {"closure_change", report.closure.relative_change},
-                        {"warnings", report.warnings}}
-      .dump();
+  nlohmann::json json{{"triangles", report.triangle_count},
+                      {"degenerate_triangles", report.degenerate_triangle_count},
+                      {"display_triangles", report.display_triangle_count},
+                      {"slivers", report.sliver_count},
+                      {"unlit_sides", report.unlit_side_count},
+                      {"covered_sides", report.covered_side_count},
+                      {"patch_size_min", report.patch_size_min},
+                      {"patch_size_median", report.patch_size_median},
+                      {"patch_size_max", report.patch_size_max},
+                      {"rays", report.ray_count},
+                      {"pairs", report.pair_count},
+                      {"form_factors", report.form_factor_count},
+                      {"row_sum_error_before", report.closure.row_sum_error_before},
+                      {"row_sum_error_after", report.closure.row_sum_error_after},
+                      {"closure_change", report.closure.relative_change},
+                      {"warnings", report.warnings}};
+  if (report.form_factor_error) {
+    json["form_factor_error_mean"] = report.form_factor_error->mean;
+    json["form_factor_error_max"] = report.form_factor_error->max;
+  }
+  return json.dump();
 }
 
 void check_residual(double residual, Precision precision) {
@@ -164,6 +173,23 @@ void check_residual(double residual, Precision precision) {
       fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
                   "please report this scene",
                   residual, largest));
+}
+
+/// Compresses the form factors of `data` and measures how well, with data.transfer as it is.
+void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
+                              const BuildSettings& settings, BuildReport& report,
+                              const Progress& progress) {
+  const std::uint64_t seed = mix_bits(settings.form_factors.seed);
+  const auto radiosities = [&](int count, std::uint64_t light_seed) {
+    return radiosities_of(*data.transfer, data.patches.reflectance,
+                          random_initial_exitances(data, tracer, count, light_seed));
+  };
+  data.compressed_form_factors =
+      compress_form_factors(data.exchange, data.patches, radiosities(kFittingLightCount, seed),
+                            {settings.form_factor_tolerance, Precision::kF16}, progress);
+  report.form_factor_error =
+      form_factor_error(*data.compressed_form_factors, data.exchange, data.patches,
+                        radiosities(kTestLightCount, seed + 1));
 }
 
 // The scene of a file, with what is plainly seen from behind made double-sided.
@@ -234,6 +260,12 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
                                                    mix_bits(settings.form_factors.seed));
       return build_hierarchical_transfer(*dense, data.patches, lights,
                                          {decided.tolerance, *decided.precision}, part);
+    });
+  }
+  if (decided.form_factor_tolerance > 0) {
+    clock.run("form factor compression", [&](const Progress& part) {
+      compress_form_factors_of(data, tracer, decided, report, part);
+      return true;
     });
   }
   const MeasuredError error = clock.run("check", [&](const Progress& part) {

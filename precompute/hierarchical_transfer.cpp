@@ -12,6 +12,7 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "single_threaded_blas.h"
+#include "symmetric_matrix.h"
 
 namespace rebounce {
 namespace {
@@ -94,25 +95,27 @@ void append_rows(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
 /// Compresses one square of the matrix, below or on the diagonal.
 class PieceCompressor {
  public:
-  PieceCompressor(const DenseOperator& dense, const ClusterTree& tree, double price,
-                  const Cluster& row, const Cluster& column)
-      : area_(dense.storage().area), tree_(tree), price_(price), row_(row), column_(column) {
-    for (std::uint32_t m = 0; m < dense.storage().matrix_count; ++m) gather(dense, m);
+  PieceCompressor(const SymmetricMatrix& matrix, const std::vector<float>& area,
+                  const ClusterTree& tree, double price, const Cluster& row, const Cluster& column)
+      : area_(area), tree_(tree), price_(price), row_(row), column_(column) {
+    const auto rows = patches_of(row), columns = patches_of(column);
+    for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) {
+      Eigen::MatrixXf& entries =
+          matrices_.emplace_back(Eigen::MatrixXf::Zero(row.count, column.count));
+      matrix.entries(m, rows, columns,
+                     entries.topLeftCorner(static_cast<Index>(rows.size()),
+                                           static_cast<Index>(columns.size())));
+    }
   }
 
   Part compress() const { return compress(row_, column_); }
 
  private:
-  void gather(const DenseOperator& dense, std::uint32_t matrix) {
-    Eigen::MatrixXf& entries = matrices_.emplace_back(row_.count, column_.count);
-    for (std::uint32_t j = 0; j < column_.count; ++j) {
-      for (std::uint32_t i = 0; i < row_.count; ++i) {
-        const std::size_t a = row_.begin + i, b = column_.begin + j;
-        const bool inside = a < tree_.patch.size() && b < tree_.patch.size();
-        entries(i, j) =
-            inside ? dense.symmetric_entry(matrix, tree_.patch[a], tree_.patch[b]) : 0.0F;
-      }
-    }
+  /// Those of a cluster's positions that hold one.
+  std::span<const std::uint32_t> patches_of(const Cluster& cluster) const {
+    const std::size_t end =
+        std::min<std::size_t>(cluster.begin + cluster.count, tree_.patch.size());
+    return {tree_.patch.data() + cluster.begin, tree_.patch.data() + end};
   }
 
   Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
@@ -238,17 +241,17 @@ constexpr double kLeast = 0.6, kAim = 0.7, kMost = 0.8;
 // The largest error may be this many times the tolerance: gates of 0.5 % and 1.5 %.
 constexpr double kLargestOverMean = 3;
 
-/// Compares operators with a dense one, taken as exact, under given lights.
+/// Compares operators with the matrix that they stand for under given lights.
 class TestLights {
  public:
-  TestLights(const DenseOperator& dense, const PatchTable& patches,
+  TestLights(const SymmetricMatrix& matrix, const PatchTable& patches,
              std::span<const std::vector<Float3>> lights)
       : area_(patches.area) {
     for (const std::vector<Float3>& light : lights) {
       if (area_norm(light, area_) > 0) lights_.push_back(light);
     }
     if (lights_.empty()) lights_.emplace_back(patches.size(), Float3{1, 1, 1});
-    for (const std::vector<Float3>& light : lights_) truths_.push_back(product(dense, light));
+    for (const std::vector<Float3>& light : lights_) truths_.push_back(matrix.multiply(light));
   }
 
   /// The mean error, or the largest by kLargestOverMean if that is more.
@@ -275,33 +278,18 @@ class TestLights {
   std::vector<std::vector<Float3>> lights_, truths_;
 };
 
-/// Frobenius norm of Yhat, squared, of all its matrices.
-double norm_squared(const DenseOperator& dense) {
-  const std::size_t n = dense.patch_count();
-  double sum = 0;
-  for (std::uint32_t m = 0; m < dense.storage().matrix_count; ++m) {
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) {
-        const double entry = dense.symmetric_entry(m, i, j);
-        sum += (i == j ? 1 : 2) * entry * entry;
-      }
-    }
-  }
-  return sum;
-}
-
 /// What a value is worth at a tolerance, to begin the search with.
-double first_price(const DenseOperator& dense, double tolerance) {
+double first_price(const SymmetricMatrix& matrix, std::size_t patch_count, double tolerance) {
   constexpr double kValuesPerPatch = 300;  // measured: notes/operator.md
-  return tolerance * tolerance * norm_squared(dense) /
-         (kValuesPerPatch * static_cast<double>(dense.patch_count()));
+  return tolerance * tolerance * matrix.norm_squared() /
+         (kValuesPerPatch * static_cast<double>(patch_count));
 }
 
 }  // namespace
 
-HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
-                                                const PatchTable& patches, double price,
-                                                const Progress& progress) {
+HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
+                                              const PatchTable& patches, double price,
+                                              const Progress& progress) {
   const SingleThreadedBlas single_threaded;
   const ClusterTree tree = build_cluster_tree(patches, kLeafSize);
   const Cluster& root = tree.clusters.front();
@@ -313,7 +301,8 @@ HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (stop) continue;
-    parts[k] = PieceCompressor(dense, tree, price, pieces[k].row, pieces[k].column).compress();
+    parts[k] = PieceCompressor(matrix, patches.area, tree, price, pieces[k].row, pieces[k].column)
+                   .compress();
     const double fraction = static_cast<double>(++done) / static_cast<double>(pieces.size());
     if (progress && omp_get_thread_num() == 0 && !progress(fraction)) stop = true;
   }
@@ -325,26 +314,32 @@ HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
   HierarchicalOperator::Storage storage;
   storage.area = patches.area;
   storage.patch = tree.patch;
-  storage.channel_matrix = dense.storage().channel_matrix;
-  storage.matrix_count = dense.storage().matrix_count;
+  storage.channel_matrix = matrix.channel_matrix();
+  storage.matrix_count = matrix.matrix_count();
   storage.blocks = std::move(whole.blocks);
   storage.values_f32 = SharedArray(std::move(whole.values));
   return storage;
 }
 
-std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
-    const DenseOperator& dense, const PatchTable& patches,
+HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
+                                                const PatchTable& patches, double price,
+                                                const Progress& progress) {
+  return compress_matrix(DenseMatrix(dense), patches, price, progress);
+}
+
+std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
+    const SymmetricMatrix& matrix, const PatchTable& patches,
     std::span<const std::vector<Float3>> test_lights, const HierarchicalSettings& settings,
     const Progress& progress) {
-  const TestLights lights(dense, patches, test_lights);
+  const TestLights lights(matrix, patches, test_lights);
   std::shared_ptr<const HierarchicalOperator> best;
-  double best_error = 0, price = first_price(dense, settings.tolerance);
+  double best_error = 0, price = first_price(matrix, patches.size(), settings.tolerance);
   for (int round = 0; round < kMostRounds; ++round) {
     Progress part;
     if (progress) part = [&](double done) { return progress((round + done) / kMostRounds); };
-    HierarchicalOperator::Storage storage = compress_transfer(dense, patches, price, part);
-    if (settings.precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
-    auto candidate = std::make_shared<const HierarchicalOperator>(std::move(storage));
+    const HierarchicalOperator::Storage storage = compress_matrix(matrix, patches, price, part);
+    auto candidate = std::make_shared<const HierarchicalOperator>(
+        HierarchicalOperator::encode(storage, settings.precision));
     const double error = lights.error(*candidate);
     const bool within = error <= kMost * settings.tolerance;
     const bool best_within = best && best_error <= kMost * settings.tolerance;
@@ -360,6 +355,13 @@ std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
     price *= std::clamp(step * step, 1e-3, 1e3);
   }
   return best;
+}
+
+std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
+    const DenseOperator& dense, const PatchTable& patches,
+    std::span<const std::vector<Float3>> test_lights, const HierarchicalSettings& settings,
+    const Progress& progress) {
+  return compress_to_tolerance(DenseMatrix(dense), patches, test_lights, settings, progress);
 }
 
 }  // namespace rebounce

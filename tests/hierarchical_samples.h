@@ -67,6 +67,8 @@ class RandomHierarchicalStorage {
       block.kind = TransferBlock::Kind::kLowRank;
       block.row_rank = random_rank(rows);
       block.column_rank = block.on_diagonal() ? block.row_rank : random_rank(columns);
+      if (block.column_rank == 0) block.row_rank = 0;
+      if (block.row_rank == 0) block.column_rank = 0;
     }
     storage.blocks.push_back(block);
     const std::size_t begin = values_.size();

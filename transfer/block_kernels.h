@@ -1,41 +1,67 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
+#include "rebounce/transfer/types.h"
+
 namespace rebounce {
 
-/// Products with the parts of a block of the hierarchical operator, for one instruction set.
-///
-/// Vectors of the three channels are planar: channel c begins at c times a stride. Sizes of vectors
-/// over patches are multiples of HierarchicalOperator::kAlignment; ranks are anything.
+/// Vectors that are worked on together, planar: vector v begins at v times `stride`. Three for each
+/// light, its channels.
+template <typename T>
+struct PlanarVectors {
+  T* data;
+  std::size_t stride, count;
+};
+
+/// Products with the bases of the hierarchical operator, for one instruction set. Counts of
+/// positions are multiples of HierarchicalOperator::kAlignment; ranks are anything. An int8_t
+/// stands for itself: its scale is elsewhere.
 template <typename Value>
-struct BlockKernels {
-  /// coefficient[c][r] = sum over k of basis[r][k] x[c][k], basis [rank][size].
-  void (*project)(const Value* basis, std::size_t rank, std::size_t size, const float* x,
-                  std::size_t stride, float* coefficient, std::size_t rank_stride);
+struct BasisKernels {
+  /// coefficient[v][r] = sum over k of basis[r][k] x[v][k], basis [rank][size].
+  void (*project)(const Value* basis, std::size_t rank, std::size_t size,
+                  PlanarVectors<const float> x, PlanarVectors<float> coefficient);
 
-  /// y[c][k] += sum over r of basis[r][k] coefficient[c][r].
-  void (*expand)(const Value* basis, std::size_t rank, std::size_t size, const float* coefficient,
-                 std::size_t rank_stride, float* y, std::size_t stride);
+  /// y[v][k] += sum over r of basis[r][k] coefficient[v][r] for `count` columns of a basis
+  /// [rank][size].
+  void (*expand)(const Value* basis, std::size_t rank, std::size_t size, std::size_t count,
+                 PlanarVectors<const float> coefficient, PlanarVectors<float> y);
+};
 
-  /// row_out = S column_in and column_out = S^T row_in for the core S [rows][columns], read once.
-  /// All have room for whole vectors; column_in is zero beyond `columns`.
-  void (*core)(const Value* core, std::size_t rows, std::size_t columns, const float* column_in,
-               const float* row_in, float* row_out, float* column_out);
+/// The cores or the entries of a block, S [matrix][rows][columns] of any size; whole vectors are
+/// read at the end of each.
+template <typename Value>
+struct CoreMatrices {
+  const Value* data;
+  std::size_t rows, columns;
+  std::array<std::uint32_t, kChannelCount> channel_matrix;
+};
 
-  /// y_row += D x_column and y_column += D^T x_row for the block D [rows][columns], read once.
-  void (*dense)(const Value* block, std::size_t rows, std::size_t columns, const float* x_column,
-                const float* x_row, float* y_row, float* y_column);
+/// What goes into the cores and what comes out, in the same order of channels and lights.
+struct CoreVectors {
+  PlanarVectors<const float> row_in, column_in;
+  PlanarVectors<float> row_out, column_out;
+};
 
-  /// y_row += D x_column.
-  void (*dense_diagonal)(const Value* block, std::size_t size, const float* x_column, float* y_row);
+/// Products with cores and dense blocks; what was there before is overwritten.
+template <typename Value>
+struct CoreKernels {
+  using Product = void (*)(const CoreMatrices<Value>& s, const CoreVectors& vectors);
+  Product both;        ///< row_out = S column_in and column_out = S^T row_in, S read once
+  Product to_rows;     ///< row_out = S column_in
+  Product to_columns;  ///< column_out = S^T row_in
 };
 
 struct BlockKernelSet {
   const char* instruction_set;
-  BlockKernels<float> f32;
-  BlockKernels<std::uint16_t> f16;
+  BasisKernels<float> bases_f32;
+  BasisKernels<std::uint16_t> bases_f16;
+  BasisKernels<std::int8_t> bases_q8;
+  CoreKernels<float> cores_f32;
+  CoreKernels<std::uint16_t> cores_f16;
 };
 
 extern const BlockKernelSet kBlockKernelsPortable;

@@ -120,12 +120,27 @@ void add_slots(const DenseOperator::Storage& storage, int channel, const float* 
 
 }  // namespace
 
+std::string precision_name(Precision precision) {
+  switch (precision) {
+    case Precision::kF16:
+      return "f16";
+    case Precision::kQ8:
+      return "q8";
+    case Precision::kF32:
+      break;
+  }
+  return "f32";
+}
+
 std::size_t DenseOperator::tile_count(std::size_t patch_count) {
   const std::size_t side = tiles_per_side(patch_count);
   return side * (side + 1) / 2;
 }
 
 DenseOperator::DenseOperator(Storage storage) : storage_(std::move(storage)) {
+  if (storage_.precision == Precision::kQ8) {
+    throw Error("dense operator: 8 bits are not precise enough; use f16 or f32");
+  }
   const std::size_t values = storage_.matrix_count * tile_count(patch_count()) * kTileSize;
   const bool half = storage_.precision == Precision::kF16;
   if ((half ? storage_.tiles_f16.size() : storage_.tiles_f32.size()) != values) {

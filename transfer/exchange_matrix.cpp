@@ -1,10 +1,58 @@
 #include "rebounce/transfer/exchange_matrix.h"
 
+#include <algorithm>
 #include <cassert>
 
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
+namespace {
+
+class RowRelaxation final : public Relaxation {
+ public:
+  explicit RowRelaxation(const FormFactorRows& rows)
+      : rows_(rows), radiosity_(rows.patch_count()) {}
+
+  void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
+    problem_ = problem;
+    std::ranges::copy(radiosity, radiosity_.begin());
+  }
+
+  double sweep(SweepDirection direction) override {
+    const std::size_t n = radiosity_.size();
+    double changed_squared = 0;
+    for (std::size_t k = 0; k < n; ++k) {
+      changed_squared += relax_row(direction == SweepDirection::kForward ? k : n - 1 - k);
+    }
+    return changed_squared;
+  }
+
+  void end(std::span<Float3> radiosity) const override {
+    std::ranges::copy(radiosity_, radiosity.begin());
+  }
+
+  int reads_per_sweep(SweepOrder /*order*/) const override { return 1; }
+
+ private:
+  double relax_row(std::size_t row) {
+    const Float3 gathered = rows_.gather_row(row, radiosity_);
+    double changed_squared = 0;
+    for (int c = 0; c < kChannelCount; ++c) {
+      const float next =
+          problem_.initial_exitance[row][c] + problem_.reflectance[row][c] * gathered[c];
+      const double change = static_cast<double>(next) - radiosity_[row][c];
+      changed_squared += problem_.area[row] * change * change;
+      radiosity_[row][c] = next;
+    }
+    return changed_squared;
+  }
+
+  const FormFactorRows& rows_;
+  RelaxationProblem problem_;
+  std::vector<Float3> radiosity_;
+};
+
+}  // namespace
 
 FormFactorRows::FormFactorRows(const ExchangeMatrix& exchange, std::span<const float> area) {
   const std::size_t n = exchange.patch_count();
@@ -42,11 +90,16 @@ std::size_t FormFactorRows::bytes() const {
          form_factor_.size() * sizeof(form_factor_[0]);
 }
 
-void FormFactorRows::gather(std::span<const Float3> in, std::span<Float3> out) const {
+void FormFactorRows::gather(std::span<const Float3> in, std::span<Float3> out,
+                            std::span<float> /*workspace*/) const {
   assert(in.size() == patch_count() && out.size() == patch_count());
   const auto n = static_cast<std::int64_t>(patch_count());
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::int64_t i = 0; i < n; ++i) out[i] = gather_row(i, in);
+}
+
+std::unique_ptr<Relaxation> FormFactorRows::make_relaxation() const {
+  return std::make_unique<RowRelaxation>(*this);
 }
 
 Float3 FormFactorRows::gather_row(std::size_t row, std::span<const Float3> in) const {

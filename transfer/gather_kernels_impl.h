@@ -65,6 +65,46 @@ void shoot_blocks(const FormFactorBlock* values, const std::uint32_t* position, 
 }
 
 template <typename V>
+void gather_and_spread_blocks(const FormFactorBlock* values, const std::uint32_t* position,
+                              std::size_t count, const float* value, const float* x, float* y,
+                              std::size_t stride, float* sum) {
+  constexpr std::size_t kVectors = kFormFactorBlock / V::kWidth;
+  const V sent[kChannelCount] = {V::broadcast(value[0]), V::broadcast(value[1]),
+                                 V::broadcast(value[2])};
+  V total[kChannelCount] = {V::zero(), V::zero(), V::zero()};
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t at = kFormFactorBlock * static_cast<std::size_t>(position[k]);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      const V f = V::load(values[k].value + v * V::kWidth);
+      for (int c = 0; c < kChannelCount; ++c) {
+        const std::size_t j = at + c * stride + v * V::kWidth;
+        total[c] = multiply_add(f, V::load(x + j), total[c]);
+        multiply_add(f, sent[c], V::load(y + j)).store(y + j);
+      }
+    }
+  }
+  for (int c = 0; c < kChannelCount; ++c) sum[c] = total[c].sum();
+}
+
+template <typename V>
+void spread_blocks(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
+                   const float* value, float* y, std::size_t stride) {
+  constexpr std::size_t kVectors = kFormFactorBlock / V::kWidth;
+  const V sent[kChannelCount] = {V::broadcast(value[0]), V::broadcast(value[1]),
+                                 V::broadcast(value[2])};
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t at = kFormFactorBlock * static_cast<std::size_t>(position[k]);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      const V f = V::load(values[k].value + v * V::kWidth);
+      for (int c = 0; c < kChannelCount; ++c) {
+        const std::size_t j = at + c * stride + v * V::kWidth;
+        multiply_add(f, sent[c], V::load(y + j)).store(y + j);
+      }
+    }
+  }
+}
+
+template <typename V>
 V magnitude(const float* x, std::size_t stride) {
   return add(add(absolute(V::load(x)), absolute(V::load(x + stride))),
              absolute(V::load(x + 2 * stride)));
@@ -95,7 +135,8 @@ std::size_t largest_magnitude(const float* x, std::size_t stride) {
 
 template <typename V>
 constexpr GatherKernels make_gather_kernels(const char* instruction_set) {
-  return {instruction_set, gather_blocks<V>, shoot_blocks<V>, largest_magnitude<V>};
+  return {instruction_set,  gather_blocks<V>,    shoot_blocks<V>, gather_and_spread_blocks<V>,
+          spread_blocks<V>, largest_magnitude<V>};
 }
 
 }  // namespace

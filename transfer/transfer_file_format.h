@@ -33,14 +33,23 @@ inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
-inline constexpr char kHierarchicalPatch[] = "transfer.hierarchical.patch";
-inline constexpr char kHierarchicalBlocks[] = "transfer.hierarchical.blocks";
-inline constexpr char kHierarchicalValues[] = "transfer.hierarchical.values";
-inline constexpr char kHierarchicalChannelMatrix[] = "transfer.hierarchical.channel_matrix";
 }  // namespace tensor
 
+/// The tensors of a hierarchical operator.
+struct HierarchicalTensors {
+  const char *patch, *blocks, *bases, *values, *channel_matrix;
+};
+
+inline constexpr HierarchicalTensors kHierarchicalTransfer = {
+    "transfer.hierarchical.patch", "transfer.hierarchical.blocks", "transfer.hierarchical.bases",
+    "transfer.hierarchical.values", "transfer.hierarchical.channel_matrix"};
+inline constexpr HierarchicalTensors kCompressedFormFactors = {
+    "form_factor.hierarchical.patch", "form_factor.hierarchical.blocks",
+    "form_factor.hierarchical.bases", "form_factor.hierarchical.values",
+    "form_factor.hierarchical.channel_matrix"};
+
 /// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
-/// order, less the offset.
+/// order.
 using StoredBlock = std::array<std::uint32_t, 7>;
 
 inline std::string texture_tensor(std::size_t texture) {

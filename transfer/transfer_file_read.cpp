@@ -231,9 +231,9 @@ std::shared_ptr<const DenseOperator> read_dense_operator(const SafetensorsFile& 
   return std::make_shared<const DenseOperator>(std::move(storage));
 }
 
-std::vector<TransferBlock> read_blocks(const SafetensorsFile& file) {
+std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* name) {
   std::vector<StoredBlock> stored;
-  TensorReader{file}(tensor::kHierarchicalBlocks, stored);
+  TensorReader{file}(name, stored);
   std::vector<TransferBlock> blocks;
   blocks.reserve(stored.size());
   for (const StoredBlock& b : stored) {
@@ -243,20 +243,23 @@ std::vector<TransferBlock> read_blocks(const SafetensorsFile& file) {
 }
 
 std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
-    const SafetensorsFile& file, const std::vector<float>& area) {
+    const SafetensorsFile& file, const HierarchicalTensors& names, const std::vector<float>& area) {
   HierarchicalOperator::Storage storage;
   storage.area = area;
-  TensorReader{file}(tensor::kHierarchicalPatch, storage.patch);
-  storage.blocks = read_blocks(file);
-  storage.channel_matrix =
-      read_channel_matrix(file, tensor::kHierarchicalChannelMatrix, kChannelCount);
+  storage.order = HierarchicalOperator::Order::kStreamed;
+  TensorReader{file}(names.patch, storage.patch);
+  storage.blocks = read_blocks(file, names.blocks);
+  storage.channel_matrix = read_channel_matrix(file, names.channel_matrix, kChannelCount);
   storage.matrix_count = 1 + std::ranges::max(storage.channel_matrix);
-  if (file.info(tensor::kHierarchicalValues).type == TensorType::kF16) {
+  if (file.info(names.values).type == TensorType::kF16) {
     storage.precision = Precision::kF16;
-    storage.values_f16 =
-        file.tensor<std::uint16_t>(tensor::kHierarchicalValues, {kAnySize}, TensorType::kF16);
+    storage.values_f16 = file.tensor<std::uint16_t>(names.values, {kAnySize}, TensorType::kF16);
   } else {
-    storage.values_f32 = file.tensor<float>(tensor::kHierarchicalValues, {kAnySize});
+    storage.values_f32 = file.tensor<float>(names.values, {kAnySize});
+  }
+  if (file.tensors().contains(names.bases)) {
+    storage.precision = Precision::kQ8;
+    storage.bases_q8 = file.tensor<std::int8_t>(names.bases, {kAnySize}, TensorType::kI8);
   }
   try {
     return std::make_shared<const HierarchicalOperator>(std::move(storage));
@@ -269,8 +272,20 @@ std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& fil
                                                       const std::vector<float>& area) {
   const std::string& kind = metadata(file, key::kOperator);
   if (kind == "dense") return read_dense_operator(file, area);
-  if (kind == "hierarchical") return read_hierarchical_operator(file, area);
+  if (kind == "hierarchical") return read_hierarchical_operator(file, kHierarchicalTransfer, area);
   refuse(file, "the operator is of a kind that this program does not know");
+}
+
+/// Nothing if the file holds none.
+std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
+    const SafetensorsFile& file, const std::vector<float>& area) {
+  const HierarchicalTensors& names = kCompressedFormFactors;
+  if (!file.tensors().contains(names.values)) return nullptr;
+  auto exchange = read_hierarchical_operator(file, names, area);
+  if (exchange->storage().matrix_count != 1) {
+    refuse(file, std::string("tensor ") + names.channel_matrix + ": more than one matrix");
+  }
+  return exchange;
 }
 
 }  // namespace
@@ -288,6 +303,7 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   data.record = read_record(file);
   check_transfer_data(data, file.name());
   data.transfer = read_operator(file, data.patches.area);
+  data.compressed_form_factors = read_compressed_form_factors(file, data.patches.area);
   return data;
 }
 

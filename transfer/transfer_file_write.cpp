@@ -80,22 +80,24 @@ void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollect
 }
 
 void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
-                                   TensorCollector& collector) {
+                                   const HierarchicalTensors& names, TensorCollector& collector) {
   std::vector<StoredBlock> blocks;
   for (const TransferBlock& b : storage.blocks) {
     blocks.push_back({b.row_begin, b.row_count, b.column_begin, b.column_count,
                       static_cast<std::uint32_t>(b.kind), b.row_rank, b.column_rank});
   }
-  collector.add_made<StoredBlock>(tensor::kHierarchicalBlocks, blocks);
-  collector(tensor::kHierarchicalPatch, storage.patch);
-  collector.add<std::uint32_t>(tensor::kHierarchicalChannelMatrix, {storage.channel_matrix.size()},
+  collector.add_made<StoredBlock>(names.blocks, blocks);
+  collector(names.patch, storage.patch);
+  collector.add<std::uint32_t>(names.channel_matrix, {storage.channel_matrix.size()},
                                storage.channel_matrix);
-  if (storage.precision == Precision::kF16) {
-    collector.add(tensor::kHierarchicalValues, {storage.values_f16.size()},
-                  storage.values_f16.span(), TensorType::kF16);
+  if (storage.precision == Precision::kQ8) {
+    collector.add(names.bases, {storage.bases_q8.size()}, storage.bases_q8.span(), TensorType::kI8);
+  }
+  if (storage.precision != Precision::kF32) {
+    collector.add(names.values, {storage.values_f16.size()}, storage.values_f16.span(),
+                  TensorType::kF16);
   } else {
-    collector.add(tensor::kHierarchicalValues, {storage.values_f32.size()},
-                  storage.values_f32.span());
+    collector.add(names.values, {storage.values_f32.size()}, storage.values_f32.span());
   }
 }
 
@@ -103,7 +105,7 @@ void collect_operator(const TransferOperator* transfer, TensorCollector& collect
   if (const auto* dense = dynamic_cast<const DenseOperator*>(transfer)) {
     collect_dense_operator(dense->storage(), collector);
   } else if (const auto* blocks = dynamic_cast<const HierarchicalOperator*>(transfer)) {
-    collect_hierarchical_operator(blocks->storage(), collector);
+    collect_hierarchical_operator(blocks->storage(), kHierarchicalTransfer, collector);
   } else {
     throw Error(
         "a transfer file cannot hold this kind of operator; give it a dense or hierarchical one");
@@ -153,6 +155,10 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   collect_textures(data.textures, collector);
   collect_exchange(data.exchange, collector);
   collect_operator(data.transfer.get(), collector);
+  if (data.compressed_form_factors) {
+    collect_hierarchical_operator(data.compressed_form_factors->storage(), kCompressedFormFactors,
+                                  collector);
+  }
 
   SafetensorsLayout layout = lay_out_safetensors(collector.tensors(), make_metadata(data));
   seal(layout);

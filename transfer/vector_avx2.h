@@ -7,20 +7,37 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "vector_x86.h"
+
 namespace rebounce {
 namespace {
 
 struct Vector8 {
   static constexpr std::size_t kWidth = 8;
+  static constexpr std::size_t kStrip = 16;
+  static constexpr std::size_t kLights = 1;
   __m256 v;
 
   static Vector8 load(const float* p) { return {_mm256_loadu_ps(p)}; }
   static Vector8 load_half(const std::uint16_t* p) {
     return {_mm256_cvtph_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
   }
+  static Vector8 load_bytes(const std::int8_t* p) {
+    return {_mm256_cvtepi32_ps(
+        _mm256_cvtepi8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))))};
+  }
+  static Vector8 load_some(const float* p, std::size_t count) {
+    return {_mm256_maskload_ps(p, first(count))};
+  }
   static Vector8 zero() { return {_mm256_setzero_ps()}; }
   static Vector8 broadcast(float x) { return {_mm256_set1_ps(x)}; }
   void store(float* p) const { _mm256_storeu_ps(p, v); }
+  void store_some(float* p, std::size_t count) const { _mm256_maskstore_ps(p, first(count), v); }
+  /// The sums over the lanes of four vectors.
+  static FourSums sums(Vector8 a, Vector8 b, Vector8 c, Vector8 d) {
+    const __m256 four = _mm256_hadd_ps(_mm256_hadd_ps(a.v, b.v), _mm256_hadd_ps(c.v, d.v));
+    return {_mm_add_ps(_mm256_castps256_ps128(four), _mm256_extractf128_ps(four, 1))};
+  }
   float sum() const {
     const __m128 half = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
     const __m128 pair = _mm_add_ps(half, _mm_movehl_ps(half, half));
@@ -37,6 +54,12 @@ struct Vector8 {
   friend Vector8 maximum(Vector8 a, Vector8 b) { return {_mm256_max_ps(a.v, b.v)}; }
   friend Vector8 multiply_add(Vector8 a, Vector8 b, Vector8 c) {
     return {_mm256_fmadd_ps(a.v, b.v, c.v)};
+  }
+
+ private:
+  static __m256i first(std::size_t count) {
+    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    return _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(count)), lane);
   }
 };
 

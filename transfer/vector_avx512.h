@@ -7,24 +7,52 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "vector_x86.h"
+
 namespace rebounce {
 namespace {
 
 struct Vector16 {
   static constexpr std::size_t kWidth = 16;
+  static constexpr std::size_t kStrip = 64;
+  static constexpr std::size_t kLights = 2;
   __m512 v;
 
   static Vector16 load(const float* p) { return {_mm512_loadu_ps(p)}; }
   static Vector16 load_half(const std::uint16_t* p) {
     return {_mm512_cvtph_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)))};
   }
+  static Vector16 load_bytes(const std::int8_t* p) {
+    return {_mm512_cvtepi32_ps(
+        _mm512_cvtepi8_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p))))};
+  }
+  static Vector16 load_some(const float* p, std::size_t count) {
+    return {_mm512_maskz_loadu_ps(first(count), p)};
+  }
   static Vector16 zero() { return {_mm512_setzero_ps()}; }
   static Vector16 broadcast(float x) { return {_mm512_set1_ps(x)}; }
   void store(float* p) const { _mm512_storeu_ps(p, v); }
+  void store_some(float* p, std::size_t count) const { _mm512_mask_storeu_ps(p, first(count), v); }
   float sum() const { return _mm512_reduce_add_ps(v); }
+  /// The sums over the lanes of four vectors.
+  static FourSums sums(Vector16 a, Vector16 b, Vector16 c, Vector16 d) {
+    const __m512 ab = _mm512_add_ps(_mm512_unpacklo_ps(a.v, b.v), _mm512_unpackhi_ps(a.v, b.v));
+    const __m512 cd = _mm512_add_ps(_mm512_unpacklo_ps(c.v, d.v), _mm512_unpackhi_ps(c.v, d.v));
+    const __m512 four =
+        _mm512_add_ps(_mm512_shuffle_ps(ab, cd, 0x44), _mm512_shuffle_ps(ab, cd, 0xEE));
+    const __m256 two =
+        _mm256_add_ps(_mm512_castps512_ps256(four),
+                      _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(four), 1)));
+    return {_mm_add_ps(_mm256_castps256_ps128(two), _mm256_extractf128_ps(two, 1))};
+  }
+  friend Vector16 add(Vector16 a, Vector16 b) { return {_mm512_add_ps(a.v, b.v)}; }
+  friend Vector16 multiply(Vector16 a, Vector16 b) { return {_mm512_mul_ps(a.v, b.v)}; }
   friend Vector16 multiply_add(Vector16 a, Vector16 b, Vector16 c) {
     return {_mm512_fmadd_ps(a.v, b.v, c.v)};
   }
+
+ private:
+  static __mmask16 first(std::size_t count) { return static_cast<__mmask16>((1U << count) - 1); }
 };
 
 }  // namespace

@@ -1,10 +1,20 @@
 #pragma once
 
 // Kernels are written over a vector type `V` of kWidth floats, one per instruction set: load,
-// load_half, store, zero, broadcast, multiply_add, sum. Everything about it is in an unnamed
-// namespace, so that files compiled for different sets never share an instantiation.
+// load_half, load_bytes, store, zero, broadcast, multiply_add, sum; load_some and store_some touch
+// the first `count` lanes alone, the others are read as zero; sums gives the sums over the lanes of
+// four vectors. kStrip positions and the channels of kLights lights are what its registers
+// have room for. Everything about it is in an unnamed namespace, so that files compiled for
+// different sets never share an instantiation.
 
+#include <cstddef>
 #include <cstdint>
+#include <type_traits>
+#include <utility>
+
+// On functions and lambdas alike: arrays of vectors are kept in registers only if all that touches
+// them is one function.
+#define REBOUNCE_INLINE __attribute__((always_inline))
 
 namespace rebounce {
 namespace {
@@ -17,6 +27,21 @@ inline V load_values(const float* p) {
 template <typename V>
 inline V load_values(const std::uint16_t* p) {
   return V::load_half(p);
+}
+
+template <typename V>
+inline V load_values(const std::int8_t* p) {
+  return V::load_bytes(p);
+}
+
+/// Calls work(index) for 0 to kCount - 1 as constants, so that arrays indexed by them are
+/// registers.
+template <std::size_t kCount, typename Work>
+REBOUNCE_INLINE inline void unroll(const Work& work) {
+  [&]<std::size_t... kIndex>(std::index_sequence<kIndex...>) REBOUNCE_INLINE {
+    (work(std::integral_constant<std::size_t, kIndex>{}), ...);
+  }
+  (std::make_index_sequence<kCount>{});
 }
 
 }  // namespace

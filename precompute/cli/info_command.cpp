@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "info_json.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
@@ -47,6 +48,8 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
           {"light_count", data.lights.size()},
           {"camera_count", data.cameras.size()},
           {"form_factor_count", data.exchange.column.size()},
+          {"compressed_form_factor_bytes",
+           data.compressed_form_factors ? data.compressed_form_factors->bytes() : 0},
           {"operator", data.transfer->kind()},
           {"operator_bytes", data.transfer->bytes()},
           {"bytes_per_patch", static_cast<double>(data.transfer->bytes()) / n},

@@ -8,6 +8,7 @@
 #include "output_check.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
@@ -61,6 +62,14 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
       data.transfer->kind(), static_cast<double>(data.transfer->bytes()) / (1 << 20),
       static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
       data.record.solve_residual, data.record.error_mean, data.record.error_max);
+  if (data.compressed_form_factors) {
+    const auto bytes = static_cast<double>(data.compressed_form_factors->bytes());
+    fmt::print(
+        "compressed form factors: {:.1f} MiB ({:.0f} bytes per patch), error {:.1e} mean, "
+        "{:.1e} max\n",
+        bytes / (1 << 20), bytes / static_cast<double>(report.patch_count),
+        report.form_factor_error->mean, report.form_factor_error->max);
+  }
   std::string times;
   for (const auto& [phase, s] : report.seconds) times += fmt::format("{} {:.1f} s, ", phase, s);
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
@@ -77,8 +86,8 @@ void check_tolerance(const BuildRecord& record) {
 
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
-  if (!chosen.precision.empty()) {
-    settings.precision = chosen.precision == "f16" ? Precision::kF16 : Precision::kF32;
+  for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
+    if (chosen.precision == precision_name(precision)) settings.precision = precision;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
   if (chosen.operator_kind == "hierarchical" ||
@@ -150,10 +159,18 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->each([chosen](const std::string&) { chosen->tolerance_given = true; })
       ->capture_default_str();
   command
-      ->add_option("--precision", chosen->precision,
-                   "Numbers of the operator: f32, or f16 for half the bytes; by default f16 for a "
-                   "hierarchical operator, f32 for a dense one")
-      ->check(CLI::IsMember({"f16", "f32"}));
+      ->add_option(
+          "--precision", chosen->precision,
+          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q8 "
+          "for two thirds of those; by default f16 for a hierarchical operator, f32 for a "
+          "dense one")
+      ->check(CLI::IsMember({"f16", "f32", "q8"}));
+  command
+      ->add_option(
+          "--compress-form-factors", chosen->settings.form_factor_tolerance,
+          "Keep the form factors compressed as well, for iterative methods, with this error of the "
+          "light that is gathered in the mean")
+      ->check(CLI::Range(1e-5, 0.5));
   command
       ->add_option("--memory-limit", chosen->memory_limit_gib,
                    "Refuse to start what needs more GiB; by default half of the machine's memory")

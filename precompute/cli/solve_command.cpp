@@ -13,6 +13,7 @@
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 
@@ -20,9 +21,10 @@ namespace rebounce::cli {
 namespace {
 
 constexpr const char* kTransfer = "transfer";  // the product with the operator, no iteration
+constexpr const char *kExact = "exact", *kCompressed = "compressed";  // F as methods see it
 
 struct SolveOptions {
-  std::string file, lights, method = kTransfer, output;
+  std::string file, lights, method = kTransfer, form_factors = kExact, output;
   SolveSettings settings;
 };
 
@@ -121,14 +123,31 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
   write_csv(path, columns);
 }
 
+/// What --method names; for the product with the operator, the method that reads F least.
+SolveMethod method_of(const SolveOptions& chosen) {
+  const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
+  return named == kSolveMethods.end() ? SolveMethod::kGathering : named->method;
+}
+
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
-                       const FormFactorBlocks& form_factors) {
+                       const FormFactorOperator& form_factors) {
   if (chosen.method == kTransfer) return solve_by_transfer(engine);
   const TransferData& data = engine.data();
-  const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
-  const auto solver = make_solver(named->method, form_factors,
+  const auto solver = make_solver(method_of(chosen), form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
   return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
+}
+
+std::unique_ptr<const FormFactorOperator> choose_form_factors(const SolveOptions& chosen,
+                                                              const TransferData& data) {
+  if (chosen.form_factors == kExact) {
+    return make_form_factors(method_of(chosen), data.exchange, data.patches.area);
+  }
+  if (!data.compressed_form_factors) {
+    throw Error(chosen.file +
+                " holds no compressed form factors; make it with --compress-form-factors");
+  }
+  return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
 }
 
 /// The names that --method takes.
@@ -144,16 +163,18 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   engine.compute_direct(setup.lights, setup.sky);
   engine.compute_initial_exitance();
-  const FormFactorBlocks form_factors(data->exchange, data->patches.area);
-  const Solution solution = find_solution(chosen, engine, form_factors);
+  const auto form_factors = choose_form_factors(chosen, *data);
+  const Solution solution = find_solution(chosen, engine, *form_factors);
   if (solution.diverged) {
     throw Error(chosen.method + " diverges: the operator of " + chosen.file +
-                " does not fit its form factors; use another method");
+                " does not fit its form factors; use another method, such as "
+                "preconditioned-conjugate-gradient");
   }
-  const double residual = radiosity_residual(engine, form_factors, solution.radiosity);
+  const double residual = radiosity_residual(engine, *form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);
   if (options.json) {
     const nlohmann::json summary = {{"method", chosen.method},
+                                    {"form_factors", chosen.form_factors},
                                     {"sweeps", solution.sweeps},
                                     {"residual", residual},
                                     {"microseconds", solution.microseconds}};
@@ -174,6 +195,12 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
                       "Lights: .json, or a .glb that has some; by default those of the scene");
   command->add_option("--method", chosen->method, "How to find the indirect light")
       ->check(CLI::IsMember(method_names()))
+      ->capture_default_str();
+  command
+      ->add_option("--form-factors", chosen->form_factors,
+                   "What iterative methods gather with: the exact form factors, or the compressed "
+                   "ones of a file that holds them")
+      ->check(CLI::IsMember({kExact, kCompressed}))
       ->capture_default_str();
   command
       ->add_option("--iterations", chosen->settings.max_sweeps,

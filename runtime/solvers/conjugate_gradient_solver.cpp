@@ -79,10 +79,7 @@ RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
   add_scaled(back_step, product_, rest_);
   precondition();
   const Scalars next = inner_product(rest_, preconditioned_);
-  Scalars turn{};
-  for (int c = 0; c < kChannelCount; ++c) {
-    turn[c] = rest_square_[c] > 0 ? next[c] / rest_square_[c] : 0;
-  }
+  const Scalars turn = turn_of_direction(step, next);
   rest_square_ = next;
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
@@ -90,6 +87,21 @@ RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
     }
   }
   return {.residual = radiosity_residual_norm()};
+}
+
+ConjugateGradientSolver::Scalars ConjugateGradientSolver::turn_of_direction(
+    const Scalars& step, const Scalars& next) const {
+  // <rest, preconditioned> as it should be, or as it is: the rest has changed by -step product.
+  Scalars square = next;
+  if (preconditioner_) {
+    square = inner_product(product_, preconditioned_);
+    for (int c = 0; c < kChannelCount; ++c) square[c] *= -step[c];
+  }
+  Scalars turn{};
+  for (int c = 0; c < kChannelCount; ++c) {
+    turn[c] = rest_square_[c] > 0 ? square[c] / rest_square_[c] : 0;
+  }
+  return turn;
 }
 
 void ConjugateGradientSolver::finish() {

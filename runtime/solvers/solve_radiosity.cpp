@@ -6,11 +6,45 @@
 #include "rebounce/runtime/refinement_solver.h"
 #include "rebounce/runtime/southwell_solver.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/exchange_blocks.h"
+#include "rebounce/transfer/form_factor_blocks.h"
 
 namespace rebounce {
+namespace {
+
+/// `form_factors` as what a method needs it to be.
+template <typename Form>
+const Form& as(const FormFactorOperator& form_factors, const char* refusal) {
+  const auto* form = dynamic_cast<const Form*>(&form_factors);
+  if (form == nullptr) throw Error(refusal);
+  return *form;
+}
+
+const SweepableFormFactors& sweepable(const FormFactorOperator& form_factors) {
+  return as<SweepableFormFactors>(form_factors,
+                                  "solver: gauss-seidel cannot sweep over these form factors; "
+                                  "take gathering or conjugate-gradient");
+}
+
+/// A shot goes from one patch to all that it sees.
+const FormFactorBlocks& rows_of(const FormFactorOperator& form_factors) {
+  return as<FormFactorBlocks>(
+      form_factors, "solver: southwell needs form factors by rows; give it FormFactorBlocks");
+}
+
+}  // namespace
+
+std::unique_ptr<const FormFactorOperator> make_form_factors(SolveMethod method,
+                                                            const ExchangeMatrix& exchange,
+                                                            std::span<const float> area) {
+  if (method == SolveMethod::kGaussSeidel || method == SolveMethod::kSouthwell) {
+    return std::make_unique<FormFactorBlocks>(exchange, area);
+  }
+  return std::make_unique<ExchangeBlocks>(exchange, area);
+}
 
 std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
-                                             const FormFactorBlocks& form_factors,
+                                             const FormFactorOperator& form_factors,
                                              const RadiosityProblem& problem,
                                              std::shared_ptr<const TransferOperator> transfer) {
   switch (method) {
@@ -18,13 +52,15 @@ std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
     case SolveMethod::kJacobi:
       return std::make_unique<GatheringSolver>(form_factors, problem);
     case SolveMethod::kGaussSeidel:
-      return std::make_unique<GaussSeidelSolver>(form_factors, problem, SweepOrder::kForward);
+      return std::make_unique<GaussSeidelSolver>(sweepable(form_factors), problem,
+                                                 SweepOrder::kForward);
     case SolveMethod::kSymmetricGaussSeidel:
-      return std::make_unique<GaussSeidelSolver>(form_factors, problem, SweepOrder::kSymmetric);
+      return std::make_unique<GaussSeidelSolver>(sweepable(form_factors), problem,
+                                                 SweepOrder::kSymmetric);
     case SolveMethod::kConjugateGradient:
       return std::make_unique<ConjugateGradientSolver>(form_factors, problem);
     case SolveMethod::kSouthwell:
-      return std::make_unique<SouthwellSolver>(form_factors, problem);
+      return std::make_unique<SouthwellSolver>(rows_of(form_factors), problem);
     case SolveMethod::kRefine:
       return std::make_unique<RefinementSolver>(form_factors, problem, std::move(transfer));
     case SolveMethod::kPreconditionedConjugateGradient:
@@ -34,7 +70,7 @@ std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
   throw Error("solver: no such method");
 }
 
-SolveResult solve_radiosity(SolveMethod method, const FormFactorBlocks& form_factors,
+SolveResult solve_radiosity(SolveMethod method, const FormFactorOperator& form_factors,
                             const RadiosityProblem& problem,
                             std::span<const Float3> initial_exitance, const SolveSettings& settings,
                             std::span<Float3> radiosity,

@@ -247,6 +247,29 @@ TEST_F(CommandLine, CompressesToATolerance) {
   EXPECT_EQ(test::npz_values<float>(arrays, "transfer", "<f4").size(), 3 * n * n);
 }
 
+TEST_F(CommandLine, IteratesOnCompressedFormFactors) {
+  const std::string file = path("box.safetensors");
+  const json info = summary_of(
+      {"precompute", kScene, "--patches", "1200", "--compress-form-factors", "0.002", "-o", file});
+  EXPECT_GT(info["compressed_form_factor_bytes"].get<double>(), 0);
+  EXPECT_LT(info["report"]["form_factor_error_mean"].get<double>(), 0.002);
+  const std::string exact = path("exact.csv"), compressed = path("compressed.csv");
+  summary_of({"solve", file, "-o", exact, "--method", "gauss-seidel"});
+  const json solved = summary_of({"solve", file, "-o", compressed, "--method",
+                                  "symmetric-gauss-seidel", "--form-factors", "compressed"});
+  EXPECT_EQ(solved["form_factors"], "compressed");
+  EXPECT_LT(solved["residual"].get<double>(), 1e-6);
+  EXPECT_LT(difference(read_csv(exact), read_csv(compressed), 3), 0.01);
+}
+
+TEST_F(CommandLine, CompressedFormFactorsMustBeThere) {
+  const Outcome outcome = run({"solve", precompute("box.safetensors"), "-o", path("x.csv"),
+                               "--method", "gathering", "--form-factors", "compressed"});
+  EXPECT_EQ(outcome.exit_code, kBadInput);
+  EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+  EXPECT_NE(outcome.err.find("--compress-form-factors"), std::string::npos) << outcome.err;
+}
+
 TEST_F(CommandLine, AMissedToleranceFails) {
   // Half precision cannot be this exact.
   const Outcome outcome =
@@ -261,9 +284,9 @@ TEST_F(CommandLine, AMissedToleranceFails) {
 TEST_F(CommandLine, MeetsThePatchSize) {
   const json made = summary_of(
       {"precompute", kScene, "--patch-size", "0.1", "-o", path("box.safetensors"), "--quiet"});
-  // The surfaces measure 2.1 m2, and the patches are right triangles, of 0.1 m at the longest side
-  // down to half of that.
-  EXPECT_GT(made["patch_count"].get<int>(), 2.1 / 0.0025);
+  // The surfaces measure 2.1 m2; the largest patch of that length is a square, the smallest a right
+  // triangle half as long.
+  EXPECT_GT(made["patch_count"].get<int>(), 2.1 / 0.005);
   EXPECT_LT(made["patch_count"].get<int>(), 2.1 / 0.000625);
 }
 

@@ -9,10 +9,13 @@
 #include <random>
 
 #include "allocation_counter.h"
+#include "exchange_samples.h"
 #include "rebounce/runtime/conjugate_gradient_solver.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/exchange_blocks.h"
+#include "rebounce/transfer/form_factor_blocks.h"
 #include "test_scene_data.h"
 
 namespace rebounce {
@@ -129,18 +132,37 @@ class SeriesOperator final : public TransferOperator {
   float scale_;
 };
 
+enum class Form : std::uint8_t { kRows, kBlocks, kExchange, kCompressed };
+
+std::unique_ptr<const FormFactorOperator> make_form(Form form, const System& system) {
+  switch (form) {
+    case Form::kRows:
+      return std::make_unique<FormFactorRows>(system.exchange, system.area);
+    case Form::kBlocks:
+      return std::make_unique<FormFactorBlocks>(system.exchange, system.area);
+    case Form::kExchange:
+      return std::make_unique<ExchangeBlocks>(system.exchange, system.area);
+    case Form::kCompressed:
+      return std::make_unique<CompressedFormFactors>(
+          test::dense_blocks(system.exchange, system.area));
+  }
+  return nullptr;
+}
+
 struct Case {
   System system;
   FormFactorBlocks blocks;
+  std::unique_ptr<const FormFactorOperator> form_factors;
   std::shared_ptr<const TransferOperator> operator_;
 
-  explicit Case(float largest_reflectance)
+  explicit Case(float largest_reflectance, Form form = Form::kBlocks)
       : system(largest_reflectance),
         blocks(system.exchange, system.area),
+        form_factors(make_form(form, system)),
         operator_(std::make_shared<SeriesOperator>(blocks, system.reflectance, 1.03F)) {}
 
   std::unique_ptr<RadiositySolver> solver(SolveMethod method) const {
-    return make_solver(method, blocks, system.problem(), operator_);
+    return make_solver(method, *form_factors, system.problem(), operator_);
   }
   double error(std::span<const Float3> radiosity, const std::vector<Float3>& truth) const {
     return relative_difference(radiosity, truth, system.area);
@@ -153,19 +175,44 @@ std::vector<Float3> copy(std::span<const Float3> values) {
   return {values.begin(), values.end()};
 }
 
-class EveryMethod : public testing::TestWithParam<NamedSolveMethod> {};
+struct MethodAndForm {
+  NamedSolveMethod named;
+  Form form;
+};
 
-INSTANTIATE_TEST_SUITE_P(Solvers, EveryMethod, testing::ValuesIn(kSolveMethods),
-                         [](const auto& instance) {
-                           std::string name(instance.param.name);
-                           std::erase(name, '-');
-                           return name;
-                         });
+/// Each method on each form of F that it takes.
+std::vector<MethodAndForm> methods_and_forms() {
+  std::vector<MethodAndForm> all;
+  for (const NamedSolveMethod& named : kSolveMethods) {
+    for (const Form form : {Form::kRows, Form::kBlocks, Form::kExchange, Form::kCompressed}) {
+      if (named.method == SolveMethod::kSouthwell && form != Form::kBlocks) continue;
+      all.push_back({named, form});
+    }
+  }
+  return all;
+}
+
+class EveryMethod : public testing::TestWithParam<MethodAndForm> {
+ protected:
+  static Case make_case(float largest_reflectance) {
+    return Case(largest_reflectance, GetParam().form);
+  }
+  static SolveMethod method() { return GetParam().named.method; }
+};
+
+std::string name_of(const testing::TestParamInfo<MethodAndForm>& instance) {
+  constexpr std::array<const char*, 4> kForms = {"Rows", "Blocks", "Exchange", "Compressed"};
+  std::string name(instance.param.named.name);
+  std::erase(name, '-');
+  return name + kForms[static_cast<std::size_t>(instance.param.form)];
+}
+
+INSTANTIATE_TEST_SUITE_P(Solvers, EveryMethod, testing::ValuesIn(methods_and_forms()), name_of);
 
 TEST_P(EveryMethod, ReachesTheSolution) {
   for (const float rho : {0.0F, 0.5F, 0.9F}) {
-    const Case c(rho);
-    const auto solver = c.solver(GetParam().method);
+    const Case c = make_case(rho);
+    const auto solver = c.solver(method());
     const SolveResult result = solver->solve(c.system.initial_exitance, kTight);
     EXPECT_TRUE(result.converged) << rho << ": " << result.residual;
     EXPECT_FALSE(result.diverged);
@@ -174,8 +221,8 @@ TEST_P(EveryMethod, ReachesTheSolution) {
 }
 
 TEST_P(EveryMethod, BlackPatchesKeepTheirOwnLight) {
-  const Case c(0.8F);
-  const auto solver = c.solver(GetParam().method);
+  const Case c = make_case(0.8F);
+  const auto solver = c.solver(method());
   solver->solve(c.system.initial_exitance);
   for (std::size_t i = 0; i < kPatchCount; i += 5) {
     for (int k = 0; k < kChannelCount; ++k) {  // Southwell rounds: it keeps area times light
@@ -185,8 +232,8 @@ TEST_P(EveryMethod, BlackPatchesKeepTheirOwnLight) {
 }
 
 TEST_P(EveryMethod, ResidualIsMeasured) {
-  const Case c(0.7F);
-  const auto solver = c.solver(GetParam().method);
+  const Case c = make_case(0.7F);
+  const auto solver = c.solver(method());
   const SolveResult result =
       solver->solve(c.system.initial_exitance, {.max_sweeps = 2, .residual = 0});
   EXPECT_EQ(result.sweeps, 2);
@@ -205,9 +252,9 @@ TEST_P(EveryMethod, ResidualIsMeasured) {
 }
 
 TEST_P(EveryMethod, BoundWithoutMeasuringHolds) {
-  const Case c(0.8F);
+  const Case c = make_case(0.8F);
   for (const int sweeps : {1, 3, 6}) {
-    const auto measured = c.solver(GetParam().method), bounded = c.solver(GetParam().method);
+    const auto measured = c.solver(method()), bounded = c.solver(method());
     const double truth =
         measured->solve(c.system.initial_exitance, {.max_sweeps = sweeps, .residual = 0}).residual;
     const double bound =
@@ -223,9 +270,9 @@ TEST_P(EveryMethod, BoundWithoutMeasuringHolds) {
 TEST_P(EveryMethod, ErrorShrinksAtLeastByTheLargestReflectance) {
   // From nothing, whose error is 1, k sweeps leave rho^k or less.
   const float rho = 0.8F;
-  const Case c(rho);
+  const Case c = make_case(rho);
   const std::vector<Float3> truth = c.system.eliminate();
-  const auto solver = c.solver(GetParam().method);
+  const auto solver = c.solver(method());
   double bound = 1;
   for (int sweeps = 1; sweeps <= 8; ++sweeps) {
     bound *= rho;
@@ -236,8 +283,8 @@ TEST_P(EveryMethod, ErrorShrinksAtLeastByTheLargestReflectance) {
 }
 
 TEST_P(EveryMethod, WarmStartIsCheaperThanACold) {
-  Case c(0.8F);
-  const auto solver = c.solver(GetParam().method);
+  Case c = make_case(0.8F);
+  const auto solver = c.solver(method());
   const SolveSettings settings = {.residual = 1e-5};
   const int cold = solver->solve(c.system.initial_exitance, settings).sweeps;
   EXPECT_EQ(solver->solve(c.system.initial_exitance, settings).sweeps, 1);
@@ -250,8 +297,8 @@ TEST_P(EveryMethod, WarmStartIsCheaperThanACold) {
 }
 
 TEST_P(EveryMethod, TakesOtherReflectancesExactly) {
-  Case c(0.6F);
-  const auto solver = c.solver(GetParam().method);
+  Case c = make_case(0.6F);
+  const auto solver = c.solver(method());
   solver->solve(c.system.initial_exitance, kTight);
   for (std::size_t i = 0; i < kPatchCount; ++i) {
     c.system.reflectance[i] = {i % 3 == 0 ? 0.0F : 0.85F, 0.4F, i % 5 == 0 ? 0.5F : 1e-6F};
@@ -263,12 +310,12 @@ TEST_P(EveryMethod, TakesOtherReflectancesExactly) {
 }
 
 TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
-  const Case c(0.8F);
+  const Case c = make_case(0.8F);
   const int threads = omp_get_max_threads();
   std::vector<Float3> first;
   for (const int count : {1, 2, 5}) {
     omp_set_num_threads(count);
-    const auto solver = c.solver(GetParam().method);
+    const auto solver = c.solver(method());
     solver->solve(c.system.initial_exitance, {.max_sweeps = 3, .residual = 0});
     if (first.empty()) first = copy(solver->radiosity());
     EXPECT_EQ(first, copy(solver->radiosity())) << count;
@@ -277,8 +324,8 @@ TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
 }
 
 TEST_P(EveryMethod, ASolveDoesNotAllocate) {
-  const Case c(0.8F);
-  const auto solver = c.solver(GetParam().method);
+  const Case c = make_case(0.8F);
+  const auto solver = c.solver(method());
   std::vector<Float3> radiosity(kPatchCount);
   solver->solve(c.system.initial_exitance);  // threads and their buffers are made once
   solver->forget();
@@ -291,28 +338,27 @@ TEST_P(EveryMethod, ASolveDoesNotAllocate) {
 }
 
 TEST_P(EveryMethod, OneOffIsTheColdSolve) {
-  const Case c(0.8F);
+  const Case c = make_case(0.8F);
   std::vector<Float3> radiosity(kPatchCount);
-  const SolveResult once = solve_radiosity(GetParam().method, c.blocks, c.system.problem(),
+  const SolveResult once = solve_radiosity(method(), *c.form_factors, c.system.problem(),
                                            c.system.initial_exitance, {}, radiosity, c.operator_);
-  const auto solver = c.solver(GetParam().method);
+  const auto solver = c.solver(method());
   EXPECT_EQ(solver->solve(c.system.initial_exitance).sweeps, once.sweeps);
   EXPECT_EQ(copy(solver->radiosity()), radiosity);
 }
 
 TEST_P(EveryMethod, TimeBudgetEndsASolve) {
-  const Case c(0.8F);
-  const SolveResult result =
-      c.solver(GetParam().method)
-          ->solve(c.system.initial_exitance,
-                  {.max_sweeps = 1000000, .residual = 0, .time_budget_microseconds = 2000});
+  const Case c = make_case(0.8F);
+  const SolveResult result = c.solver(method())->solve(
+      c.system.initial_exitance,
+      {.max_sweeps = 1000000, .residual = 0, .time_budget_microseconds = 2000});
   EXPECT_LT(result.sweeps, 1000000);
   EXPECT_GE(result.microseconds, 2000);
 }
 
 TEST_P(EveryMethod, DarknessIsSolved) {
-  const Case c(0.8F);
-  const auto solver = c.solver(GetParam().method);
+  const Case c = make_case(0.8F);
+  const auto solver = c.solver(method());
   solver->solve(c.system.initial_exitance);
   const SolveResult result = solver->solve(std::vector<Float3>(kPatchCount, {0, 0, 0}));
   EXPECT_TRUE(result.converged);
@@ -320,8 +366,8 @@ TEST_P(EveryMethod, DarknessIsSolved) {
 }
 
 TEST_P(EveryMethod, RefusesWhatDoesNotFit) {
-  Case c(0.5F);
-  const auto solver = c.solver(GetParam().method);
+  Case c = make_case(0.5F);
+  const auto solver = c.solver(method());
   const std::span<const Float3> m0 = c.system.initial_exitance;
   EXPECT_THROW(solver->solve(m0.first(5)), Error);
   EXPECT_THROW(solver->solve(m0, {.max_sweeps = 0}), Error);
@@ -334,7 +380,7 @@ TEST_P(EveryMethod, RefusesWhatDoesNotFit) {
   c.system.initial_exitance[0][0] = std::numeric_limits<float>::infinity();
   EXPECT_THROW(solver->solve(m0), Error);
   c.system.area.pop_back();
-  EXPECT_THROW(c.solver(GetParam().method), Error);
+  EXPECT_THROW(c.solver(method()), Error);
 }
 
 TEST(Refinement, AHandfulOfStepsFromThreePerCent) {
@@ -385,6 +431,41 @@ TEST(Solvers, MissingOrOtherOperatorsAreRefused) {
     const System small(0.5F, 20);
     const FormFactorBlocks small_blocks(small.exchange, small.area);
     EXPECT_THROW(make_solver(method, small_blocks, small.problem(), c.operator_), Error);
+  }
+}
+
+/// F that can only gather.
+class Gatherer final : public FormFactorOperator {
+ public:
+  explicit Gatherer(const FormFactorBlocks& blocks) : blocks_(blocks) {}
+  std::size_t patch_count() const override { return blocks_.patch_count(); }
+  std::size_t bytes() const override { return blocks_.bytes(); }
+  std::size_t workspace_size() const override { return blocks_.workspace_size(); }
+  void gather(std::span<const Float3> in, std::span<Float3> out,
+              std::span<float> workspace) const override {
+    blocks_.gather(in, out, workspace);
+  }
+
+ private:
+  const FormFactorBlocks& blocks_;
+};
+
+TEST(Solvers, FormsThatAMethodCannotUseAreRefused) {
+  const Case c(0.5F, Form::kExchange);
+  EXPECT_THROW(c.solver(SolveMethod::kSouthwell), Error);
+  const Gatherer gatherer(c.blocks);
+  for (const SolveMethod method : {SolveMethod::kGaussSeidel, SolveMethod::kSymmetricGaussSeidel}) {
+    EXPECT_THROW(make_solver(method, gatherer, c.system.problem()), Error);
+  }
+  EXPECT_NO_THROW(make_solver(SolveMethod::kConjugateGradient, gatherer, c.system.problem()));
+}
+
+TEST(Solvers, EveryMethodHasAFormOfItsOwn) {
+  const Case c(0.5F);
+  for (const NamedSolveMethod& named : kSolveMethods) {
+    const auto form = make_form_factors(named.method, c.system.exchange, c.system.area);
+    const auto solver = make_solver(named.method, *form, c.system.problem(), c.operator_);
+    EXPECT_TRUE(solver->solve(c.system.initial_exitance, {.residual = 1e-5}).converged);
   }
 }
 

@@ -26,6 +26,7 @@ TransferData sample_data(Precision precision) {
   TransferData data;
   HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
   if (precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
+  if (precision == Precision::kQ8) storage = HierarchicalOperator::encode_bytes(storage);
   data.patches.area = storage.area;
   data.patches.centroid.assign(kPatchCount, {0, 0, 0});
   data.patches.normal.assign(kPatchCount, {0, 1, 0});
@@ -44,7 +45,7 @@ const HierarchicalOperator::Storage& storage_of(const TransferData& data) {
 }
 
 TEST(HierarchicalFile, RoundTrips) {
-  for (const Precision precision : {Precision::kF16, Precision::kF32}) {
+  for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
     const test::TemporaryFolder folder;
     const TransferData data = sample_data(precision);
     save_transfer_file(folder / "file", data);
@@ -57,6 +58,7 @@ TEST(HierarchicalFile, RoundTrips) {
     EXPECT_EQ(a.precision, b.precision);
     EXPECT_TRUE(std::ranges::equal(a.values_f32, b.values_f32));
     EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
+    EXPECT_TRUE(std::ranges::equal(a.bases_q8, b.bases_q8));
     std::vector<float> expanded_a(kPatchCount * kPatchCount), expanded_b(expanded_a);
     data.transfer->expand(1, expanded_a);
     loaded.transfer->expand(1, expanded_b);
@@ -67,10 +69,49 @@ TEST(HierarchicalFile, RoundTrips) {
 }
 
 TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
+  for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
+    const test::TemporaryFolder folder;
+    save_transfer_file(folder / "file", sample_data(precision));
+    const TransferData data = load_transfer_file(folder / "file");
+    const auto& owner = data.exchange.row_begin.owner();
+    EXPECT_EQ(storage_of(data).values_f16.owner(), owner);
+    if (precision == Precision::kQ8) {
+      EXPECT_EQ(storage_of(data).bases_q8.owner(), owner);
+    }
+  }
+}
+
+std::shared_ptr<const HierarchicalOperator> sample_form_factors(std::uint32_t matrix_count) {
+  HierarchicalOperator::Storage storage =
+      test::random_hierarchical_storage(kPatchCount, matrix_count, 5);
+  return std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode_half(storage));
+}
+
+TEST(HierarchicalFile, HoldsCompressedFormFactorsBesideTheOperator) {
   const test::TemporaryFolder folder;
-  save_transfer_file(folder / "file", sample_data(Precision::kF16));
-  const TransferData data = load_transfer_file(folder / "file");
-  EXPECT_EQ(storage_of(data).values_f16.owner(), data.exchange.row_begin.owner());
+  TransferData data = sample_data(Precision::kF32);
+  save_transfer_file(folder / "without", data);
+  EXPECT_EQ(load_transfer_file(folder / "without").compressed_form_factors, nullptr);
+  data.compressed_form_factors = sample_form_factors(1);
+  save_transfer_file(folder / "file", data);
+  const TransferData loaded = load_transfer_file(folder / "file");
+  ASSERT_NE(loaded.compressed_form_factors, nullptr);
+  const auto& a = data.compressed_form_factors->storage();
+  const auto& b = loaded.compressed_form_factors->storage();
+  EXPECT_EQ(a.patch, b.patch);
+  EXPECT_EQ(a.blocks.size(), b.blocks.size());
+  EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
+  EXPECT_EQ(b.values_f16.owner(), loaded.exchange.row_begin.owner());  // mapped, not copied
+  save_transfer_file(folder / "again", loaded);
+  EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
+}
+
+TEST(HierarchicalFile, RefusesFormFactorsThatDifferByChannel) {
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data(Precision::kF32);
+  data.compressed_form_factors = sample_form_factors(2);
+  save_transfer_file(folder / "file", data);
+  expect_error([&] { load_transfer_file(folder / "file"); }, "more than one matrix");
 }
 
 /// The file's tensors with one of them changed by hand, under a good checksum.
@@ -121,6 +162,7 @@ TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
       {"blocks", 4, 2, "unknown kind"},
       {"blocks", 4, 0xFFFFFFFF, "unknown kind"},
       {"blocks", 5, 1000, "rank"},
+      {"blocks", 5, 0, "rank"},
       {"blocks", 6, 0xFFFFFFFF, "rank"},
       {"channel_matrix", 2, 3, "no such matrix"},
       {"channel_matrix", 2, 2, "number of values"},

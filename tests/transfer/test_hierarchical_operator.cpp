@@ -106,6 +106,21 @@ TEST(HierarchicalOperator, HalfPrecisionIsAsGoodAsItsBits) {
   EXPECT_GT(error, 0);
 }
 
+TEST(HierarchicalOperator, BytesAreAsGoodAsTheirBits) {
+  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+    const HierarchicalOperator::Storage storage = random_hierarchical_storage(500, matrices, 5);
+    const HierarchicalOperator exact(storage);
+    const HierarchicalOperator bytes(HierarchicalOperator::encode_bytes(storage));
+    EXPECT_LT(bytes.bytes(), exact.bytes() / 2);
+    const std::vector<Float3> m0 = random_light(500, 1);
+    const std::vector<float>& area = storage.area;
+    EXPECT_LT(relative_difference(product(bytes, m0), multiply_expansion(bytes, m0), area), 2e-6);
+    const double error = relative_difference(product(bytes, m0), product(exact, m0), area);
+    EXPECT_LT(error, 5e-3);  // 7 bits per value of a basis, two of them to an entry
+    EXPECT_GT(error, 1e-5);
+  }
+}
+
 TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
   const HierarchicalOperator op(random_hierarchical_storage(777, 3, 6));
   const std::vector<Float3> m0 = random_light(777, 2);
@@ -118,6 +133,76 @@ TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one, five);
 }
 
+std::vector<Float3> batch_product(const TransferOperator& op, std::size_t lights,
+                                  const std::vector<Float3>& m0) {
+  std::vector<Float3> h(m0.size());
+  std::vector<float> workspace(op.batch_workspace_size(lights), std::nanf(""));
+  op.apply_batch(lights, m0, h, workspace);
+  return h;
+}
+
+TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
+  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+    const std::size_t n = 333;
+    const HierarchicalOperator::Storage storage =
+        random_hierarchical_storage(n, matrices, 40 + matrices);
+    for (const HierarchicalOperator& op :
+         {HierarchicalOperator(storage),
+          HierarchicalOperator(HierarchicalOperator::encode_half(storage))}) {
+      for (const std::size_t lights : {1U, 2U, 3U, 5U}) {
+        const std::vector<Float3> m0 = random_light(lights * n, lights);
+        const std::vector<Float3> batch = batch_product(op, lights, m0);
+        for (std::size_t light = 0; light < lights; ++light) {
+          const auto at = static_cast<std::ptrdiff_t>(light * n);
+          const auto end = at + static_cast<std::ptrdiff_t>(n);
+          const std::vector<Float3> one(m0.begin() + at, m0.begin() + end);
+          const std::vector<Float3> part(batch.begin() + at, batch.begin() + end);
+          EXPECT_LT(relative_difference(part, product(op, one), storage.area), 1e-6);
+        }
+      }
+    }
+  }
+}
+
+TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
+  const std::size_t n = 777;
+  const HierarchicalOperator op(random_hierarchical_storage(n, 3, 12));
+  const std::vector<Float3> m0 = random_light(n, 4), whole = product(op, m0);
+  std::vector<float> workspace(op.workspace_size(), std::nanf(""));
+  constexpr Float3 kUnset = {-1, -2, -3};
+  std::uint64_t previous = 0;
+  for (const std::size_t count : {0U, 1U, 40U, 400U, 777U}) {
+    // Neighbours in the order of the clusters, like the patches of a room.
+    const std::vector<std::uint32_t> patches(
+        op.storage().patch.begin() + static_cast<std::ptrdiff_t>((n - count) / 2),
+        op.storage().patch.begin() + static_cast<std::ptrdiff_t>((n - count) / 2 + count));
+    const HierarchicalOperator::Receivers receivers = op.receivers(patches);
+    std::vector<Float3> h(n, kUnset);
+    op.apply_to(receivers, m0, h, workspace);
+    std::vector<Float3> expected(n, kUnset);
+    for (const std::uint32_t p : patches) expected[p] = whole[p];
+    for (std::size_t i = 0; i < n; ++i) {
+      for (int c = 0; c < kChannelCount; ++c) {
+        EXPECT_NEAR(h[i][c], expected[i][c], 2e-6F * std::abs(expected[i][c]));
+      }
+    }
+    EXPECT_TRUE(receivers.value_count() > previous || count == 0);
+    previous = receivers.value_count();
+  }
+  EXPECT_EQ(op.receivers(std::vector<std::uint32_t>{}).value_count(), 0U);
+  expect_error([&] { (void)op.receivers(std::vector<std::uint32_t>{777}); }, "does not exist");
+}
+
+TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
+  const HierarchicalOperator::Storage by_block = random_hierarchical_storage(500, 2, 9);
+  const HierarchicalOperator::Storage streamed = HierarchicalOperator::stream(by_block);
+  const std::vector<Float3> m0 = random_light(500, 5);
+  EXPECT_EQ(streamed.order, HierarchicalOperator::Order::kStreamed);
+  EXPECT_EQ(streamed.values_f32.size() % 64, 0U);
+  EXPECT_EQ(product(HierarchicalOperator(by_block), m0),
+            product(HierarchicalOperator(streamed), m0));
+}
+
 TEST(HierarchicalOperator, AllocatesNothing) {
   const HierarchicalOperator op(random_hierarchical_storage(500, 3, 8));
   const std::vector<Float3> m0 = random_light(500, 3);
@@ -125,6 +210,8 @@ TEST(HierarchicalOperator, AllocatesNothing) {
   std::vector<float> workspace(op.workspace_size());
   op.apply(m0, h, workspace);
   EXPECT_EQ(test::count_allocations([&] { op.apply(m0, h, workspace); }), 0);
+  const HierarchicalOperator::Receivers receivers = op.receivers(std::vector<std::uint32_t>{1, 7});
+  EXPECT_EQ(test::count_allocations([&] { op.apply_to(receivers, m0, h, workspace); }), 0);
   EXPECT_GT(test::count_allocations([&] { h.reserve(2 * h.size()); }), 0)
       << "allocations are counted";
 }
@@ -169,6 +256,7 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
          s.blocks[0].column_rank = 2;
        }},
       {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
+      {"number of values", [](Storage& s) { s.order = HierarchicalOperator::Order::kStreamed; }},
       {"number of values", [](Storage& s) { s.precision = Precision::kF16; }},
   };
   for (std::size_t k = 0; k < faults.size(); ++k) {
@@ -187,7 +275,7 @@ TEST(HierarchicalOperator, RefusesHalfPrecisionBeyondItsRange) {
   expect_error([&] { HierarchicalOperator::encode_half(storage); }, "too large for f16");
 }
 
-/// Vectors and matrices with random entries, as floats and as halves.
+/// Vectors and matrices with random entries that half precision holds exactly.
 struct Random {
   std::mt19937 engine{3};
   std::vector<float> floats(std::size_t size) {
@@ -204,98 +292,118 @@ std::vector<std::uint16_t> to_half(const std::vector<float>& values) {
   return half;
 }
 
-// Sums of up to 96 products of numbers below 1.
+// Relative to sums of up to 96 products of numbers below 1, or below 128 for bytes.
 constexpr double kAllowed = 1e-5;
 
+// What a kernel must not touch keeps this value.
+constexpr float kUntouched = -1234;
+
+PlanarVectors<const float> planar(const std::vector<float>& data, std::size_t count) {
+  return {data.data(), data.size() / count, count};
+}
+PlanarVectors<float> planar(std::vector<float>& data, std::size_t count) {
+  return {data.data(), data.size() / count, count};
+}
+
 template <typename Value>
-void check_bases(const BlockKernels<Value>& kernels, const Value* basis,
-                 const std::vector<float>& plain, std::size_t rank, std::size_t size) {
+void check_bases(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
+                 const std::vector<float>& plain, std::size_t rank, std::size_t size,
+                 std::size_t count) {
   constexpr std::size_t kStride = 100, kRankStride = 20;
+  const double allowed = kAllowed * (sizeof(Value) == 1 ? 128 : 1);
   Random random;
-  const std::vector<float> x = random.floats(3 * kStride), y = random.floats(3 * kStride);
-  std::vector<float> coefficient(3 * kRankStride), sum = y;
-  kernels.project(basis, rank, size, x.data(), kStride, coefficient.data(), kRankStride);
-  kernels.expand(basis, rank, size, coefficient.data(), kRankStride, sum.data(), kStride);
-  for (std::size_t c = 0; c < 3; ++c) {
-    for (std::size_t r = 0; r < rank; ++r) {
-      double expected = 0;
-      for (std::size_t k = 0; k < size; ++k) expected += plain[r * size + k] * x[c * kStride + k];
-      EXPECT_NEAR(coefficient[c * kRankStride + r], expected, kAllowed);
-    }
-    for (std::size_t k = 0; k < size; ++k) {
-      double expected = y[c * kStride + k];
-      for (std::size_t r = 0; r < rank; ++r) {
-        expected += plain[r * size + k] * coefficient[c * kRankStride + r];
+  const std::vector<float> x = random.floats(count * kStride), y = random.floats(count * kStride);
+  const std::vector<float> scale = random.floats(count * kRankStride);
+  std::vector<float> coefficient(count * kRankStride, kUntouched), sum = y;
+  kernels.project(basis.data(), rank, size, planar(x, count), planar(coefficient, count));
+  for (std::size_t v = 0; v < count; ++v) {
+    for (std::size_t r = 0; r < kRankStride; ++r) {
+      double expected = r < rank ? 0 : kUntouched;
+      for (std::size_t k = 0; k < size && r < rank; ++k) {
+        expected += plain[r * size + k] * x[v * kStride + k];
       }
-      EXPECT_NEAR(sum[c * kStride + k], expected, kAllowed);
+      EXPECT_NEAR(coefficient[v * kRankStride + r], expected, allowed);
+    }
+  }
+  for (std::size_t part = 16; part <= size; part += 16) {
+    sum = y;
+    kernels.expand(basis.data() + size - part, rank, size, part, planar(scale, count),
+                   planar(sum, count));
+    for (std::size_t v = 0; v < count; ++v) {
+      for (std::size_t k = 0; k < kStride; ++k) {
+        double expected = y[v * kStride + k];
+        for (std::size_t r = 0; r < rank && k < part; ++r) {
+          expected += plain[r * size + size - part + k] * scale[v * kRankStride + r];
+        }
+        EXPECT_NEAR(sum[v * kStride + k], expected, allowed);
+      }
     }
   }
 }
 
 template <typename Value>
-void check_core(const BlockKernels<Value>& kernels, const Value* core,
-                const std::vector<float>& plain, std::size_t rows, std::size_t columns) {
+void check_core(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+                const std::vector<float>& plain, std::size_t rows, std::size_t columns,
+                std::size_t lights) {
+  constexpr std::size_t kStride = 110;
+  const std::size_t count = 3 * lights;
+  const CoreMatrices<Value> matrices{values.data(), rows, columns, {1, 0, 1}};
   Random random;
-  std::vector<float> column_in = random.floats(32), row_in = random.floats(32);
-  std::fill(column_in.begin() + static_cast<std::ptrdiff_t>(columns), column_in.end(), 0.0F);
-  std::vector<float> row_out(32), column_out(32);
-  kernels.core(core, rows, columns, column_in.data(), row_in.data(), row_out.data(),
-               column_out.data());
-  for (std::size_t i = 0; i < rows; ++i) {
-    double expected = 0;
-    for (std::size_t j = 0; j < columns; ++j) expected += plain[i * columns + j] * column_in[j];
-    EXPECT_NEAR(row_out[i], expected, kAllowed);
-  }
-  for (std::size_t j = 0; j < columns; ++j) {
-    double expected = 0;
-    for (std::size_t i = 0; i < rows; ++i) expected += plain[i * columns + j] * row_in[i];
-    EXPECT_NEAR(column_out[j], expected, kAllowed);
-  }
-}
-
-template <typename Value>
-void check_dense(const BlockKernels<Value>& kernels, const Value* block,
-                 const std::vector<float>& plain, std::size_t rows, std::size_t columns) {
-  Random random;
-  const std::vector<float> x_row = random.floats(rows), x_column = random.floats(columns);
-  std::vector<float> y_row(rows, 1), y_column(columns, 2), diagonal(rows, 3);
-  kernels.dense(block, rows, columns, x_column.data(), x_row.data(), y_row.data(), y_column.data());
-  if (rows == columns) kernels.dense_diagonal(block, rows, x_column.data(), diagonal.data());
-  for (std::size_t i = 0; i < rows; ++i) {
-    double expected = 0;
-    for (std::size_t j = 0; j < columns; ++j) expected += plain[i * columns + j] * x_column[j];
-    EXPECT_NEAR(y_row[i], 1 + expected, kAllowed);
-    if (rows == columns) {
-      EXPECT_NEAR(diagonal[i], 3 + expected, kAllowed);
+  const std::vector<float> row_in = random.floats(count * kStride);
+  const std::vector<float> column_in = random.floats(count * kStride);
+  for (const bool to_rows : {true, false}) {
+    for (const bool to_columns : {true, false}) {
+      if (!to_rows && !to_columns) continue;
+      std::vector<float> row_out(count * kStride, kUntouched), column_out = row_out;
+      const auto product = !to_columns ? kernels.to_rows
+                           : !to_rows  ? kernels.to_columns
+                                       : kernels.both;
+      product(matrices, {planar(row_in, count), planar(column_in, count), planar(row_out, count),
+                         planar(column_out, count)});
+      for (std::size_t v = 0; v < count; ++v) {
+        const float* s = plain.data() + matrices.channel_matrix[v % 3] * rows * columns;
+        for (std::size_t i = 0; i < kStride; ++i) {
+          double expected = to_rows && i < rows ? 0 : kUntouched;
+          for (std::size_t j = 0; j < columns && to_rows && i < rows; ++j) {
+            expected += s[i * columns + j] * column_in[v * kStride + j];
+          }
+          EXPECT_NEAR(row_out[v * kStride + i], expected, kAllowed);
+        }
+        for (std::size_t j = 0; j < kStride; ++j) {
+          double expected = to_columns && j < columns ? 0 : kUntouched;
+          for (std::size_t i = 0; i < rows && to_columns && j < columns; ++i) {
+            expected += s[i * columns + j] * row_in[v * kStride + i];
+          }
+          EXPECT_NEAR(column_out[v * kStride + j], expected, kAllowed);
+        }
+      }
     }
-  }
-  for (std::size_t j = 0; j < columns; ++j) {
-    double expected = 2;
-    for (std::size_t i = 0; i < rows; ++i) expected += plain[i * columns + j] * x_row[i];
-    EXPECT_NEAR(y_column[j], expected, kAllowed);
   }
 }
 
 void check_kernels(const BlockKernelSet& kernels) {
   SCOPED_TRACE(kernels.instruction_set);
   Random random;
-  const std::vector<float> values = random.floats(96 * 96 + HierarchicalOperator::kPadding);
+  const std::vector<float> values = random.floats(2 * 96 * 96 + HierarchicalOperator::kPadding);
   const std::vector<std::uint16_t> half = to_half(values);
-  for (const std::size_t rank : {1U, 3U, 4U, 7U, 17U}) {
-    for (const std::size_t size : {16U, 48U, 96U}) {
-      check_bases(kernels.f32, values.data(), values, rank, size);
-      check_bases(kernels.f16, half.data(), values, rank, size);
+  std::vector<std::int8_t> bytes(values.size());
+  std::ranges::transform(values, bytes.begin(),
+                         [](float v) { return static_cast<std::int8_t>(127 * v); });
+  const std::vector<float> plain_bytes(bytes.begin(), bytes.end());
+  for (const std::size_t lights : {1U, 2U, 3U}) {
+    for (const std::size_t rank : {1U, 2U, 3U, 4U, 7U, 17U}) {
+      for (const std::size_t size : {16U, 32U, 48U, 96U}) {
+        check_bases(kernels.bases_f32, values, values, rank, size, 3 * lights);
+        check_bases(kernels.bases_f16, half, values, rank, size, 3 * lights);
+        check_bases(kernels.bases_q8, bytes, plain_bytes, rank, size, 3 * lights);
+      }
+      for (const std::size_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
+        check_core(kernels.cores_f32, values, values, rank, columns, lights);
+        check_core(kernels.cores_f16, half, values, rank, columns, lights);
+      }
     }
-    for (const std::size_t columns : {1U, 8U, 11U, 16U, 19U}) {
-      check_core(kernels.f32, values.data(), values, rank, columns);
-      check_core(kernels.f16, half.data(), values, rank, columns);
-    }
-  }
-  for (const std::size_t rows : {16U, 32U, 48U}) {
-    for (const std::size_t columns : {16U, 32U, 48U, 96U}) {
-      check_dense(kernels.f32, values.data(), values, rows, columns);
-      check_dense(kernels.f16, half.data(), values, rows, columns);
-    }
+    check_core(kernels.cores_f32, values, values, 48, 96, lights);
+    check_core(kernels.cores_f16, half, values, 96, 32, lights);
   }
 }
 

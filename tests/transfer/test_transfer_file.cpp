@@ -343,8 +343,10 @@ TEST(TransferFile, RefusesOtherFiles) {
   expect_error([&] { load_transfer_file(folder / "none"); }, "cannot read");
   write_safetensors(folder / "other", lay_out_safetensors({}, {{"format", "pt"}}));
   expect_error([&] { load_transfer_file(folder / "other"); }, "is not a transfer file");
-  write_safetensors(folder / "unsealed", lay_out_safetensors({}, {{"format", "rebounce transfer"},
-                                                                  {"format_version", "1"}}));
+  write_safetensors(
+      folder / "unsealed",
+      lay_out_safetensors({}, {{"format", "rebounce transfer"},
+                               {"format_version", std::to_string(kFileFormatVersion)}}));
   expect_error([&] { load_transfer_file(folder / "unsealed"); }, "checksum is missing");
 }
 

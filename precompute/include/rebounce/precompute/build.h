@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/subdivision.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/transfer_data.h"
@@ -37,6 +38,9 @@ struct BuildSettings {
   /// kF16: half the bytes, an error of some 1e-4. By default that for the hierarchical operator,
   /// and f32 for the dense one.
   std::optional<Precision> precision;
+  /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are
+  /// compressed for iterative solvers; 0: they are not. Less: more bytes, fewer errors.
+  double form_factor_tolerance = 0;
   std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
 };
 
@@ -59,6 +63,9 @@ struct BuildReport {
   std::vector<std::pair<std::string, double>> seconds;  ///< by phase, in order
   std::uint64_t ray_count = 0, pair_count = 0, form_factor_count = 0;
   ClosureReport closure;
+  /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
+  /// were not fitted to.
+  std::optional<MeasuredError> form_factor_error;
   CostEstimate estimate;
 };
 

@@ -18,7 +18,10 @@ namespace rebounce {
 /// its own.
 ///
 /// With a stored operator Y, of these or of other reflectances, I + R Y R is the preconditioner:
-/// the inverse itself where Y is exact. It must be positive; a Y that is not shows as divergence.
+/// the inverse itself where Y is exact. Directions are then kept conjugate in the flexible way
+/// (G. H. Golub, Q. Ye, "Inexact preconditioned conjugate gradient method with inner-outer
+/// iteration", 1999), which forgives a Y that is not exactly symmetric. It must be positive; a Y
+/// that is not shows as divergence.
 class ConjugateGradientSolver final : public RadiositySolver {
  public:
   /// `preconditioner` may be null. Throws Error if its number of patches is another.
@@ -37,6 +40,9 @@ class ConjugateGradientSolver final : public RadiositySolver {
   /// preconditioned_ = (I + R Y R) rest_, or rest_ itself
   void precondition();
   double radiosity_residual_norm() const;
+  /// How much of the last direction the next one keeps, after a step that made <rest_,
+  /// preconditioned_> be `next`.
+  Scalars turn_of_direction(const Scalars& step, const Scalars& next) const;
   Scalars inner_product(std::span<const Float3> a, std::span<const Float3> b) const;
 
   std::shared_ptr<const TransferOperator> preconditioner_;

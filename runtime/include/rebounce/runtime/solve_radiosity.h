@@ -8,18 +8,19 @@
 #include <string_view>
 
 #include "rebounce/runtime/radiosity_solver.h"
-#include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/form_factor_operator.h"
 #include "rebounce/transfer/transfer_operator.h"
 
 namespace rebounce {
 
 enum class SolveMethod : std::uint8_t {
   kGathering,
-  kJacobi,  ///< the same iteration as gathering, see gathering_solver.h
-  kGaussSeidel,
-  kSymmetricGaussSeidel,
+  kJacobi,                ///< the same iteration as gathering, see gathering_solver.h
+  kGaussSeidel,           ///< needs SweepableFormFactors
+  kSymmetricGaussSeidel,  ///< likewise
   kConjugateGradient,
-  kSouthwell,
+  kSouthwell,                        ///< needs FormFactorBlocks
   kRefine,                           ///< needs the stored operator
   kPreconditionedConjugateGradient,  ///< needs the stored operator
 };
@@ -40,16 +41,24 @@ inline constexpr std::array<NamedSolveMethod, 8> kSolveMethods = {{
     {"preconditioned-conjugate-gradient", SolveMethod::kPreconditionedConjugateGradient},
 }};
 
+/// Sparse F in the form that `method` is fastest on: rows in blocks where it goes by rows in one
+/// direction, otherwise the symmetric half of them. `area` has n entries in m². Throws Error if the
+/// sizes do not agree.
+std::unique_ptr<const FormFactorOperator> make_form_factors(SolveMethod method,
+                                                            const ExchangeMatrix& exchange,
+                                                            std::span<const float> area);
+
 /// A solver of its own for `method`. `form_factors` must outlive it; `transfer` may be null for the
-/// methods that do not need it. Throws Error if sizes differ or the operator is needed and missing.
+/// methods that do not need it. Throws Error if sizes differ, the operator is needed and missing,
+/// or the method needs another form of F.
 std::unique_ptr<RadiositySolver> make_solver(
-    SolveMethod method, const FormFactorBlocks& form_factors, const RadiosityProblem& problem,
+    SolveMethod method, const FormFactorOperator& form_factors, const RadiosityProblem& problem,
     std::shared_ptr<const TransferOperator> transfer = nullptr);
 
 /// Solves once, from nothing, and writes the solution [n] in lx to `radiosity`. Allocates what the
 /// method needs; keep a solver for more than one solve. Throws Error as make_solver and
 /// RadiositySolver::solve do.
-SolveResult solve_radiosity(SolveMethod method, const FormFactorBlocks& form_factors,
+SolveResult solve_radiosity(SolveMethod method, const FormFactorOperator& form_factors,
                             const RadiosityProblem& problem,
                             std::span<const Float3> initial_exitance, const SolveSettings& settings,
                             std::span<Float3> radiosity,

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/transfer/relaxation.h"
 #include "rebounce/transfer/shared_array.h"
 #include "rebounce/transfer/types.h"
 
@@ -13,9 +14,9 @@ namespace rebounce {
 /// The form factors as exchange areas S(i,j) = area(i) F(i,j) in m².
 ///
 /// S is symmetric (reciprocity), so only the upper triangle is kept, by rows: one stored number
-/// serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. Pairs that do
-/// not see each other are absent, and so is the diagonal of patches that do not see themselves, as
-/// flat ones do not.
+/// serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. Pairs that
+/// do not see each other are absent, and so is the diagonal of patches that do not see themselves,
+/// as flat ones do not.
 struct ExchangeMatrix {
   SharedArray<std::uint64_t> row_begin;  ///< [n + 1], row_begin[n] = number of entries
   SharedArray<std::uint32_t> column;     ///< ascending in each row, row <= column < n
@@ -27,23 +28,28 @@ struct ExchangeMatrix {
 /// Form factors by full rows, ready for gathering: row i lists every j with F(i,j) > 0.
 ///
 /// Twice the entries of the ExchangeMatrix it is made from, in exchange for row access.
-class FormFactorRows {
+class FormFactorRows final : public SweepableFormFactors {
  public:
   /// Expands `exchange`. `area` has n entries in m². Throws Error if the sizes do not agree.
   FormFactorRows(const ExchangeMatrix& exchange, std::span<const float> area);
 
-  std::size_t patch_count() const { return row_begin_.size() - 1; }
+  std::size_t patch_count() const override { return row_begin_.size() - 1; }
   std::span<const std::uint32_t> columns(std::size_t row) const {
     return {column_.data() + row_begin_[row], column_.data() + row_begin_[row + 1]};
   }
   std::span<const float> form_factors(std::size_t row) const {
     return {form_factor_.data() + row_begin_[row], form_factor_.data() + row_begin_[row + 1]};
   }
-  std::size_t bytes() const;
+  std::size_t bytes() const override;
+  std::size_t workspace_size() const override { return 0; }
 
-  /// Gathers: out(i) = sum over j of F(i,j) in(j), each of [n][3]. `out` must not overlap `in`.
-  /// Rows are shared out among OpenMP threads; the bits do not depend on how many there are.
-  void gather(std::span<const Float3> in, std::span<Float3> out) const;
+  /// Rows are summed in double precision and shared out among OpenMP threads; no workspace is used.
+  void gather(std::span<const Float3> in, std::span<Float3> out,
+              std::span<float> workspace) const override;
+  void gather(std::span<const Float3> in, std::span<Float3> out) const { gather(in, out, {}); }
+
+  /// Gauss-Seidel in the order of the patches, on one thread.
+  std::unique_ptr<Relaxation> make_relaxation() const override;
 
   /// One row of gather, summed in double precision in the order of the columns.
   Float3 gather_row(std::size_t row, std::span<const Float3> in) const;

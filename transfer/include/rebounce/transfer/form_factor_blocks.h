@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "rebounce/transfer/exchange_matrix.h"
-#include "rebounce/transfer/form_factor_operator.h"
+#include "rebounce/transfer/relaxation.h"
 
 namespace rebounce {
 
@@ -25,7 +25,7 @@ struct alignas(4 * kFormFactorBlock) FormFactorBlock {
 /// are one wide load instead of eight scattered ones.
 ///
 /// Vectors are "planes": [3][plane_size()], one channel after another, zero past patch n.
-class FormFactorBlocks final : public FormFactorOperator {
+class FormFactorBlocks final : public SweepableFormFactors {
  public:
   /// Gauss-Seidel takes this many rows at a time: a multiple of the block, so that a block is
   /// wholly inside or outside a group. More: fewer synchronisations, a longer serial part.
@@ -41,6 +41,12 @@ class FormFactorBlocks final : public FormFactorOperator {
   std::size_t workspace_size() const override { return kChannelCount * plane_size(); }
   void gather(std::span<const Float3> in, std::span<Float3> out,
               std::span<float> workspace) const override;
+
+  /// Sequential Gauss-Seidel in the order of the patches, to the letter, on any number of threads:
+  /// rows are taken in groups of kGroup; what they gather from outside the group is found in
+  /// parallel, what they gather from each other one after another. That costs two synchronisations
+  /// and a serial part of kGroup² form factors per group, and nothing in convergence.
+  std::unique_ptr<Relaxation> make_relaxation() const override;
 
   /// The part of the values that is not zero: 1 when every block is full.
   double fill() const;

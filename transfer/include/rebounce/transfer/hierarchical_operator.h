@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,8 +14,8 @@
 
 namespace rebounce {
 
-template <typename Value>
-struct BlockKernels;
+class HierarchicalPlan;
+struct HierarchicalLayout;
 
 /// A rectangle of the symmetric matrix Yhat in cluster order. Either it lies on the diagonal, its
 /// rows and columns the same, or all of its columns come before its rows; then it stands for its
@@ -26,7 +27,6 @@ struct TransferBlock {
   std::uint32_t column_begin = 0, column_count = 0;  ///< likewise
   Kind kind = Kind::kDense;
   std::uint32_t row_rank = 0, column_rank = 0;  ///< of a low-rank block, 0 for a dense one
-  std::uint64_t offset = 0;                     ///< of its first value
 
   bool on_diagonal() const { return row_begin == column_begin; }
 
@@ -39,12 +39,14 @@ struct TransferBlock {
 /// that are dense or of low rank. Of a block and its mirror image one is stored and applied twice.
 ///
 /// The channels share the bases of a low-rank block and have a core each: B_c = U S_c V^T, on the
-/// diagonal B_c = U S_c U^T. Values of a block, one after the other:
+/// diagonal B_c = U S_c U^T. Values of a block:
 ///   dense     [matrix][row_count][column_count]
 ///   low-rank  U^T [row_rank][row_count], V^T [column_rank][column_count] (not on the diagonal),
 ///             S [matrix][row_rank][column_rank]
-/// Blocks follow each other without holes in the order of traversal; kPadding values that are not
-/// used end the buffer, so that kernels may read whole vectors.
+///
+/// An apply streams through the values: all bases of a cluster of patches are kept together,
+/// whichever blocks they belong to, so that one pass over them takes the light of the cluster to
+/// its coefficients, and another the coefficients back to the light that arrives.
 class HierarchicalOperator final : public TransferOperator {
  public:
   /// Clusters begin and end at multiples of this many positions.
@@ -55,27 +57,67 @@ class HierarchicalOperator final : public TransferOperator {
   /// normal numbers; bases are stored as they are.
   static constexpr float kHalfScale = DenseOperator::kHalfScale;
 
+  /// In 8 bits, a basis holds its vectors times numbers of their own such that their largest
+  /// entries are +-127; cores are divided by them, with this for 1 at each end.
+  static constexpr float kByteScale = 128;
+
+  enum class Order : std::uint8_t {
+    /// Block by block, U^T V^T S or the entries, without holes, then kPadding values not used.
+    kByBlock,
+    /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
+    /// the order of their blocks, U^T before V^T; then cores and dense entries by block; zeros to
+    /// the next multiple of 64 values, at least kPadding of them. Bases in an array of their own
+    /// are followed by zeros likewise.
+    kStreamed,
+  };
+
   struct Storage {
     std::vector<float> area;                                    ///< [n] m², by patch
     std::vector<std::uint32_t> patch;                           ///< [n] patch at each position
     std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
     std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
-    std::vector<TransferBlock> blocks;                          ///< offsets are filled in
+    std::vector<TransferBlock> blocks;
+    Order order = Order::kByBlock;  ///< of the values
     Precision precision = Precision::kF32;
     SharedArray<float> values_f32;          ///< if kF32
     SharedArray<std::uint16_t> values_f16;  ///< IEEE half-precision bits, if kF16
+    SharedArray<std::int8_t> bases_q8;      ///< if kQ8; values_f16 then holds the others alone
+  };
+
+  /// Some of the patches, as `receivers` prepares them for `apply_to`.
+  class Receivers {
+   public:
+    /// Values of the operator that an apply to them reads.
+    std::uint64_t value_count() const;
+
+   private:
+    friend class HierarchicalOperator;
+    explicit Receivers(std::shared_ptr<const HierarchicalPlan> plan) : plan_(std::move(plan)) {}
+    std::shared_ptr<const HierarchicalPlan> plan_;
   };
 
   /// Positions with the padding that makes them whole vectors: n rounded up to kAlignment.
   static std::size_t position_count(std::size_t patch_count);
 
-  /// The same blocks with their values as half-precision numbers. Throws Error if one is beyond
-  /// their range.
+  /// The same operator with its values in the order kStreamed. A low-rank block that has only one
+  /// rank loses it. Throws Error as the constructor does.
+  static Storage stream(const Storage& storage);
+
+  /// The same with half-precision numbers, in the order kStreamed. Throws Error if a value is
+  /// beyond their range, and as the constructor does.
   static Storage encode_half(const Storage& storage);
 
-  /// Takes over `storage`. Throws Error if `patch` is not a permutation, a block reaches outside
-  /// the matrix, is misplaced or has a rank above its size, or the values do not fit the blocks.
-  /// Whether the blocks cover the matrix is not looked at.
+  /// The same with bases of 8 bits. Storage has values in f32. Throws Error as encode_half does.
+  static Storage encode_bytes(const Storage& storage);
+
+  /// Values in f32 as `precision` has them, in the order kStreamed. Throws Error as the constructor
+  /// and the encodings do.
+  static Storage encode(const Storage& storage, Precision precision);
+
+  /// Takes over `storage`; values in the order kByBlock are copied into the order kStreamed. Throws
+  /// Error if `patch` is not a permutation, a block reaches outside the matrix, is misplaced or has
+  /// a rank above its size, or the values do not fit the blocks. Whether the blocks cover the
+  /// matrix is not looked at.
   explicit HierarchicalOperator(Storage storage);
 
   const Storage& storage() const { return storage_; }
@@ -83,32 +125,35 @@ class HierarchicalOperator final : public TransferOperator {
   std::size_t patch_count() const override { return storage_.area.size(); }
   std::size_t bytes() const override;
   std::string kind() const override { return "hierarchical"; }
-  std::size_t workspace_size() const override;
+  std::size_t workspace_size() const override { return batch_workspace_size(1); }
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
              std::span<float> workspace) const override;
+  std::size_t batch_workspace_size(std::size_t light_count) const override;
+  void apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
+                   std::span<Float3> indirect_irradiance,
+                   std::span<float> workspace) const override;
   void expand(int channel, std::span<float> transfer) const override;
 
- private:
-  /// Consecutive blocks whose products are summed in a buffer of their own, and the positions that
-  /// they add to.
-  struct Slot {
-    std::size_t first_block = 0, last_block = 0;
-    std::size_t begin = 0, end = 0;
-  };
+  /// Prepares applies to these patches alone, which read only the blocks that reach them or
+  /// neighbours within a run of kAlignment positions. Allocates. Throws Error if a patch does not
+  /// exist.
+  Receivers receivers(std::span<const std::uint32_t> patches) const;
 
-  static std::vector<Slot> share_out(std::span<const TransferBlock> blocks,
-                                     std::uint64_t value_count);
-  template <typename Value>
-  void apply_slots(const BlockKernels<Value>& kernels, const Value* values, const float* x,
-                   float* slots) const;
-  /// Adds up what the slots hold of one channel, in their order, into sum [positions].
-  void add_slots(int channel, const float* slots, float* sum) const;
-  std::size_t slot_size() const;
+  /// Like `apply`, but writes the irradiance [n] of the receivers alone, the same as `apply` would
+  /// up to rounding; that of the other patches is left as it is.
+  void apply_to(const Receivers& receivers, std::span<const Float3> initial_exitance,
+                std::span<Float3> indirect_irradiance, std::span<float> workspace) const;
+
+ private:
+  void run(const HierarchicalPlan& plan, std::size_t light_count,
+           std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+           std::span<float> workspace) const;
 
   Storage storage_;
   std::vector<float> sqrt_area_;  ///< [n] by position
-  std::vector<Slot> slots_;
-  std::size_t rank_stride_ = 0;  ///< the largest rank, rounded up to kAlignment
+  std::vector<float> inverse_;    ///< of it, times the scale of the products
+  std::shared_ptr<const HierarchicalLayout> layout_;
+  std::shared_ptr<const HierarchicalPlan> plan_;  ///< to all patches
 };
 
 }  // namespace rebounce

@@ -16,6 +16,8 @@
 
 namespace rebounce {
 
+class HierarchicalOperator;
+
 /// Per-patch quantities, each of n entries.
 struct PatchTable {
   std::vector<float> area;               ///< m², > 0
@@ -75,6 +77,9 @@ struct TransferData {
   std::vector<Camera> cameras;
   std::vector<Light> lights;
   ExchangeMatrix exchange;
+  /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels, or null if that is not kept:
+  /// see CompressedFormFactors.
+  std::shared_ptr<const HierarchicalOperator> compressed_form_factors;
   std::shared_ptr<const TransferOperator> transfer;
   BuildRecord record;
 };

@@ -34,6 +34,15 @@ class TransferOperator {
   virtual void apply(std::span<const Float3> initial_exitance,
                      std::span<Float3> indirect_irradiance, std::span<float> workspace) const = 0;
 
+  /// Floats of workspace that a batch of `light_count` needs.
+  virtual std::size_t batch_workspace_size(std::size_t light_count) const;
+
+  /// Does what `apply` does for several lights, one after the other in both arrays,
+  /// [light_count][n][3]; cheaper where the operator can make its values serve several of them.
+  /// The same as that many applies up to rounding; by default it is that many.
+  virtual void apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
+                           std::span<Float3> indirect_irradiance, std::span<float> workspace) const;
+
   /// Writes Y itself, row-major [n][n], for one channel: dense, unscaled, for export and tests. By
   /// default n products with unit vectors.
   virtual void expand(int channel, std::span<float> transfer) const;

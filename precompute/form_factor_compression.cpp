@@ -1,0 +1,51 @@
+#include "rebounce/precompute/form_factor_compression.h"
+
+#include <algorithm>
+
+#include "rebounce/transfer/area_norm.h"
+#include "symmetric_matrix.h"
+
+namespace rebounce {
+
+std::shared_ptr<const HierarchicalOperator> compress_form_factors(
+    const ExchangeMatrix& exchange, const PatchTable& patches,
+    std::span<const std::vector<Float3>> test_radiosities, const HierarchicalSettings& settings,
+    const Progress& progress) {
+  return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, test_radiosities,
+                               settings, progress);
+}
+
+MeasuredError form_factor_error(const HierarchicalOperator& compressed,
+                                const ExchangeMatrix& exchange, const PatchTable& patches,
+                                std::span<const std::vector<Float3>> radiosities) {
+  const FormFactorRows rows(exchange, patches.area);
+  std::vector<float> workspace(compressed.workspace_size());
+  std::vector<Float3> truth(patches.size()), gathered(patches.size());
+  MeasuredError error;
+  for (const std::vector<Float3>& radiosity : radiosities) {
+    rows.gather(radiosity, truth);
+    compressed.apply(radiosity, gathered, workspace);
+    const double e = relative_difference(gathered, truth, patches.area);
+    error.mean += e / static_cast<double>(radiosities.size());
+    error.max = std::max(error.max, e);
+  }
+  return error;
+}
+
+std::vector<std::vector<Float3>> radiosities_of(
+    const TransferOperator& transfer, std::span<const Float3> reflectance,
+    std::span<const std::vector<Float3>> initial_exitances) {
+  std::vector<float> workspace(transfer.workspace_size());
+  std::vector<Float3> indirect(reflectance.size());
+  std::vector<std::vector<Float3>> radiosities;
+  for (const std::vector<Float3>& m0 : initial_exitances) {
+    transfer.apply(m0, indirect, workspace);
+    std::vector<Float3>& radiosity = radiosities.emplace_back(m0);
+    for (std::size_t i = 0; i < radiosity.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) radiosity[i][c] += reflectance[i][c] * indirect[i][c];
+    }
+  }
+  return radiosities;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hierarchical_layout.h"
+
+namespace rebounce {
+
+/// What a Gauss-Seidel sweep over a symmetric hierarchical matrix does, diagonal block after
+/// diagonal block. Of the blocks below the diagonal, those to the left of it receive what earlier
+/// positions send in a forward sweep, and send in a backward one; those below it the other way
+/// round.
+struct ClusterSweepPlan {
+  /// Bases of one cluster that are used together: [rank][size].
+  struct Bases {
+    std::uint64_t values;
+    std::uint32_t rank, size, begin, coefficient;
+  };
+
+  /// A core or a dense block below the diagonal.
+  struct Product {
+    std::uint64_t values;
+    std::uint32_t rows, columns;
+    std::uint32_t row, column;  ///< first coefficients, or positions if `dense`
+    bool dense;
+  };
+
+  /// A block on the diagonal, and ranges of what belongs to it.
+  struct Step {
+    TransferBlock diagonal;
+    std::uint64_t basis = 0, values = 0;  ///< U^T; S or the entries
+    std::uint32_t coefficient = 0;
+    std::uint32_t last_row_bases = 0, last_column_bases = 0;  ///< one past, from the step before on
+    std::uint32_t last_row_product = 0, last_column_product = 0;
+  };
+
+  explicit ClusterSweepPlan(const HierarchicalOperator::Storage& storage);
+
+  std::vector<Step> steps;  ///< by position
+  /// Row ends of clusters that begin in a step's block, column ends of clusters that end in it.
+  std::vector<Bases> row_bases, column_bases;
+  /// Blocks whose rows begin in a step's block, and blocks whose columns end in it.
+  std::vector<Product> row_products, column_products;
+  std::uint32_t coefficient_count = 0;
+  std::uint32_t largest_side = 0;  ///< of a dense block
+};
+
+}  // namespace rebounce

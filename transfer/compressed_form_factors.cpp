@@ -1,0 +1,25 @@
+#include "rebounce/transfer/compressed_form_factors.h"
+
+#include "cluster_relaxation.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+
+CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalOperator> exchange)
+    : exchange_(std::move(exchange)) {
+  if (!exchange_) throw Error("compressed form factors: there are none");
+  for (const std::uint32_t matrix : exchange_->storage().channel_matrix) {
+    if (matrix != 0) throw Error("compressed form factors: the channels have different matrices");
+  }
+}
+
+void CompressedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
+                                   std::span<float> workspace) const {
+  exchange_->apply(in, out, workspace);
+}
+
+std::unique_ptr<Relaxation> CompressedFormFactors::make_relaxation() const {
+  return make_cluster_relaxation(exchange_->storage());
+}
+
+}  // namespace rebounce

@@ -1,0 +1,136 @@
+#include "hierarchical_layout.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+// More values than any memory holds: sums of block sizes stay far from the end of 64 bits.
+constexpr std::uint64_t kMostValues = std::uint64_t{1} << 48;
+
+using Cluster = HierarchicalLayout::Cluster;
+using End = HierarchicalLayout::End;
+
+bool comes_before(const Cluster& a, const Cluster& b) {
+  return a.begin != b.begin ? a.begin < b.begin : a.size > b.size;
+}
+
+bool is_low_rank(const TransferBlock& block) {
+  return block.kind == TransferBlock::Kind::kLowRank && has_values(block);
+}
+
+/// visit(end, begin, size, rank) for the ends of the low-rank blocks in the order of their bases.
+template <typename Visit>
+void visit_ends(std::span<const TransferBlock> blocks,
+                std::vector<HierarchicalLayout::Place>& places, const Visit& visit) {
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const TransferBlock& block = blocks[b];
+    if (!is_low_rank(block)) continue;
+    visit(places[b].row, block.row_begin, block.row_count, block.row_rank);
+    if (block.on_diagonal()) {
+      places[b].column = places[b].row;
+    } else {
+      visit(places[b].column, block.column_begin, block.column_count, block.column_rank);
+    }
+  }
+}
+
+std::uint32_t checked_count(std::uint64_t count) {
+  if (count > std::numeric_limits<std::uint32_t>::max() / 2) {
+    throw Error("hierarchical operator: its blocks have too many ranks");
+  }
+  return static_cast<std::uint32_t>(count);
+}
+
+}  // namespace
+
+bool has_values(const TransferBlock& block) {
+  return block.kind == TransferBlock::Kind::kDense || block.row_rank > 0;
+}
+
+HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
+                                       std::uint32_t matrix_count)
+    : places(blocks.size()) {
+  std::uint64_t total = 0;
+  for (const TransferBlock& block : blocks) {
+    total += block.value_count(matrix_count);
+    if (total > kMostValues) {
+      throw Error("hierarchical operator: its blocks are larger than any memory");
+    }
+  }
+  find_clusters(blocks);
+  place_bases(blocks);
+  place_cores(blocks, matrix_count);
+}
+
+void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {
+  visit_ends(blocks, places, [&](End&, std::uint32_t begin, std::uint32_t size, std::uint32_t) {
+    clusters.push_back({.begin = begin, .size = size});
+  });
+  std::ranges::sort(clusters, comes_before);
+  const auto same = [](const Cluster& a, const Cluster& b) {
+    return a.begin == b.begin && a.size == b.size;
+  };
+  const auto rest = std::ranges::unique(clusters, same);
+  clusters.erase(rest.begin(), rest.end());
+}
+
+std::uint32_t HierarchicalLayout::cluster_at(std::uint32_t begin, std::uint32_t size) const {
+  const Cluster key{.begin = begin, .size = size};
+  const auto found = std::ranges::lower_bound(clusters, key, comes_before);
+  return static_cast<std::uint32_t>(found - clusters.begin());
+}
+
+void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks) {
+  // First each end's place among the bases of its cluster, then that of the clusters.
+  visit_ends(blocks, places,
+             [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank) {
+               end.cluster = cluster_at(begin, size);
+               Cluster& cluster = clusters[end.cluster];
+               end.coefficient = cluster.rank;
+               cluster.rank = checked_count(std::uint64_t{cluster.rank} + rank);
+             });
+  for (Cluster& cluster : clusters) {
+    cluster.coefficient = coefficient_count;
+    cluster.values = basis_value_count;
+    coefficient_count = checked_count(std::uint64_t{coefficient_count} + cluster.rank);
+    basis_value_count += std::uint64_t{cluster.rank} * cluster.size;
+  }
+  visit_ends(blocks, places, [&](End& end, std::uint32_t, std::uint32_t size, std::uint32_t) {
+    const Cluster& cluster = clusters[end.cluster];
+    end.basis = cluster.values + std::uint64_t{end.coefficient} * size;
+    end.coefficient += cluster.coefficient;
+  });
+}
+
+void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
+                                     std::uint32_t matrix_count) {
+  product_count = coefficient_count;
+  const auto add_products = [&](End& end, std::uint32_t count) {
+    end.coefficient = product_count;
+    product_count = checked_count(std::uint64_t{product_count} + count);
+  };
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const TransferBlock& block = blocks[b];
+    Place& place = places[b];
+    place.values = core_value_count;
+    if (block.kind == TransferBlock::Kind::kDense) {
+      core_value_count += block.value_count(matrix_count);
+      add_products(place.row, block.row_count);
+      if (!block.on_diagonal()) add_products(place.column, block.column_count);
+    } else {
+      core_value_count +=
+          std::uint64_t{matrix_count} * block.row_rank * std::uint64_t{block.column_rank};
+    }
+  }
+}
+
+std::uint64_t HierarchicalLayout::padded(std::uint64_t value_count) {
+  constexpr std::uint64_t kMultiple = 64;
+  return (value_count + HierarchicalOperator::kPadding + kMultiple - 1) / kMultiple * kMultiple;
+}
+
+}  // namespace rebounce

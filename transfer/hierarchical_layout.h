@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/transfer/hierarchical_operator.h"
+
+namespace rebounce {
+
+/// Where the values and the coefficients of a hierarchical operator lie in the order kStreamed.
+/// Coefficients are numbered like the rows of the bases: those of a cluster one after the other.
+struct HierarchicalLayout {
+  /// All bases over one cluster of positions: [rank][size].
+  struct Cluster {
+    std::uint32_t begin = 0, size = 0;  ///< positions
+    std::uint32_t rank = 0;
+    std::uint32_t coefficient = 0;  ///< the first
+    std::uint64_t values = 0;       ///< where they begin
+  };
+
+  /// One end of a block.
+  struct End {
+    std::uint32_t cluster = 0;      ///< low-rank blocks only
+    std::uint32_t coefficient = 0;  ///< the first; of a dense block: of its products
+    std::uint64_t basis = 0;        ///< where U^T or V^T begins; low-rank blocks only
+  };
+  struct Place {
+    End row, column;           ///< the same on the diagonal
+    std::uint64_t values = 0;  ///< where S or the entries begin, after the bases
+  };
+
+  /// The blocks must be checked. Throws Error if they hold more values than any memory.
+  HierarchicalLayout(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
+
+  std::vector<Cluster> clusters;  ///< by begin, then by size, the largest first
+  std::vector<Place> places;      ///< by block
+  std::uint64_t basis_value_count = 0;
+  std::uint64_t core_value_count = 0;   ///< cores and dense entries
+  std::uint32_t coefficient_count = 0;  ///< of the bases
+  std::uint32_t product_count = 0;      ///< with the products of dense blocks, which follow them
+
+  /// `value_count` values with the zeros that follow them.
+  static std::uint64_t padded(std::uint64_t value_count);
+
+ private:
+  void find_clusters(std::span<const TransferBlock> blocks);
+  std::uint32_t cluster_at(std::uint32_t begin, std::uint32_t size) const;
+  void place_bases(std::span<const TransferBlock> blocks);
+  void place_cores(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
+};
+
+/// Whether a block has values.
+bool has_values(const TransferBlock& block);
+
+}  // namespace rebounce

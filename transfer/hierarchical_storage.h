@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hierarchical_layout.h"
+
+namespace rebounce {
+
+/// Throws Error if the tables or the number of values are not those of an operator.
+void check_hierarchical_storage(const HierarchicalOperator::Storage& storage);
+
+/// What products of stored values must be multiplied by.
+float product_scale(Precision precision);
+
+/// The entries of one block, [row_count][column_count], of one matrix; values in the order
+/// kStreamed.
+std::vector<double> block_entries(const HierarchicalOperator::Storage& storage,
+                                  const HierarchicalLayout& layout, std::size_t block,
+                                  std::uint32_t matrix);
+
+}  // namespace rebounce
