@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <optional>
 #include <vector>
 
@@ -263,32 +262,37 @@ class ReconstructionWeights {
   /// The patches with samples around a vertex that face as it does, about in its plane and in
   /// sight, the heaviest kMostGivers of them.
   std::vector<Giver> givers_within(std::uint32_t v, float reach) const {
+    std::vector<Giver> candidates = candidates_within(v, reach);
+    std::ranges::stable_sort(candidates, std::greater<>(), &Giver::weight);
+    std::vector<Giver> givers;
+    for (const Giver& giver : candidates) {
+      if (givers.size() == kMostGivers) break;
+      if (is_own(v, giver.patch) || in_sight(receivers_[v], giver)) givers.push_back(giver);
+    }
+    std::ranges::sort(givers, {}, &Giver::patch);
+    return givers;
+  }
+
+  /// The same, whether in sight or not, in ascending order: so are the samples.
+  std::vector<Giver> candidates_within(std::uint32_t v, float reach) const {
     const Receiver& receiver = receivers_[v];
-    std::map<std::uint32_t, Giver> giver_of;
+    std::vector<Giver> givers;
     for (const auto& [index, distance_squared] : finder_->within(mesh_.position[v], reach)) {
       const Sample& sample = samples_[index];
       if (absorbed_[sample.patch] > kMostlyCovered) continue;
       if (glm::dot(sample.normal, receiver.normal) < kCreaseCosine) continue;
       const float height = glm::dot(sample.position - receiver.position, receiver.normal);
       if (std::abs(height) > kPlaneReach * reach) continue;
+      if (givers.empty() || givers.back().patch != sample.patch) {
+        givers.push_back({sample.patch, 0, reach * reach, {}, {}});
+      }
+      Giver& giver = givers.back();
       const float fall = 1 - distance_squared / (reach * reach);
-      Giver& giver =
-          giver_of.try_emplace(sample.patch, Giver{sample.patch, 0, reach * reach, {}, {}})
-              .first->second;
       giver.weight += sample.share * fall * fall;
       if (distance_squared > giver.distance_squared) continue;
       giver.distance_squared = distance_squared;
       giver.position = sample.position;
       giver.normal = sample.normal;
-    }
-    std::vector<Giver> givers;
-    for (const auto& [patch, giver] : giver_of) {
-      if (is_own(v, patch) || in_sight(receiver, giver)) givers.push_back(giver);
-    }
-    if (givers.size() > kMostGivers) {
-      std::ranges::stable_sort(givers, std::greater<>(), &Giver::weight);
-      givers.resize(kMostGivers);
-      std::ranges::sort(givers, {}, &Giver::patch);
     }
     return givers;
   }

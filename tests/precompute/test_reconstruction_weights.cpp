@@ -89,6 +89,39 @@ TEST(ReconstructionWeights, ShowALinearFieldOnAFloorOfClusters) {
   EXPECT_LT(at_edge, patch_size) << "no weights >= 0 can reach beyond the outermost centroids";
 }
 
+TEST(ReconstructionWeights, KeepTheMeansOfPatches) {
+  // The mean of what is shown on a patch is the patch's value, also where light has a peak.
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 40);
+  const PatchModel model = make_weighted_model(std::move(scene), 200);
+  const DisplayMesh& mesh = model.mesh;
+  const auto field = [](const Float3& p) { return std::exp(-8 * (p[0] * p[0] + p[2] * p[2])); };
+  std::vector<double> mean(model.patches.size(), 0.0), count(model.patches.size(), 0.0);
+  for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {  // all of one size
+    for (const std::uint32_t v : mesh.triangle[t]) {
+      mean[mesh.triangle_patch[t]] += shown_value(model, v, field);
+      count[mesh.triangle_patch[t]] += 1;
+    }
+  }
+  for (std::size_t i = 0; i < mean.size(); ++i) {
+    EXPECT_NEAR(mean[i] / count[i], field(model.patches.centroid[i]), 0.02);
+  }
+}
+
+TEST(ReconstructionWeights, AreNegativeOnlyInPart) {
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 40);
+  const PatchModel model = make_weighted_model(std::move(scene), 200);
+  const DisplayMesh& mesh = model.mesh;
+  for (std::size_t v = 0; v < mesh.position.size(); ++v) {
+    double negative = 0;
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      negative += std::min(0.0F, mesh.weight[k]);
+    }
+    EXPECT_GT(negative, -0.6);
+  }
+}
+
 TEST(ReconstructionWeights, TakeNothingFromBehindAWall) {
   // The wall stands on vertices of the floor, which both sides share in the scene.
   Scene scene = test::empty_scene();
