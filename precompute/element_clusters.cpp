@@ -22,8 +22,13 @@ constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0;
 // Each element's nearest others that may join it without an edge between.
 constexpr std::size_t kNearCount = 8;
 
+// A patch is no longer than this many mean sizes: else, where much must not merge because of the
+// leak test, the walls around it would, at any price.
+constexpr double kLongest = 4;
+
 // Where there are still too many patches, rounds in which those that lie near each other become
-// neighbours and the leak test is left to larger ones; both lengths double each time.
+// neighbours, patches may be longer and the leak test is left to larger ones; all three lengths
+// double each time.
 constexpr int kRounds = 6;
 
 // Elements of a patch between which lines of sight are drawn.
@@ -63,6 +68,7 @@ class Merging {
     size_ = settings.patch_count > 0 ? std::sqrt(area / static_cast<double>(settings.patch_count))
                                      : settings.largest;
     small_ = kSmall * size_;
+    longest_ = kLongest * size_;
     clusters_.reserve(2 * elements.size());
     elements_of_.assign(1 + *std::ranges::max_element(elements.triangle), {kNone, kNone});
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
@@ -80,6 +86,7 @@ class Merging {
     merge_cheapest();
     for (int round = 0; round < kRounds && alive_ > settings_.patch_count; ++round) {
       small_ *= 2;
+      longest_ *= 2;
       queue_neighbours();
       connect_near_clusters(size_ * std::exp2(round));
       merge_cheapest();
@@ -203,7 +210,7 @@ class Merging {
   bool may_merge(std::uint32_t a, std::uint32_t b) const {
     const double length = glm::distance(glm::min(clusters_[a].low, clusters_[b].low),
                                         glm::max(clusters_[a].high, clusters_[b].high));
-    if (settings_.largest > 0 && length > settings_.largest) return false;
+    if (length > longest_ || (settings_.largest > 0 && length > settings_.largest)) return false;
     const auto [free, blocked_by_itself, count] = look_between(a, b);
     if (2 * free > count) return true;
     const double piece =
@@ -325,8 +332,9 @@ class Merging {
   const Elements& elements_;
   const RayTracer& tracer_;
   const ClusterSettings& settings_;
-  double size_;   ///< the mean patch's, metres
-  double small_;  ///< what is no longer may merge around itself, metres
+  double size_;     ///< the mean patch's, metres
+  double small_;    ///< what is no longer may merge around itself, metres
+  double longest_;  ///< patch that may be made, metres
   std::size_t alive_;
   std::vector<std::array<std::uint32_t, 2>> elements_of_;  ///< sides of each surface triangle
   std::vector<double> piece_length_;                       ///< metres, by element

@@ -13,6 +13,7 @@
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
+#include "vertex_split.h"
 
 namespace rebounce {
 namespace {
@@ -47,6 +48,7 @@ class PatchModelBuilder {
     const RayTracer tracer = make_surface_tracer(model_.mesh);
     make_patches(tracer);
     find_shown_patches(tracer);
+    split_vertices(model_.mesh, tracer);
     if (clamped_count_ > 0) {
       model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
                                 " patches was clamped to 0.99");
@@ -82,14 +84,7 @@ class PatchModelBuilder {
       const auto [entry, is_new] =
           back_vertex.try_emplace(v, static_cast<std::uint32_t>(mesh.position.size()));
       if (is_new) {
-        const Float3 position = mesh.position[v], normal = mesh.normal[v];
-        const Float2 base_color = mesh.base_color_texcoord[v], emissive = mesh.emissive_texcoord[v];
-        const Float3 color = mesh.vertex_color[v];
-        mesh.position.push_back(position);
-        mesh.normal.push_back({-normal[0], -normal[1], -normal[2]});
-        mesh.base_color_texcoord.push_back(base_color);
-        mesh.emissive_texcoord.push_back(emissive);
-        mesh.vertex_color.push_back(color);
+        for (float& n : mesh.normal[copy_vertex(mesh, v)]) n = -n;
       }
       return entry->second;
     };

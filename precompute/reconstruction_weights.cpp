@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <optional>
 #include <vector>
 
 #include "element_neighbours.h"
+#include "local_max_entropy.h"
+#include "mean_preservation.h"
 #include "point_finder.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
@@ -24,6 +25,10 @@ constexpr float kMostlyCovered = 0.9F;   // what little is left of such a patch 
 // far their feet are drawn in from its corners, so that they keep clear of the walls beside it.
 constexpr double kProbeHeight = 0.25, kProbeInset = 0.2;
 
+// Slivers beside a contact are looked at as if they were this part of the mean patch's size, so
+// that what hangs close above them is seen.
+constexpr double kLeastProbeSize = 0.5;
+
 // A patch with less than this part of its area covered is open, and the other way round.
 constexpr double kLittle = 0.1;
 
@@ -33,10 +38,18 @@ constexpr std::size_t kSampleCount = 16;
 // How far a vertex looks for patches, in mean sizes of its own: chosen with bench_truth
 // (notes/patches.md). Farther where all near ones are mixed; how far off its plane, in parts of
 // that.
-constexpr float kReach = 1.1F, kFartherReach = 2, kPlaneReach = 0.25F;
+constexpr float kReach = 1, kFartherReach = 2, kPlaneReach = 0.25F;
 
-// Patches that give to a vertex, at most.
+// How firmly the mean place of a vertex's patches is drawn to the vertex: a compromise of what is
+// best at edges and what leaves a vertex with many patches to average (notes/patches.md).
+constexpr double kRidge = 0.1;
+
+// Patches that give to a vertex, at most, and the part of its value below which one is left out.
 constexpr std::size_t kMostGivers = 16;
+constexpr float kNegligible = 1e-3F;
+
+// What a vertex takes away of patches beyond its own, at most, for the sake of the patches' means.
+constexpr double kMostNegative = 0.5;
 
 /// How a triangle lies among the surfaces close above it.
 enum class Exposure : std::uint8_t { kOpen, kMixed, kCovered };
@@ -55,11 +68,13 @@ Ray segment_ray(const Float3& from, const Float3& to) {
   return ray;
 }
 
-/// Looks straight up from four points of the triangle, and between their upper ends.
-Exposure find_exposure(const std::array<glm::dvec3, 3>& p, const RayTracer& tracer) {
+/// Looks straight up from four points of the triangle, and between their upper ends. The rays are
+/// as long as suits a triangle of `least_size` metres at least.
+Exposure find_exposure(const std::array<glm::dvec3, 3>& p, double least_size,
+                       const RayTracer& tracer) {
   const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
   const glm::dvec3 normal = glm::normalize(cross);
-  const double height = kProbeHeight * std::sqrt(0.5 * glm::length(cross));
+  const double height = kProbeHeight * std::max(std::sqrt(0.5 * glm::length(cross)), least_size);
   const glm::dvec3 middle = (p[0] + p[1] + p[2]) / 3.0;
   std::array<Float3, 4> foot, top;
   for (int k = 0; k < 4; ++k) {
@@ -111,44 +126,59 @@ class ReconstructionWeights {
         tracer_(tracer),
         mesh_(mesh),
         triangles_(mesh.triangle_patch, absorbed.size()) {
-    find_exposures();
+    measure_patches();
     make_samples();
     make_receivers();
   }
 
   void compute() {
     const std::size_t count = mesh_.position.size();
-    std::vector<std::vector<Giver>> givers(count);
+    std::vector<VertexWeights> weights(count);
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t v = 0; v < count; ++v) {
-      if (receivers_[v].is_shown) givers[v] = find_givers(static_cast<std::uint32_t>(v));
+      if (!receivers_[v].is_shown) continue;
+      std::vector<Giver> givers = find_givers(static_cast<std::uint32_t>(v));
+      centre_weights(receivers_[v], givers);
+      weights[v] = open_weights(givers);
     }
-    mesh_.weight_begin.assign(1, 0);
-    mesh_.weight_patch.clear();
-    mesh_.weight.clear();
-    for (const std::vector<Giver>& of_vertex : givers) {
-      append_weights(of_vertex);
-      mesh_.weight_begin.push_back(static_cast<std::uint32_t>(mesh_.weight.size()));
-    }
+    preserve_patch_means(mesh_, triangles_, good_patches(), {kMostNegative, kMostGivers}, weights);
+    write_weights(weights);
   }
 
  private:
-  /// A patch is mixed if the open and the covered part of its area are both worth the name.
-  void find_exposures() {
+  /// The root of the patches' mean area, metres.
+  double mean_patch_size() const {
+    double area = 0;
+    for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
+      if (mesh_.triangle_patch[t] == kNone) continue;
+      const std::array<glm::dvec3, 3> p = corners_of(mesh_, mesh_.triangle[t]);
+      area += 0.5 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+    }
+    return std::sqrt(area / static_cast<double>(std::max<std::size_t>(absorbed_.size(), 1)));
+  }
+
+  /// Measures the patches. One is mixed if the open and the covered part of its area are both worth
+  /// the name.
+  void measure_patches() {
     const std::size_t n = triangles_.patch_count();
     area_.resize(n);
+    centroid_.resize(n);
     exposure_.resize(n);
+    const double least_size = kLeastProbeSize * mean_patch_size();
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::size_t i = 0; i < n; ++i) {
       std::array<double, 3> area{};
+      glm::dvec3 moment(0);
       for (const std::uint32_t t : triangles_[i]) {
         const std::array<glm::dvec3, 3> p = corners_of(mesh_, mesh_.triangle[t]);
         const double size = 0.5 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
-        area[static_cast<std::size_t>(find_exposure(p, tracer_))] += size;
+        area[static_cast<std::size_t>(find_exposure(p, least_size, tracer_))] += size;
+        moment += size / 3 * (p[0] + p[1] + p[2]);
       }
       const double whole = area[0] + area[1] + area[2];
       const double covered = area[2] + 0.5 * area[1];
       area_[i] = static_cast<float>(whole);
+      centroid_[i] = glm::vec3(moment / whole);
       exposure_[i] = covered < kLittle * whole         ? Exposure::kOpen
                      : covered > (1 - kLittle) * whole ? Exposure::kCovered
                                                        : Exposure::kMixed;
@@ -250,32 +280,37 @@ class ReconstructionWeights {
   /// The patches with samples around a vertex that face as it does, about in its plane and in
   /// sight, the heaviest kMostGivers of them.
   std::vector<Giver> givers_within(std::uint32_t v, float reach) const {
+    std::vector<Giver> candidates = candidates_within(v, reach);
+    std::ranges::stable_sort(candidates, std::greater<>(), &Giver::weight);
+    std::vector<Giver> givers;
+    for (const Giver& giver : candidates) {
+      if (givers.size() == kMostGivers) break;
+      if (is_own(v, giver.patch) || in_sight(receivers_[v], giver)) givers.push_back(giver);
+    }
+    std::ranges::sort(givers, {}, &Giver::patch);
+    return givers;
+  }
+
+  /// The same, whether in sight or not, in ascending order: so are the samples.
+  std::vector<Giver> candidates_within(std::uint32_t v, float reach) const {
     const Receiver& receiver = receivers_[v];
-    std::map<std::uint32_t, Giver> giver_of;
+    std::vector<Giver> givers;
     for (const auto& [index, distance_squared] : finder_->within(mesh_.position[v], reach)) {
       const Sample& sample = samples_[index];
       if (absorbed_[sample.patch] > kMostlyCovered) continue;
       if (glm::dot(sample.normal, receiver.normal) < kCreaseCosine) continue;
       const float height = glm::dot(sample.position - receiver.position, receiver.normal);
       if (std::abs(height) > kPlaneReach * reach) continue;
+      if (givers.empty() || givers.back().patch != sample.patch) {
+        givers.push_back({sample.patch, 0, reach * reach, {}, {}});
+      }
+      Giver& giver = givers.back();
       const float fall = 1 - distance_squared / (reach * reach);
-      Giver& giver =
-          giver_of.try_emplace(sample.patch, Giver{sample.patch, 0, reach * reach, {}, {}})
-              .first->second;
       giver.weight += sample.share * fall * fall;
       if (distance_squared > giver.distance_squared) continue;
       giver.distance_squared = distance_squared;
       giver.position = sample.position;
       giver.normal = sample.normal;
-    }
-    std::vector<Giver> givers;
-    for (const auto& [patch, giver] : giver_of) {
-      if (is_own(v, patch) || in_sight(receiver, giver)) givers.push_back(giver);
-    }
-    if (givers.size() > kMostGivers) {
-      std::ranges::stable_sort(givers, std::greater<>(), &Giver::weight);
-      givers.resize(kMostGivers);
-      std::ranges::sort(givers, {}, &Giver::patch);
     }
     return givers;
   }
@@ -285,13 +320,58 @@ class ReconstructionWeights {
                         {to_float3(giver.position), to_float3(giver.normal)}, tracer_) == kNone;
   }
 
-  void append_weights(const std::vector<Giver>& givers) {
+  /// Shifts the weights so that the centroids of the patches balance about the vertex.
+  void centre_weights(const Receiver& receiver, std::vector<Giver>& givers) const {
+    if (givers.empty() || receiver.reach <= 0) return;
+    const glm::dmat3 frame = frame_around(receiver.normal);
+    std::vector<double> prior;
+    std::vector<glm::dvec2> place;
+    for (const Giver& giver : givers) {
+      const glm::dvec3 offset(centroid_[giver.patch] - receiver.position);
+      prior.push_back(giver.weight);
+      place.push_back(glm::dvec2(offset * frame) / static_cast<double>(receiver.reach));
+    }
+    const std::vector<double> weight = max_entropy_weights(prior, place, kRidge);
+    for (std::size_t k = 0; k < givers.size(); ++k)
+      givers[k].weight = static_cast<float>(weight[k]);
+    std::erase_if(givers, [](const Giver& giver) { return giver.weight < kNegligible; });
+  }
+
+  /// Those in the open, whose means can be trusted.
+  std::vector<std::uint8_t> good_patches() const {
+    std::vector<std::uint8_t> good(exposure_.size());
+    for (std::size_t i = 0; i < good.size(); ++i) {
+      const bool is_good = exposure_[i] == Exposure::kOpen && absorbed_[i] <= kMostlyCovered;
+      good[i] = is_good ? 1 : 0;
+    }
+    return good;
+  }
+
+  /// What the givers say of light in the open, of which a patch shows the part that is not
+  /// absorbed.
+  VertexWeights open_weights(const std::vector<Giver>& givers) const {
     double sum = 0;
     for (const Giver& giver : givers) sum += giver.weight * (1.0 - absorbed_[giver.patch]);
-    if (sum <= 0) return;
+    VertexWeights weight;
+    if (sum <= 0) return weight;
     for (const Giver& giver : givers) {
-      mesh_.weight_patch.push_back(giver.patch);
-      mesh_.weight.push_back(static_cast<float>(giver.weight / sum));
+      weight.push_back({giver.patch, giver.weight * (1.0 - absorbed_[giver.patch]) / sum});
+    }
+    return weight;
+  }
+
+  void write_weights(const std::vector<VertexWeights>& weights) {
+    mesh_.weight_begin.assign(1, 0);
+    mesh_.weight_patch.clear();
+    mesh_.weight.clear();
+    for (const VertexWeights& of_vertex : weights) {
+      for (const auto& [patch, weight] : of_vertex) {
+        const double open = 1.0 - absorbed_[patch];
+        if (open <= 0) continue;
+        mesh_.weight_patch.push_back(patch);
+        mesh_.weight.push_back(static_cast<float>(weight / open));
+      }
+      mesh_.weight_begin.push_back(static_cast<std::uint32_t>(mesh_.weight.size()));
     }
   }
 
@@ -300,10 +380,11 @@ class ReconstructionWeights {
   const RayTracer& tracer_;
   DisplayMesh& mesh_;
   const PatchTriangles triangles_;
-  std::vector<float> area_;         ///< [n] m²
-  std::vector<Exposure> exposure_;  ///< [n]
-  std::vector<Sample> samples_;     ///< [n][kSampleCount]
-  std::vector<Float3> positions_;   ///< theirs
+  std::vector<float> area_;          ///< [n] m²
+  std::vector<glm::vec3> centroid_;  ///< [n]
+  std::vector<Exposure> exposure_;   ///< [n]
+  std::vector<Sample> samples_;      ///< [n][kSampleCount]
+  std::vector<Float3> positions_;    ///< theirs
   std::optional<PointFinder> finder_;
   std::vector<Receiver> receivers_;                      ///< [v]
   std::vector<std::vector<std::uint32_t>> own_patches_;  ///< [v]

@@ -185,7 +185,7 @@ class Checker {
   void check_weights() const {
     const DisplayMesh& mesh = data_.mesh;
     begins<std::uint32_t>("mesh.weight_begin", mesh.weight_begin, mesh.weight.size());
-    numbers("mesh.weight", mesh.weight, kNotNegative);
+    numbers("mesh.weight", mesh.weight, kFinite);
     for (std::size_t i = 0; i < mesh.weight_patch.size(); ++i) {
       index("mesh.weight_patch", i, mesh.weight_patch[i], data_.patches.size());
     }

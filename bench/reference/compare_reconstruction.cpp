@@ -71,7 +71,7 @@ glm::dvec3 vertex_value(const DisplayMesh& mesh, std::span<const Float3> patch_v
   for (std::uint32_t k = mesh.weight_begin[vertex]; k < mesh.weight_begin[vertex + 1]; ++k) {
     value += static_cast<double>(mesh.weight[k]) * to_dvec3(patch_value[mesh.weight_patch[k]]);
   }
-  return value;
+  return glm::max(value, glm::dvec3(0));  // some weights are negative
 }
 
 Float3 reconstruct(const DisplayMesh& mesh, std::span<const Float3> patch_value,

@@ -205,6 +205,7 @@ std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,
     for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
       value[v] += mesh.weight[k] * patch_value[mesh.weight_patch[k]];
     }
+    value[v] = glm::max(value[v], glm::vec3(0));  // some weights are negative
   }
   return value;
 }

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "rebounce/precompute/lit_sides.h"
-#include "rebounce/precompute/reconstruction_weights.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
 
@@ -118,77 +117,6 @@ TEST(PatchModel, DropsSliversBelowThePrecisionOfRays) {
   Scene nothing = test::empty_scene();
   test::add_polygon(nothing, sliver);
   EXPECT_THROW(make_patch_model(nothing, {}), Error);
-}
-
-TEST(ReconstructionWeights, TakeNothingFromUnderARug) {
-  // A rug just above part of the floor: the floor outside must not show the light under it.
-  Scene scene = test::empty_scene();
-  const std::vector<glm::dvec3> floor = {{-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
-  const std::vector<glm::dvec3> rug = {
-      {-0.77, 0.01, -0.63}, {-0.77, 0.01, 0.71}, {0.69, 0.01, 0.71}, {0.69, 0.01, -0.63}};
-  test::add_polygon(scene, floor);
-  test::add_polygon(scene, rug);
-  PatchModel model = make_patch_model(scene, {.patch_count = 800});
-  const std::vector<float> absorbed(model.patches.size(), 0.0F);
-  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
-  const auto under_the_rug = [&](const Float3& p, float margin) {
-    return p[1] == 0 && p[0] > -0.77F - margin && p[0] < 0.69F + margin && p[2] > -0.63F - margin &&
-           p[2] < 0.71F + margin;
-  };
-  int outside = 0, excluded = 0;
-  for (std::size_t v = 0; v < model.mesh.position.size(); ++v) {
-    if (model.mesh.position[v][1] != 0 || under_the_rug(model.mesh.position[v], 0)) continue;
-    ++outside;
-    for (std::uint32_t k = model.mesh.weight_begin[v]; k < model.mesh.weight_begin[v + 1]; ++k) {
-      const Float3& c = model.patches.centroid[model.mesh.weight_patch[k]];
-      EXPECT_FALSE(under_the_rug(c, 0));
-    }
-    excluded += under_the_rug(model.mesh.position[v], 0.2F) ? 1 : 0;
-  }
-  EXPECT_GT(outside, 100);
-  EXPECT_GT(excluded, 5) << "some vertices beside the rug were put to the test";
-}
-
-TEST(ReconstructionWeights, ReproduceAConstantAndRespectCreases) {
-  Scene scene = test::empty_scene();
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-  PatchModel model = make_patch_model(scene, {.patch_count = 600});
-  const std::vector<float> absorbed(model.patches.size(), 0.0F);
-  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
-  const DisplayMesh& mesh = model.mesh;
-  ASSERT_EQ(mesh.weight_begin.size(), mesh.position.size() + 1);
-  for (std::size_t v = 0; v < mesh.position.size(); ++v) {
-    double sum = 0;
-    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
-      sum += mesh.weight[k];
-      // In a box all faces are at right angles: a vertex takes from patches of its own face only.
-      EXPECT_GT(
-          glm::dot(to_dvec3(mesh.normal[v]), to_dvec3(model.patches.normal[mesh.weight_patch[k]])),
-          0.99);
-    }
-    EXPECT_NEAR(sum, 1, 1e-5);
-  }
-}
-
-TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
-  Scene scene = test::empty_scene();
-  const std::vector<glm::dvec3> floor = {{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}};
-  test::add_polygon(scene, floor);
-  PatchModel model = make_patch_model(scene, {.patch_count = 200});
-  // Light of 1 everywhere; some patches are covered in part and their mean is less by that much.
-  std::vector<float> absorbed(model.patches.size()), value(model.patches.size());
-  for (std::size_t i = 0; i < absorbed.size(); ++i) {
-    absorbed[i] = i % 3 == 0 ? 0.6F : 0.0F;
-    value[i] = 1 - absorbed[i];
-  }
-  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
-  for (std::size_t v = 0; v + 1 < model.mesh.weight_begin.size(); ++v) {
-    double shown = 0;
-    for (std::uint32_t k = model.mesh.weight_begin[v]; k < model.mesh.weight_begin[v + 1]; ++k) {
-      shown += model.mesh.weight[k] * value[model.mesh.weight_patch[k]];
-    }
-    EXPECT_NEAR(shown, 1, 1e-5);
-  }
 }
 
 }  // namespace

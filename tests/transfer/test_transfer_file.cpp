@@ -494,7 +494,7 @@ TEST(TransferFile, RefusesAnImpossibleMesh) {
       {"mesh.weight_begin: 4 rows, not 5", mesh([](auto& m) { m.weight_begin.pop_back(); })},
       {"mesh.weight_patch", mesh([](auto& m) { m.weight_patch[3] = 3; })},
       {"mesh.weight: 3 rows, not 4", mesh([](auto& m) { m.weight.pop_back(); })},
-      {"mesh.weight", mesh([](auto& m) { m.weight[0] = -0.5F; })},
+      {"mesh.weight", mesh([](auto& m) { m.weight[0] = kNan; })},
   });
 }
 

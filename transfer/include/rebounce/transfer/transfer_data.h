@@ -53,7 +53,7 @@ struct DisplayMesh {
   /// so that patches that are partly covered do not darken what is seen of them; or there are none.
   std::vector<std::uint32_t> weight_begin;  ///< [v + 1]
   std::vector<std::uint32_t> weight_patch;  ///< patch indices
-  std::vector<float> weight;                ///< >= 0
+  std::vector<float> weight;                ///< some may be negative: clamp what is shown to >= 0
 
   std::size_t surface_count() const { return back_triangle.size(); }
 };

@@ -1,0 +1,119 @@
+#include "vertex_split.h"
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "element_neighbours.h"
+#include "rebounce/runtime/float3_glm.h"
+
+namespace rebounce {
+namespace {
+
+// Where an edge is looked across: this part of it away from the vertex, and by this part of the way
+// to the third corner on either side.
+constexpr double kAlongEdge = 0.25, kAwayFromEdge = 0.1;
+
+/// The display triangles around each vertex, in ascending order.
+class VertexTriangles {
+ public:
+  explicit VertexTriangles(const DisplayMesh& mesh) : begin_(mesh.position.size() + 1, 0) {
+    for (const Uint3& corner : mesh.triangle) {
+      for (const std::uint32_t v : corner) ++begin_[v + 1];
+    }
+    for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
+    triangle_.resize(begin_.back());
+    std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
+    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+      for (const std::uint32_t v : mesh.triangle[t]) triangle_[next[v]++] = t;
+    }
+  }
+
+  std::span<const std::uint32_t> operator[](std::uint32_t v) const {
+    return {triangle_.data() + begin_[v], triangle_.data() + begin_[v + 1]};
+  }
+
+ private:
+  std::vector<std::uint32_t> begin_, triangle_;
+};
+
+class VertexSplitter {
+ public:
+  VertexSplitter(const DisplayMesh& mesh, const RayTracer& tracer) : mesh_(mesh), tracer_(tracer) {}
+
+  /// The groups of the `around` triangles of a vertex that share it: numbers in order of first use.
+  std::vector<std::uint32_t> groups(std::uint32_t v, std::span<const std::uint32_t> around) const {
+    std::vector<std::uint32_t> label(around.size());
+    for (std::uint32_t k = 0; k < label.size(); ++k) label[k] = k;
+    for (std::size_t a = 0; a < around.size(); ++a) {
+      for (std::size_t b = a + 1; b < around.size(); ++b) {
+        if (label[a] == label[b] || !are_joined(v, around[a], around[b])) continue;
+        const auto [kept, merged] = std::minmax(label[a], label[b]);
+        std::ranges::replace(label, std::uint32_t{merged}, std::uint32_t{kept});
+      }
+    }
+    std::vector<std::uint32_t> first(label);
+    std::ranges::sort(first);
+    first.erase(std::ranges::unique(first).begin(), first.end());
+    for (std::uint32_t& l : label) {
+      l = static_cast<std::uint32_t>(std::ranges::lower_bound(first, l) - first.begin());
+    }
+    return label;
+  }
+
+ private:
+  /// True if triangles `a` and `b` share an edge from `v` and nothing stands on it.
+  bool are_joined(std::uint32_t v, std::uint32_t a, std::uint32_t b) const {
+    return std::ranges::any_of(mesh_.triangle[a], [&](std::uint32_t u) {
+      return u != v && std::ranges::count(mesh_.triangle[b], u) > 0 &&
+             find_between(beside_edge(v, u, a), beside_edge(v, u, b), tracer_) == kNone;
+    });
+  }
+
+  /// A point of triangle `t` beside its edge from `v` to `u`.
+  PatchPoint beside_edge(std::uint32_t v, std::uint32_t u, std::uint32_t t) const {
+    const auto [a, b, c] = mesh_.triangle[t];
+    const std::uint32_t third = a != v && a != u ? a : b != v && b != u ? b : c;
+    const auto at = [&](std::uint32_t k) { return to_dvec3(mesh_.position[k]); };
+    const glm::dvec3 on_edge = glm::mix(at(v), at(u), kAlongEdge);
+    const glm::dvec3 normal = glm::normalize(glm::cross(at(b) - at(a), at(c) - at(a)));
+    return {to_float3(glm::mix(on_edge, at(third), kAwayFromEdge)), to_float3(normal)};
+  }
+
+  const DisplayMesh& mesh_;
+  const RayTracer& tracer_;
+};
+
+}  // namespace
+
+std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v) {
+  const auto append = [v](auto& of_vertex) {
+    const auto value = of_vertex[v];
+    of_vertex.push_back(value);
+  };
+  append(mesh.position);
+  append(mesh.normal);
+  append(mesh.base_color_texcoord);
+  append(mesh.emissive_texcoord);
+  append(mesh.vertex_color);
+  return static_cast<std::uint32_t>(mesh.position.size() - 1);
+}
+
+std::size_t split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
+  const VertexTriangles around(mesh);
+  const auto vertex_count = static_cast<std::uint32_t>(mesh.position.size());
+  std::vector<std::vector<std::uint32_t>> group(vertex_count);
+  const VertexSplitter splitter(mesh, tracer);
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::uint32_t v = 0; v < vertex_count; ++v) group[v] = splitter.groups(v, around[v]);
+  for (std::uint32_t v = 0; v < vertex_count; ++v) {
+    std::vector<std::uint32_t> vertex_of{v};
+    for (std::size_t k = 0; k < group[v].size(); ++k) {
+      while (vertex_of.size() <= group[v][k]) vertex_of.push_back(copy_vertex(mesh, v));
+      std::ranges::replace(mesh.triangle[around[v][k]], v, vertex_of[group[v][k]]);
+    }
+  }
+  return mesh.position.size() - vertex_count;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// Appends a copy of vertex `v` and returns its number.
+std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v);
+
+/// Gives a vertex on which something stands (a wall on the floor, the edge of a slab in a wall) a
+/// copy for each side of it, so that each side shows its own light: triangles around a vertex keep
+/// sharing it where they meet at an edge with nothing between them and do not bend away from each
+/// other by more than about 50 degrees. `tracer` holds the surface of `mesh`. Returns the number of
+/// copies.
+std::size_t split_vertices(DisplayMesh& mesh, const RayTracer& tracer);
+
+}  // namespace rebounce

@@ -1,0 +1,211 @@
+#include "rebounce/precompute/reconstruction_weights.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "rebounce/precompute/patch_model.h"
+#include "test_scenes.h"
+
+namespace rebounce {
+namespace {
+
+/// The patches of a scene with weights, nothing of them covered.
+PatchModel make_weighted_model(Scene scene, std::size_t patch_count) {
+  PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
+  const std::vector<float> absorbed(model.patches.size(), 0.0F);
+  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
+  return model;
+}
+
+/// A floor of size 2 around the origin in `squares` x `squares` squares, which share their corners.
+void add_tiled_floor(Scene& scene, std::uint32_t squares) {
+  const auto first = static_cast<std::uint32_t>(scene.position.size());
+  const float step = 2.0F / static_cast<float>(squares);
+  for (std::uint32_t i = 0; i <= squares; ++i) {
+    for (std::uint32_t j = 0; j <= squares; ++j) {
+      scene.position.push_back(
+          {static_cast<float>(i) * step - 1, 0, static_cast<float>(j) * step - 1});
+      scene.normal.push_back({0, 1, 0});
+      scene.base_color_texcoord.push_back({0, 0});
+      scene.emissive_texcoord.push_back({0, 0});
+      scene.vertex_color.push_back({1, 1, 1});
+    }
+  }
+  for (std::uint32_t i = 0; i < squares; ++i) {
+    for (std::uint32_t j = 0; j < squares; ++j) {
+      const std::uint32_t v = first + i * (squares + 1) + j;
+      scene.triangle.push_back({v, v + 1, v + squares + 2});
+      scene.triangle.push_back({v, v + squares + 2, v + squares + 1});
+      scene.triangle_material.insert(scene.triangle_material.end(), 2, 0);
+    }
+  }
+}
+
+/// What is shown at a vertex if each patch has the value `of_centroid`(its centroid).
+template <typename Field>
+double shown_value(const PatchModel& model, std::size_t v, const Field& of_centroid) {
+  const DisplayMesh& mesh = model.mesh;
+  double value = 0;
+  for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+    value += mesh.weight[k] * of_centroid(model.patches.centroid[mesh.weight_patch[k]]);
+  }
+  return value;
+}
+
+TEST(ReconstructionWeights, ShowConstantLightWithFewPatches) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {-3, -3, -2}, {4, 3, 5}, true);
+  test::add_box(scene, {2, -3, 2}, {3, -1, 3}, false);
+  test::add_ball(scene, 24, 12, false);
+  const PatchModel model = make_weighted_model(std::move(scene), 700);
+  const DisplayMesh& mesh = model.mesh;
+  ASSERT_EQ(mesh.weight_begin.size(), mesh.position.size() + 1);
+  for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+    if (model.shown_patch[t] == kNone) continue;
+    for (const std::uint32_t v : mesh.triangle[t]) {
+      EXPECT_NEAR(shown_value(model, v, [](const Float3&) { return 1.0; }), 1, 1e-5);
+      EXPECT_LE(mesh.weight_begin[v + 1] - mesh.weight_begin[v], 16U);
+    }
+  }
+}
+
+TEST(ReconstructionWeights, ShowALinearFieldOnAFloorOfClusters) {
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 40);
+  const PatchModel model = make_weighted_model(std::move(scene), 200);
+  ASSERT_LT(model.patches.size(), 250U);
+  const double patch_size = std::sqrt(4.0 / static_cast<double>(model.patches.size()));
+  const auto field = [](const Float3& p) { return 2.0 + p[0] + 0.5 * p[2]; };
+  double inside = 0, at_edge = 0;
+  for (std::size_t v = 0; v < model.mesh.position.size(); ++v) {
+    const Float3& p = model.mesh.position[v];
+    const double error = std::abs(shown_value(model, v, field) - field(p));
+    const bool is_inside = std::max(std::abs(p[0]), std::abs(p[2])) < 1 - patch_size;
+    (is_inside ? inside : at_edge) = std::max(is_inside ? inside : at_edge, error);
+  }
+  EXPECT_LT(inside, 0.03) << "of values between 0.5 and 3.5";
+  EXPECT_LT(at_edge, patch_size) << "no weights >= 0 can reach beyond the outermost centroids";
+}
+
+TEST(ReconstructionWeights, KeepTheMeansOfPatches) {
+  // The mean of what is shown on a patch is the patch's value, also where light has a peak.
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 40);
+  const PatchModel model = make_weighted_model(std::move(scene), 200);
+  const DisplayMesh& mesh = model.mesh;
+  const auto field = [](const Float3& p) { return std::exp(-8 * (p[0] * p[0] + p[2] * p[2])); };
+  std::vector<double> mean(model.patches.size(), 0.0), count(model.patches.size(), 0.0);
+  for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {  // all of one size
+    for (const std::uint32_t v : mesh.triangle[t]) {
+      mean[mesh.triangle_patch[t]] += shown_value(model, v, field);
+      count[mesh.triangle_patch[t]] += 1;
+    }
+  }
+  for (std::size_t i = 0; i < mean.size(); ++i) {
+    EXPECT_NEAR(mean[i] / count[i], field(model.patches.centroid[i]), 0.02);
+  }
+}
+
+TEST(ReconstructionWeights, AreNegativeOnlyInPart) {
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 40);
+  const PatchModel model = make_weighted_model(std::move(scene), 200);
+  const DisplayMesh& mesh = model.mesh;
+  for (std::size_t v = 0; v < mesh.position.size(); ++v) {
+    double negative = 0;
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      negative += std::min(0.0F, mesh.weight[k]);
+    }
+    EXPECT_GT(negative, -0.6);
+  }
+}
+
+TEST(ReconstructionWeights, TakeNothingFromBehindAWall) {
+  // The wall stands on vertices of the floor, which both sides share in the scene.
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 10);
+  const std::vector<glm::dvec3> wall = {{-1, 0, 0}, {1, 0, 0}, {1, 1, 0}, {-1, 1, 0}};
+  test::add_polygon(scene, wall);
+  const PatchModel model = make_weighted_model(std::move(scene), 500);
+  const auto is_behind = [](const Float3& p) { return p[2] < 0 ? 1.0 : 0.0; };
+  int at_wall = 0;
+  for (const Uint3& corner : model.mesh.triangle) {
+    const auto z = [&](int k) { return model.mesh.position[corner[k]][2]; };
+    if (std::ranges::any_of(corner, [&](auto v) { return model.mesh.position[v][1] > 0; }))
+      continue;
+    const double behind = z(0) + z(1) + z(2) < 0 ? 1 : 0;
+    for (const std::uint32_t v : corner) {
+      EXPECT_NEAR(shown_value(model, v, is_behind), behind, 1e-6);
+      at_wall += model.mesh.position[v][2] == 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(at_wall, 40);
+}
+
+TEST(ReconstructionWeights, TakeNothingFromUnderARug) {
+  // A rug just above part of the floor: the floor outside must not show the light under it.
+  Scene scene = test::empty_scene();
+  const std::vector<glm::dvec3> floor = {{-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
+  const std::vector<glm::dvec3> rug = {
+      {-0.77, 0.01, -0.63}, {-0.77, 0.01, 0.71}, {0.69, 0.01, 0.71}, {0.69, 0.01, -0.63}};
+  test::add_polygon(scene, floor);
+  test::add_polygon(scene, rug);
+  const PatchModel model = make_weighted_model(std::move(scene), 800);
+  const auto under_the_rug = [&](const Float3& p, float margin) {
+    return p[1] == 0 && p[0] > -0.77F - margin && p[0] < 0.69F + margin && p[2] > -0.63F - margin &&
+           p[2] < 0.71F + margin;
+  };
+  int outside = 0, excluded = 0;
+  for (std::size_t v = 0; v < model.mesh.position.size(); ++v) {
+    if (model.mesh.position[v][1] != 0 || under_the_rug(model.mesh.position[v], 0)) continue;
+    ++outside;
+    for (std::uint32_t k = model.mesh.weight_begin[v]; k < model.mesh.weight_begin[v + 1]; ++k) {
+      const Float3& c = model.patches.centroid[model.mesh.weight_patch[k]];
+      EXPECT_FALSE(under_the_rug(c, 0));
+    }
+    excluded += under_the_rug(model.mesh.position[v], 0.2F) ? 1 : 0;
+  }
+  EXPECT_GT(outside, 100);
+  EXPECT_GT(excluded, 5) << "some vertices beside the rug were put to the test";
+}
+
+TEST(ReconstructionWeights, RespectCreases) {
+  // In a box all faces are at right angles: a vertex takes from patches of its own face only.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  const PatchModel model = make_weighted_model(std::move(scene), 600);
+  const DisplayMesh& mesh = model.mesh;
+  for (std::size_t v = 0; v < mesh.position.size(); ++v) {
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      EXPECT_GT(
+          glm::dot(to_dvec3(mesh.normal[v]), to_dvec3(model.patches.normal[mesh.weight_patch[k]])),
+          0.99);
+    }
+  }
+}
+
+TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
+  Scene scene = test::empty_scene();
+  const std::vector<glm::dvec3> floor = {{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}};
+  test::add_polygon(scene, floor);
+  PatchModel model = make_patch_model(scene, {.patch_count = 200});
+  // Light of 1 everywhere; some patches are covered in part and their mean is less by that much.
+  std::vector<float> absorbed(model.patches.size()), value(model.patches.size());
+  for (std::size_t i = 0; i < absorbed.size(); ++i) {
+    absorbed[i] = i % 3 == 0 ? 0.6F : 0.0F;
+    value[i] = 1 - absorbed[i];
+  }
+  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
+  for (std::size_t v = 0; v + 1 < model.mesh.weight_begin.size(); ++v) {
+    double shown = 0;
+    for (std::uint32_t k = model.mesh.weight_begin[v]; k < model.mesh.weight_begin[v + 1]; ++k) {
+      shown += model.mesh.weight[k] * value[model.mesh.weight_patch[k]];
+    }
+    EXPECT_NEAR(shown, 1, 1e-5);
+  }
+}
+
+}  // namespace
+}  // namespace rebounce
