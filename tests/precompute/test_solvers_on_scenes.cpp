@@ -272,14 +272,19 @@ struct CompressedRoom {
   std::unique_ptr<CompressedFormFactors> form_factors;
 
   CompressedRoom(const Room& of, double tolerance, Precision precision) : room(of) {
+    const auto shaping = radiosities(100, 132), judging = radiosities(40, 48);
+    form_factors = std::make_unique<CompressedFormFactors>(
+        compress_form_factors(room.exchange, room.patches, {shaping, judging},
+                              {.tolerance = tolerance, .precision = precision}));
+  }
+
+  /// Of the lamps with these seeds.
+  std::vector<std::vector<Float3>> radiosities(std::uint64_t begin, std::uint64_t end) const {
     std::vector<std::vector<Float3>> lights;
-    for (std::uint64_t seed = 40; seed < 48; ++seed) {
+    for (std::uint64_t seed = begin; seed < end; ++seed) {
       lights.push_back(lamp_light(room.patches.size(), seed));
     }
-    const auto radiosities = radiosities_of(*room.transfer, room.patches.reflectance, lights);
-    form_factors = std::make_unique<CompressedFormFactors>(
-        compress_form_factors(room.exchange, room.patches, {radiosities, radiosities},
-                              {.tolerance = tolerance, .precision = precision}));
+    return radiosities_of(*room.transfer, room.patches.reflectance, lights);
   }
 
   std::unique_ptr<RadiositySolver> solver(SolveMethod method) const {
