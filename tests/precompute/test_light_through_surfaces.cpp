@@ -8,6 +8,7 @@
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/runtime/direct_lighting.h"
+#include "rebounce/runtime/patch_points.h"
 #include "test_scenes.h"
 
 namespace rebounce {
