@@ -10,14 +10,11 @@
 #include "closure.h"
 #include "escape.h"
 #include "rebounce/transfer/error.h"
+#include "row_targets.h"
 #include "shadow_rays.h"
 
 namespace rebounce {
 namespace {
-
-// A row whose sum is off its target by more than this (and three deviations) is traced again: it is
-// partly covered, and probe rays miss what little of it is seen.
-constexpr double kRowSumTolerance = 0.005;
 
 // A pair whose rays all agree may still be partly hidden: its variance is not zero but this part
 // of the squared exchange.
@@ -42,8 +39,8 @@ class FormFactorAssembly {
       escape[i] = measure_escape(model_, shadow_rays_.triangle(i), i, tracer_,
                                  settings_.escape_rays, settings_.seed, scratch.rays, scratch.hits);
     });
-    const std::vector<RowTarget> target = row_targets(escape);
-    const std::vector<bool> doubtful = find_doubtful_rows(rows, target);
+    const std::vector<RowTarget> target = row_targets(escape, settings_.escape_rays);
+    const std::vector<bool> doubtful = find_doubtful_rows(row_sums(rows, areas()), target);
     for_each_patch(0.8, 1.0, [&](std::uint32_t i, Scratch& scratch) {
       refine_row(i, doubtful, scratch, rows[i]);
     });
@@ -152,29 +149,6 @@ class FormFactorAssembly {
     area.reserve(n);
     for (std::size_t i = 0; i < n; ++i) area.push_back(shadow_rays_.triangle(i).area);
     return area;
-  }
-
-  std::vector<RowTarget> row_targets(const std::vector<Escape>& escape) const {
-    std::vector<RowTarget> target;
-    target.reserve(escape.size());
-    for (const Escape& e : escape) {
-      const double lost = e.sky + e.absorbed, count = settings_.escape_rays;
-      // Where no ray at all is lost, the row is taken as closed. Else the measurement is as sure as
-      // the rule of succession says; low-discrepancy rays err about half as much as random ones.
-      const double p = (lost * count + 1) / (count + 2);
-      target.push_back({1 - lost, lost > 0 ? 0.5 * std::sqrt(p * (1 - p) / count) : 0.0});
-    }
-    return target;
-  }
-
-  std::vector<bool> find_doubtful_rows(const ExchangeRows& rows,
-                                       const std::vector<RowTarget>& target) const {
-    const std::vector<double> sum = row_sums(rows, areas());
-    std::vector<bool> doubtful(rows.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      doubtful[i] = std::abs(sum[i] - target[i].sum) > kRowSumTolerance + 3 * target[i].deviation;
-    }
-    return doubtful;
   }
 
   /// What the rows of F leave of 1 is what escapes; its parts are shared as they were measured.

@@ -1,5 +1,7 @@
 #include "shadow_rays.h"
 
+#include <array>
+
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
@@ -65,21 +67,30 @@ void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& faci
 ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
                                               std::span<const Ray> rays) const {
   const std::uint64_t hash = pair_hash(i, j);
-  double sum = 0, sum_of_squares = 0, visible = 0, count = 0;
+  std::array<double, kPointCount> weight;
   for (std::size_t k = 0; k < rays.size(); ++k) {
     const auto [x, y] = ray_ends(i, j, static_cast<std::uint32_t>(k), hash);
-    const double weight =
+    weight[k] =
         point_kernel(to_dvec3(*x), triangles_[i].normal, to_dvec3(*y), triangles_[j].normal);
+  }
+  return visible_part(rays, std::span(weight).first(rays.size()));
+}
+
+ShadowRays::Visibility ShadowRays::visible_part(std::span<const Ray> rays,
+                                                std::span<const double> weight) {
+  double sum = 0, sum_of_squares = 0, visible = 0, count = 0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
     const bool clear = !is_occluded(rays[k]);
-    sum += weight;
-    sum_of_squares += weight * weight;
-    visible += clear ? weight : 0;
+    sum += weight[k];
+    sum_of_squares += weight[k] * weight[k];
+    visible += clear ? weight[k] : 0;
     count += clear ? 1 : 0;
   }
   const double part = sum > 0 ? visible / sum : count / static_cast<double>(rays.size());
   // As sure as that many rays of equal weight (Kish's effective sample size).
   const double effective = sum > 0 ? sum * sum / sum_of_squares : 1;
-  return {part, part * (1 - part) / effective};
+  const bool mixed = count > 0 && count < static_cast<double>(rays.size());
+  return {part, part * (1 - part) / effective, mixed};
 }
 
 }  // namespace rebounce

@@ -32,6 +32,14 @@ class ShadowRays {
   std::size_t patch_count() const { return triangles_.size(); }
   const FlatTriangle& triangle(std::size_t patch) const { return triangles_[patch]; }
 
+  /// Exchange area in m² of two patches with nothing between them; 0 for a patch with itself.
+  double unoccluded(std::uint32_t i, std::uint32_t j) const;
+
+  /// Point `k` of those spread over a patch, moved off its surface; k counts modulo kPointCount.
+  const Float3& point(std::uint32_t patch, std::uint32_t k) const {
+    return points_[static_cast<std::size_t>(patch) * kPointCount + k % kPointCount];
+  }
+
   /// Writes to `facing` the patches j > i that patch i would exchange light with, if `wanted`(j),
   /// in ascending order.
   template <typename Wanted>
@@ -45,11 +53,15 @@ class ShadowRays {
   struct Visibility {
     double part;      ///< of the pair's light that gets through, [0, 1]
     double variance;  ///< of `part`
+    bool mixed;       ///< some rays got through and some did not
   };
 
   /// What the traced `rays` of the pair (i, j) say of it: each is weighted by the kernel between
   /// its ends.
   Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const;
+
+  /// What traced rays of `weight` each say.
+  static Visibility visible_part(std::span<const Ray> rays, std::span<const double> weight);
 
  private:
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
@@ -62,17 +74,20 @@ class ShadowRays {
   std::vector<Float3> points_;           ///< [n][kPointCount], moved off the surface
 };
 
+inline double ShadowRays::unoccluded(std::uint32_t i, std::uint32_t j) const {
+  const FlatTriangle &a = triangles_[i], &b = triangles_[j];
+  const glm::dvec3 d = b.centroid - a.centroid;
+  if (glm::dot(a.normal, d) + b.radius <= 0 || a.radius - glm::dot(b.normal, d) <= 0) return 0;
+  return unoccluded_exchange_area(a, b, kernel_tolerance_);
+}
+
 template <typename Wanted>
 void ShadowRays::find_facing(std::uint32_t i, std::vector<FacingPatch>& facing,
                              const Wanted& wanted) const {
   facing.clear();
-  const FlatTriangle& a = triangles_[i];
   for (std::uint32_t j = i + 1; j < triangles_.size(); ++j) {
     if (!wanted(j)) continue;
-    const FlatTriangle& b = triangles_[j];
-    const glm::dvec3 d = b.centroid - a.centroid;
-    if (glm::dot(a.normal, d) + b.radius <= 0 || a.radius - glm::dot(b.normal, d) <= 0) continue;
-    const double exchange = unoccluded_exchange_area(a, b, kernel_tolerance_);
+    const double exchange = unoccluded(i, j);
     if (exchange > 0) facing.push_back({j, exchange});
   }
 }

@@ -1,0 +1,125 @@
+#include "link_expansion.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "rebounce/transfer/error.h"
+#include "rebounce/runtime/float3_glm.h"
+
+namespace rebounce {
+namespace {
+
+/// A link as one of its nodes sees it.
+struct DirectedLink {
+  std::uint32_t link;
+  bool from_a;  ///< the node is the link's a
+};
+
+class LinkExpansion {
+ public:
+  LinkExpansion(const LinkTree& tree, const ShadowRays& shadow_rays, std::span<const Link> links,
+                LinkSpread spread)
+      : tree_(tree), shadow_rays_(shadow_rays), links_(links), spread_(spread) {
+    find_parents();
+    sort_by_node();
+  }
+
+  ExchangeRows run(const Progress& progress) const {
+    ExchangeRows rows(tree_.patches().size());
+    std::atomic<bool> stop = false;
+    std::atomic<std::size_t> done = 0;
+    const auto nodes = tree_.nodes();
+#pragma omp parallel for schedule(dynamic, 16)
+    for (std::uint32_t k = 0; k < nodes.size(); ++k) {
+      if (stop || !nodes[k].is_leaf()) continue;
+      expand_row(k, rows[tree_.leaf_patch(nodes[k])]);
+      const double part = static_cast<double>(++done) / static_cast<double>(rows.size());
+      if (progress && omp_get_thread_num() == 0 && !progress(part)) stop = true;
+    }
+    if (stop) throw Cancelled();
+    return rows;
+  }
+
+ private:
+  void find_parents() {
+    const auto nodes = tree_.nodes();
+    parent_.assign(nodes.size(), kNone);
+    for (std::uint32_t k = 0; k < nodes.size(); ++k) {
+      if (nodes[k].is_leaf()) continue;
+      parent_[nodes[k].first_child] = parent_[nodes[k].first_child + 1] = k;
+    }
+  }
+
+  void sort_by_node() {
+    begin_.assign(tree_.nodes().size() + 1, 0);
+    for (const Link& link : links_) {
+      ++begin_[link.a + 1];
+      ++begin_[link.b + 1];
+    }
+    for (std::size_t k = 1; k < begin_.size(); ++k) begin_[k] += begin_[k - 1];
+    directed_.resize(begin_.back());
+    std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
+    for (std::uint32_t k = 0; k < links_.size(); ++k) {
+      directed_[next[links_[k].a]++] = {k, true};
+      directed_[next[links_[k].b]++] = {k, false};
+    }
+  }
+
+  void expand_row(std::uint32_t leaf, std::vector<ExchangeEntry>& row) const {
+    const std::uint32_t i = tree_.leaf_patch(tree_[leaf]);
+    for (std::uint32_t node = leaf; node != kNone; node = parent_[node]) {
+      for (std::uint64_t k = begin_[node]; k < begin_[node + 1]; ++k) {
+        const Link& link = links_[directed_[k].link];
+        if (link.exchange_area <= 0) continue;
+        const LinkNode& other = tree_[directed_[k].from_a ? link.b : link.a];
+        for (const std::uint32_t j : tree_.patches(other)) {
+          if (j > i) append(link, directed_[k].from_a, i, j, row);
+        }
+      }
+    }
+    std::ranges::sort(row, {}, &ExchangeEntry::column);
+  }
+
+  void append(const Link& link, bool from_a, std::uint32_t i, std::uint32_t j,
+              std::vector<ExchangeEntry>& row) const {
+    ExchangeEntry entry{j, link.exchange_area, link.unoccluded_area, link.visibility_variance};
+    const LinkNode &a = tree_[link.a], &b = tree_[link.b];
+    if (!a.is_leaf() || !b.is_leaf()) {
+      const double visible = link.exchange_area / link.unoccluded_area;
+      const double exchange = spread_ == LinkSpread::kKernel
+                                  ? visible * shadow_rays_.unoccluded(i, j)
+                                  : (from_a ? affine(link, i, j) : affine(link, j, i));
+      entry.exchange_area = static_cast<float>(exchange);
+      entry.unoccluded_area = static_cast<float>(exchange / visible);
+    }
+    if (entry.exchange_area > 0) row.push_back(entry);
+  }
+
+  double affine(const Link& link, std::uint32_t in_a, std::uint32_t in_b) const {
+    const LinkNode &a = tree_[link.a], &b = tree_[link.b];
+    const FlatTriangle &x = shadow_rays_.triangle(in_a), &y = shadow_rays_.triangle(in_b);
+    return x.area * y.area / (a.area * b.area) *
+           (link.exchange_area + glm::dot(to_dvec3(link.gradient_a), x.centroid - a.center) +
+            glm::dot(to_dvec3(link.gradient_b), y.centroid - b.center));
+  }
+
+  const LinkTree& tree_;
+  const ShadowRays& shadow_rays_;
+  const std::span<const Link> links_;
+  const LinkSpread spread_;
+  std::vector<std::uint32_t> parent_;
+  std::vector<std::uint64_t> begin_;    ///< [nodes + 1] of a node's links
+  std::vector<DirectedLink> directed_;  ///< by node
+};
+
+}  // namespace
+
+ExchangeRows expand_links(const LinkTree& tree, const ShadowRays& shadow_rays,
+                          std::span<const Link> links, LinkSpread spread,
+                          const Progress& progress) {
+  return LinkExpansion(tree, shadow_rays, links, spread).run(progress);
+}
+
+}  // namespace rebounce
