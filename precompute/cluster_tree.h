@@ -27,8 +27,8 @@ struct ClusterTree {
   std::vector<Cluster> clusters;
 };
 
-/// Builds the tree; leaves have at most `leaf_size` positions, a multiple of `alignment`. With 1 and
-/// 1 the leaves are the patches.
+/// Builds the tree; leaves have at most `leaf_size` positions, a multiple of `alignment`. With 1
+/// and 1 the leaves are the patches.
 ClusterTree build_cluster_tree(
     const PatchTable& patches, std::uint32_t leaf_size,
     std::uint32_t alignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment));

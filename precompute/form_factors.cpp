@@ -9,7 +9,9 @@
 
 #include "closure.h"
 #include "escape.h"
+#include "link_expansion.h"
 #include "rebounce/transfer/error.h"
+#include "refined_links.h"
 #include "row_targets.h"
 #include "shadow_rays.h"
 
@@ -30,7 +32,10 @@ class FormFactorAssembly {
         progress_(progress),
         shadow_rays_(model, tracer, settings.seed, settings.kernel_tolerance) {}
 
-  FormFactors run() {
+  FormFactors run() { return settings_.link_epsilon > 0 ? run_on_links() : run_on_pairs(); }
+
+ private:
+  FormFactors run_on_pairs() {
     const std::size_t n = shadow_rays_.patch_count();
     ExchangeRows rows(n);
     std::vector<Escape> escape(n);
@@ -45,16 +50,33 @@ class FormFactorAssembly {
       refine_row(i, doubtful, scratch, rows[i]);
     });
 
+    return close(rows, escape, target);
+  }
+
+  FormFactors run_on_links() {
+    const RefinedLinks refined =
+        refine_links(model_, shadow_rays_, tracer_, settings_, {}, progress_);
+    ExchangeRows rows =
+        expand_links(refined.tree, shadow_rays_, refined.links, LinkSpread::kKernel, progress_);
+    for (auto& row : rows) {
+      for (ExchangeEntry& entry : row) entry.visibility_variance += kVarianceFloor;
+    }
+    ray_count_ = refined.ray_count;
+    pair_count_ = refined.candidate_count;
+    return close(rows, refined.escape, refined.target);
+  }
+
+  FormFactors close(ExchangeRows& rows, const std::vector<Escape>& escape,
+                    const std::vector<RowTarget>& target) const {
     FormFactors result;
     result.closure = enforce_closure(rows, areas(), target);
     store_escape(rows, escape, result);
     result.exchange = compress_rows(rows);
-    result.ray_count = ray_count_ + n * settings_.escape_rays;
+    result.ray_count = ray_count_ + escape.size() * settings_.escape_rays;
     result.pair_count = pair_count_;
     return result;
   }
 
- private:
   struct Scratch {
     std::vector<FacingPatch> facing, mixed;
     std::vector<Ray> rays;
@@ -190,12 +212,7 @@ class FormFactorAssembly {
 
 FormFactors compute_form_factors(const PatchModel& model, const RayTracer& tracer,
                                  const FormFactorSettings& settings, const Progress& progress) {
-  const auto in_range = [](int rays) {
-    return rays >= 1 && rays <= static_cast<int>(ShadowRays::kPointCount);
-  };
-  if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) || settings.escape_rays < 1) {
-    throw Error("form factors: rays per pair must be between 1 and 64, escape rays at least 1");
-  }
+  check_form_factor_settings(settings);
   return FormFactorAssembly(model, tracer, settings, progress).run();
 }
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <atomic>
 
-#include "rebounce/transfer/error.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {

@@ -20,8 +20,8 @@ enum class LinkSpread : std::uint8_t {
 /// The links as pairs of patches: the upper triangle by rows, columns ascending. Pairs of
 /// two patches come out as they went in, bit by bit.
 ///
-/// Costs time and memory in proportion to the pairs that see each other, some n² / 4, but no rays. Rows are
-/// shared out among OpenMP threads. Throws Cancelled when `progress` says so.
+/// Costs time and memory in proportion to the pairs that see each other, some n² / 4, but no rays.
+/// Rows are shared out among OpenMP threads. Throws Cancelled when `progress` says so.
 ExchangeRows expand_links(const LinkTree& tree, const ShadowRays& shadow_rays,
                           std::span<const Link> links, LinkSpread spread,
                           const Progress& progress = {});

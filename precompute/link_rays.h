@@ -26,8 +26,7 @@ class LinkRays {
 
   /// What `count` <= kMostRays rays between points spread over two nodes say. Two patches have the
   /// rays that ShadowRays gives them.
-  ShadowRays::Visibility trace(std::uint32_t a, std::uint32_t b, int count,
-                               Scratch& scratch) const;
+  ShadowRays::Visibility trace(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
 
  private:
   ShadowRays::Visibility trace_patches(std::uint32_t i, std::uint32_t j, int count,

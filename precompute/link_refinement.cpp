@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdlib>
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
@@ -29,7 +28,7 @@ struct LinkRefinement::Scratch {
 };
 
 LinkRefinement::LinkRefinement(const LinkTree& tree, const ShadowRays& shadow_rays,
-                               const RayTracer& tracer, const LinkSettings& settings)
+                               const RayTracer& tracer, const FormFactorSettings& settings)
     : tree_(tree),
       shadow_rays_(shadow_rays),
       settings_(settings),
@@ -125,7 +124,7 @@ LinkRefinement::Outcome LinkRefinement::link_patches(const Candidate& pair,
 
 double LinkRefinement::allowed_squared(const LinkNode& a, const LinkNode& b) const {
   const double weight_squared = 0.5 * (a.weight * a.weight + b.weight * b.weight);
-  return settings_.epsilon * settings_.epsilon / weight_squared;
+  return settings_.link_epsilon * settings_.link_epsilon / weight_squared;
 }
 
 LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratch& scratch) const {
@@ -134,9 +133,7 @@ LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratc
   const bool smooth = scratch.kernel.residual_squared() < allowed;
   if (smooth && scratch.kernel.unoccluded() == 0) return {};
   // Where k rays agree, the part that does not is some 1 / (k + 2): rule of succession.
-  static const double kUnseen = std::getenv("UNSEEN") ? std::atof(std::getenv("UNSEEN")) : 1.0;
-  const double enough =
-      kUnseen * scratch.kernel.unoccluded() / std::sqrt(a.area * b.area * allowed) - 2;
+  const double enough = std::sqrt(scratch.kernel.norm_squared() / allowed) - 2;
   if (!(enough < LinkRays::kMostRays) || (!smooth && pair.seen)) return split(pair, pair.seen);
   const bool careful = is_doubtful(pair.a) || is_doubtful(pair.b);
   int count = careful ? settings_.full_rays : settings_.probe_rays;
@@ -160,9 +157,8 @@ LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const 
   const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
   if (is_doubtful(pair.a) && !a.is_leaf()) return {.kind = Outcome::Kind::kSplitA, .link = {}};
   if (is_doubtful(pair.b) && !b.is_leaf()) return {.kind = Outcome::Kind::kSplitB, .link = {}};
-  const double exchange_squared = kernel.unoccluded() * kernel.unoccluded() / (a.area * b.area);
   const double error_squared = visible.part * visible.part * kernel.residual_squared() +
-                               visible.part * (1 - visible.part) * exchange_squared;
+                               visible.part * (1 - visible.part) * kernel.norm_squared();
   if (!(error_squared < allowed_squared(a, b))) return split(pair, false);
   return make_link(pair, kernel, visible);
 }
@@ -184,7 +180,8 @@ LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const P
 LinkRefinement::Outcome LinkRefinement::split(const Candidate& pair, bool seen) const {
   const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
   const bool first = b.is_leaf() || (!a.is_leaf() && a.radius >= b.radius);
-  return {.kind = first ? Outcome::Kind::kSplitA : Outcome::Kind::kSplitB, .seen = seen, .link = {}};
+  return {
+      .kind = first ? Outcome::Kind::kSplitA : Outcome::Kind::kSplitB, .seen = seen, .link = {}};
 }
 
 /// Merges the outcomes in order; what is split makes the next generation.

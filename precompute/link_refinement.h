@@ -7,7 +7,7 @@
 #include "link_rays.h"
 #include "link_tree.h"
 #include "pair_kernel.h"
-#include "rebounce/precompute/links.h"
+#include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "shadow_rays.h"
@@ -26,25 +26,25 @@ struct Link {
 };
 
 /// Hierarchical refinement (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical radiosity
-/// algorithm", SIGGRAPH 1991): a pair of nodes is linked where what it is taken for is near enough to
-/// what it is, and otherwise the node that is larger as seen from the other is split.
+/// algorithm", SIGGRAPH 1991): a pair of nodes is linked where what it is taken for is near enough
+/// to what it is, and otherwise the node that is larger as seen from the other is split.
 ///
 /// What differs. The kernel is taken as affine over either node and not as constant, so that
 /// fewer links do. Its error is that of all its entries in the sense of Frobenius,
 ///   sqrt(area_a area_b variance of (kernel x visibility) about what it is taken for),
-/// found from the kernel between the nodes' cells; what cannot be told from cells, that patches in one
-/// cell face different ways, counts as error. Rays between stratified points find the visibility; a pair
-/// gets the more rays the more it exchanges, so that what they may have missed is below epsilon
-/// too, and pairs of which nothing is seen end there. Pairs of patches have the kernel and the
-/// rays that they have when all pairs are looked at.
+/// found from the kernel between the nodes' cells; what cannot be told from cells, that patches in
+/// one cell face different ways, counts as error. Rays between stratified points find the
+/// visibility; a pair gets the more rays the more it exchanges, so that what they may have missed
+/// is below link_epsilon too, and pairs of which nothing is seen end there. Pairs of patches have
+/// the kernel and the rays that they have when all pairs are looked at.
 ///
-/// Pairs are refined in generations, each shared out among OpenMP threads; the bits do not depend on
-/// how many there are. Throws Cancelled when a `progress` says so.
+/// Pairs are refined in generations, each shared out among OpenMP threads; the bits do not depend
+/// on how many there are. Throws Cancelled when a `progress` says so.
 class LinkRefinement {
  public:
   /// Refers to all but the settings' values, which must outlive it.
   LinkRefinement(const LinkTree& tree, const ShadowRays& shadow_rays, const RayTracer& tracer,
-                 const LinkSettings& settings);
+                 const FormFactorSettings& settings);
 
   /// Refines from the root.
   void run(const Progress& progress);
@@ -88,13 +88,11 @@ class LinkRefinement {
                               const std::vector<Outcome>& outcomes);
   void append_children(const Candidate& pair, const Outcome& outcome,
                        std::vector<Candidate>& next) const;
-  bool is_doubtful(std::uint32_t node) const {
-    return !doubtful_.empty() && doubtful_[node] != 0;
-  }
+  bool is_doubtful(std::uint32_t node) const { return !doubtful_.empty() && doubtful_[node] != 0; }
 
   const LinkTree& tree_;
   const ShadowRays& shadow_rays_;
-  const LinkSettings settings_;
+  const FormFactorSettings settings_;
   const LinkRays rays_;
   std::vector<Link> links_;
   std::vector<std::uint8_t> doubtful_;  ///< [nodes] holds a doubtful patch; empty: none does

@@ -82,8 +82,7 @@ std::vector<double> scale_links(const LinkTree& tree, const ShadowRays& shadow_r
       const double row = factor[i] * sum[i];
       worst = std::max(worst, std::abs(row - wanted[i]));
       if (row <= 0 || wanted[i] <= 0) continue;
-      factor[i] =
-          std::clamp(factor[i] * std::sqrt(wanted[i] / row), kLeastFactor, kGreatestFactor);
+      factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row), kLeastFactor, kGreatestFactor);
     }
     if (worst < kScaled) break;
     sum = gather_links(tree, shadow_rays, links, factor);

@@ -34,8 +34,7 @@ double highest_along(const glm::dvec3& axis, const LinkNode& b) {
 /// Nothing of `b` is before the plane of any patch of `a`.
 bool is_behind(const LinkNode& a, const LinkNode& b) {
   if (a.is_flat()) {
-    return highest_along(a.axis, b) <=
-           a.lowest + kPlaneTolerance * std::max(a.radius, b.radius);
+    return highest_along(a.axis, b) <= a.lowest + kPlaneTolerance * std::max(a.radius, b.radius);
   }
   const glm::dvec3 d = b.center - a.center;
   const double distance = glm::length(d), reach = a.radius + b.radius;
@@ -115,9 +114,8 @@ void LinkTree::bound(LinkNode& node, const ShadowRays& shadow_rays,
 void LinkTree::choose_cells(std::uint32_t node) {
   std::vector<std::uint32_t> cells = {node};
   while (cells.size() < kCellCount) {
-    const auto largest = std::ranges::max_element(cells, {}, [&](std::uint32_t c) {
-      return nodes_[c].is_leaf() ? 0.0 : nodes_[c].area;
-    });
+    const auto largest = std::ranges::max_element(
+        cells, {}, [&](std::uint32_t c) { return nodes_[c].is_leaf() ? 0.0 : nodes_[c].area; });
     const std::uint32_t first = nodes_[*largest].first_child;
     if (first == kNone) break;
     *largest = first;

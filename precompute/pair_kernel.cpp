@@ -10,17 +10,21 @@ namespace {
 // Cells nearer to each other than this, in sums of their radii, are too near for the kernel between
 // their centres.
 constexpr double kNear = 1.0;
-// Patches nearer than this get the kernel of patches instead.
-constexpr double kNearPatches = 4.0;
+// Patches nearer than this get the kernel of patches instead, with this tolerance.
+constexpr double kNearPatches = 3.0, kPatchTolerance = 1e-2;
+// Nodes nearer to each other than this are not worth a look: their kernel is never nearly affine.
+constexpr double kTouching = 0.75;
 
 }  // namespace
 
 bool PairKernel::estimate(std::uint32_t a, std::uint32_t b) {
+  const double reach = kTouching * (tree_[a].radius + tree_[b].radius);
+  if (glm::distance(tree_[a].center, tree_[b].center) < reach) return false;
   const Cells cells_a = tree_.cells(a), cells_b = tree_.cells(b);
   if (!fill(cells_a, cells_b)) return false;
   fit(tree_[a], cells_a, tree_[b], cells_b);
   limit(tree_[a], cells_a, tree_[b], cells_b);
-  residual_squared_ = uncertain_ + residual(tree_[a], cells_a, tree_[b], cells_b);
+  measure(tree_[a], cells_a, tree_[b], cells_b);
   return true;
 }
 
@@ -62,7 +66,7 @@ bool PairKernel::fill(const LinkNode& p, const LinkNode& q, double& kernel) {
 
 double PairKernel::exchange_of_patches(const LinkNode& p, const LinkNode& q) const {
   const std::uint32_t i = tree_.leaf_patch(p), j = tree_.leaf_patch(q);
-  return shadow_rays_.unoccluded(std::min(i, j), std::max(i, j));
+  return shadow_rays_.unoccluded(std::min(i, j), std::max(i, j), kPatchTolerance);
 }
 
 /// Least squares: the mean of the kernel, and its first moments over either node.
@@ -100,23 +104,23 @@ double PairKernel::fall(const LinkNode& node, Cells cells, const glm::dvec3& gra
   return most;
 }
 
-double PairKernel::residual(const LinkNode& a, Cells cells_a, const LinkNode& b,
-                            Cells cells_b) const {
+void PairKernel::measure(const LinkNode& a, Cells cells_a, const LinkNode& b, Cells cells_b) {
   const double scale = 1 / (a.area * b.area);
   std::array<double, LinkTree::kCellCount> part_b;
   for (std::size_t q = 0; q < cells_b.size(); ++q) {
     part_b[q] = glm::dot(gradient_b_, tree_[cells_b[q]].center - b.center);
   }
-  double sum = 0;
+  residual_squared_ = norm_squared_ = uncertain_;
   std::size_t k = 0;
   for (const std::uint32_t p : cells_a) {
     const double part_a = unoccluded_ + glm::dot(gradient_a_, tree_[p].center - a.center);
-    for (std::size_t q = 0; q < cells_b.size(); ++q) {
-      const double error = kernel_[k++] - scale * (part_a + part_b[q]);
-      sum += tree_[p].area * tree_[cells_b[q]].area * error * error;
+    for (std::size_t q = 0; q < cells_b.size(); ++q, ++k) {
+      const double error = kernel_[k] - scale * (part_a + part_b[q]);
+      const double area = tree_[p].area * tree_[cells_b[q]].area;
+      residual_squared_ += area * error * error;
+      norm_squared_ += area * kernel_[k] * kernel_[k];
     }
   }
-  return sum;
 }
 
 }  // namespace rebounce

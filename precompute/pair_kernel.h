@@ -21,12 +21,15 @@ class PairKernel {
   /// else holds.
   bool estimate(std::uint32_t a, std::uint32_t b);
 
-  double unoccluded() const { return unoccluded_; }  ///< exchange area, m²
+  double unoccluded() const { return unoccluded_; }             ///< exchange area, m²
   const glm::dvec3& gradient_a() const { return gradient_a_; }  ///< of it, m; see Link
   const glm::dvec3& gradient_b() const { return gradient_b_; }
 
   /// The integral over both nodes of (kernel - what it is taken for)², of dimension 1.
   double residual_squared() const { return residual_squared_; }
+
+  /// The integral of kernel² likewise.
+  double norm_squared() const { return norm_squared_; }
 
  private:
   using Cells = std::span<const std::uint32_t>;
@@ -37,13 +40,13 @@ class PairKernel {
   void fit(const LinkNode& a, Cells cells_a, const LinkNode& b, Cells cells_b);
   void limit(const LinkNode& a, Cells cells_a, const LinkNode& b, Cells cells_b);
   double fall(const LinkNode& node, Cells cells, const glm::dvec3& gradient) const;
-  double residual(const LinkNode& a, Cells cells_a, const LinkNode& b, Cells cells_b) const;
+  void measure(const LinkNode& a, Cells cells_a, const LinkNode& b, Cells cells_b);
 
   const LinkTree& tree_;
   const ShadowRays& shadow_rays_;
   std::array<double, LinkTree::kCellCount * LinkTree::kCellCount> kernel_;  ///< of cells, 1/m²
   double uncertain_ = 0;  ///< integral of the kernel's variance within cells
-  double unoccluded_ = 0, residual_squared_ = 0;
+  double unoccluded_ = 0, residual_squared_ = 0, norm_squared_ = 0;
   glm::dvec3 gradient_a_{0}, gradient_b_{0};
 };
 

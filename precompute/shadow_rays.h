@@ -33,7 +33,10 @@ class ShadowRays {
   const FlatTriangle& triangle(std::size_t patch) const { return triangles_[patch]; }
 
   /// Exchange area in m² of two patches with nothing between them; 0 for a patch with itself.
-  double unoccluded(std::uint32_t i, std::uint32_t j) const;
+  double unoccluded(std::uint32_t i, std::uint32_t j) const {
+    return unoccluded(i, j, kernel_tolerance_);
+  }
+  double unoccluded(std::uint32_t i, std::uint32_t j, double tolerance) const;
 
   /// Point `k` of those spread over a patch, moved off its surface; k counts modulo kPointCount.
   const Float3& point(std::uint32_t patch, std::uint32_t k) const {
@@ -74,11 +77,11 @@ class ShadowRays {
   std::vector<Float3> points_;           ///< [n][kPointCount], moved off the surface
 };
 
-inline double ShadowRays::unoccluded(std::uint32_t i, std::uint32_t j) const {
+inline double ShadowRays::unoccluded(std::uint32_t i, std::uint32_t j, double tolerance) const {
   const FlatTriangle &a = triangles_[i], &b = triangles_[j];
   const glm::dvec3 d = b.centroid - a.centroid;
   if (glm::dot(a.normal, d) + b.radius <= 0 || a.radius - glm::dot(b.normal, d) <= 0) return 0;
-  return unoccluded_exchange_area(a, b, kernel_tolerance_);
+  return unoccluded_exchange_area(a, b, tolerance);
 }
 
 template <typename Wanted>
