@@ -50,7 +50,8 @@ class OfflineStage {
         model_(make_patch_model(import_gltf(scene), options.settings.subdivision)),
         tracer_(model_.mesh.position,
                 std::span(model_.mesh.triangle).first(model_.mesh.surface_count())),
-        shadow_rays_(model_, tracer_, ff_settings().seed, ff_settings().kernel_tolerance),
+        geometry_(model_, tracer_, ff_settings().seed),
+        shadow_rays_(geometry_, ff_settings().seed, ff_settings().kernel_tolerance),
         matrix_(test_matrix(model_.patches.size())) {}
 
   void measure() {
@@ -128,7 +129,7 @@ class OfflineStage {
     {
       std::vector<FacingPatch> facing;
 #pragma omp for schedule(dynamic, 4)
-      for (std::size_t i = 0; i < shadow_rays_.patch_count(); i += row_step_) {
+      for (std::size_t i = 0; i < geometry_.patch_count(); i += row_step_) {
         shadow_rays_.find_facing(static_cast<std::uint32_t>(i), facing,
                                  [](std::uint32_t) { return true; });
         pairs += facing.size();
@@ -198,6 +199,7 @@ class OfflineStage {
   const OfflineOptions& options_;
   PatchModel model_;
   RayTracer tracer_;
+  PatchGeometry geometry_;
   ShadowRays shadow_rays_;
   TiledMatrix matrix_;
   BuildReport report_;

@@ -16,11 +16,13 @@ std::uint64_t hidden_among(std::span<const Ray> rays) {
 
 StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
                           const FormFactorSettings& settings, std::uint32_t row_step) {
-  const ShadowRays shadow_rays(model, tracer, settings.seed, settings.kernel_tolerance);
+  const PatchTriangles patch_triangles(model.mesh.triangle_patch, model.patches.size());
+  const PatchGeometry geometry(model, tracer, settings.seed);
+  const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
   StageRays result;
   std::vector<FacingPatch> facing, mixed;
   std::vector<Ray> rays;
-  std::vector<Hit> hits;
+  EscapeScratch escape;
   const auto add_shadow_stream = [&](std::uint32_t row, const std::vector<FacingPatch>& pairs,
                                      int count) {
     shadow_rays.make_rays(row, pairs, count, rays);
@@ -29,7 +31,7 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
     tracer.occluded(rays);
     result.hidden_count += hidden_among(rays);
   };
-  for (std::uint32_t row = 0; row < shadow_rays.patch_count(); row += row_step) {
+  for (std::uint32_t row = 0; row < geometry.patch_count(); row += row_step) {
     shadow_rays.find_facing(row, facing, [](std::uint32_t) { return true; });
     add_shadow_stream(row, facing, settings.probe_rays);
     mixed.clear();
@@ -40,10 +42,10 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
       if (hidden > 0 && hidden < probe_rays) mixed.push_back(facing[p]);
     }
     add_shadow_stream(row, mixed, settings.full_rays);
-    measure_escape(model, shadow_rays.triangle(row), row, tracer, settings.escape_rays,
-                   settings.seed, rays, hits);
-    result.escape.push_back(rays);
-    result.escape_count += rays.size();
+    measure_escape(model.mesh, patch_triangles[row], row, tracer, settings.escape_rays,
+                   settings.seed, escape);
+    result.escape.push_back(escape.rays);
+    result.escape_count += escape.rays.size();
   }
   return result;
 }

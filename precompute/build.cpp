@@ -11,6 +11,7 @@
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/links.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/reconstruction_weights.h"
@@ -132,6 +133,8 @@ std::string settings_json(const BuildSettings& settings) {
                         {"probe_rays", f.probe_rays},
                         {"full_rays", f.full_rays},
                         {"escape_rays", f.escape_rays},
+                        {"link_epsilon", f.link_epsilon},
+                        {"store_links", settings.store_links},
                         {"kernel_tolerance", f.kernel_tolerance}}
       .dump();
 }
@@ -150,6 +153,7 @@ std::string report_json(const BuildReport& report) {
                         {"rays", report.ray_count},
                         {"pairs", report.pair_count},
                         {"form_factors", report.form_factor_count},
+                        {"links", report.link_count},
                         {"row_sum_error_before", report.closure.row_sum_error_before},
                         {"row_sum_error_after", report.closure.row_sum_error_after},
                         {"closure_change", report.closure.relative_change},
@@ -164,6 +168,12 @@ void check_residual(double residual, Precision precision) {
       fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
                   "please report this scene",
                   residual, largest));
+}
+
+FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
+                           FormFactorSettings settings, const Progress& progress) {
+  if (settings.link_epsilon == 0) settings.link_epsilon = kLinkEpsilon;
+  return build_links(model, tracer, settings, {}, progress).links;
 }
 
 // The scene of a file, with what is plainly seen from behind made double-sided.
@@ -213,6 +223,12 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   report.pair_count = form_factors.pair_count;
   report.form_factor_count = form_factors.exchange.column.size();
   report.closure = form_factors.closure;
+  if (settings.store_links) {
+    data.links = clock.run("links", [&](const Progress& part) {
+      return find_links(model, tracer, settings.form_factors, part);
+    });
+    report.link_count = data.links.pair.size();
+  }
   data.patches = std::move(model.patches);
   data.patches.sky_visibility = std::move(form_factors.sky_visibility);
   data.patches.absorbed = std::move(form_factors.absorbed);

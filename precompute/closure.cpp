@@ -27,7 +27,7 @@ class NormalEquations {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (const ExchangeEntry& entry : rows[i]) {
         diagonal_[i] += entry.variance();
-        diagonal_[entry.column] += entry.variance();
+        if (entry.column != i) diagonal_[entry.column] += entry.variance();
       }
     }
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -70,6 +70,7 @@ class NormalEquations {
       double sum = 0;
       for (const ExchangeEntry& entry : rows_[i]) {
         const double v = entry.variance();
+        if (entry.column == i) continue;  // all of it is in the diagonal
         sum += v * x[entry.column];
         y[entry.column] += v * x[i];
       }
@@ -96,7 +97,7 @@ std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> a
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (const ExchangeEntry& entry : rows[i]) {
       sum[i] += entry.exchange_area;
-      sum[entry.column] += entry.exchange_area;
+      if (entry.column != i) sum[entry.column] += entry.exchange_area;
     }
   }
   for (std::size_t i = 0; i < sum.size(); ++i) sum[i] /= area[i];
@@ -125,8 +126,8 @@ ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (std::size_t k = 0; k < rows[i].size(); ++k) {
         ExchangeEntry& entry = rows[i][k];
-        const double wanted =
-            entry.exchange_area + entry.variance() * (multiplier[i] + multiplier[entry.column]);
+        const double both = multiplier[i] + (entry.column == i ? 0 : multiplier[entry.column]);
+        const double wanted = entry.exchange_area + entry.variance() * both;
         entry.exchange_area =
             std::clamp(static_cast<float>(wanted), kLeastPart * original[i][k],
                        std::max(kGreatestPart * original[i][k], entry.unoccluded_area));

@@ -27,12 +27,16 @@ void fill_system(const ExchangeMatrix& exchange, const PatchTable& patches,
                  const std::vector<double>& root, TiledMatrix& system) {
   const std::size_t n = patches.size();
   for (std::size_t i = 0; i < n; ++i) {
-    system.at(i, i) = 1;
+    system.at(i, i) += 1;
     for (std::uint64_t k = exchange.row_begin[i]; k < exchange.row_begin[i + 1]; ++k) {
       const std::size_t j = exchange.column[k];
       const double g = exchange.exchange_area[k] /
                        std::sqrt(static_cast<double>(patches.area[i]) * patches.area[j]);
       const double value = -root[i] * g * root[j];
+      if (i == j) {
+        system.at(i, i) += value;
+        continue;
+      }
       system.at(j, i) = value;
       if (j / TiledMatrix::kTile == i / TiledMatrix::kTile) system.at(i, j) = value;
     }

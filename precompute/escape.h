@@ -4,8 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/precompute/form_factor_kernel.h"
-#include "rebounce/precompute/patch_model.h"
+#include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
@@ -16,10 +15,17 @@ struct Escape {
   double absorbed = 0;  ///< meets the back of a one-sided surface
 };
 
-/// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over it. `rays` and `hits` are scratch; afterwards they hold what was traced.
-Escape measure_escape(const PatchModel& model, const FlatTriangle& triangle, std::uint32_t patch,
-                      const RayTracer& tracer, int ray_count, std::uint64_t seed,
-                      std::vector<Ray>& rays, std::vector<Hit>& hits);
+/// Room for the work of measure_escape; afterwards `rays` and `hits` hold what was traced.
+struct EscapeScratch {
+  std::vector<PatchPoint> points;
+  std::vector<Ray> rays;
+  std::vector<Hit> hits;
+};
+
+/// Measures the escape of patch `patch` of `mesh` by `ray_count` cosine-distributed rays from
+/// points spread over its `triangles`.
+Escape measure_escape(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
+                      std::uint32_t patch, const RayTracer& tracer, int ray_count,
+                      std::uint64_t seed, EscapeScratch& scratch);
 
 }  // namespace rebounce

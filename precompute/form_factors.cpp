@@ -30,22 +30,25 @@ class FormFactorAssembly {
         tracer_(tracer),
         settings_(settings),
         progress_(progress),
-        shadow_rays_(model, tracer, settings.seed, settings.kernel_tolerance) {}
+        patch_triangles_(model.mesh.triangle_patch, model.patches.size()),
+        geometry_(model, tracer, settings.seed),
+        shadow_rays_(geometry_, settings.seed, settings.kernel_tolerance) {}
 
   FormFactors run() { return settings_.link_epsilon > 0 ? run_on_links() : run_on_pairs(); }
 
  private:
   FormFactors run_on_pairs() {
-    const std::size_t n = shadow_rays_.patch_count();
+    const std::size_t n = geometry_.patch_count();
     ExchangeRows rows(n);
     std::vector<Escape> escape(n);
     for_each_patch(0.0, 0.8, [&](std::uint32_t i, Scratch& scratch) {
       compute_row(i, scratch, rows[i]);
-      escape[i] = measure_escape(model_, shadow_rays_.triangle(i), i, tracer_,
-                                 settings_.escape_rays, settings_.seed, scratch.rays, scratch.hits);
+      escape[i] = measure_escape(model_.mesh, patch_triangles_[i], i, tracer_,
+                                 settings_.escape_rays, settings_.seed, scratch.escape);
     });
     const std::vector<RowTarget> target = row_targets(escape, settings_.escape_rays);
-    const std::vector<bool> doubtful = find_doubtful_rows(row_sums(rows, areas()), target);
+    const std::vector<bool> doubtful =
+        find_doubtful_rows(row_sums(rows, geometry_.areas()), target);
     for_each_patch(0.8, 1.0, [&](std::uint32_t i, Scratch& scratch) {
       refine_row(i, doubtful, scratch, rows[i]);
     });
@@ -69,7 +72,7 @@ class FormFactorAssembly {
   FormFactors close(ExchangeRows& rows, const std::vector<Escape>& escape,
                     const std::vector<RowTarget>& target) const {
     FormFactors result;
-    result.closure = enforce_closure(rows, areas(), target);
+    result.closure = enforce_closure(rows, geometry_.areas(), target);
     store_escape(rows, escape, result);
     result.exchange = compress_rows(rows);
     result.ray_count = ray_count_ + escape.size() * settings_.escape_rays;
@@ -80,14 +83,14 @@ class FormFactorAssembly {
   struct Scratch {
     std::vector<FacingPatch> facing, mixed;
     std::vector<Ray> rays;
-    std::vector<Hit> hits;
+    EscapeScratch escape;
   };
 
   /// Runs `work` for every patch on all threads, with progress; throws Cancelled if asked to.
   /// The work is the part from `begin` to `end` of the whole.
   template <typename Work>
   void for_each_patch(double begin, double end, const Work& work) {
-    const std::size_t n = shadow_rays_.patch_count();
+    const std::size_t n = geometry_.patch_count();
     std::atomic<bool> stop = false;
     std::atomic<std::size_t> rows_done = 0;
 #pragma omp parallel
@@ -165,18 +168,10 @@ class FormFactorAssembly {
                    static_cast<float>(variance + kVarianceFloor)});
   }
 
-  std::vector<double> areas() const {
-    std::vector<double> area;
-    const std::size_t n = shadow_rays_.patch_count();
-    area.reserve(n);
-    for (std::size_t i = 0; i < n; ++i) area.push_back(shadow_rays_.triangle(i).area);
-    return area;
-  }
-
   /// What the rows of F leave of 1 is what escapes; its parts are shared as they were measured.
   void store_escape(const ExchangeRows& rows, const std::vector<Escape>& escape,
                     FormFactors& result) const {
-    const std::vector<double> sum = row_sums(rows, areas());
+    const std::vector<double> sum = row_sums(rows, geometry_.areas());
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const double rest = std::max(0.0, 1 - sum[i]), lost = escape[i].sky + escape[i].absorbed;
       const double sky = lost > 0 ? rest * escape[i].sky / lost : 0;
@@ -204,6 +199,8 @@ class FormFactorAssembly {
   const RayTracer& tracer_;
   const FormFactorSettings& settings_;
   const Progress& progress_;
+  const PatchTriangles patch_triangles_;
+  const PatchGeometry geometry_;
   const ShadowRays shadow_rays_;
   std::atomic<std::uint64_t> ray_count_ = 0, pair_count_ = 0;
 };

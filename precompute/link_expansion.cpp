@@ -56,14 +56,14 @@ class LinkExpansion {
     begin_.assign(tree_.nodes().size() + 1, 0);
     for (const Link& link : links_) {
       ++begin_[link.a + 1];
-      ++begin_[link.b + 1];
+      if (link.a != link.b) ++begin_[link.b + 1];
     }
     for (std::size_t k = 1; k < begin_.size(); ++k) begin_[k] += begin_[k - 1];
     directed_.resize(begin_.back());
     std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
     for (std::uint32_t k = 0; k < links_.size(); ++k) {
       directed_[next[links_[k].a]++] = {k, true};
-      directed_[next[links_[k].b]++] = {k, false};
+      if (links_[k].a != links_[k].b) directed_[next[links_[k].b]++] = {k, false};
     }
   }
 
@@ -75,7 +75,7 @@ class LinkExpansion {
         if (link.exchange_area <= 0) continue;
         const LinkNode& other = tree_[directed_[k].from_a ? link.b : link.a];
         for (const std::uint32_t j : tree_.patches(other)) {
-          if (j > i) append(link, directed_[k].from_a, i, j, row);
+          if (j >= i) append(link, directed_[k].from_a, i, j, row);
         }
       }
     }
@@ -99,7 +99,8 @@ class LinkExpansion {
 
   double affine(const Link& link, std::uint32_t in_a, std::uint32_t in_b) const {
     const LinkNode &a = tree_[link.a], &b = tree_[link.b];
-    const FlatTriangle &x = shadow_rays_.triangle(in_a), &y = shadow_rays_.triangle(in_b);
+    const PatchPart &x = shadow_rays_.geometry().parts(in_a, 0)[0],
+                    &y = shadow_rays_.geometry().parts(in_b, 0)[0];
     return x.area * y.area / (a.area * b.area) *
            (link.exchange_area + glm::dot(to_dvec3(link.gradient_a), x.centroid - a.center) +
             glm::dot(to_dvec3(link.gradient_b), y.centroid - b.center));

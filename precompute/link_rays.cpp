@@ -7,6 +7,11 @@
 #include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
+namespace {
+
+constexpr std::uint32_t kPoints = ShadowRays::kPointCount;
+
+}  // namespace
 
 ShadowRays::Visibility LinkRays::trace(std::uint32_t a, std::uint32_t b, int count,
                                        Scratch& scratch) const {
@@ -28,7 +33,7 @@ ShadowRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, i
   const std::uint64_t hash =
       mix_bits(seed_ * 0x9E3779B9ULL + ((static_cast<std::uint64_t>(a) << 32) | b));
   const glm::dvec2 shift = unit_square(mix_bits(hash));
-  const auto first = static_cast<std::uint32_t>(hash % ShadowRays::kPointCount);
+  const auto first = static_cast<std::uint32_t>(hash % kPoints);
   scratch.rays.resize(count);
   std::array<double, kMostRays> weight;
   for (int k = 0; k < count; ++k) {
@@ -36,15 +41,16 @@ ShadowRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, i
     const int other = (19 * k + static_cast<int>(first)) % count;
     const std::uint32_t i = tree_.patch_at(tree_[a], (k + shift.x) / count),
                         j = tree_.patch_at(tree_[b], (other + shift.y) / count);
-    const Float3 &x = shadow_rays_.point(i, first + k), &y = shadow_rays_.point(j, first + 7 * k);
+    const PatchPoint &x = shadow_rays_.geometry().points(i)[(first + k) % kPoints],
+                     &y = shadow_rays_.geometry().points(j)[(first + 7 * k) % kPoints];
     Ray& ray = scratch.rays[k];
     ray = Ray{};
-    ray.origin = x;
+    ray.origin = x.position;
     ray.t_near = 0;
-    ray.direction = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
+    ray.direction = to_float3(to_glm(y.position) - to_glm(x.position));
     ray.t_far = 1;
-    weight[k] = point_kernel(to_dvec3(x), shadow_rays_.triangle(i).normal, to_dvec3(y),
-                             shadow_rays_.triangle(j).normal);
+    weight[k] = point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
+                             to_dvec3(y.normal));
   }
   tracer_.occluded(scratch.rays);
   return ShadowRays::visible_part(scratch.rays, std::span(weight).first(count));

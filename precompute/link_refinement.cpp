@@ -52,7 +52,8 @@ void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& p
   std::erase_if(links_, [&](const Link& link) {
     if (!is_doubtful(link.a) && !is_doubtful(link.b)) return false;
     again.push_back({link.a, link.b, false});
-    done_ -= 2 * tree_[link.a].area * tree_[link.b].area / (tree_[0].area * tree_[0].area);
+    done_ -= (link.a == link.b ? 1 : 2) * tree_[link.a].area * tree_[link.b].area /
+             (tree_[0].area * tree_[0].area);
     return true;
   });
   refine(std::move(again), progress);
@@ -90,8 +91,9 @@ void LinkRefinement::decide(const std::vector<Candidate>& generation,
 
 LinkRefinement::Outcome LinkRefinement::decide(const Candidate& pair, Scratch& scratch) const {
   const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
-  if (pair.a == pair.b) return a.is_leaf() || is_plane(a) ? Outcome{} : split(pair, false);
-  if (cannot_exchange(a, b)) return {};
+  if (pair.a == pair.b && !a.is_leaf()) return is_plane(a) ? Outcome{} : split(pair, false);
+  if (pair.a == pair.b && shadow_rays_.geometry().bounds(tree_.leaf_patch(a)).is_flat()) return {};
+  if (pair.a != pair.b && cannot_exchange(a, b)) return {};
   if (a.is_leaf() && b.is_leaf()) return link_patches(pair, scratch);
   if (!scratch.kernel.estimate(pair.a, pair.b)) return split(pair, pair.seen);
   return link_nodes(pair, scratch);

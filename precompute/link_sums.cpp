@@ -23,8 +23,8 @@ struct Moments {
 
 }  // namespace
 
-std::vector<double> gather_links(const LinkTree& tree, const ShadowRays& shadow_rays,
-                                 std::span<const Link> links, std::span<const double> x) {
+std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> links,
+                                 std::span<const double> x) {
   const auto nodes = tree.nodes();
   std::vector<Moments> mean(nodes.size()), arrived(nodes.size());
   for (std::size_t k = nodes.size(); k-- > 0;) {
@@ -47,6 +47,7 @@ std::vector<double> gather_links(const LinkTree& tree, const ShadowRays& shadow_
   };
   for (const Link& link : links) {
     add(link.a, link.b, link.exchange_area, link.gradient_a, link.gradient_b);
+    if (link.a == link.b) continue;
     add(link.b, link.a, link.exchange_area, link.gradient_b, link.gradient_a);
   }
   std::vector<double> out(x.size());
@@ -54,7 +55,7 @@ std::vector<double> gather_links(const LinkTree& tree, const ShadowRays& shadow_
     const LinkNode& node = nodes[k];
     if (node.is_leaf()) {
       const std::uint32_t patch = tree.leaf_patch(node);
-      out[patch] = arrived[k].sum / shadow_rays.triangle(patch).area;
+      out[patch] = arrived[k].sum / node.area;
       continue;
     }
     for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
@@ -67,10 +68,10 @@ std::vector<double> gather_links(const LinkTree& tree, const ShadowRays& shadow_
   return out;
 }
 
-std::vector<double> scale_links(const LinkTree& tree, const ShadowRays& shadow_rays,
-                                std::span<const Link> links, std::span<const RowTarget> target) {
+std::vector<double> scale_links(const LinkTree& tree, std::span<const Link> links,
+                                std::span<const RowTarget> target) {
   std::vector<double> factor(target.size(), 1.0), wanted(target.size());
-  std::vector<double> sum = gather_links(tree, shadow_rays, links, factor);
+  std::vector<double> sum = gather_links(tree, links, factor);
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const double variance = kSumDeviation * kSumDeviation,
                  uncertain = target[i].deviation * target[i].deviation;
@@ -85,7 +86,7 @@ std::vector<double> scale_links(const LinkTree& tree, const ShadowRays& shadow_r
       factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row), kLeastFactor, kGreatestFactor);
     }
     if (worst < kScaled) break;
-    sum = gather_links(tree, shadow_rays, links, factor);
+    sum = gather_links(tree, links, factor);
   }
   return factor;
 }

@@ -3,7 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numbers>
 
 #include "cluster_tree.h"
 
@@ -18,6 +18,19 @@ constexpr double kPlaneTolerance = 1e-7;
 
 // Directions in which a node is thinner than this part of its size have no gradient.
 constexpr double kThin = 1e-3;
+
+// A mean normal shorter than this is rounding.
+constexpr double kNoAxis = 1e-6;
+
+void enclose(const FlatTriangle& t, LinkNode& node) {
+  node.cone_cosine = std::min(node.cone_cosine, glm::dot(node.axis, t.normal));
+  for (const glm::dvec3& v : t.vertex) {
+    node.low = glm::min(node.low, v);
+    node.high = glm::max(node.high, v);
+    node.lowest = std::min(node.lowest, glm::dot(node.axis, v));
+    node.highest = std::max(node.highest, glm::dot(node.axis, v));
+  }
+}
 
 /// The greatest value of dot(axis, x) over node `b`, whichever of its bounds knows best.
 double highest_along(const glm::dvec3& axis, const LinkNode& b) {
@@ -54,13 +67,13 @@ bool cannot_exchange(const LinkNode& a, const LinkNode& b) {
   return is_behind(a, b) || is_behind(b, a);
 }
 
-LinkTree::LinkTree(const PatchModel& model, const ShadowRays& shadow_rays,
+LinkTree::LinkTree(const PatchModel& model, const PatchGeometry& geometry,
                    std::span<const float> weight) {
   ClusterTree tree = build_cluster_tree(model.patches, 1, 1);
   patch_ = std::move(tree.patch);
   area_before_.resize(patch_.size() + 1);
   for (std::size_t k = 0; k < patch_.size(); ++k) {
-    area_before_[k + 1] = area_before_[k] + shadow_rays.triangle(patch_[k]).area;
+    area_before_[k + 1] = area_before_[k] + geometry.area(patch_[k]);
   }
   nodes_.resize(tree.clusters.size());
 #pragma omp parallel for schedule(dynamic, 64)
@@ -68,7 +81,7 @@ LinkTree::LinkTree(const PatchModel& model, const ShadowRays& shadow_rays,
     nodes_[k].begin = tree.clusters[k].begin;
     nodes_[k].count = tree.clusters[k].count;
     nodes_[k].first_child = tree.clusters[k].first_child;
-    bound(nodes_[k], shadow_rays, weight);
+    bound(nodes_[k], geometry, weight);
   }
   cell_begin_ = {0};
   for (std::uint32_t k = 0; k < nodes_.size(); ++k) {
@@ -77,36 +90,27 @@ LinkTree::LinkTree(const PatchModel& model, const ShadowRays& shadow_rays,
   }
 }
 
-void LinkTree::bound(LinkNode& node, const ShadowRays& shadow_rays,
+void LinkTree::bound(LinkNode& node, const PatchGeometry& geometry,
                      std::span<const float> weight) const {
-  const auto members = patches(node);
   double weight_squared = 0;
-  for (const std::uint32_t patch : members) {
-    const FlatTriangle& t = shadow_rays.triangle(patch);
-    node.area += t.area;
-    node.center += t.area * t.centroid;
-    node.normal += t.area * t.normal;
-    const double w = weight.empty() ? 1 : weight[patch];
-    weight_squared += t.area * w * w;
+  for (const std::uint32_t patch : patches(node)) {
+    const double area = geometry.area(patch), w = weight.empty() ? 1 : weight[patch];
+    node.area += area;
+    weight_squared += area * w * w;
+    for (const FlatTriangle& t : geometry.triangles(patch)) {
+      node.center += t.area * t.centroid;
+      node.normal += t.area * t.normal;
+    }
   }
   node.center /= node.area;
   node.normal /= node.area;
   node.weight = std::sqrt(weight_squared / node.area);
   const double length = glm::length(node.normal);
-  if (length > 1e-6) node.axis = node.normal / length;
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  node.low = glm::dvec3(kInfinity), node.high = -node.low;
-  node.lowest = kInfinity, node.highest = -kInfinity;
-  for (const std::uint32_t patch : members) {
-    const FlatTriangle& t = shadow_rays.triangle(patch);
-    node.radius = std::max(node.radius, glm::distance(node.center, t.centroid) + t.radius);
-    node.cone_cosine = std::min(node.cone_cosine, glm::dot(node.axis, t.normal));
-    for (const glm::dvec3& v : t.vertex) {
-      node.low = glm::min(node.low, v);
-      node.high = glm::max(node.high, v);
-      node.lowest = std::min(node.lowest, glm::dot(node.axis, v));
-      node.highest = std::max(node.highest, glm::dot(node.axis, v));
-    }
+  if (length > kNoAxis) node.axis = node.normal / length;
+  for (const std::uint32_t patch : patches(node)) {
+    const PatchBounds& bounds = geometry.bounds(patch);
+    node.radius = std::max(node.radius, glm::distance(node.center, bounds.centre) + bounds.radius);
+    for (const FlatTriangle& t : geometry.triangles(patch)) enclose(t, node);
   }
 }
 

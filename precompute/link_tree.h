@@ -3,27 +3,31 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "patch_geometry.h"
 #include "rebounce/precompute/patch_model.h"
-#include "shadow_rays.h"
 
 namespace rebounce {
 
 /// What the refinement of links must know of a set of patches.
 struct LinkNode {
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
   std::uint32_t begin = 0, count = 0;  ///< positions in the tree's order of patches
   std::uint32_t first_child = kNone;   ///< the second follows it; kNone for a single patch
   double area = 0;                     ///< m²
   glm::dvec3 center{0};                ///< area-weighted, metres
   double radius = 0;                   ///< of the sphere around `center` that holds every patch
-  glm::dvec3 low{0}, high{0};          ///< box that holds every patch
-  glm::dvec3 normal{0};                ///< area-weighted mean, not of unit length
-  glm::dvec3 axis{0};                  ///< the same of unit length; 0 if there is none
-  double cone_cosine = 1;              ///< least cosine between `axis` and a patch's normal
-  double lowest = 0, highest = 0;      ///< of all patches along `axis`, from the origin
-  double weight = 1;                   ///< root mean square of the patches' weights
+  glm::dvec3 low{kInfinity}, high{-kInfinity};  ///< box that holds every patch
+  glm::dvec3 normal{0};                         ///< area-weighted mean, not of unit length
+  glm::dvec3 axis{0};                           ///< the same of unit length; 0 if there is none
+  double cone_cosine = 1;  ///< least cosine between `axis` and a patch's normal
+  double lowest = kInfinity,
+         highest = -kInfinity;  ///< of all patches along `axis`, from the origin
+  double weight = 1;            ///< root mean square of the patches' weights
   /// Maps the first moment of something over the cells to its gradient: the pseudo-inverse of the
   /// cells' second moment, 1/m⁴.
   glm::dmat3 inverse_moment{0};
@@ -41,7 +45,7 @@ class LinkTree {
   static constexpr std::uint32_t kCellCount = 16;
 
   /// `weight` [n] >= 0, or empty for 1 everywhere.
-  LinkTree(const PatchModel& model, const ShadowRays& shadow_rays, std::span<const float> weight);
+  LinkTree(const PatchModel& model, const PatchGeometry& geometry, std::span<const float> weight);
 
   std::span<const LinkNode> nodes() const { return nodes_; }
   const LinkNode& operator[](std::uint32_t node) const { return nodes_[node]; }
@@ -58,7 +62,7 @@ class LinkTree {
   std::uint32_t patch_at(const LinkNode& node, double fraction) const;
 
  private:
-  void bound(LinkNode& node, const ShadowRays& shadow_rays, std::span<const float> weight) const;
+  void bound(LinkNode& node, const PatchGeometry& geometry, std::span<const float> weight) const;
   void choose_cells(std::uint32_t node);
   void invert_moment(std::uint32_t node);
 

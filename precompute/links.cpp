@@ -36,13 +36,13 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
   if (!weight.empty() && weight.size() != model.patches.size()) {
     throw Error("links: weights and patches differ in number");
   }
-  const ShadowRays shadow_rays(model, tracer, settings.seed, settings.kernel_tolerance);
+  const PatchGeometry geometry(model, tracer, settings.seed);
+  const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
   const RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
   LinkBuild build;
   copy_tree(refined.tree, build.links);
   copy_links(refined.links, build.links);
-  const std::vector<double> scale =
-      scale_links(refined.tree, shadow_rays, refined.links, refined.target);
+  const std::vector<double> scale = scale_links(refined.tree, refined.links, refined.target);
   build.links.scale.assign(scale.begin(), scale.end());
   build.ray_count = refined.ray_count + model.patches.size() * settings.escape_rays;
   build.candidate_count = refined.candidate_count;

@@ -31,20 +31,16 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
                                        std::uint64_t seed) {
   const DisplayMesh& mesh = data.mesh;
   const double open_reach = 0.25 * glm::distance(lowest_corner(mesh), highest_corner(mesh));
-  std::vector<std::uint32_t> triangle_of(data.patches.size());
-  for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
-    if (mesh.triangle_patch[t] != kNone) triangle_of[mesh.triangle_patch[t]] = t;
-  }
+  const PatchTriangles triangles(mesh.triangle_patch, data.patches.size());
   std::vector<Light> lights(count);
   for (int k = 0; k < count; ++k) {
     const std::uint64_t bits = mix_bits(seed + 0x51ED270BULL * k);
     const std::uint32_t patch = static_cast<std::uint32_t>(bits % data.patches.size());
-    const Uint3& v = mesh.triangle[triangle_of[patch]];
+    std::array<PatchPoint, 1> point;
     std::array<Ray, 1> ray;
     std::array<Hit, 1> hit;
-    make_hemisphere_rays({to_dvec3(mesh.position[v[0]]), to_dvec3(mesh.position[v[1]]),
-                          to_dvec3(mesh.position[v[2]])},
-                         to_dvec3(data.patches.normal[patch]), tracer, bits, ray);
+    spread_points(mesh, triangles[patch], unit_square(mix_bits(bits + 1)), point);
+    make_hemisphere_rays(point, tracer, unit_square(mix_bits(bits + 2)), ray);
     tracer.intersect(ray, hit);
     const double reach = hit[0].triangle == kNone ? open_reach : hit[0].t;
     const double part = 0.2 + 0.6 * unit_square(mix_bits(bits)).x;

@@ -95,7 +95,6 @@ class PatchModelBuilder {
     DisplayMesh& mesh = model_.mesh;
     PatchTable& patches = model_.patches;
     mesh.triangle_patch[t] = static_cast<std::uint32_t>(patches.size());
-    model_.patch_triangle.push_back(t);
 
     const auto [a, b, c] = mesh.triangle[t];
     const glm::dvec3 p = to_dvec3(mesh.position[a]), q = to_dvec3(mesh.position[b]),

@@ -6,17 +6,17 @@
 namespace rebounce {
 namespace {
 
-std::vector<Escape> measure_escapes(const PatchModel& model, const ShadowRays& shadow_rays,
-                                    const RayTracer& tracer, const FormFactorSettings& settings) {
-  std::vector<Escape> escape(shadow_rays.patch_count());
+std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tracer,
+                                    const FormFactorSettings& settings) {
+  const PatchTriangles triangles(model.mesh.triangle_patch, model.patches.size());
+  std::vector<Escape> escape(model.patches.size());
 #pragma omp parallel
   {
-    std::vector<Ray> rays;
-    std::vector<Hit> hits;
+    EscapeScratch scratch;
 #pragma omp for schedule(dynamic, 16)
     for (std::uint32_t i = 0; i < escape.size(); ++i) {
-      escape[i] = measure_escape(model, shadow_rays.triangle(i), i, tracer, settings.escape_rays,
-                                 settings.seed, rays, hits);
+      escape[i] = measure_escape(model.mesh, triangles[i], i, tracer, settings.escape_rays,
+                                 settings.seed, scratch);
     }
   }
   return escape;
@@ -33,13 +33,13 @@ Progress part_of(const Progress& progress, double begin, double end) {
 RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
                           const RayTracer& tracer, const FormFactorSettings& settings,
                           std::span<const float> weight, const Progress& progress) {
-  RefinedLinks result{LinkTree(model, shadow_rays, weight), {}, {}, {}, 0, 0};
+  RefinedLinks result{LinkTree(model, shadow_rays.geometry(), weight), {}, {}, {}, 0, 0};
   LinkRefinement refinement(result.tree, shadow_rays, tracer, settings);
   refinement.run(part_of(progress, 0.0, 0.5));
-  result.escape = measure_escapes(model, shadow_rays, tracer, settings);
+  result.escape = measure_escapes(model, tracer, settings);
   result.target = row_targets(result.escape, settings.escape_rays);
-  const std::vector<double> ones(shadow_rays.patch_count(), 1.0);
-  const std::vector<double> sum = gather_links(result.tree, shadow_rays, refinement.links(), ones);
+  const std::vector<double> ones(model.patches.size(), 1.0);
+  const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
   refinement.revise(find_doubtful_rows(sum, result.target), part_of(progress, 0.5, 1.0));
   result.links.assign(refinement.links().begin(), refinement.links().end());
   result.ray_count = refinement.ray_count();

@@ -5,8 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "rebounce/precompute/form_factor_kernel.h"
-#include "rebounce/precompute/patch_model.h"
+#include "patch_geometry.h"
 #include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
@@ -21,30 +20,25 @@ struct FacingPatch {
 /// pair's exchange gets through. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
-  /// Sample points per patch, and with it the most rays that a pair can have; a power of two.
-  static constexpr std::uint32_t kPointCount = 64;
+  /// The most rays that a pair can have.
+  static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
 
-  /// Spreads the sample points. `tracer` holds the scene that the rays are for. `kernel_tolerance`
-  /// is that of unoccluded_exchange_area().
-  ShadowRays(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed,
-             double kernel_tolerance);
+  /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
+  /// `kernel_tolerance` is that of unoccluded_exchange_area().
+  ShadowRays(const PatchGeometry& geometry, std::uint64_t seed, double kernel_tolerance)
+      : geometry_(geometry), seed_(seed), kernel_tolerance_(kernel_tolerance) {}
 
-  std::size_t patch_count() const { return triangles_.size(); }
-  const FlatTriangle& triangle(std::size_t patch) const { return triangles_[patch]; }
+  const PatchGeometry& geometry() const { return geometry_; }
 
-  /// Exchange area in m² of two patches with nothing between them; 0 for a patch with itself.
+  /// Exchange area in m² of two patches with nothing between them, i <= j; of a patch with itself
+  /// if it is not flat.
   double unoccluded(std::uint32_t i, std::uint32_t j) const {
     return unoccluded(i, j, kernel_tolerance_);
   }
   double unoccluded(std::uint32_t i, std::uint32_t j, double tolerance) const;
 
-  /// Point `k` of those spread over a patch, moved off its surface; k counts modulo kPointCount.
-  const Float3& point(std::uint32_t patch, std::uint32_t k) const {
-    return points_[static_cast<std::size_t>(patch) * kPointCount + k % kPointCount];
-  }
-
-  /// Writes to `facing` the patches j > i that patch i would exchange light with, if `wanted`(j),
-  /// in ascending order.
+  /// Writes to `facing` the patches j >= i that patch i would exchange light with, if `wanted`(j),
+  /// in ascending order. Patch i itself is among them if it is not flat.
   template <typename Wanted>
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
@@ -68,27 +62,27 @@ class ShadowRays {
 
  private:
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
-  std::pair<const Float3*, const Float3*> ray_ends(std::uint32_t i, std::uint32_t j,
-                                                   std::uint32_t k, std::uint64_t hash) const;
+  std::pair<const PatchPoint*, const PatchPoint*> ray_ends(std::uint32_t i, std::uint32_t j,
+                                                           std::uint32_t k,
+                                                           std::uint64_t hash) const;
 
+  const PatchGeometry& geometry_;
   std::uint64_t seed_;
   double kernel_tolerance_;
-  std::vector<FlatTriangle> triangles_;  ///< [n]
-  std::vector<Float3> points_;           ///< [n][kPointCount], moved off the surface
 };
 
 inline double ShadowRays::unoccluded(std::uint32_t i, std::uint32_t j, double tolerance) const {
-  const FlatTriangle &a = triangles_[i], &b = triangles_[j];
-  const glm::dvec3 d = b.centroid - a.centroid;
-  if (glm::dot(a.normal, d) + b.radius <= 0 || a.radius - glm::dot(b.normal, d) <= 0) return 0;
-  return unoccluded_exchange_area(a, b, tolerance);
+  const PatchBounds &a = geometry_.bounds(i), &b = geometry_.bounds(j);
+  if (!a.may_face(b.centre, b.radius) || !b.may_face(a.centre, a.radius)) return 0;
+  return unoccluded_exchange_area(geometry_, i, j, tolerance);
 }
 
 template <typename Wanted>
 void ShadowRays::find_facing(std::uint32_t i, std::vector<FacingPatch>& facing,
                              const Wanted& wanted) const {
   facing.clear();
-  for (std::uint32_t j = i + 1; j < triangles_.size(); ++j) {
+  for (std::uint32_t j = geometry_.bounds(i).is_flat() ? i + 1 : i; j < geometry_.patch_count();
+       ++j) {
     if (!wanted(j)) continue;
     const double exchange = unoccluded(i, j);
     if (exchange > 0) facing.push_back({j, exchange});

@@ -29,19 +29,12 @@ DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer
   points_.resize(n * points_per_patch_);
   rays_.resize(n * points_per_patch_);
   contributions_.resize(n * points_per_patch_);
-  const DisplayMesh& mesh = data.mesh;
-  for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
-    const std::uint32_t patch = mesh.triangle_patch[t];
-    if (patch == kNone) continue;
-    const glm::dvec3 a = to_dvec3(mesh.position[mesh.triangle[t][0]]);
-    const glm::dvec3 ab = to_dvec3(mesh.position[mesh.triangle[t][1]]) - a;
-    const glm::dvec3 ac = to_dvec3(mesh.position[mesh.triangle[t][2]]) - a;
-    const glm::dvec2 shift = unit_square(mix_bits(patch));
-    for (std::size_t k = 0; k < points_per_patch_; ++k) {
-      const glm::dvec2 b = square_to_triangle(r2_point(static_cast<std::uint32_t>(k), shift));
-      points_[patch * points_per_patch_ + k] =
-          tracer.offset_point(to_float3(a + b.x * ab + b.y * ac), data.patches.normal[patch]);
-    }
+  const PatchTriangles triangles(data.mesh.triangle_patch, n);
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::span points = std::span(points_).subspan(i * points_per_patch_, points_per_patch_);
+    spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), points);
+    for (PatchPoint& p : points) p.position = tracer.offset_point(p.position, p.normal);
   }
 }
 
@@ -68,8 +61,9 @@ void DirectLighting::add_light(const Light& light, std::size_t begin, std::size_
   std::size_t count = 0;
   for (std::size_t k = begin * points_per_patch_; k < end * points_per_patch_; ++k) {
     const std::size_t patch = k / points_per_patch_;
-    const IncidentLight incident = evaluate_light(light, points_[k]);
-    const float cosine = glm::dot(to_glm(incident.direction), to_glm(data_.patches.normal[patch]));
+    const auto& [position, normal] = points_[k];
+    const IncidentLight incident = evaluate_light(light, position);
+    const float cosine = glm::dot(to_glm(incident.direction), to_glm(normal));
     const Float3& e = incident.illuminance;
     if (cosine <= 0 || (e[0] <= 0 && e[1] <= 0 && e[2] <= 0)) continue;
     const float weight = cosine / static_cast<float>(points_per_patch_);
@@ -77,7 +71,7 @@ void DirectLighting::add_light(const Light& light, std::size_t begin, std::size_
                             {weight * e[0], weight * e[1], weight * e[2]}};
     Ray& ray = rays[count++];
     ray = Ray{};
-    ray.origin = points_[k];
+    ray.origin = position;
     ray.direction = incident.direction;
     ray.t_near = 0;
     ray.t_far = incident.distance * (1 - kLampGap);

@@ -13,7 +13,11 @@ FormFactorRows::FormFactorRows(const ExchangeMatrix& exchange, std::span<const f
   for (std::size_t i = 0; i < n; ++i) {
     row_begin_[i + 1] += exchange.row_begin[i + 1] - exchange.row_begin[i];
   }
-  for (const std::uint32_t j : exchange.column) ++row_begin_[j + 1];
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::uint64_t k = exchange.row_begin[i]; k < exchange.row_begin[i + 1]; ++k) {
+      if (exchange.column[k] != i) ++row_begin_[exchange.column[k] + 1];
+    }
+  }
   for (std::size_t i = 0; i < n; ++i) row_begin_[i + 1] += row_begin_[i];
 
   column_.resize(row_begin_[n]);
@@ -28,7 +32,7 @@ FormFactorRows::FormFactorRows(const ExchangeMatrix& exchange, std::span<const f
   for (std::size_t i = 0; i < n; ++i) {
     for (std::uint64_t k = exchange.row_begin[i]; k < exchange.row_begin[i + 1]; ++k) {
       append(i, exchange.column[k], exchange.exchange_area[k]);
-      append(exchange.column[k], i, exchange.exchange_area[k]);
+      if (exchange.column[k] != i) append(exchange.column[k], i, exchange.exchange_area[k]);
     }
   }
 }

@@ -211,14 +211,14 @@ class Checker {
     const ExchangeMatrix& exchange = data_.exchange;
     begins(tensor::kRowBegin, exchange.row_begin.span(), exchange.column.size());
     for (std::size_t row = 0; row < data_.patches.size(); ++row) {
-      std::size_t previous = row;  // above the diagonal
+      std::size_t least = row;  // not below the diagonal
       for (std::size_t i = exchange.row_begin[row]; i < exchange.row_begin[row + 1]; ++i) {
         index(tensor::kColumn, i, exchange.column[i], data_.patches.size());
-        if (exchange.column[i] <= previous) {
+        if (exchange.column[i] < least) {
           refuse_entry(tensor::kColumn, i, std::to_string(exchange.column[i]),
-                       "above " + std::to_string(previous));
+                       "at least " + std::to_string(least));
         }
-        previous = exchange.column[i];
+        least = exchange.column[i] + std::size_t{1};
       }
     }
     numbers(tensor::kExchangeArea, exchange.exchange_area, kPositive);

@@ -31,6 +31,7 @@ namespace tensor {
 inline constexpr char kRowBegin[] = "form_factor.row_begin";
 inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
+inline constexpr char kLinksPatch[] = "links.patch";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 inline constexpr char kHierarchicalPatch[] = "transfer.hierarchical.patch";
@@ -94,6 +95,17 @@ void visit_tensors_of_mesh(Mesh& mesh, Visit&& visit) {
   visit("mesh.weight_begin", mesh.weight_begin);
   visit("mesh.weight_patch", mesh.weight_patch);
   visit("mesh.weight", mesh.weight);
+}
+
+template <typename Links, typename Visit>
+void visit_tensors_of_links(Links& links, Visit&& visit) {
+  visit(tensor::kLinksPatch, links.patch);
+  visit("links.first_child", links.first_child);
+  visit("links.count", links.count);
+  visit("links.pair", links.pair);
+  visit("links.exchange_area", links.exchange_area);
+  visit("links.gradient", links.gradient);
+  visit("links.scale", links.scale);
 }
 
 // visit(name, items, member) for each tensor that is a member of every item of an array.

@@ -152,6 +152,7 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   visit_tensors_of_scene(data, collector);
   collect_textures(data.textures, collector);
   collect_exchange(data.exchange, collector);
+  if (!data.links.empty()) visit_tensors_of_links(data.links, collector);
   collect_operator(data.transfer.get(), collector);
 
   SafetensorsLayout layout = lay_out_safetensors(collector.tensors(), make_metadata(data));

@@ -1,10 +1,10 @@
 #include <array>
 
+#include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
 #include "reference/compare.h"
-#include "reference/cumulative_choice.h"
 #include "reference/error_sum.h"
 #include "reference/scene_surface.h"
 

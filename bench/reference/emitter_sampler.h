@@ -4,7 +4,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "reference/cumulative_choice.h"
+#include "rebounce/runtime/cumulative_choice.h"
 #include "reference/scene_surface.h"
 
 namespace rebounce::reference {

@@ -1,9 +1,9 @@
 #include "reference/surface_points.h"
 
+#include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
-#include "reference/cumulative_choice.h"
 #include "reference/scene_surface.h"
 
 namespace rebounce::reference {

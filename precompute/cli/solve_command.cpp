@@ -11,6 +11,7 @@
 #include "rebounce/precompute/csv_writer.h"
 #include "rebounce/precompute/npz_writer.h"
 #include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/hierarchical_solver.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
@@ -19,6 +20,8 @@
 namespace rebounce::cli {
 namespace {
 
+// Gathering along links; they are another F than the solvers in solve_radiosity.h are given.
+constexpr const char* kHierarchical = "hierarchical";
 constexpr const char* kTransfer = "transfer";  // the product with the operator, no iteration
 
 struct SolveOptions {
@@ -125,15 +128,23 @@ Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorBlocks& form_factors) {
   if (chosen.method == kTransfer) return solve_by_transfer(engine);
   const TransferData& data = engine.data();
+  const RadiosityProblem problem{data.patches.area, data.patches.reflectance};
+  if (chosen.method == kHierarchical) {
+    if (data.links.empty()) {
+      throw Error(chosen.file + " has no links; make it again with precompute --store-links");
+    }
+    const LinkedFormFactors links(data.links, data.patches.area, data.patches.centroid);
+    HierarchicalSolver solver(links, problem);
+    return solve_by_iteration(solver, engine, links, chosen.settings);
+  }
   const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
-  const auto solver = make_solver(named->method, form_factors,
-                                  {data.patches.area, data.patches.reflectance}, data.transfer);
+  const auto solver = make_solver(named->method, form_factors, problem, data.transfer);
   return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
 }
 
 /// The names that --method takes.
 std::vector<std::string> method_names() {
-  std::vector<std::string> names = {kTransfer};
+  std::vector<std::string> names = {kTransfer, kHierarchical};
   for (const NamedSolveMethod& method : kSolveMethods) names.emplace_back(method.name);
   return names;
 }

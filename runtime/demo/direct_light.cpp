@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "polygon_form_factor.h"
+#include "rebounce/runtime/polygon_form_factor.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "sample_sequence.h"

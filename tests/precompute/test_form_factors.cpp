@@ -33,9 +33,7 @@ std::vector<double> row_sums_of(const PatchModel& model, const FormFactors& f) {
 /// F from all patches of one material to all of another.
 double factor_between(const PatchModel& model, const FormFactors& f, std::uint32_t from,
                       std::uint32_t to) {
-  const auto material = [&](std::size_t patch) {
-    return model.mesh.triangle_material[model.patch_triangle[patch]];
-  };
+  const auto material = [&](std::size_t patch) { return test::material_of(model, patch); };
   double exchange = 0, area = 0;
   for (std::size_t i = 0; i < model.patches.size(); ++i) {
     if (material(i) == from) area += model.patches.area[i];
@@ -132,7 +130,7 @@ TEST(FormFactors, OpeningsAndBackFacesAreAccountedFor) {
   double floor_sky = 0, floor_area = 0;
   for (std::size_t i = 0; i < model.patches.size(); ++i) {
     EXPECT_EQ(f.absorbed[i], 0);
-    if (model.mesh.triangle_material[model.patch_triangle[i]] != 1) continue;
+    if (test::material_of(model, i) != 1) continue;
     floor_sky += model.patches.area[i] * f.sky_visibility[i];
     floor_area += model.patches.area[i];
   }
@@ -147,7 +145,7 @@ TEST(FormFactors, OpeningsAndBackFacesAreAccountedFor) {
   const FormFactors g = form_factors_of(lidded_model);
   double absorbed = 0;
   for (std::size_t i = 0; i < lidded_model.patches.size(); ++i) {
-    if (lidded_model.mesh.triangle_material[lidded_model.patch_triangle[i]] != 1) continue;
+    if (test::material_of(lidded_model, i) != 1) continue;
     absorbed += lidded_model.patches.area[i] * g.absorbed[i];
   }
   EXPECT_NEAR(absorbed, 0.19982489569839, 1e-3);

@@ -93,4 +93,10 @@ inline RayTracer make_tracer(const PatchModel& model) {
   return {model.mesh.position, std::span(model.mesh.triangle).first(model.mesh.surface_count())};
 }
 
+/// The material of a patch's triangles.
+inline std::uint32_t material_of(const PatchModel& model, std::size_t patch) {
+  const auto found = std::ranges::find(model.mesh.triangle_patch, patch);
+  return model.mesh.triangle_material[found - model.mesh.triangle_patch.begin()];
+}
+
 }  // namespace rebounce::test

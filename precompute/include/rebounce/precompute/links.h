@@ -13,7 +13,7 @@ namespace rebounce {
 
 /// Error that a link may have by default: see FormFactorSettings::link_epsilon. Measured:
 /// notes/links.md.
-inline constexpr double kLinkEpsilon = 1e-3;
+inline constexpr double kLinkEpsilon = 5e-4;
 
 struct LinkBuild {
   FormFactorLinks links;

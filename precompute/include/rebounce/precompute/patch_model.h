@@ -18,7 +18,6 @@ inline constexpr float kMaxReflectance = 0.99F;
 struct PatchModel {
   PatchTable patches;  ///< sky_visibility and absorbed are left to the form factors
   DisplayMesh mesh;
-  std::vector<std::uint32_t> patch_triangle;  ///< [n] display triangle of each patch
   /// [t] the patch whose light a display triangle shows: its own, or that of the surface that
   /// covers it; kNone for a side that sees nothing.
   std::vector<std::uint32_t> shown_patch;

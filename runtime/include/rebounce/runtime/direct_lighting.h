@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -41,7 +42,7 @@ class DirectLighting {
   const TransferData& data_;
   const RayTracer& tracer_;
   std::size_t points_per_patch_;
-  std::vector<Float3> points_;            ///< [n][points_per_patch], moved off the surface
+  std::vector<PatchPoint> points_;        ///< [n][points_per_patch], moved off the surface
   std::vector<Ray> rays_;                 ///< [n][points_per_patch] scratch
   std::vector<ShadowRay> contributions_;  ///< [n][points_per_patch] scratch, beside rays_
 };

@@ -12,12 +12,13 @@ namespace rebounce {
 
 /// The form factors as exchange areas S(i,j) = area(i) F(i,j) in m².
 ///
-/// S is symmetric (reciprocity), so only the strict upper triangle is kept, by rows: one stored
-/// number serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. The
-/// diagonal is zero: a flat patch does not see itself. Pairs that do not see each other are absent.
+/// S is symmetric (reciprocity), so only the upper triangle is kept, by rows: one stored number
+/// serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. Pairs that do
+/// not see each other are absent, and so is the diagonal of patches that do not see themselves, as
+/// flat ones do not.
 struct ExchangeMatrix {
   SharedArray<std::uint64_t> row_begin;  ///< [n + 1], row_begin[n] = number of entries
-  SharedArray<std::uint32_t> column;     ///< ascending in each row, row < column < n
+  SharedArray<std::uint32_t> column;     ///< ascending in each row, row <= column < n
   SharedArray<float> exchange_area;      ///< m², > 0
 
   std::size_t patch_count() const { return row_begin.empty() ? 0 : row_begin.size() - 1; }

@@ -30,6 +30,10 @@ struct FormFactorLinks {
   bool empty() const { return patch.empty(); }
 };
 
+/// Throws Error if `links` are not a tree whose leaves are `patch_count` patches, level by level,
+/// and links between its nodes.
+void check_links(const FormFactorLinks& links, std::size_t patch_count);
+
 /// Gathers with links: pulls light up the tree, gathers it at every level along the links, and
 /// pushes what arrived down again (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical
 /// radiosity algorithm", SIGGRAPH 1991), with a mean and a first moment for each node. The cost is
@@ -41,7 +45,7 @@ class LinkedFormFactors final : public FormFactorOperator {
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                     std::span<const Float3> centroid);
 
-  std::size_t patch_count() const override { return patch_node_.size(); }
+  std::size_t patch_count() const override { return scale_.size(); }
   std::size_t node_count() const { return node_.size(); }
   std::size_t bytes() const override;
   std::size_t workspace_size() const override;
@@ -75,8 +79,7 @@ class LinkedFormFactors final : public FormFactorOperator {
   std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number
   std::vector<std::uint64_t> incoming_begin_;  ///< [m + 1]
   std::vector<Incoming> incoming_;
-  std::vector<std::uint32_t> patch_node_;  ///< [n] leaf of each patch
-  std::vector<float> scale_;               ///< [n]
+  std::vector<float> scale_;  ///< [n]
 };
 
 }  // namespace rebounce

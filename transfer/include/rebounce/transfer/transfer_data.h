@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/scene_description.h"
 #include "rebounce/transfer/transfer_operator.h"
 #include "rebounce/transfer/types.h"
@@ -75,6 +76,7 @@ struct TransferData {
   std::vector<Camera> cameras;
   std::vector<Light> lights;
   ExchangeMatrix exchange;
+  FormFactorLinks links;  ///< empty if they were not asked for
   std::shared_ptr<const TransferOperator> transfer;
   BuildRecord record;
 };

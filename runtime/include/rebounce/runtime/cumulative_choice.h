@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace rebounce::reference {
+namespace rebounce {
 
 /// Choices from a list in proportion to weights.
 class CumulativeChoice {
@@ -40,4 +40,4 @@ class CumulativeChoice {
   std::vector<double> end_;  // running sums
 };
 
-}  // namespace rebounce::reference
+}  // namespace rebounce

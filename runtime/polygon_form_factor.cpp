@@ -2,7 +2,7 @@
 // D. Baum, H. Rushmeier, J. Winget, "Improving Radiosity Solutions Through the Use of Analytically
 // Determined Form-Factors", SIGGRAPH 1989.
 
-#include "polygon_form_factor.h"
+#include "rebounce/runtime/polygon_form_factor.h"
 
 #include <algorithm>
 #include <cmath>

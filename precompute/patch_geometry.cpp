@@ -1,0 +1,241 @@
+#include "patch_geometry.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/polygon_form_factor.h"
+#include "rebounce/runtime/sampling.h"
+
+namespace rebounce {
+namespace {
+
+// Normals within this angle (in cosine; 2.5 degrees), and a thickness of this part of the radius,
+// count as one plane's.
+constexpr double kFlatCosine = 0.999, kFlatThickness = 0.02;
+
+// Pairs with as few pairs of triangles as this are summed triangle by triangle.
+constexpr std::size_t kFewTrianglePairs = 16;
+
+// Sums over 2^level parts each are taken while (sum of radii) / distance is below these: their
+// error goes with (that / sqrt(2)^level)^2. Measured: tests/precompute/test_patch_geometry.cpp.
+constexpr std::array<double, 3> kPartReach = {0.03, 0.15, 0.6};
+constexpr std::array<int, 3> kPartLevel = {0, 2, 4};
+
+// A triangle this small for its distance is taken as a point.
+constexpr double kPointLike = 0.1;
+
+std::size_t part_offset(int level) {
+  return (std::size_t{1} << level) - 1;
+}
+constexpr std::size_t kPartStride = (std::size_t{2} << PatchGeometry::kPartLevels) - 1;
+
+PatchBounds bounds_of(std::span<const FlatTriangle> triangles) {
+  PatchBounds bounds;
+  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low, vector_area(0);
+  for (const FlatTriangle& t : triangles) {
+    vector_area += t.area * t.normal;
+    for (const glm::dvec3& v : t.vertex) {
+      low = glm::min(low, v);
+      high = glm::max(high, v);
+    }
+  }
+  bounds.centre = triangles.size() == 1 ? triangles[0].centroid : 0.5 * (low + high);
+  const double length = glm::length(vector_area);
+  bounds.axis = length > 0 ? vector_area / length : triangles[0].normal;
+  for (const FlatTriangle& t : triangles) {
+    bounds.cone_cosine = std::min(bounds.cone_cosine, glm::dot(bounds.axis, t.normal));
+    for (const glm::dvec3& v : t.vertex) {
+      const glm::dvec3 d = v - bounds.centre;
+      bounds.radius = std::max(bounds.radius, glm::length(d));
+      if (triangles.size() == 1) continue;
+      bounds.thickness = std::max(bounds.thickness, std::abs(glm::dot(bounds.axis, d)));
+    }
+  }
+  bounds.cone_sine = std::sqrt(std::max(0.0, 1 - bounds.cone_cosine * bounds.cone_cosine));
+  return bounds;
+}
+
+PatchPart whole_of(std::span<const FlatTriangle> triangles) {
+  PatchPart part;
+  glm::dvec3 vector_area(0);
+  for (const FlatTriangle& t : triangles) {
+    part.area += t.area;
+    part.centroid += t.area * t.centroid;
+    vector_area += t.area * t.normal;
+  }
+  part.centroid /= part.area;
+  const double length = glm::length(vector_area);
+  part.normal = length > 0 ? vector_area / length : triangles[0].normal;
+  return part;
+}
+
+std::array<FlatTriangle, 2> bisect(const FlatTriangle& t) {
+  int longest = 0;
+  double length = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double edge = glm::distance(t.vertex[k], t.vertex[(k + 1) % 3]);
+    if (edge > length) {
+      length = edge;
+      longest = k;
+    }
+  }
+  const glm::dvec3 a = t.vertex[longest], b = t.vertex[(longest + 1) % 3],
+                   c = t.vertex[(longest + 2) % 3], middle = 0.5 * (a + b);
+  return {FlatTriangle(a, middle, c), FlatTriangle(middle, b, c)};
+}
+
+/// Sorts triangles along the longest side of their box; returns how many make up half the area.
+std::size_t split_in_half(std::span<FlatTriangle> triangles) {
+  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
+  double area = 0;
+  for (const FlatTriangle& t : triangles) {
+    low = glm::min(low, t.centroid);
+    high = glm::max(high, t.centroid);
+    area += t.area;
+  }
+  const glm::dvec3 size = high - low;
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  std::ranges::stable_sort(triangles, {},
+                           [axis](const FlatTriangle& t) { return t.centroid[axis]; });
+  std::size_t count = 0;
+  for (double before = 0; count + 1 < triangles.size() && before < 0.5 * area; ++count) {
+    before += triangles[count].area;
+  }
+  return std::max<std::size_t>(count, 1);
+}
+
+/// Writes the parts of `triangles` for this level and those below to part[0], part[1..2], ...: a
+/// binary heap whose `node` this is.
+void write_parts(std::span<FlatTriangle> triangles, int levels_below, std::size_t node,
+                 std::span<PatchPart> heap) {
+  heap[node] = whole_of(triangles);
+  if (levels_below == 0) return;
+  if (triangles.size() == 1) {
+    std::array<FlatTriangle, 2> half = bisect(triangles[0]);
+    write_parts(std::span(half).first(1), levels_below - 1, 2 * node + 1, heap);
+    write_parts(std::span(half).last(1), levels_below - 1, 2 * node + 2, heap);
+    return;
+  }
+  const std::size_t first = split_in_half(triangles);
+  write_parts(triangles.first(first), levels_below - 1, 2 * node + 1, heap);
+  write_parts(triangles.subspan(first), levels_below - 1, 2 * node + 2, heap);
+}
+
+double between_parts(std::span<const PatchPart> a, std::span<const PatchPart> b) {
+  double sum = 0;
+  for (const PatchPart& x : a) {
+    double inner = 0;
+    for (const PatchPart& y : b) {
+      inner += y.area * point_kernel(x.centroid, x.normal, y.centroid, y.normal);
+    }
+    sum += x.area * inner;
+  }
+  return sum;
+}
+
+double between_triangles(std::span<const FlatTriangle> a, std::span<const FlatTriangle> b,
+                         double tolerance) {
+  double sum = 0;
+  for (const FlatTriangle& x : a) {
+    for (const FlatTriangle& y : b) sum += unoccluded_exchange_area(x, y, tolerance);
+  }
+  return sum;
+}
+
+double part_to_triangle(const PatchPart& part, const FlatTriangle& t) {
+  const glm::dvec3 d = part.centroid - t.centroid;
+  const double height = glm::dot(t.normal, d);
+  if (height <= 1e-6 * t.radius) return 0;
+  if (t.radius * t.radius < kPointLike * kPointLike * glm::dot(d, d)) {
+    return t.area * point_kernel(part.centroid, part.normal, t.centroid, t.normal);
+  }
+  // Relative to the part, so that single precision is enough.
+  return point_to_triangle_form_factor(
+      {0, 0, 0}, part.normal,
+      {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid, t.vertex[2] - part.centroid});
+}
+
+double parts_to_triangles(std::span<const PatchPart> parts,
+                          std::span<const FlatTriangle> triangles) {
+  double sum = 0;
+  for (const PatchPart& part : parts) {
+    double inner = 0;
+    for (const FlatTriangle& t : triangles) inner += part_to_triangle(part, t);
+    sum += part.area * std::min(inner, 1.0);
+  }
+  return sum;
+}
+
+}  // namespace
+
+bool PatchBounds::is_flat() const {
+  return cone_cosine >= kFlatCosine && thickness <= kFlatThickness * radius;
+}
+
+bool PatchBounds::may_face(const glm::dvec3& point, double sphere_radius) const {
+  const glm::dvec3 d = point - centre;
+  const double along = glm::dot(axis, d);
+  if (along + thickness + sphere_radius > 0 || cone_cosine <= 0) return true;
+  if (cone_cosine == 1) return false;
+  // The normal of the cone that turns most towards the point.
+  const double across = std::sqrt(std::max(0.0, glm::dot(d, d) - along * along));
+  return along * cone_cosine + across * cone_sine + radius + sphere_radius > 0;
+}
+
+PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed) {
+  const PatchTriangles patches(model.mesh.triangle_patch, model.patches.size());
+  const std::size_t n = patches.patch_count();
+  begin_.push_back(0);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (const std::uint32_t t : patches[i]) {
+      const Uint3& v = model.mesh.triangle[t];
+      triangle_.emplace_back(to_dvec3(model.mesh.position[v[0]]),
+                             to_dvec3(model.mesh.position[v[1]]),
+                             to_dvec3(model.mesh.position[v[2]]));
+    }
+    begin_.push_back(static_cast<std::uint32_t>(triangle_.size()));
+  }
+  area_.resize(n);
+  bounds_.resize(n);
+  points_.resize(n * kPointCount);
+  parts_.resize(n * kPartStride);
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t i = 0; i < n; ++i) {
+    for (const FlatTriangle& t : triangles(i)) area_[i] += t.area;
+    bounds_[i] = bounds_of(triangles(i));
+    const std::span<PatchPoint> points(&points_[i * kPointCount], kPointCount);
+    spread_points(model.mesh, patches[i], unit_square(mix_bits(seed ^ mix_bits(i))), points);
+    for (PatchPoint& p : points) p.position = tracer.offset_point(p.position, p.normal);
+    add_parts(i);
+  }
+}
+
+void PatchGeometry::add_parts(std::size_t patch) {
+  const std::span<const FlatTriangle> all = triangles(patch);
+  std::vector<FlatTriangle> own(all.begin(), all.end());
+  write_parts(own, kPartLevels, 0, {&parts_[patch * kPartStride], kPartStride});
+}
+
+std::span<const PatchPart> PatchGeometry::parts(std::size_t patch, int level) const {
+  return {&parts_[patch * kPartStride + part_offset(level)], std::size_t{1} << level};
+}
+
+double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, std::size_t j,
+                                double tolerance) {
+  const std::span<const FlatTriangle> a = geometry.triangles(i), b = geometry.triangles(j);
+  if (a.size() * b.size() <= kFewTrianglePairs) return between_triangles(a, b, tolerance);
+  const PatchBounds &near = geometry.bounds(i), &far = geometry.bounds(j);
+  const double reach = (near.radius + far.radius) / glm::distance(near.centre, far.centre);
+  for (std::size_t k = 0; i != j && k < kPartReach.size(); ++k) {
+    if (!(reach < kPartReach[k])) continue;
+    return between_parts(geometry.parts(i, kPartLevel[k]), geometry.parts(j, kPartLevel[k]));
+  }
+  constexpr int kFinest = PatchGeometry::kPartLevels;
+  return 0.5 * (parts_to_triangles(geometry.parts(i, kFinest), b) +
+                parts_to_triangles(geometry.parts(j, kFinest), a));
+}
+
+}  // namespace rebounce

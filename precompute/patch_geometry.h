@@ -1,0 +1,89 @@
+#pragma once
+
+// What form factors ask of the shape of patches: their triangles, bounds, and points on them.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/precompute/form_factor_kernel.h"
+#include "rebounce/precompute/patch_model.h"
+#include "rebounce/runtime/patch_points.h"
+#include "rebounce/runtime/ray_tracer.h"
+
+namespace rebounce {
+
+/// A sphere around a patch and a cone around its normals.
+struct PatchBounds {
+  glm::dvec3 centre{0};
+  double radius = 0;       ///< metres
+  glm::dvec3 axis{0};      ///< unit; the normal of a flat patch
+  double thickness = 0;    ///< metres: no point is farther from the plane across `axis`
+  double cone_cosine = 1;  ///< of the widest angle between `axis` and a normal
+  double cone_sine = 0;
+
+  /// True if it lies in one plane, as far as light is concerned.
+  bool is_flat() const;
+
+  /// False if the sphere of `sphere_radius` around `point` is behind every part of the patch.
+  bool may_face(const glm::dvec3& point, double sphere_radius) const;
+};
+
+/// A part of a patch taken as a point with a normal.
+struct PatchPart {
+  glm::dvec3 centroid{0};
+  glm::dvec3 normal{0};  ///< unit
+  double area = 0;       ///< m²
+};
+
+/// The shapes of all patches. Immutable, usable from any number of threads.
+class PatchGeometry {
+ public:
+  /// Sample points per patch; a power of two.
+  static constexpr std::uint32_t kPointCount = 64;
+
+  /// Parts that a patch is cut into at most: two to the power of levels.
+  static constexpr int kPartLevels = 4;
+
+  /// `tracer` holds the scene; points are moved off its surface. `seed` shifts them.
+  PatchGeometry(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed);
+
+  std::size_t patch_count() const { return bounds_.size(); }
+  double area(std::size_t patch) const { return area_[patch]; }
+  std::vector<double> areas() const { return area_; }
+  const PatchBounds& bounds(std::size_t patch) const { return bounds_[patch]; }
+
+  /// Its triangles, at least one.
+  std::span<const FlatTriangle> triangles(std::size_t patch) const {
+    return {triangle_.data() + begin_[patch], triangle_.data() + begin_[patch + 1]};
+  }
+
+  /// kPointCount points spread over it evenly, every prefix too, moved off the surface.
+  std::span<const PatchPoint> points(std::size_t patch) const {
+    return {points_.data() + patch * kPointCount, kPointCount};
+  }
+
+  /// At most 2^`level` parts that make up the patch; 0 <= level <= kPartLevels.
+  std::span<const PatchPart> parts(std::size_t patch, int level) const;
+
+ private:
+  void add_parts(std::size_t patch);
+
+  std::vector<std::uint32_t> begin_;    ///< [n + 1]
+  std::vector<FlatTriangle> triangle_;  ///< those of patch i at [begin_[i], begin_[i + 1])
+  std::vector<double> area_;            ///< [n] m²
+  std::vector<PatchBounds> bounds_;     ///< [n]
+  std::vector<PatchPoint> points_;      ///< [n][kPointCount]
+  std::vector<PatchPart> parts_;        ///< [n][all levels, the coarsest first]
+};
+
+/// Exchange area A_i F_ij in m² of patches i and j with nothing between them: symmetric up to
+/// rounding, >= 0. With i == j what a patch that is not flat gives to itself.
+///
+/// Pairs of few triangles by the kernel of their triangles (`tolerance`: form_factor_kernel.h);
+/// others as sums over parts where they are small for their distance, and from parts to triangles
+/// in closed form where they are near.
+double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, std::size_t j,
+                                double tolerance);
+
+}  // namespace rebounce
