@@ -93,7 +93,7 @@ class SceneBench {
     const double seconds = seconds_of([&] {
 #pragma omp parallel for schedule(dynamic, 1) reduction(+ : rays)
       for (std::size_t k = 0; k < count; ++k)
-        rays += compute_row(rows_.patch[k], rows_.form_factor[k]);
+        rays += compute_row(rows_.patch[k], settings_.probe_rays, rows_.form_factor[k]);
     });
     // Every pair is in two rows.
     const double all = 0.5 * static_cast<double>(n) / static_cast<double>(count);
@@ -102,8 +102,9 @@ class SceneBench {
     scale_to_targets();
   }
 
-  /// Returns the number of rays.
-  std::uint64_t compute_row(std::uint32_t i, std::vector<double>& row) const {
+  /// As form_factors.h has it: with `probe_rays`, and more where these disagree. Returns the number
+  /// of rays.
+  std::uint64_t compute_row(std::uint32_t i, int probe_rays, std::vector<double>& row) const {
     std::vector<FacingPatch> facing, mixed;
     std::vector<Ray> rays;
     row.assign(model_.patches.size(), 0.0);
@@ -112,9 +113,9 @@ class SceneBench {
           i == j && geometry_.bounds(i).is_flat() ? 0 : shadow_rays_.unoccluded(i, j);
       if (exchange > 0) facing.push_back({j, exchange});
     }
-    std::uint64_t count = trace(i, facing, settings_.probe_rays, rays);
+    std::uint64_t count = trace(i, facing, probe_rays, rays);
     for (std::size_t p = 0; p < facing.size(); ++p) {
-      const auto visible = visibility(i, facing, p, settings_.probe_rays, rays);
+      const auto visible = visibility(i, facing, p, probe_rays, rays);
       if (visible.mixed) mixed.push_back(facing[p]);
       row[facing[p].patch] = visible.part * facing[p].unoccluded / geometry_.area(i);
     }
@@ -147,8 +148,14 @@ class SceneBench {
                                       settings_.escape_rays, settings_.seed, scratch));
     }
     const std::vector<RowTarget> target = row_targets(escape, settings_.escape_rays);
+    std::vector<double> sums;
+    for (const auto& row : rows_.form_factor) {
+      sums.push_back(std::accumulate(row.begin(), row.end(), 0.0));
+    }
+    const std::vector<bool> doubtful = find_doubtful_rows(sums, target);
     for (std::size_t k = 0; k < target.size(); ++k) {
       auto& row = rows_.form_factor[k];
+      if (doubtful[k]) compute_row(rows_.patch[k], settings_.full_rays, row);
       const double sum = std::accumulate(row.begin(), row.end(), 0.0);
       if (sum <= 0) continue;
       for (double& f : row) f *= target[k].sum / sum;

@@ -11,36 +11,62 @@ namespace {
 
 constexpr std::uint32_t kPoints = ShadowRays::kPointCount;
 
+// As many rays are needed to say that two nodes do not see each other at all.
+constexpr int kEnoughRays = 6;
+
 }  // namespace
 
-ShadowRays::Visibility LinkRays::trace(std::uint32_t a, std::uint32_t b, int count,
-                                       Scratch& scratch) const {
+LinkRays::Visibility LinkRays::trace(std::uint32_t a, std::uint32_t b, int count,
+                                     Scratch& scratch) const {
   if (!tree_[a].is_leaf() || !tree_[b].is_leaf()) return trace_nodes(a, b, count, scratch);
   const std::uint32_t i = tree_.leaf_patch(tree_[a]), j = tree_.leaf_patch(tree_[b]);
   return trace_patches(std::min(i, j), std::max(i, j), count, scratch);
 }
 
-ShadowRays::Visibility LinkRays::trace_patches(std::uint32_t i, std::uint32_t j, int count,
-                                               Scratch& scratch) const {
+LinkRays::Visibility LinkRays::trace_patches(std::uint32_t i, std::uint32_t j, int count,
+                                             Scratch& scratch) const {
   scratch.facing.assign(1, {j, 0});
   shadow_rays_.make_rays(i, scratch.facing, count, scratch.rays);
   tracer_.occluded(scratch.rays);
-  return shadow_rays_.visibility(i, j, scratch.rays);
+  const ShadowRays::Visibility visible = shadow_rays_.visibility(i, j, scratch.rays);
+  return {visible.part, visible.variance, visible.mixed, false};
 }
 
-ShadowRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int count,
-                                             Scratch& scratch) const {
+/// The part of a node's area that its first child has.
+double LinkRays::first_part(const LinkNode& node) const {
+  return node.is_leaf() ? 1 : tree_[node.first_child].area / node.area;
+}
+
+/// True if rays between two of the children, enough of them to tell, are all hidden.
+bool LinkRays::is_divided(std::span<const Ray> rays, std::span<const int> children) {
+  std::array<int, 4> seen{}, count{};
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    ++count[children[k]];
+    seen[children[k]] += is_occluded(rays[k]) ? 0 : 1;
+  }
+  for (int pair = 0; pair < 4; ++pair) {
+    if (count[pair] >= kEnoughRays && seen[pair] == 0) return true;
+  }
+  return false;
+}
+
+LinkRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int count,
+                                           Scratch& scratch) const {
   const std::uint64_t hash =
       mix_bits(seed_ * 0x9E3779B9ULL + ((static_cast<std::uint64_t>(a) << 32) | b));
   const glm::dvec2 shift = unit_square(mix_bits(hash));
   const auto first = static_cast<std::uint32_t>(hash % kPoints);
   scratch.rays.resize(count);
   std::array<double, kMostRays> weight;
+  std::array<int, kMostRays> children;  // which pair of them a ray joins
   for (int k = 0; k < count; ++k) {
     // Strata of equal area of one node against those of the other, in steps of 19.
     const int other = (19 * k + static_cast<int>(first)) % count;
-    const std::uint32_t i = tree_.patch_at(tree_[a], (k + shift.x) / count),
-                        j = tree_.patch_at(tree_[b], (other + shift.y) / count);
+    const double along_a = (k + shift.x) / count, along_b = (other + shift.y) / count;
+    const std::uint32_t i = tree_.patch_at(tree_[a], along_a),
+                        j = tree_.patch_at(tree_[b], along_b);
+    children[k] =
+        2 * (along_a < first_part(tree_[a]) ? 0 : 1) + (along_b < first_part(tree_[b]) ? 0 : 1);
     const PatchPoint &x = shadow_rays_.geometry().points(i)[(first + k) % kPoints],
                      &y = shadow_rays_.geometry().points(j)[(first + 7 * k) % kPoints];
     Ray& ray = scratch.rays[k];
@@ -53,7 +79,10 @@ ShadowRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, i
                              to_dvec3(y.normal));
   }
   tracer_.occluded(scratch.rays);
-  return ShadowRays::visible_part(scratch.rays, std::span(weight).first(count));
+  const ShadowRays::Visibility visible =
+      ShadowRays::visible_part(scratch.rays, std::span(weight).first(count));
+  return {visible.part, visible.variance, visible.mixed,
+          visible.mixed && is_divided(scratch.rays, children)};
 }
 
 }  // namespace rebounce

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "link_tree.h"
@@ -24,15 +25,22 @@ class LinkRays {
            std::uint64_t seed)
       : tree_(tree), shadow_rays_(shadow_rays), tracer_(tracer), seed_(seed) {}
 
+  struct Visibility {
+    double part;      ///< of the pair's light that gets through, [0, 1]
+    double variance;  ///< of `part`
+    bool mixed;       ///< some rays got through and some did not
+    bool divided;     ///< mixed, but none got through between two of the nodes' children
+  };
+
   /// What `count` <= kMostRays rays between points spread over two nodes say. Two patches have the
   /// rays that ShadowRays gives them.
-  ShadowRays::Visibility trace(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
+  Visibility trace(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
 
  private:
-  ShadowRays::Visibility trace_patches(std::uint32_t i, std::uint32_t j, int count,
-                                       Scratch& scratch) const;
-  ShadowRays::Visibility trace_nodes(std::uint32_t a, std::uint32_t b, int count,
-                                     Scratch& scratch) const;
+  Visibility trace_patches(std::uint32_t i, std::uint32_t j, int count, Scratch& scratch) const;
+  Visibility trace_nodes(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
+  double first_part(const LinkNode& node) const;
+  static bool is_divided(std::span<const Ray> rays, std::span<const int> children);
 
   const LinkTree& tree_;
   const ShadowRays& shadow_rays_;

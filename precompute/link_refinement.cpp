@@ -15,6 +15,10 @@ namespace {
 // A plane's points are off it by less than this part of its size.
 constexpr double kPlane = 1e-7;
 
+// Where some children see each other and others do not, a wall may be between them, and light
+// would leak through it: only this part of the error is allowed.
+constexpr double kDivided = 0.1;
+
 bool is_plane(const LinkNode& node) {
   return node.is_flat() && node.highest - node.lowest <= kPlane * node.radius;
 }
@@ -104,7 +108,7 @@ LinkRefinement::Outcome LinkRefinement::link_patches(const Candidate& pair,
   const std::uint32_t i = tree_.leaf_patch(tree_[pair.a]), j = tree_.leaf_patch(tree_[pair.b]);
   const double unoccluded = shadow_rays_.unoccluded(std::min(i, j), std::max(i, j));
   if (unoccluded <= 0) return {};
-  ShadowRays::Visibility visible{0, 0, true};
+  LinkRays::Visibility visible{0, 0, true, false};
   if (!is_doubtful(pair.a) && !is_doubtful(pair.b)) {
     visible = rays_.trace(pair.a, pair.b, settings_.probe_rays, scratch.rays);
     scratch.ray_count += settings_.probe_rays;
@@ -142,7 +146,7 @@ LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratc
   while (count < enough) count *= 2;
   count = std::min(count, LinkRays::kMostRays);
 
-  ShadowRays::Visibility visible = rays_.trace(pair.a, pair.b, count, scratch.rays);
+  LinkRays::Visibility visible = rays_.trace(pair.a, pair.b, count, scratch.rays);
   scratch.ray_count += count;
   if (!visible.mixed && visible.part == 0) return make_link(pair, scratch.kernel, visible);
   if (!smooth) return split(pair, !visible.mixed);
@@ -155,18 +159,19 @@ LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratc
 }
 
 LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const PairKernel& kernel,
-                                                   const ShadowRays::Visibility& visible) const {
+                                                   const LinkRays::Visibility& visible) const {
   const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
   if (is_doubtful(pair.a) && !a.is_leaf()) return {.kind = Outcome::Kind::kSplitA, .link = {}};
   if (is_doubtful(pair.b) && !b.is_leaf()) return {.kind = Outcome::Kind::kSplitB, .link = {}};
   const double error_squared = visible.part * visible.part * kernel.residual_squared() +
                                visible.part * (1 - visible.part) * kernel.norm_squared();
-  if (!(error_squared < allowed_squared(a, b))) return split(pair, false);
+  const double allowed = allowed_squared(a, b) * (visible.divided ? kDivided * kDivided : 1);
+  if (!(error_squared < allowed)) return split(pair, false);
   return make_link(pair, kernel, visible);
 }
 
 LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const PairKernel& kernel,
-                                                  const ShadowRays::Visibility& visible) const {
+                                                  const LinkRays::Visibility& visible) const {
   return {.kind = Outcome::Kind::kLink,
           .seen = false,
           .link = {.a = pair.a,

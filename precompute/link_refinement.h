@@ -79,9 +79,9 @@ class LinkRefinement {
   Outcome link_patches(const Candidate& pair, Scratch& scratch) const;
   Outcome link_nodes(const Candidate& pair, Scratch& scratch) const;
   Outcome link_mixed(const Candidate& pair, const PairKernel& kernel,
-                     const ShadowRays::Visibility& visible) const;
+                     const LinkRays::Visibility& visible) const;
   Outcome make_link(const Candidate& pair, const PairKernel& kernel,
-                    const ShadowRays::Visibility& visible) const;
+                    const LinkRays::Visibility& visible) const;
   Outcome split(const Candidate& pair, bool seen) const;
   double allowed_squared(const LinkNode& a, const LinkNode& b) const;
   std::vector<Candidate> take(const std::vector<Candidate>& generation,

@@ -12,8 +12,21 @@ namespace {
 constexpr double kNear = 1.0;
 // Patches nearer than this get the kernel of patches instead, with this tolerance.
 constexpr double kNearPatches = 3.0, kPatchTolerance = 1e-2;
+// Mean square distance of a cell's points from a plane through its centre, in squares of its
+// radius.
+constexpr double kSpread = 0.1;
 // Nodes nearer to each other than this are not worth a look: their kernel is never nearly affine.
 constexpr double kTouching = 0.75;
+
+/// Of a cosine, because normals differ within a cell.
+double normal_variance(const LinkNode& cell) {
+  return 1 - std::min(1.0, glm::dot(cell.normal, cell.normal));
+}
+
+/// Because a part of `cell` may be before a plane and the rest behind: of the height above it.
+double horizon_variance(double height, const LinkNode& cell) {
+  return std::abs(height) < cell.radius ? kSpread * cell.radius * cell.radius : 0;
+}
 
 }  // namespace
 
@@ -52,13 +65,13 @@ bool PairKernel::fill(const LinkNode& p, const LinkNode& q, double& kernel) {
     kernel = 0;
     return cannot_exchange(p, q);
   }
-  const double cosine_p = std::max(0.0, glm::dot(p.normal, d)),
-               cosine_q = std::max(0.0, -glm::dot(q.normal, d));
+  const double along_p = glm::dot(p.normal, d), along_q = -glm::dot(q.normal, d);
+  const double cosine_p = std::max(0.0, along_p), cosine_q = std::max(0.0, along_q);
   const double scale = 1 / (std::numbers::pi * r2 * r2);
   kernel = cosine_p * cosine_q * scale;
-  // Normals that differ within a cell: the variance of either cosine.
-  const double sp = r2 * (1 - std::min(1.0, glm::dot(p.normal, p.normal))),
-               sq = r2 * (1 - std::min(1.0, glm::dot(q.normal, q.normal)));
+  // The variance of either cosine, times r².
+  const double sp = r2 * normal_variance(p) + horizon_variance(along_p, q),
+               sq = r2 * normal_variance(q) + horizon_variance(along_q, p);
   uncertain_ +=
       area * scale * scale * (sp * cosine_q * cosine_q + sq * cosine_p * cosine_p + sp * sq);
   return true;
