@@ -15,10 +15,6 @@ namespace {
 // A plane's points are off it by less than this part of its size.
 constexpr double kPlane = 1e-7;
 
-// Where some children see each other and others do not, a wall may be between them, and light
-// would leak through it: only this part of the error is allowed.
-constexpr double kDivided = 0.1;
-
 bool is_plane(const LinkNode& node) {
   return node.is_flat() && node.highest - node.lowest <= kPlane * node.radius;
 }
@@ -165,8 +161,9 @@ LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const 
   if (is_doubtful(pair.b) && !b.is_leaf()) return {.kind = Outcome::Kind::kSplitB, .link = {}};
   const double error_squared = visible.part * visible.part * kernel.residual_squared() +
                                visible.part * (1 - visible.part) * kernel.norm_squared();
-  const double allowed = allowed_squared(a, b) * (visible.divided ? kDivided * kDivided : 1);
-  if (!(error_squared < allowed)) return split(pair, false);
+  // Where some children see each other and others do not, a wall may be between them, and light
+  // would leak through it.
+  if (visible.divided || !(error_squared < allowed_squared(a, b))) return split(pair, false);
   return make_link(pair, kernel, visible);
 }
 
