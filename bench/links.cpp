@@ -115,9 +115,12 @@ class SceneBench {
     }
     std::uint64_t count = trace(i, facing, probe_rays, rays);
     for (std::size_t p = 0; p < facing.size(); ++p) {
-      const auto visible = visibility(i, facing, p, probe_rays, rays);
-      if (visible.mixed) mixed.push_back(facing[p]);
-      row[facing[p].patch] = visible.part * facing[p].unoccluded / geometry_.area(i);
+      const auto agreement = ShadowRays::agreement(
+          std::span(rays).subspan(p * probe_rays, static_cast<std::size_t>(probe_rays)));
+      if (agreement == ShadowRays::Agreement::kMixed) mixed.push_back(facing[p]);
+      if (agreement == ShadowRays::Agreement::kClear) {
+        row[facing[p].patch] = facing[p].unoccluded / geometry_.area(i);
+      }
     }
     count += trace(i, mixed, settings_.full_rays, rays);
     for (std::size_t p = 0; p < mixed.size(); ++p) {

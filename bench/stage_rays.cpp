@@ -37,9 +37,9 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
     mixed.clear();
     const auto probe_rays = static_cast<std::size_t>(settings.probe_rays);
     for (std::size_t p = 0; p < facing.size(); ++p) {
-      const std::uint64_t hidden =
-          hidden_among(std::span(rays).subspan(p * probe_rays, probe_rays));
-      if (hidden > 0 && hidden < probe_rays) mixed.push_back(facing[p]);
+      const auto agreement =
+          ShadowRays::agreement(std::span(rays).subspan(p * probe_rays, probe_rays));
+      if (agreement == ShadowRays::Agreement::kMixed) mixed.push_back(facing[p]);
     }
     add_shadow_stream(row, mixed, settings.full_rays);
     measure_escape(model.mesh, patch_triangles[row], row, tracer, settings.escape_rays,

@@ -115,15 +115,12 @@ class FormFactorAssembly {
     shadow_rays_.find_facing(i, scratch.facing, [](std::uint32_t) { return true; });
     trace(i, scratch.facing, settings_.probe_rays, scratch.rays);
     scratch.mixed.clear();
-    const int probe = settings_.probe_rays;
+    const auto probe = static_cast<std::size_t>(settings_.probe_rays);
     for (std::size_t p = 0; p < scratch.facing.size(); ++p) {
-      const Ray* rays = &scratch.rays[p * probe];
-      const auto hidden = std::count_if(rays, rays + probe, is_occluded);
-      if (hidden == 0) {
-        append(row, scratch.facing[p], 1.0, 0.0);
-      } else if (hidden < probe) {
-        scratch.mixed.push_back(scratch.facing[p]);
-      }
+      const auto agreement =
+          ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe));
+      if (agreement == ShadowRays::Agreement::kClear) append(row, scratch.facing[p], 1.0, 0.0);
+      if (agreement == ShadowRays::Agreement::kMixed) scratch.mixed.push_back(scratch.facing[p]);
     }
     append_mixed(i, scratch, row);
     pair_count_ += scratch.facing.size();

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 
-#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
@@ -28,8 +27,11 @@ LinkRays::Visibility LinkRays::trace_patches(std::uint32_t i, std::uint32_t j, i
   scratch.facing.assign(1, {j, 0});
   shadow_rays_.make_rays(i, scratch.facing, count, scratch.rays);
   tracer_.occluded(scratch.rays);
+  const auto agreement = ShadowRays::agreement(scratch.rays);
+  if (agreement == ShadowRays::Agreement::kClear) return {1, 0, false, false};
+  if (agreement == ShadowRays::Agreement::kHidden) return {0, 0, false, false};
   const ShadowRays::Visibility visible = shadow_rays_.visibility(i, j, scratch.rays);
-  return {visible.part, visible.variance, visible.mixed, false};
+  return {visible.part, visible.variance, true, false};
 }
 
 /// The part of a node's area that its first child has.
@@ -41,6 +43,7 @@ double LinkRays::first_part(const LinkNode& node) const {
 bool LinkRays::is_divided(std::span<const Ray> rays, std::span<const int> children) {
   std::array<int, 4> seen{}, count{};
   for (std::size_t k = 0; k < rays.size(); ++k) {
+    if (ShadowRays::is_void(rays[k])) continue;
     ++count[children[k]];
     seen[children[k]] += is_occluded(rays[k]) ? 0 : 1;
   }
@@ -69,20 +72,26 @@ LinkRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int
         2 * (along_a < first_part(tree_[a]) ? 0 : 1) + (along_b < first_part(tree_[b]) ? 0 : 1);
     const PatchPoint &x = shadow_rays_.geometry().points(i)[(first + k) % kPoints],
                      &y = shadow_rays_.geometry().points(j)[(first + 7 * k) % kPoints];
-    Ray& ray = scratch.rays[k];
-    ray = Ray{};
-    ray.origin = x.position;
-    ray.t_near = 0;
-    ray.direction = to_float3(to_glm(y.position) - to_glm(x.position));
-    ray.t_far = 1;
-    weight[k] = point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
-                             to_dvec3(y.normal));
+    weight[k] = ShadowRays::kernel(x, y);
+    // Between points that do not face each other there is no light to hide.
+    scratch.rays[k] = weight[k] > 0 ? ShadowRays::ray_between(x, y) : ShadowRays::void_ray();
   }
   tracer_.occluded(scratch.rays);
-  const ShadowRays::Visibility visible =
-      ShadowRays::visible_part(scratch.rays, std::span(weight).first(count));
-  return {visible.part, visible.variance, visible.mixed,
-          visible.mixed && is_divided(scratch.rays, children)};
+  return judge(scratch.rays, std::span(weight).first(count), children);
+}
+
+LinkRays::Visibility LinkRays::judge(std::span<const Ray> rays, std::span<const double> weight,
+                                     std::span<const int> children) {
+  double sum = 0, sum_of_squares = 0, visible = 0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    sum += weight[k];
+    sum_of_squares += weight[k] * weight[k];
+    if (!is_occluded(rays[k])) visible += weight[k];
+  }
+  if (sum <= 0) return {1, 1, true, true};  // no ray can tell
+  const double part = visible / sum, effective = sum * sum / sum_of_squares;
+  const bool mixed = ShadowRays::agreement(rays) == ShadowRays::Agreement::kMixed;
+  return {part, part * (1 - part) / effective, mixed, mixed && is_divided(rays, children)};
 }
 
 }  // namespace rebounce

@@ -40,6 +40,8 @@ class LinkRays {
   Visibility trace_patches(std::uint32_t i, std::uint32_t j, int count, Scratch& scratch) const;
   Visibility trace_nodes(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
   double first_part(const LinkNode& node) const;
+  static Visibility judge(std::span<const Ray> rays, std::span<const double> weight,
+                          std::span<const int> children);
   static bool is_divided(std::span<const Ray> rays, std::span<const int> children);
 
   const LinkTree& tree_;

@@ -24,6 +24,9 @@ constexpr std::size_t kFewTrianglePairs = 16;
 constexpr std::array<double, 3> kPartReach = {0.03, 0.15, 0.6};
 constexpr std::array<int, 3> kPartLevel = {0, 2, 4};
 
+// A part whose vector area is this much of its area is about flat: within 45 degrees or so.
+constexpr double kAboutFlat = 0.85;
+
 // A triangle this small for its distance is taken as a point.
 constexpr double kPointLike = 0.1;
 
@@ -60,16 +63,17 @@ PatchBounds bounds_of(std::span<const FlatTriangle> triangles) {
 
 PatchPart whole_of(std::span<const FlatTriangle> triangles) {
   PatchPart part;
-  glm::dvec3 vector_area(0);
   for (const FlatTriangle& t : triangles) {
     part.area += t.area;
     part.centroid += t.area * t.centroid;
-    vector_area += t.area * t.normal;
+    part.vector_area += t.area * t.normal;
   }
   part.centroid /= part.area;
-  const double length = glm::length(vector_area);
-  part.normal = length > 0 ? vector_area / length : triangles[0].normal;
   return part;
+}
+
+bool is_about_flat(const PatchPart& part) {
+  return glm::length(part.vector_area) >= kAboutFlat * part.area;
 }
 
 std::array<FlatTriangle, 2> bisect(const FlatTriangle& t) {
@@ -87,19 +91,20 @@ std::array<FlatTriangle, 2> bisect(const FlatTriangle& t) {
   return {FlatTriangle(a, middle, c), FlatTriangle(middle, b, c)};
 }
 
-/// Sorts triangles along the longest side of their box; returns how many make up half the area.
-std::size_t split_in_half(std::span<FlatTriangle> triangles) {
+/// Sorts triangles along the axis in which `vector`(t) spreads most; returns how many make up half
+/// the area.
+template <typename Vector>
+std::size_t split_in_half(std::span<FlatTriangle> triangles, const Vector& vector) {
   glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
   double area = 0;
   for (const FlatTriangle& t : triangles) {
-    low = glm::min(low, t.centroid);
-    high = glm::max(high, t.centroid);
+    low = glm::min(low, vector(t));
+    high = glm::max(high, vector(t));
     area += t.area;
   }
   const glm::dvec3 size = high - low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  std::ranges::stable_sort(triangles, {},
-                           [axis](const FlatTriangle& t) { return t.centroid[axis]; });
+  std::ranges::stable_sort(triangles, {}, [&](const FlatTriangle& t) { return vector(t)[axis]; });
   std::size_t count = 0;
   for (double before = 0; count + 1 < triangles.size() && before < 0.5 * area; ++count) {
     before += triangles[count].area;
@@ -119,7 +124,11 @@ void write_parts(std::span<FlatTriangle> triangles, int levels_below, std::size_
     write_parts(std::span(half).last(1), levels_below - 1, 2 * node + 2, heap);
     return;
   }
-  const std::size_t first = split_in_half(triangles);
+  // First by normals, which matter at any distance.
+  const std::size_t first =
+      is_about_flat(heap[node])
+          ? split_in_half(triangles, [](const FlatTriangle& t) { return t.centroid; })
+          : split_in_half(triangles, [](const FlatTriangle& t) { return t.normal; });
   write_parts(triangles.first(first), levels_below - 1, 2 * node + 1, heap);
   write_parts(triangles.subspan(first), levels_below - 1, 2 * node + 2, heap);
 }
@@ -129,9 +138,9 @@ double between_parts(std::span<const PatchPart> a, std::span<const PatchPart> b)
   for (const PatchPart& x : a) {
     double inner = 0;
     for (const PatchPart& y : b) {
-      inner += y.area * point_kernel(x.centroid, x.normal, y.centroid, y.normal);
+      inner += point_kernel(x.centroid, x.vector_area, y.centroid, y.vector_area);
     }
-    sum += x.area * inner;
+    sum += inner;
   }
   return sum;
 }
@@ -145,16 +154,17 @@ double between_triangles(std::span<const FlatTriangle> a, std::span<const FlatTr
   return sum;
 }
 
-double part_to_triangle(const PatchPart& part, const FlatTriangle& t) {
+/// From the part to the triangle, per area of the part as `normal` faces it.
+double part_to_triangle(const PatchPart& part, const glm::dvec3& normal, const FlatTriangle& t) {
   const glm::dvec3 d = part.centroid - t.centroid;
   const double height = glm::dot(t.normal, d);
   if (height <= 1e-6 * t.radius) return 0;
   if (t.radius * t.radius < kPointLike * kPointLike * glm::dot(d, d)) {
-    return t.area * point_kernel(part.centroid, part.normal, t.centroid, t.normal);
+    return t.area * point_kernel(part.centroid, normal, t.centroid, t.normal);
   }
   // Relative to the part, so that single precision is enough.
   return point_to_triangle_form_factor(
-      {0, 0, 0}, part.normal,
+      {0, 0, 0}, normal,
       {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid, t.vertex[2] - part.centroid});
 }
 
@@ -162,9 +172,13 @@ double parts_to_triangles(std::span<const PatchPart> parts,
                           std::span<const FlatTriangle> triangles) {
   double sum = 0;
   for (const PatchPart& part : parts) {
+    const double seen_area = glm::length(part.vector_area);
+    if (seen_area <= 0) continue;
     double inner = 0;
-    for (const FlatTriangle& t : triangles) inner += part_to_triangle(part, t);
-    sum += part.area * std::min(inner, 1.0);
+    for (const FlatTriangle& t : triangles) {
+      inner += part_to_triangle(part, part.vector_area / seen_area, t);
+    }
+    sum += seen_area * std::min(inner, 1.0);
   }
   return sum;
 }
@@ -202,6 +216,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
   bounds_.resize(n);
   points_.resize(n * kPointCount);
   parts_.resize(n * kPartStride);
+  flat_level_.resize(n);
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t i = 0; i < n; ++i) {
     for (const FlatTriangle& t : triangles(i)) area_[i] += t.area;
@@ -217,6 +232,9 @@ void PatchGeometry::add_parts(std::size_t patch) {
   const std::span<const FlatTriangle> all = triangles(patch);
   std::vector<FlatTriangle> own(all.begin(), all.end());
   write_parts(own, kPartLevels, 0, {&parts_[patch * kPartStride], kPartStride});
+  int level = 0;
+  while (level < kPartLevels && !std::ranges::all_of(parts(patch, level), is_about_flat)) ++level;
+  flat_level_[patch] = static_cast<std::uint8_t>(level);
 }
 
 std::span<const PatchPart> PatchGeometry::parts(std::size_t patch, int level) const {
@@ -231,7 +249,8 @@ double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, st
   const double reach = (near.radius + far.radius) / glm::distance(near.centre, far.centre);
   for (std::size_t k = 0; i != j && k < kPartReach.size(); ++k) {
     if (!(reach < kPartReach[k])) continue;
-    return between_parts(geometry.parts(i, kPartLevel[k]), geometry.parts(j, kPartLevel[k]));
+    return between_parts(geometry.parts(i, std::max(kPartLevel[k], geometry.flat_level(i))),
+                         geometry.parts(j, std::max(kPartLevel[k], geometry.flat_level(j))));
   }
   constexpr int kFinest = PatchGeometry::kPartLevels;
   return 0.5 * (parts_to_triangles(geometry.parts(i, kFinest), b) +

@@ -29,11 +29,12 @@ struct PatchBounds {
   bool may_face(const glm::dvec3& point, double sphere_radius) const;
 };
 
-/// A part of a patch taken as a point with a normal.
+/// A part of a patch taken as a point. Its area counts by what is seen of it: the normals of a part
+/// that is not flat cancel in part, as its projections do.
 struct PatchPart {
   glm::dvec3 centroid{0};
-  glm::dvec3 normal{0};  ///< unit
-  double area = 0;       ///< m²
+  glm::dvec3 vector_area{0};  ///< m²: the sum of area x normal
+  double area = 0;            ///< m²
 };
 
 /// The shapes of all patches. Immutable, usable from any number of threads.
@@ -43,7 +44,7 @@ class PatchGeometry {
   static constexpr std::uint32_t kPointCount = 64;
 
   /// Parts that a patch is cut into at most: two to the power of levels.
-  static constexpr int kPartLevels = 4;
+  static constexpr int kPartLevels = 5;
 
   /// `tracer` holds the scene; points are moved off its surface. `seed` shifts them.
   PatchGeometry(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed);
@@ -63,18 +64,23 @@ class PatchGeometry {
     return {points_.data() + patch * kPointCount, kPointCount};
   }
 
-  /// At most 2^`level` parts that make up the patch; 0 <= level <= kPartLevels.
+  /// The 2^`level` parts that make up the patch, `level` at most kPartLevels and at least
+  /// flat_level(patch) if they are to stand for it.
   std::span<const PatchPart> parts(std::size_t patch, int level) const;
+
+  /// The level from which on parts are about flat, or kPartLevels.
+  int flat_level(std::size_t patch) const { return flat_level_[patch]; }
 
  private:
   void add_parts(std::size_t patch);
 
-  std::vector<std::uint32_t> begin_;    ///< [n + 1]
-  std::vector<FlatTriangle> triangle_;  ///< those of patch i at [begin_[i], begin_[i + 1])
-  std::vector<double> area_;            ///< [n] m²
-  std::vector<PatchBounds> bounds_;     ///< [n]
-  std::vector<PatchPoint> points_;      ///< [n][kPointCount]
-  std::vector<PatchPart> parts_;        ///< [n][all levels, the coarsest first]
+  std::vector<std::uint32_t> begin_;      ///< [n + 1]
+  std::vector<FlatTriangle> triangle_;    ///< those of patch i at [begin_[i], begin_[i + 1])
+  std::vector<double> area_;              ///< [n] m²
+  std::vector<PatchBounds> bounds_;       ///< [n]
+  std::vector<PatchPoint> points_;        ///< [n][kPointCount]
+  std::vector<std::uint8_t> flat_level_;  ///< [n]
+  std::vector<PatchPart> parts_;          ///< [n][all levels, the coarsest first]
 };
 
 /// Exchange area A_i F_ij in m² of patches i and j with nothing between them: symmetric up to

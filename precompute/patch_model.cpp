@@ -1,9 +1,11 @@
 #include "rebounce/precompute/patch_model.h"
 
 #include <algorithm>
+#include <array>
 #include <numbers>
 #include <unordered_map>
 
+#include "element_clusters.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
@@ -14,7 +16,8 @@ namespace {
 
 class PatchModelBuilder {
  public:
-  PatchModelBuilder(Scene scene, const SubdivisionSettings& settings) : scene_(std::move(scene)) {
+  PatchModelBuilder(Scene scene, const SubdivisionSettings& settings)
+      : scene_(std::move(scene)), settings_(settings) {
     drop_slivers();
     model_.scene_triangle_count = scene_.triangle.size();
     const std::vector<TriangleSides> sides =
@@ -32,11 +35,10 @@ class PatchModelBuilder {
   PatchModel build() {
     copy_surface();
     add_second_sides();
-    for (std::uint32_t t = 0; t < model_.mesh.triangle.size(); ++t) {
-      model_.mesh.triangle_patch.push_back(kNone);
-      if (kind_[t] == SideKind::kLit) add_patch_of(t);
-    }
-    find_shown_patches();
+    const RayTracer tracer(model_.mesh.position,
+                           std::span(model_.mesh.triangle).first(model_.mesh.surface_count()));
+    make_patches(tracer);
+    find_shown_patches(tracer);
     if (clamped_count_ > 0) {
       model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
                                 " patches was clamped to 0.99");
@@ -91,34 +93,108 @@ class PatchModelBuilder {
     }
   }
 
-  void add_patch_of(std::uint32_t t) {
-    DisplayMesh& mesh = model_.mesh;
-    PatchTable& patches = model_.patches;
-    mesh.triangle_patch[t] = static_cast<std::uint32_t>(patches.size());
-
+  std::array<glm::dvec3, 3> corners(std::uint32_t t) const {
+    const DisplayMesh& mesh = model_.mesh;
     const auto [a, b, c] = mesh.triangle[t];
-    const glm::dvec3 p = to_dvec3(mesh.position[a]), q = to_dvec3(mesh.position[b]),
-                     r = to_dvec3(mesh.position[c]);
-    const glm::dvec3 cross = glm::cross(q - p, r - p);
-    patches.area.push_back(static_cast<float>(0.5 * glm::length(cross)));
-    patches.centroid.push_back(to_float3((p + q + r) / 3.0));
-    patches.normal.push_back(to_float3(glm::normalize(cross)));
+    return {to_dvec3(mesh.position[a]), to_dvec3(mesh.position[b]), to_dvec3(mesh.position[c])};
+  }
 
-    const Material& material = scene_.materials[mesh.triangle_material[t]];
-    Float3 reflectance = mean_base_color(
-        scene_, material,
+  /// Mean reflectance of a display triangle, textures integrated.
+  Float3 mean_reflectance(std::uint32_t t) const {
+    const DisplayMesh& mesh = model_.mesh;
+    const auto [a, b, c] = mesh.triangle[t];
+    return mean_base_color(
+        scene_, scene_.materials[mesh.triangle_material[t]],
         {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]},
         {mesh.vertex_color[a], mesh.vertex_color[b], mesh.vertex_color[c]});
+  }
+
+  /// Mean emitted exitance of a display triangle in lx, textures integrated.
+  Float3 mean_exitance(std::uint32_t t) const {
+    const DisplayMesh& mesh = model_.mesh;
+    const auto [a, b, c] = mesh.triangle[t];
     Float3 exitance = mean_emitted_luminance(
-        scene_, material,
+        scene_, scene_.materials[mesh.triangle_material[t]],
         {mesh.emissive_texcoord[a], mesh.emissive_texcoord[b], mesh.emissive_texcoord[c]});
     for (float& m : exitance) m *= std::numbers::pi_v<float>;
+    return exitance;
+  }
+
+  /// The lit sides, with what they reflect and emit.
+  void make_elements() {
+    for (std::uint32_t t = 0; t < kind_.size(); ++t) {
+      if (kind_[t] == SideKind::kLit) element_triangle_.push_back(t);
+    }
+    const std::vector<std::uint32_t> position = weld_positions(model_.mesh.position).id;
+    const std::size_t count = element_triangle_.size();
+    elements_.resize(count);
+    exitance_.resize(count);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::size_t e = 0; e < count; ++e) {
+      const std::uint32_t t = element_triangle_[e];
+      const auto [p, q, r] = corners(t);
+      const glm::dvec3 cross = glm::cross(q - p, r - p);
+      const auto [a, b, c] = model_.mesh.triangle[t];
+      elements_.corner[e] = {position[a], position[b], position[c]};
+      elements_.centroid[e] = to_float3((p + q + r) / 3.0);
+      elements_.low[e] = to_float3(glm::min(p, glm::min(q, r)));
+      elements_.high[e] = to_float3(glm::max(p, glm::max(q, r)));
+      elements_.normal[e] = to_float3(glm::normalize(cross));
+      elements_.area[e] = static_cast<float>(0.5 * glm::length(cross));
+      elements_.reflectance[e] = mean_reflectance(t);
+      exitance_[e] = mean_exitance(t);
+      elements_.emits[e] = std::ranges::any_of(exitance_[e], [](float m) { return m > 0; });
+    }
+  }
+
+  void make_patches(const RayTracer& tracer) {
+    make_elements();
+    const ElementPatches merged = merge_elements(
+        elements_, tracer, {.patch_count = settings_.patch_count, .largest = settings_.patch_size});
+    model_.element_count = elements_.size();
+    model_.mesh.triangle_patch.assign(model_.mesh.triangle.size(), kNone);
+    for (std::size_t e = 0; e < elements_.size(); ++e) {
+      model_.mesh.triangle_patch[element_triangle_[e]] = merged.patch[e];
+    }
+    average_elements(merged);
+  }
+
+  /// Fills the table of patches with the means of their elements, by area.
+  void average_elements(const ElementPatches& merged) {
+    const std::size_t n = merged.patch_count;
+    std::vector<double> area(n, 0.0);
+    std::vector<glm::dvec3> centroid(n, glm::dvec3(0)), normal = centroid, reflectance = centroid,
+                                                        exitance = centroid;
+    std::vector<Float3> first_normal(n);
+    for (std::size_t e = merged.patch.size(); e-- > 0;) {
+      const std::uint32_t i = merged.patch[e];
+      const double part = elements_.area[e];
+      area[i] += part;
+      centroid[i] += part * to_dvec3(elements_.centroid[e]);
+      normal[i] += part * to_dvec3(elements_.normal[e]);
+      reflectance[i] += part * to_dvec3(elements_.reflectance[e]);
+      exitance[i] += part * to_dvec3(exitance_[e]);
+      first_normal[i] = elements_.normal[e];
+    }
+    PatchTable& patches = model_.patches;
+    for (std::size_t i = 0; i < n; ++i) {
+      patches.area.push_back(static_cast<float>(area[i]));
+      patches.centroid.push_back(to_float3(centroid[i] / area[i]));
+      const double length = glm::length(normal[i]);
+      // A closed patch has no mean normal.
+      patches.normal.push_back(length > 1e-6 * area[i] ? to_float3(normal[i] / length)
+                                                       : first_normal[i]);
+      patches.reflectance.push_back(clamp_reflectance(to_float3(reflectance[i] / area[i])));
+      patches.emitted_exitance.push_back(to_float3(exitance[i] / area[i]));
+    }
+  }
+
+  Float3 clamp_reflectance(Float3 reflectance) {
     if (std::ranges::any_of(reflectance, [](float rho) { return rho > kMaxReflectance; })) {
       ++clamped_count_;
       for (float& rho : reflectance) rho = std::min(rho, kMaxReflectance);
     }
-    patches.reflectance.push_back(reflectance);
-    patches.emitted_exitance.push_back(exitance);
+    return reflectance;
   }
 
   /// Takes out triangles whose height is below the precision of rays: what stands on them or looks
@@ -143,10 +219,9 @@ class PatchModelBuilder {
   }
 
   /// Covered sides show the light of what covers them at their middle.
-  void find_shown_patches() {
+  void find_shown_patches(const RayTracer& tracer) {
     const DisplayMesh& mesh = model_.mesh;
     model_.shown_patch = mesh.triangle_patch;
-    const RayTracer tracer(mesh.position, std::span(mesh.triangle).first(mesh.surface_count()));
     std::vector<std::uint32_t> surface_of(mesh.triangle.size());
     for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
       surface_of[t] = t;
@@ -158,9 +233,7 @@ class PatchModelBuilder {
       model_.unlit_side_count += kind_[t] == SideKind::kUnlit ? 1 : 0;
       if (kind_[t] != SideKind::kCovered) continue;
       ++model_.covered_side_count;
-      const auto [a, b, c] = mesh.triangle[t];
-      const glm::dvec3 p = to_dvec3(mesh.position[a]), q = to_dvec3(mesh.position[b]),
-                       r = to_dvec3(mesh.position[c]);
+      const auto [p, q, r] = corners(t);
       find_coincident_sides(
           tracer, to_float3((p + q + r) / 3.0), to_float3(glm::normalize(glm::cross(q - p, r - p))),
           surface_of[t], [&](std::uint32_t o) { return mesh.back_triangle[o] != kNone; }, hits,
@@ -174,8 +247,12 @@ class PatchModelBuilder {
   }
 
   Scene scene_;
-  std::vector<TriangleSides> sides_;  ///< of each triangle of the subdivided scene
-  std::vector<SideKind> kind_;        ///< of each display triangle
+  const SubdivisionSettings& settings_;
+  std::vector<TriangleSides> sides_;             ///< of each triangle of the subdivided scene
+  std::vector<SideKind> kind_;                   ///< of each display triangle
+  std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
+  Elements elements_;
+  std::vector<Float3> exitance_;  ///< lx, of each element
   PatchModel model_;
   std::size_t clamped_count_ = 0;
 };

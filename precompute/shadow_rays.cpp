@@ -1,6 +1,6 @@
 #include "shadow_rays.h"
 
-#include <array>
+#include <algorithm>
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
@@ -17,55 +17,80 @@ std::pair<const PatchPoint*, const PatchPoint*> ShadowRays::ray_ends(std::uint32
                                                                      std::uint32_t j,
                                                                      std::uint32_t k,
                                                                      std::uint64_t hash) const {
+  const std::uint32_t round = k / kPointCount;
   const std::uint32_t a = (k + static_cast<std::uint32_t>(hash)) % kPointCount;
-  const std::uint32_t b = (19 * k + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
+  const std::uint32_t b =
+      (19 * k + 7 * round + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
   return {&geometry_.points(i)[a], &geometry_.points(j)[b]};
+}
+
+double ShadowRays::kernel(const PatchPoint& x, const PatchPoint& y) {
+  return point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
+                      to_dvec3(y.normal));
 }
 
 void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                            std::vector<Ray>& rays) const {
   rays.resize(facing.size() * count);
-  Ray* ray = rays.data();
-  for (const FacingPatch& other : facing) {
-    const std::uint64_t hash = pair_hash(i, other.patch);
-    for (int k = 0; k < count; ++k, ++ray) {
-      const auto [x, y] = ray_ends(i, other.patch, k, hash);
-      *ray = Ray{};
-      ray->origin = x->position;
-      ray->t_near = 0;
-      ray->direction = to_float3(to_glm(y->position) - to_glm(x->position));
-      ray->t_far = 1;
-    }
+  for (std::size_t p = 0; p < facing.size(); ++p) {
+    make_pair_rays(i, facing[p].patch, std::span(rays).subspan(p * count, count));
   }
+}
+
+void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const {
+  const std::uint64_t hash = pair_hash(i, j);
+  std::size_t made = 0;
+  for (std::uint32_t k = 0; k < kCandidateCount && made < rays.size(); ++k) {
+    const auto [x, y] = ray_ends(i, j, k, hash);
+    if (kernel(*x, *y) <= 0) continue;
+    Ray& ray = rays[made++];
+    ray = ray_between(*x, *y);
+    ray.id = k;
+  }
+  for (Ray& ray : rays.subspan(made)) ray = void_ray();
+}
+
+Ray ShadowRays::ray_between(const PatchPoint& x, const PatchPoint& y) {
+  Ray ray{};
+  ray.origin = x.position;
+  ray.t_near = 0;
+  ray.direction = to_float3(to_glm(y.position) - to_glm(x.position));
+  ray.t_far = 1;
+  return ray;
+}
+
+Ray ShadowRays::void_ray() {
+  Ray ray{};
+  ray.mask = 0;
+  ray.t_near = ray.t_far = 0;
+  ray.direction = {1, 0, 0};
+  ray.id = kNone;
+  return ray;
+}
+
+ShadowRays::Agreement ShadowRays::agreement(std::span<const Ray> rays) {
+  const auto count = rays.size() - static_cast<std::size_t>(std::ranges::count_if(rays, is_void));
+  const auto hidden = static_cast<std::size_t>(std::ranges::count_if(rays, is_occluded));
+  if (hidden == count) return Agreement::kHidden;
+  return hidden == 0 ? Agreement::kClear : Agreement::kMixed;
 }
 
 ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
                                               std::span<const Ray> rays) const {
   const std::uint64_t hash = pair_hash(i, j);
-  std::array<double, kPointCount> weight;
-  for (std::size_t k = 0; k < rays.size(); ++k) {
-    const auto [x, y] = ray_ends(i, j, static_cast<std::uint32_t>(k), hash);
-    weight[k] = point_kernel(to_dvec3(x->position), to_dvec3(x->normal), to_dvec3(y->position),
-                             to_dvec3(y->normal));
+  double sum = 0, sum_of_squares = 0, visible = 0;
+  for (const Ray& ray : rays) {
+    if (is_void(ray)) continue;
+    const auto [x, y] = ray_ends(i, j, ray.id, hash);
+    const double weight = kernel(*x, *y);
+    sum += weight;
+    sum_of_squares += weight * weight;
+    if (!is_occluded(ray)) visible += weight;
   }
-  return visible_part(rays, std::span(weight).first(rays.size()));
-}
-
-ShadowRays::Visibility ShadowRays::visible_part(std::span<const Ray> rays,
-                                                std::span<const double> weight) {
-  double sum = 0, sum_of_squares = 0, visible = 0, count = 0;
-  for (std::size_t k = 0; k < rays.size(); ++k) {
-    const bool clear = !is_occluded(rays[k]);
-    sum += weight[k];
-    sum_of_squares += weight[k] * weight[k];
-    visible += clear ? weight[k] : 0;
-    count += clear ? 1 : 0;
-  }
-  const double part = sum > 0 ? visible / sum : count / static_cast<double>(rays.size());
+  if (sum <= 0) return {0, 1};
   // As sure as that many rays of equal weight (Kish's effective sample size).
-  const double effective = sum > 0 ? sum * sum / sum_of_squares : 1;
-  const bool mixed = count > 0 && count < static_cast<double>(rays.size());
-  return {part, part * (1 - part) / effective, mixed};
+  const double part = visible / sum, effective = sum * sum / sum_of_squares;
+  return {part, part * (1 - part) / effective};
 }
 
 }  // namespace rebounce

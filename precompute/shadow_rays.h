@@ -20,7 +20,8 @@ struct FacingPatch {
 /// pair's exchange gets through. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
-  /// The most rays that a pair can have.
+  /// The most rays that a pair can have. Rays between points that do not face each other are not
+  /// made: they carry no light.
   static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
 
   /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
@@ -43,25 +44,40 @@ class ShadowRays {
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
   /// Writes to `rays` `count` <= kPointCount untraced rays for each pair of patch i, one pair after
-  /// the other.
+  /// the other; where a pair has fewer the rest are never occluded and void (is_void).
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
+
+  /// What the traced rays of a pair agree on.
+  enum class Agreement : std::uint8_t { kClear, kHidden, kMixed };
+  static Agreement agreement(std::span<const Ray> rays);
+
+  /// True for a ray that stands for none.
+  static bool is_void(const Ray& ray) { return ray.id == kNone; }
 
   struct Visibility {
     double part;      ///< of the pair's light that gets through, [0, 1]
     double variance;  ///< of `part`
-    bool mixed;       ///< some rays got through and some did not
   };
 
   /// What the traced `rays` of the pair (i, j) say of it: each is weighted by the kernel between
   /// its ends.
   Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays) const;
 
-  /// What traced rays of `weight` each say.
-  static Visibility visible_part(std::span<const Ray> rays, std::span<const double> weight);
+  /// A ray from `x` to `y`.
+  static Ray ray_between(const PatchPoint& x, const PatchPoint& y);
+
+  /// One that stands for none and is never occluded.
+  static Ray void_ray();
+
+  static double kernel(const PatchPoint& x, const PatchPoint& y);
 
  private:
+  // Pairs of points that are looked at for rays, at most.
+  static constexpr std::uint32_t kCandidateCount = 4 * kPointCount;
+
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
+  void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
   std::pair<const PatchPoint*, const PatchPoint*> ray_ends(std::uint32_t i, std::uint32_t j,
                                                            std::uint32_t k,
                                                            std::uint64_t hash) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <glm/glm.hpp>
 #include <map>
 #include <queue>
@@ -13,6 +14,10 @@ namespace rebounce {
 namespace {
 
 using EdgeKey = std::uint64_t;
+
+// A mesh of nothing but large triangles, bisected until there are enough, has no edge longer than
+// this many mean patch sizes.
+constexpr double kLongestEdge = 2.9;
 
 EdgeKey edge_key(std::uint32_t a, std::uint32_t b) {
   return (static_cast<EdgeKey>(std::min(a, b)) << 32) | std::max(a, b);
@@ -45,9 +50,11 @@ class Subdivision {
   }
 
   void run(const SubdivisionSettings& settings) {
+    const double longest = kLongestEdge * mean_patch_size(settings.patch_count);
     while (!queue_.empty()) {
       const QueuedEdge edge = queue_.top();
-      const bool enough = settings.patch_count > 0 && patch_count_ >= settings.patch_count;
+      const bool enough = settings.patch_count > 0 && patch_count_ >= settings.patch_count &&
+                          edge.length_squared <= longest * longest;
       const bool fine = settings.patch_size > 0 &&
                         edge.length_squared <= settings.patch_size * settings.patch_size;
       if (enough || fine) break;
@@ -71,6 +78,19 @@ class Subdivision {
   }
 
  private:
+  /// The root of the mean area of `patch_count` patches, metres.
+  double mean_patch_size(std::size_t patch_count) const {
+    double area = 0;
+    for (std::uint32_t t = 0; t < source_.size(); ++t) {
+      const auto [a, b, c] = scene_.triangle[t];
+      const glm::dvec3 p = to_dvec3(scene_.position[a]);
+      area += 0.5 * patches_per_triangle_[t] *
+              glm::length(
+                  glm::cross(to_dvec3(scene_.position[b]) - p, to_dvec3(scene_.position[c]) - p));
+    }
+    return std::sqrt(area / static_cast<double>(std::max<std::size_t>(patch_count, 1)));
+  }
+
   void attach_edge(std::uint32_t t, int corner) {
     const std::uint32_t a = scene_.triangle[t][corner], b = scene_.triangle[t][(corner + 1) % 3];
     const EdgeKey key = edge_key(position_id_[a], position_id_[b]);

@@ -21,6 +21,7 @@ struct PatchModel {
   /// [t] the patch whose light a display triangle shows: its own, or that of the surface that
   /// covers it; kNone for a side that sees nothing.
   std::vector<std::uint32_t> shown_patch;
+  std::size_t element_count = 0;         ///< lit sides, of which patches are made
   std::size_t scene_triangle_count = 0;  ///< before subdivision, slivers not counted
   std::size_t sliver_count = 0;          ///< triangles thinner than rays are precise: dropped
   std::size_t unlit_side_count = 0;      ///< sides of display triangles that see nothing: no patch
@@ -28,10 +29,10 @@ struct PatchModel {
   std::vector<std::string> warnings;
 };
 
-/// Subdivides the scene's triangles and makes every lit side of every one (lit_sides.h) a patch:
-/// reflectance and emission are means over the triangle, textures integrated. Double-sided
-/// triangles get a second display triangle. The reconstruction weights are left to
-/// reconstruction_weights.h.
+/// Subdivides the scene's large triangles (subdivision.h) and merges small ones: every lit side
+/// (lit_sides.h) is an element of one patch (element_clusters.h). Reflectance and emission are
+/// means over the patch, textures integrated. Double-sided triangles get a second display triangle.
+/// The reconstruction weights are left to reconstruction_weights.h.
 PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);
 
 }  // namespace rebounce

@@ -9,15 +9,17 @@
 namespace rebounce {
 
 struct SubdivisionSettings {
-  /// Stop once there are this many patches; 0: no such limit. More patches: finer light, offline
-  /// time and memory that grow with their square.
+  /// As many patches as are wanted; 0: as many as patch_size asks for. More patches: finer light,
+  /// offline time and memory that grow with their square.
   std::size_t patch_count = 4096;
-  /// Stop once no edge is longer than this, in metres; 0: no such limit.
+  /// No patch should be longer than this, in metres; 0: no such limit.
   float patch_size = 0;
 };
 
-/// Splits the scene's triangles until `settings` is met, and returns for each triangle the index
-/// of the triangle it came from.
+/// Splits the scene's triangles until there are as many elements as patches are wanted and none is
+/// much larger than a mean patch (small triangles are merged afterwards: element_clusters.h), or
+/// until no edge is longer than patch_size. Returns for each triangle the index of the triangle it
+/// came from.
 ///
 /// The longest edge of the whole scene is bisected over and over, in all triangles that share it
 /// (edges are the same where their end points are, whatever their materials). Being the longest of

@@ -1,0 +1,63 @@
+#pragma once
+
+// Small triangles merged into patches.
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/types.h"
+
+namespace rebounce {
+
+/// The lit sides of display triangles, each an element of some patch.
+struct Elements {
+  std::vector<Uint3> corner;        ///< numbers of positions, the same where positions are
+  std::vector<Float3> centroid;     ///< metres
+  std::vector<Float3> low, high;    ///< box around it, metres
+  std::vector<Float3> normal;       ///< unit
+  std::vector<float> area;          ///< m², > 0
+  std::vector<Float3> reflectance;  ///< [0, 1]
+  std::vector<std::uint8_t> emits;  ///< 1 if it does
+
+  std::size_t size() const { return area.size(); }
+  void resize(std::size_t count);
+};
+
+/// Elements as patches.
+struct ElementPatches {
+  std::vector<std::uint32_t> patch;  ///< of each element
+  std::size_t patch_count = 0;
+};
+
+struct ClusterSettings {
+  /// Merge until no more than this many patches are left.
+  std::size_t patch_count = 0;
+  /// Do not merge what would be longer than this, in metres; 0: no such limit.
+  float largest = 0;
+};
+
+/// Merges elements into patches, the cheapest pair first: what a pair costs is how much more its
+/// elements differ from the mean of their patch, in position, normal and reflectance, summed over
+/// their area (J. H. Ward, "Hierarchical grouping to optimize an objective function", 1963; over
+/// the dual graph of the mesh as in M. Garland, A. Willmott, P. S. Heckbert, "Hierarchical face
+/// clustering on polygonal surfaces", 2001). So a patch is small where surfaces turn or change
+/// colour, and detail far smaller than a patch is taken as a whole.
+///
+/// Pairs are neighbours over an edge; elements that lie near each other without an edge between
+/// (leaves, slats), if the line of sight between them is free; and once none of those is left,
+/// patches that lie near each other. Emitting and other elements are never merged.
+///
+/// The leak test: what is longer than half of a mean patch merges only if most lines of sight
+/// between its elements are free, so that no patch lies on two sides of a wall or in two rooms.
+/// Where that leaves more patches than are wanted, it is waived for lengths that grow until there
+/// are few enough.
+///
+/// `tracer` holds the surface. Patches are numbered in the order of their first elements.
+/// Deterministic.
+ElementPatches merge_elements(const Elements& elements, const RayTracer& tracer,
+                              const ClusterSettings& settings);
+
+}  // namespace rebounce

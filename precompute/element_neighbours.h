@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "rebounce/runtime/patch_points.h"
+#include "rebounce/runtime/ray_tracer.h"
+
+namespace rebounce {
+
+/// Pairs of elements or patches, the smaller number first.
+using Pairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
+
+/// Pairs of elements that meet at an edge and are on the same side of the surface: they run along
+/// the edge in opposite ways. Ascending, each once.
+Pairs find_edge_neighbours(std::span<const Uint3> corner);
+
+/// For each point the `count` nearest others within `reach` metres. Ascending, each once.
+Pairs find_near_pairs(std::span<const Float3> point, std::size_t count, float reach);
+
+/// True if nothing is between two points of the surface: on the way up from each along its normal,
+/// by a part of their distance, and across between the upper ends, so that a rounded surface does
+/// not hide its own points from each other.
+bool see_each_other(const PatchPoint& a, const PatchPoint& b, const RayTracer& tracer);
+
+}  // namespace rebounce
