@@ -39,13 +39,14 @@ double LinkRays::first_part(const LinkNode& node) const {
   return node.is_leaf() ? 1 : tree_[node.first_child].area / node.area;
 }
 
-/// True if rays between two of the children, enough of them to tell, are all hidden.
+/// True if no ray between two of the children gets through, of enough to tell: they are hidden
+/// from each other or do not face each other.
 bool LinkRays::is_divided(std::span<const Ray> rays, std::span<const int> children) {
   std::array<int, 4> seen{}, count{};
   for (std::size_t k = 0; k < rays.size(); ++k) {
-    if (ShadowRays::is_void(rays[k])) continue;
+    const bool clear = !ShadowRays::is_void(rays[k]) && !is_occluded(rays[k]);
     ++count[children[k]];
-    seen[children[k]] += is_occluded(rays[k]) ? 0 : 1;
+    seen[children[k]] += clear ? 1 : 0;
   }
   for (int pair = 0; pair < 4; ++pair) {
     if (count[pair] >= kEnoughRays && seen[pair] == 0) return true;
@@ -90,8 +91,9 @@ LinkRays::Visibility LinkRays::judge(std::span<const Ray> rays, std::span<const 
   }
   if (sum <= 0) return {1, 1, true, true};  // no ray can tell
   const double part = visible / sum, effective = sum * sum / sum_of_squares;
-  const bool mixed = ShadowRays::agreement(rays) == ShadowRays::Agreement::kMixed;
-  return {part, part * (1 - part) / effective, mixed, mixed && is_divided(rays, children)};
+  const bool divided = visible > 0 && is_divided(rays, children);
+  const bool mixed = divided || ShadowRays::agreement(rays) == ShadowRays::Agreement::kMixed;
+  return {part, part * (1 - part) / effective, mixed, divided};
 }
 
 }  // namespace rebounce

@@ -28,8 +28,8 @@ class LinkRays {
   struct Visibility {
     double part;      ///< of the pair's light that gets through, [0, 1]
     double variance;  ///< of `part`
-    bool mixed;       ///< some rays got through and some did not
-    bool divided;     ///< mixed, but none got through between two of the nodes' children
+    bool mixed;       ///< not all of either sees all of the other, or nothing
+    bool divided;     ///< mixed, and two of the nodes' children see nothing of each other
   };
 
   /// What `count` <= kMostRays rays between points spread over two nodes say. Two patches have the

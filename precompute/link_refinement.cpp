@@ -15,6 +15,9 @@ namespace {
 // A plane's points are off it by less than this part of its size.
 constexpr double kPlane = 1e-7;
 
+// A pair that faces in part may be linked where all of it is below this part of the error allowed.
+constexpr double kNegligible = 0.1;
+
 bool is_plane(const LinkNode& node) {
   return node.is_flat() && node.highest - node.lowest <= kPlane * node.radius;
 }
@@ -132,7 +135,9 @@ double LinkRefinement::allowed_squared(const LinkNode& a, const LinkNode& b) con
 LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratch& scratch) const {
   const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
   const double allowed = allowed_squared(a, b);
-  const bool smooth = scratch.kernel.residual_squared() < allowed;
+  const bool smooth = scratch.kernel.residual_squared() < allowed &&
+                      !(scratch.kernel.faces_in_part() &&
+                        scratch.kernel.norm_squared() > kNegligible * kNegligible * allowed);
   if (smooth && scratch.kernel.unoccluded() == 0) return {};
   // Where k rays agree, the part that does not is some 1 / (k + 2): rule of succession.
   const double enough = std::sqrt(scratch.kernel.norm_squared() / allowed) - 2;

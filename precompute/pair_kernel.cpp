@@ -35,6 +35,9 @@ bool PairKernel::estimate(std::uint32_t a, std::uint32_t b) {
   if (glm::distance(tree_[a].center, tree_[b].center) < reach) return false;
   const Cells cells_a = tree_.cells(a), cells_b = tree_.cells(b);
   if (!fill(cells_a, cells_b)) return false;
+  const auto pairs = std::span(kernel_).first(cells_a.size() * cells_b.size());
+  const auto dark = std::ranges::count(pairs, 0.0);
+  faces_in_part_ = dark > 0 && dark < static_cast<std::ptrdiff_t>(pairs.size());
   fit(tree_[a], cells_a, tree_[b], cells_b);
   limit(tree_[a], cells_a, tree_[b], cells_b);
   measure(tree_[a], cells_a, tree_[b], cells_b);

@@ -28,6 +28,9 @@ class PairKernel {
   /// The integral over both nodes of (kernel - what it is taken for)², of dimension 1.
   double residual_squared() const { return residual_squared_; }
 
+  /// True if some cells face each other and some do not: light would leak to what is behind.
+  bool faces_in_part() const { return faces_in_part_; }
+
   /// The integral of kernel² likewise.
   double norm_squared() const { return norm_squared_; }
 
@@ -45,6 +48,7 @@ class PairKernel {
   const LinkTree& tree_;
   const ShadowRays& shadow_rays_;
   std::array<double, LinkTree::kCellCount * LinkTree::kCellCount> kernel_;  ///< of cells, 1/m²
+  bool faces_in_part_ = false;
   double uncertain_ = 0;  ///< integral of the kernel's variance within cells
   double unoccluded_ = 0, residual_squared_ = 0, norm_squared_ = 0;
   glm::dvec3 gradient_a_{0}, gradient_b_{0};
