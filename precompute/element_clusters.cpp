@@ -1,8 +1,9 @@
-#include "element_clusters.h"
+#include "rebounce/precompute/element_clusters.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <queue>
 
@@ -28,8 +29,11 @@ constexpr int kRounds = 6;
 // Elements of a patch between which lines of sight are drawn.
 constexpr std::size_t kWitnessCount = 4;
 
-// A patch longer than this part of the mean size must pass the leak test.
+// What is no longer than this part of the mean size hides nothing, and may merge around itself.
 constexpr double kSmall = 0.5;
+
+// Only pieces of the mesh up to this many times that length are things and not walls.
+constexpr double kSmallPiece = 4;
 
 struct Cluster {
   double area = 0;
@@ -60,11 +64,18 @@ class Merging {
                                      : settings.largest;
     small_ = kSmall * size_;
     clusters_.reserve(2 * elements.size());
-    for (std::uint32_t e = 0; e < elements.size(); ++e) clusters_.push_back(cluster_of(e));
+    elements_of_.assign(1 + *std::ranges::max_element(elements.triangle), {kNone, kNone});
+    for (std::uint32_t e = 0; e < elements.size(); ++e) {
+      clusters_.push_back(cluster_of(e));
+      auto& sides = elements_of_[elements.triangle[e]];
+      sides[sides[0] == kNone ? 0 : 1] = e;
+    }
   }
 
   ElementPatches run() {
-    connect(find_edge_neighbours(elements_.corner));
+    const Pairs edges = find_edge_neighbours(elements_.corner);
+    measure_pieces(edges);
+    connect(edges);
     connect_in_sight(find_near_pairs(elements_.centroid, kNearCount, static_cast<float>(size_)));
     merge_cheapest();
     for (int round = 0; round < kRounds && alive_ > settings_.patch_count; ++round) {
@@ -94,6 +105,29 @@ class Merging {
     return cluster;
   }
 
+  /// Finds how long the connected piece of the mesh is that each element is of.
+  void measure_pieces(const Pairs& edges) {
+    std::vector<std::uint32_t> piece(elements_.size());
+    std::iota(piece.begin(), piece.end(), 0U);
+    const auto find = [&](std::uint32_t e) {
+      while (piece[e] != e) e = piece[e] = piece[piece[e]];
+      return e;
+    };
+    for (const auto& [a, b] : edges) {
+      const std::uint32_t low = std::min(find(a), find(b)), high = std::max(find(a), find(b));
+      piece[high] = low;
+    }
+    std::vector<glm::dvec3> low(elements_.size(), glm::dvec3(std::numeric_limits<double>::max()));
+    std::vector<glm::dvec3> high(elements_.size(), -low[0]);
+    for (std::uint32_t e = 0; e < elements_.size(); ++e) {
+      low[find(e)] = glm::min(low[find(e)], to_dvec3(elements_.low[e]));
+      high[find(e)] = glm::max(high[find(e)], to_dvec3(elements_.high[e]));
+    }
+    for (std::uint32_t e = 0; e < elements_.size(); ++e) {
+      piece_length_.push_back(glm::distance(low[find(e)], high[find(e)]));
+    }
+  }
+
   static double cost(const Cluster& a, const Cluster& b) {
     double distance_squared = 0;
     for (std::size_t k = 0; k < kFeatureCount; ++k) {
@@ -112,13 +146,13 @@ class Merging {
     }
   }
 
-  /// Connects those of the pairs of clusters that see each other.
+  /// Connects those of the pairs of clusters that nothing large stands between.
   void connect_in_sight(const Pairs& pairs) {
     std::vector<std::uint8_t> in_sight(pairs.size());
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t k = 0; k < pairs.size(); ++k) {
       const auto [a, b] = pairs[k];
-      in_sight[k] = see_each_other(witness(a, 0), witness(b, 0), tracer_) ? 1 : 0;
+      in_sight[k] = look_between(a, b, witness(a, 0), witness(b, 0)) == Sight::kFree ? 1 : 0;
     }
     Pairs seen;
     for (std::size_t k = 0; k < pairs.size(); ++k) {
@@ -170,18 +204,60 @@ class Merging {
     const double length = glm::distance(glm::min(clusters_[a].low, clusters_[b].low),
                                         glm::max(clusters_[a].high, clusters_[b].high));
     if (settings_.largest > 0 && length > settings_.largest) return false;
-    return length <= small_ || mostly_in_sight(a, b);
+    const auto [free, blocked_by_itself, count] = look_between(a, b);
+    if (2 * free > count) return true;
+    const double piece =
+        std::max(piece_length_[clusters_[a].witness[0]], piece_length_[clusters_[b].witness[0]]);
+    return 2 * (free + blocked_by_itself) > count && length <= small_ &&
+           piece <= kSmallPiece * small_;
   }
 
-  bool mostly_in_sight(std::uint32_t a, std::uint32_t b) const {
-    std::size_t free = 0;
-    const std::size_t count = clusters_[a].witness_count * clusters_[b].witness_count;
+  enum class Sight : std::uint8_t { kFree, kItself, kWall };
+
+  /// What stands between two points of clusters a and b. What is small hides nothing.
+  Sight look_between(std::uint32_t a, std::uint32_t b, const PatchPoint& from,
+                     const PatchPoint& to) const {
+    const std::uint32_t triangle = find_between(from, to, tracer_);
+    if (triangle == kNone) return Sight::kFree;
+    bool small = true;
+    for (const std::uint32_t e : elements_of_[triangle]) {
+      if (e == kNone) continue;
+      const std::uint32_t c = cluster_of_element(e);
+      if (c == a || c == b) return Sight::kItself;
+      small &= piece_length_[e] <= kSmall * size_;
+    }
+    const bool unlit = elements_of_[triangle] == std::array{kNone, kNone};
+    return small && !unlit ? Sight::kFree : Sight::kWall;
+  }
+
+  struct SightCount {
+    std::size_t free, blocked_by_itself, count;
+  };
+
+  SightCount look_between(std::uint32_t a, std::uint32_t b) const {
+    SightCount result{0, 0, clusters_[a].witness_count * clusters_[b].witness_count};
     for (std::size_t i = 0; i < clusters_[a].witness_count; ++i) {
       for (std::size_t j = 0; j < clusters_[b].witness_count; ++j) {
-        if (see_each_other(witness(a, i), witness(b, j), tracer_)) ++free;
+        const Sight sight = look_between(a, b, witness(a, i), witness(b, j));
+        result.free += sight == Sight::kFree ? 1 : 0;
+        result.blocked_by_itself += sight == Sight::kItself ? 1 : 0;
       }
     }
-    return 2 * free > count;
+    return result;
+  }
+
+  std::uint32_t cluster_of_element(std::uint32_t e) const {
+    std::uint32_t c = e;
+    while (!is_alive(c)) c = clusters_[c].merged_into;
+    return c;
+  }
+
+  /// Lets every cluster point to the one that it is part of now, so that chains stay short.
+  void shorten_chains() {
+    for (std::size_t c = clusters_.size(); c-- > 0;) {  // what merged comes after its parts
+      const std::uint32_t next = clusters_[c].merged_into;
+      if (next != kNone && !is_alive(next)) clusters_[c].merged_into = clusters_[next].merged_into;
+    }
   }
 
   PatchPoint witness(std::uint32_t cluster, std::size_t k) const {
@@ -201,6 +277,10 @@ class Merging {
     choose_witnesses(first, second, whole);
     first.merged_into = second.merged_into = merged;
     --alive_;
+    if (clusters_.size() >= next_shortening_) {
+      shorten_chains();
+      next_shortening_ += clusters_.size() / 8;
+    }
     join_neighbours(first, second, whole);
     for (const std::uint32_t n : whole.neighbours) {
       clusters_[n].neighbours.push_back(merged);
@@ -230,14 +310,12 @@ class Merging {
     all.erase(std::ranges::unique(all).begin(), all.end());
   }
 
-  ElementPatches result() const {
+  ElementPatches result() {
+    shorten_chains();
     ElementPatches result;
-    std::vector<std::uint32_t> root(clusters_.size()), patch_of(clusters_.size(), kNone);
-    for (std::size_t c = clusters_.size(); c-- > 0;) {  // what merged comes after its parts
-      root[c] = is_alive(c) ? static_cast<std::uint32_t>(c) : root[clusters_[c].merged_into];
-    }
+    std::vector<std::uint32_t> patch_of(clusters_.size(), kNone);
     for (std::uint32_t e = 0; e < elements_.size(); ++e) {
-      std::uint32_t& patch = patch_of[root[e]];
+      std::uint32_t& patch = patch_of[cluster_of_element(e)];
       if (patch == kNone) patch = static_cast<std::uint32_t>(result.patch_count++);
       result.patch.push_back(patch);
     }
@@ -248,15 +326,19 @@ class Merging {
   const RayTracer& tracer_;
   const ClusterSettings& settings_;
   double size_;   ///< the mean patch's, metres
-  double small_;  ///< what is no longer may merge unseen, metres
+  double small_;  ///< what is no longer may merge around itself, metres
   std::size_t alive_;
+  std::vector<std::array<std::uint32_t, 2>> elements_of_;  ///< sides of each surface triangle
+  std::vector<double> piece_length_;                       ///< metres, by element
   std::vector<Cluster> clusters_;
+  std::size_t next_shortening_ = 0;
   std::priority_queue<Candidate> queue_;
 };
 
 }  // namespace
 
 void Elements::resize(std::size_t count) {
+  triangle.resize(count);
   corner.resize(count);
   centroid.resize(count);
   low.resize(count);
@@ -269,6 +351,7 @@ void Elements::resize(std::size_t count) {
 
 ElementPatches merge_elements(const Elements& elements, const RayTracer& tracer,
                               const ClusterSettings& settings) {
+  if (elements.size() == 0) return {};
   return Merging(elements, tracer, settings).run();
 }
 

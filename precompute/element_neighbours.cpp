@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <compare>
-#include <nanoflann.hpp>
 
+#include "point_finder.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
@@ -44,23 +44,6 @@ void sort_and_unique(Pairs& pairs) {
   pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
 }
 
-/// What nanoflann asks of a set of points.
-struct PointSet {
-  std::span<const Float3> point;
-
-  // NOLINTBEGIN(readability-identifier-naming): nanoflann's names
-  std::size_t kdtree_get_point_count() const { return point.size(); }
-  float kdtree_get_pt(std::size_t index, std::size_t axis) const { return point[index][axis]; }
-  template <typename Box>
-  bool kdtree_get_bbox(Box& /*box*/) const {
-    return false;
-  }
-  // NOLINTEND(readability-identifier-naming)
-};
-
-using PointTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSet>,
-                                                      PointSet, 3, std::uint32_t>;
-
 // How far lines of sight are lifted off the surface, as a part of their length: half a circle's
 // rounding is passed over, a wall is not.
 constexpr float kLift = 0.3F;
@@ -98,36 +81,34 @@ Pairs find_edge_neighbours(std::span<const Uint3> corner) {
 
 Pairs find_near_pairs(std::span<const Float3> point, std::size_t count, float reach) {
   if (point.size() < 2) return {};
-  const PointSet set{point};
-  const PointTree tree(3, set, nanoflann::KDTreeSingleIndexAdaptorParams(16));
-  const std::size_t wanted = std::min(count + 1, point.size());  // a point is its own nearest
-  std::vector<std::uint32_t> index(wanted * point.size());
-  std::vector<std::size_t> found(point.size());
+  const PointFinder finder(point);
+  std::vector<std::vector<PointFinder::Found>> found(point.size());
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t k = 0; k < point.size(); ++k) {
-    std::vector<float> distance_squared(wanted);
-    found[k] = tree.knnSearch(point[k].data(), wanted, &index[k * wanted], distance_squared.data());
-    while (found[k] > 0 && distance_squared[found[k] - 1] > reach * reach) --found[k];
+    found[k] = finder.nearest(point[k], count + 1);  // a point is its own nearest
   }
   Pairs pairs;
   for (std::uint32_t k = 0; k < point.size(); ++k) {
-    for (std::size_t n = 0; n < found[k]; ++n) {
-      const std::uint32_t other = index[k * wanted + n];
-      if (other != k) pairs.emplace_back(std::min(k, other), std::max(k, other));
+    for (const auto& [other, distance_squared] : found[k]) {
+      if (other == k || distance_squared > reach * reach) continue;
+      pairs.emplace_back(std::min(k, other), std::max(k, other));
     }
   }
   sort_and_unique(pairs);
   return pairs;
 }
 
-bool see_each_other(const PatchPoint& a, const PatchPoint& b, const RayTracer& tracer) {
+std::uint32_t find_between(const PatchPoint& a, const PatchPoint& b, const RayTracer& tracer) {
   const glm::vec3 pa = to_glm(tracer.offset_point(a.position, a.normal));
   const glm::vec3 pb = to_glm(tracer.offset_point(b.position, b.normal));
   const float lift = kLift * glm::distance(pa, pb);
   const glm::vec3 above_a = pa + lift * to_glm(a.normal), above_b = pb + lift * to_glm(b.normal);
-  std::array<Ray, 3> rays = {segment(pa, above_a), segment(above_a, above_b), segment(above_b, pb)};
-  tracer.occluded(rays);
-  return std::ranges::none_of(rays, is_occluded);
+  const std::array<Ray, 3> rays = {segment(above_a, above_b), segment(pa, above_a),
+                                   segment(pb, above_b)};
+  std::array<Hit, 3> hits;
+  tracer.intersect(rays, hits);
+  const auto hit = std::ranges::find_if(hits, [](const Hit& h) { return h.triangle != kNone; });
+  return hit == hits.end() ? kNone : hit->triangle;
 }
 
 }  // namespace rebounce

@@ -1,4 +1,4 @@
-#include "patch_geometry.h"
+#include "rebounce/precompute/patch_geometry.h"
 
 #include <algorithm>
 #include <array>
@@ -21,14 +21,17 @@ constexpr std::size_t kFewTrianglePairs = 16;
 
 // Sums over 2^level parts each are taken while (sum of radii) / distance is below these: their
 // error goes with (that / sqrt(2)^level)^2. Measured: tests/precompute/test_patch_geometry.cpp.
-constexpr std::array<double, 3> kPartReach = {0.03, 0.15, 0.6};
-constexpr std::array<int, 3> kPartLevel = {0, 2, 4};
+constexpr std::array<double, 4> kPartReach = {0.03, 0.15, 0.6, 0.9};
+constexpr std::array<int, 4> kPartLevel = {0, 2, 4, 5};
 
 // A part whose vector area is this much of its area is about flat: within 45 degrees or so.
 constexpr double kAboutFlat = 0.85;
 
+// A part nearer than this many times the radii of both is looked at triangle by triangle.
+constexpr double kNearPart = 1.5;
+
 // A triangle this small for its distance is taken as a point.
-constexpr double kPointLike = 0.1;
+constexpr double kPointLike = 0.25;
 
 std::size_t part_offset(int level) {
   return (std::size_t{1} << level) - 1;
@@ -69,6 +72,11 @@ PatchPart whole_of(std::span<const FlatTriangle> triangles) {
     part.vector_area += t.area * t.normal;
   }
   part.centroid /= part.area;
+  for (const FlatTriangle& t : triangles) {
+    for (const glm::dvec3& v : t.vertex) {
+      part.radius = std::max(part.radius, glm::distance(v, part.centroid));
+    }
+  }
   return part;
 }
 
@@ -112,26 +120,43 @@ std::size_t split_in_half(std::span<FlatTriangle> triangles, const Vector& vecto
   return std::max<std::size_t>(count, 1);
 }
 
-/// Writes the parts of `triangles` for this level and those below to part[0], part[1..2], ...: a
-/// binary heap whose `node` this is.
-void write_parts(std::span<FlatTriangle> triangles, int levels_below, std::size_t node,
-                 std::span<PatchPart> heap) {
-  heap[node] = whole_of(triangles);
-  if (levels_below == 0) return;
-  if (triangles.size() == 1) {
-    std::array<FlatTriangle, 2> half = bisect(triangles[0]);
-    write_parts(std::span(half).first(1), levels_below - 1, 2 * node + 1, heap);
-    write_parts(std::span(half).last(1), levels_below - 1, 2 * node + 2, heap);
-    return;
+/// Cuts a patch into parts of about equal area, a binary heap of them: the children of the part at
+/// k are at 2 k + 1 and 2 k + 2.
+class PartWriter {
+ public:
+  PartWriter(std::span<PatchPart> heap, std::vector<FlatTriangle>& fragment,
+             std::vector<std::uint32_t>& begin)
+      : heap_(heap), fragment_(fragment), begin_(begin) {
+    begin_.push_back(0);
   }
-  // First by normals, which matter at any distance.
-  const std::size_t first =
-      is_about_flat(heap[node])
-          ? split_in_half(triangles, [](const FlatTriangle& t) { return t.centroid; })
-          : split_in_half(triangles, [](const FlatTriangle& t) { return t.normal; });
-  write_parts(triangles.first(first), levels_below - 1, 2 * node + 1, heap);
-  write_parts(triangles.subspan(first), levels_below - 1, 2 * node + 2, heap);
-}
+
+  void write(std::span<FlatTriangle> triangles, int levels_below, std::size_t node) {
+    heap_[node] = whole_of(triangles);
+    if (levels_below == 0) {
+      fragment_.insert(fragment_.end(), triangles.begin(), triangles.end());
+      begin_.push_back(static_cast<std::uint32_t>(fragment_.size()));
+      return;
+    }
+    std::array<FlatTriangle, 2> half;
+    std::size_t first = 1;
+    if (triangles.size() == 1) {
+      half = bisect(triangles[0]);
+      triangles = half;
+    } else {
+      // First by normals, which matter at any distance.
+      first = is_about_flat(heap_[node])
+                  ? split_in_half(triangles, [](const FlatTriangle& t) { return t.centroid; })
+                  : split_in_half(triangles, [](const FlatTriangle& t) { return t.normal; });
+    }
+    write(triangles.first(first), levels_below - 1, 2 * node + 1);
+    write(triangles.subspan(first), levels_below - 1, 2 * node + 2);
+  }
+
+ private:
+  std::span<PatchPart> heap_;
+  std::vector<FlatTriangle>& fragment_;
+  std::vector<std::uint32_t>& begin_;
+};
 
 double between_parts(std::span<const PatchPart> a, std::span<const PatchPart> b) {
   double sum = 0;
@@ -168,15 +193,27 @@ double part_to_triangle(const PatchPart& part, const glm::dvec3& normal, const F
       {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid, t.vertex[2] - part.centroid});
 }
 
-double parts_to_triangles(std::span<const PatchPart> parts,
-                          std::span<const FlatTriangle> triangles) {
+/// From the parts of patch i to patch j: to its parts where they are far for their size, else to
+/// their triangles.
+double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
+  constexpr int kFinest = PatchGeometry::kPartLevels;
+  const std::span<const PatchPart> to = geometry.parts(j, kFinest);
   double sum = 0;
-  for (const PatchPart& part : parts) {
-    const double seen_area = glm::length(part.vector_area);
+  for (const PatchPart& from : geometry.parts(i, kFinest)) {
+    const double seen_area = glm::length(from.vector_area);
     if (seen_area <= 0) continue;
+    const glm::dvec3 normal = from.vector_area / seen_area;
     double inner = 0;
-    for (const FlatTriangle& t : triangles) {
-      inner += part_to_triangle(part, part.vector_area / seen_area, t);
+    for (std::size_t k = 0; k < to.size(); ++k) {
+      const double reach = kNearPart * (from.radius + to[k].radius);
+      const glm::dvec3 d = to[k].centroid - from.centroid;
+      if (glm::dot(d, d) > reach * reach) {
+        inner += point_kernel(from.centroid, normal, to[k].centroid, to[k].vector_area);
+        continue;
+      }
+      for (const FlatTriangle& t : geometry.fragments(j, k)) {
+        inner += part_to_triangle(from, normal, t);
+      }
     }
     sum += seen_area * std::min(inner, 1.0);
   }
@@ -216,6 +253,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
   bounds_.resize(n);
   points_.resize(n * kPointCount);
   parts_.resize(n * kPartStride);
+  fragments_.resize(n);
   flat_level_.resize(n);
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t i = 0; i < n; ++i) {
@@ -231,7 +269,9 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
 void PatchGeometry::add_parts(std::size_t patch) {
   const std::span<const FlatTriangle> all = triangles(patch);
   std::vector<FlatTriangle> own(all.begin(), all.end());
-  write_parts(own, kPartLevels, 0, {&parts_[patch * kPartStride], kPartStride});
+  PartWriter({&parts_[patch * kPartStride], kPartStride}, fragments_[patch].triangle,
+             fragments_[patch].begin)
+      .write(own, kPartLevels, 0);
   int level = 0;
   while (level < kPartLevels && !std::ranges::all_of(parts(patch, level), is_about_flat)) ++level;
   flat_level_[patch] = static_cast<std::uint8_t>(level);
@@ -252,9 +292,7 @@ double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, st
     return between_parts(geometry.parts(i, std::max(kPartLevel[k], geometry.flat_level(i))),
                          geometry.parts(j, std::max(kPartLevel[k], geometry.flat_level(j))));
   }
-  constexpr int kFinest = PatchGeometry::kPartLevels;
-  return 0.5 * (parts_to_triangles(geometry.parts(i, kFinest), b) +
-                parts_to_triangles(geometry.parts(j, kFinest), a));
+  return 0.5 * (parts_to_patch(geometry, i, j) + parts_to_patch(geometry, j, i));
 }
 
 }  // namespace rebounce

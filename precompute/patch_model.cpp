@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <numbers>
+#include <numeric>
 #include <unordered_map>
 
-#include "element_clusters.h"
+#include "rebounce/precompute/element_clusters.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
@@ -62,6 +63,8 @@ class PatchModelBuilder {
     mesh.triangle_material = scene_.triangle_material;
     mesh.back_triangle.assign(scene_.triangle.size(), kNone);
     for (const TriangleSides& sides : sides_) kind_.push_back(sides.front);
+    surface_of_.resize(mesh.triangle.size());
+    std::iota(surface_of_.begin(), surface_of_.end(), 0U);
   }
 
   /// Appends a copy with reversed winding and normals of every double-sided triangle.
@@ -90,6 +93,7 @@ class PatchModelBuilder {
       mesh.triangle.push_back({back_of(a), back_of(c), back_of(b)});
       mesh.triangle_material.push_back(mesh.triangle_material[t]);
       kind_.push_back(sides_[t].back);
+      surface_of_.push_back(t);
     }
   }
 
@@ -135,6 +139,7 @@ class PatchModelBuilder {
       const auto [p, q, r] = corners(t);
       const glm::dvec3 cross = glm::cross(q - p, r - p);
       const auto [a, b, c] = model_.mesh.triangle[t];
+      elements_.triangle[e] = surface_of_[t];
       elements_.corner[e] = {position[a], position[b], position[c]};
       elements_.centroid[e] = to_float3((p + q + r) / 3.0);
       elements_.low[e] = to_float3(glm::min(p, glm::min(q, r)));
@@ -222,11 +227,6 @@ class PatchModelBuilder {
   void find_shown_patches(const RayTracer& tracer) {
     const DisplayMesh& mesh = model_.mesh;
     model_.shown_patch = mesh.triangle_patch;
-    std::vector<std::uint32_t> surface_of(mesh.triangle.size());
-    for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
-      surface_of[t] = t;
-      if (mesh.back_triangle[t] != kNone) surface_of[mesh.back_triangle[t]] = t;
-    }
     std::vector<Hit> hits;
     std::vector<CoincidentSide> sides;
     for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
@@ -236,7 +236,7 @@ class PatchModelBuilder {
       const auto [p, q, r] = corners(t);
       find_coincident_sides(
           tracer, to_float3((p + q + r) / 3.0), to_float3(glm::normalize(glm::cross(q - p, r - p))),
-          surface_of[t], [&](std::uint32_t o) { return mesh.back_triangle[o] != kNone; }, hits,
+          surface_of_[t], [&](std::uint32_t o) { return mesh.back_triangle[o] != kNone; }, hits,
           sides);
       for (const CoincidentSide& side : sides) {
         const std::uint32_t other = side.front ? side.triangle : mesh.back_triangle[side.triangle];
@@ -250,6 +250,7 @@ class PatchModelBuilder {
   const SubdivisionSettings& settings_;
   std::vector<TriangleSides> sides_;             ///< of each triangle of the subdivided scene
   std::vector<SideKind> kind_;                   ///< of each display triangle
+  std::vector<std::uint32_t> surface_of_;        ///< surface triangle of each display triangle
   std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
   Elements elements_;
   std::vector<Float3> exitance_;  ///< lx, of each element

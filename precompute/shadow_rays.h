@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "patch_geometry.h"
+#include "rebounce/precompute/patch_geometry.h"
 #include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {

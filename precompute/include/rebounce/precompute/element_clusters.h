@@ -14,13 +14,14 @@ namespace rebounce {
 
 /// The lit sides of display triangles, each an element of some patch.
 struct Elements {
-  std::vector<Uint3> corner;        ///< numbers of positions, the same where positions are
-  std::vector<Float3> centroid;     ///< metres
-  std::vector<Float3> low, high;    ///< box around it, metres
-  std::vector<Float3> normal;       ///< unit
-  std::vector<float> area;          ///< m², > 0
-  std::vector<Float3> reflectance;  ///< [0, 1]
-  std::vector<std::uint8_t> emits;  ///< 1 if it does
+  std::vector<std::uint32_t> triangle;  ///< that of the surface which it is a side of
+  std::vector<Uint3> corner;            ///< numbers of positions, the same where positions are
+  std::vector<Float3> centroid;         ///< metres
+  std::vector<Float3> low, high;        ///< box around it, metres
+  std::vector<Float3> normal;           ///< unit
+  std::vector<float> area;              ///< m², > 0
+  std::vector<Float3> reflectance;      ///< [0, 1]
+  std::vector<std::uint8_t> emits;      ///< 1 if it does
 
   std::size_t size() const { return area.size(); }
   void resize(std::size_t count);
@@ -47,13 +48,14 @@ struct ClusterSettings {
 /// colour, and detail far smaller than a patch is taken as a whole.
 ///
 /// Pairs are neighbours over an edge; elements that lie near each other without an edge between
-/// (leaves, slats), if the line of sight between them is free; and once none of those is left,
-/// patches that lie near each other. Emitting and other elements are never merged.
+/// (leaves, slats); and once none of those is left, patches that lie near each other. Emitting and
+/// other elements are never merged.
 ///
-/// The leak test: what is longer than half of a mean patch merges only if most lines of sight
-/// between its elements are free, so that no patch lies on two sides of a wall or in two rooms.
-/// Where that leaves more patches than are wanted, it is waived for lengths that grow until there
-/// are few enough.
+/// The leak test, so that no patch lies on two sides of a wall or in two rooms: lines of sight are
+/// drawn between the elements of both, and a pair with a piece of mesh between it that is longer
+/// than half of a mean patch is not merged. Where it is its own surface that stands between (the
+/// two faces of a wall, the far side of a table's leg) only what is small may merge; where that
+/// leaves too many patches, what counts as small grows.
 ///
 /// `tracer` holds the surface. Patches are numbered in the order of their first elements.
 /// Deterministic.

@@ -35,6 +35,7 @@ struct PatchPart {
   glm::dvec3 centroid{0};
   glm::dvec3 vector_area{0};  ///< m²: the sum of area x normal
   double area = 0;            ///< m²
+  double radius = 0;          ///< of the sphere around the centroid, metres
 };
 
 /// The shapes of all patches. Immutable, usable from any number of threads.
@@ -68,10 +69,23 @@ class PatchGeometry {
   /// flat_level(patch) if they are to stand for it.
   std::span<const PatchPart> parts(std::size_t patch, int level) const;
 
+  /// The triangles, cut where need be, of a part of the finest level.
+  std::span<const FlatTriangle> fragments(std::size_t patch, std::size_t part) const {
+    const std::vector<std::uint32_t>& begin = fragments_[patch].begin;
+    return std::span(fragments_[patch].triangle)
+        .subspan(begin[part], begin[part + 1] - begin[part]);
+  }
+
   /// The level from which on parts are about flat, or kPartLevels.
   int flat_level(std::size_t patch) const { return flat_level_[patch]; }
 
  private:
+  /// The triangles of the finest parts, one part after the other.
+  struct Fragments {
+    std::vector<FlatTriangle> triangle;
+    std::vector<std::uint32_t> begin;  ///< [parts + 1]
+  };
+
   void add_parts(std::size_t patch);
 
   std::vector<std::uint32_t> begin_;      ///< [n + 1]
@@ -79,6 +93,7 @@ class PatchGeometry {
   std::vector<double> area_;              ///< [n] m²
   std::vector<PatchBounds> bounds_;       ///< [n]
   std::vector<PatchPoint> points_;        ///< [n][kPointCount]
+  std::vector<Fragments> fragments_;      ///< [n]
   std::vector<std::uint8_t> flat_level_;  ///< [n]
   std::vector<PatchPart> parts_;          ///< [n][all levels, the coarsest first]
 };
@@ -88,7 +103,7 @@ class PatchGeometry {
 ///
 /// Pairs of few triangles by the kernel of their triangles (`tolerance`: form_factor_kernel.h);
 /// others as sums over parts where they are small for their distance, and from parts to triangles
-/// in closed form where they are near.
+/// in closed form where those are near.
 double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, std::size_t j,
                                 double tolerance);
 
