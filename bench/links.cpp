@@ -7,10 +7,10 @@
 #include <numeric>
 
 #include "escape.h"
-#include "patch_geometry.h"
 #include "program.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/links.h"
+#include "rebounce/precompute/patch_geometry.h"
 #include "rebounce/precompute/winding.h"
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/runtime/hierarchical_solver.h"

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "patch_geometry.h"
+#include "rebounce/precompute/patch_geometry.h"
 #include "rebounce/precompute/patch_model.h"
 
 namespace rebounce {
