@@ -13,6 +13,7 @@
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/links.h"
 #include "rebounce/precompute/low_rank_transfer.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/patch_model.h"
@@ -153,6 +154,8 @@ std::string settings_json(const BuildSettings& settings) {
                         {"probe_rays", f.probe_rays},
                         {"full_rays", f.full_rays},
                         {"escape_rays", f.escape_rays},
+                        {"link_epsilon", f.link_epsilon},
+                        {"store_links", settings.store_links},
                         {"kernel_tolerance", f.kernel_tolerance},
                         {"probe_grid", settings.probes.grid},
                         {"probe_spacing", settings.probes.spacing},
@@ -181,6 +184,7 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
                       {"rays", report.ray_count},
                       {"pairs", report.pair_count},
                       {"form_factors", report.form_factor_count},
+                      {"links", report.link_count},
                       {"row_sum_error_before", report.closure.row_sum_error_before},
                       {"row_sum_error_after", report.closure.row_sum_error_after},
                       {"closure_change", report.closure.relative_change},
@@ -246,6 +250,12 @@ void record_errors(const std::vector<KindError>& errors, BuildRecord& record) {
   }
 }
 
+FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
+                           FormFactorSettings settings, const Progress& progress) {
+  if (settings.link_epsilon == 0) settings.link_epsilon = kLinkEpsilon;
+  return build_links(model, tracer, settings, {}, progress).links;
+}
+
 // The scene of a file, with what is plainly seen from behind made double-sided.
 Scene import_usable(const std::filesystem::path& path, double scale) {
   Scene scene = import_gltf(path, scale);
@@ -293,6 +303,12 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   report.pair_count = form_factors.pair_count;
   report.form_factor_count = form_factors.exchange.column.size();
   report.closure = form_factors.closure;
+  if (settings.store_links) {
+    data.links = clock.run("links", [&](const Progress& part) {
+      return find_links(model, tracer, settings.form_factors, part);
+    });
+    report.link_count = data.links.pair.size();
+  }
   data.patches = std::move(model.patches);
   data.patches.sky_visibility = std::move(form_factors.sky_visibility);
   data.patches.absorbed = std::move(form_factors.absorbed);

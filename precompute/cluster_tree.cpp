@@ -5,14 +5,10 @@
 #include <numeric>
 #include <span>
 
-#include "rebounce/transfer/hierarchical_operator.h"
-
 namespace rebounce {
 namespace {
 
 using Feature = Eigen::Matrix<double, 6, 1>;
-
-constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
 
 // Two patches that face opposite ways are as far apart as two that are this part of the scene's
 // size away from each other. Measured: notes/operator.md.
@@ -39,19 +35,22 @@ std::vector<Feature> make_features(const PatchTable& patches) {
 
 class TreeBuilder {
  public:
-  TreeBuilder(const PatchTable& patches, std::uint32_t leaf_size)
-      : features_(make_features(patches)), leaf_size_(leaf_size) {
+  TreeBuilder(const PatchTable& patches, std::uint32_t leaf_size, std::uint32_t alignment)
+      : features_(make_features(patches)), leaf_size_(leaf_size), alignment_(alignment) {
     tree_.patch.resize(patches.size());
     std::iota(tree_.patch.begin(), tree_.patch.end(), 0U);
     projection_.resize(patches.size());
-    const auto positions = HierarchicalOperator::position_count(patches.size());
-    tree_.clusters.push_back({0, static_cast<std::uint32_t>(positions)});
+    tree_.clusters.push_back({0, aligned(static_cast<std::uint32_t>(patches.size()))});
     for (std::size_t k = 0; k < tree_.clusters.size(); ++k) split(k);
   }
 
   ClusterTree take() { return std::move(tree_); }
 
  private:
+  std::uint32_t aligned(std::uint32_t count) const {
+    return (count + alignment_ - 1) / alignment_ * alignment_;
+  }
+
   void split(std::size_t index) {
     const Cluster cluster = tree_.clusters[index];
     if (cluster.count <= leaf_size_) return;
@@ -89,10 +88,10 @@ class TreeBuilder {
     std::vector<double> sum(members.size() + 1, 0.0);
     for (std::size_t k = 0; k < members.size(); ++k) sum[k + 1] = sum[k] + projection_[members[k]];
     const auto size = static_cast<double>(members.size());
-    const std::uint32_t half = (count / 2 + kAlignment - 1) / kAlignment * kAlignment;
+    const std::uint32_t half = aligned(count / 2);
     std::uint32_t best = half;
     double best_gain = -1;
-    for (std::uint32_t first = kAlignment; first < members.size(); first += kAlignment) {
+    for (std::uint32_t first = alignment_; first < members.size(); first += alignment_) {
       if (4 * first < count || 4 * first > 3 * count) continue;
       const double difference = sum[first] / first - (sum.back() - sum[first]) / (size - first);
       const double gain = first * (size - first) * difference * difference;
@@ -105,15 +104,16 @@ class TreeBuilder {
   }
 
   std::vector<Feature> features_;
-  std::uint32_t leaf_size_;
+  std::uint32_t leaf_size_, alignment_;
   ClusterTree tree_;
   std::vector<double> projection_;  ///< of each patch on the axis of the cluster that is split
 };
 
 }  // namespace
 
-ClusterTree build_cluster_tree(const PatchTable& patches, std::uint32_t leaf_size) {
-  return TreeBuilder(patches, leaf_size).take();
+ClusterTree build_cluster_tree(const PatchTable& patches, std::uint32_t leaf_size,
+                               std::uint32_t alignment) {
+  return TreeBuilder(patches, leaf_size, alignment).take();
 }
 
 }  // namespace rebounce

@@ -9,15 +9,14 @@
 
 #include "closure.h"
 #include "escape.h"
+#include "link_expansion.h"
 #include "rebounce/transfer/error.h"
+#include "refined_links.h"
+#include "row_targets.h"
 #include "shadow_rays.h"
 
 namespace rebounce {
 namespace {
-
-// A row whose sum is off its target by more than this (and three deviations) is traced again: it is
-// partly covered, and probe rays miss what little of it is seen.
-constexpr double kRowSumTolerance = 0.005;
 
 // A pair whose rays all agree may still be partly hidden: its variance is not zero but this part
 // of the squared exchange.
@@ -35,7 +34,10 @@ class FormFactorAssembly {
         geometry_(model, tracer, settings.seed),
         shadow_rays_(geometry_, settings.seed, settings.kernel_tolerance) {}
 
-  FormFactors run() {
+  FormFactors run() { return settings_.link_epsilon > 0 ? run_on_links() : run_on_pairs(); }
+
+ private:
+  FormFactors run_on_pairs() {
     const std::size_t n = geometry_.patch_count();
     ExchangeRows rows(n);
     std::vector<Escape> escape(n);
@@ -44,22 +46,39 @@ class FormFactorAssembly {
       escape[i] = measure_escape(model_.mesh, patch_triangles_[i], i, tracer_,
                                  settings_.escape_rays, settings_.seed, scratch.escape);
     });
-    const std::vector<RowTarget> target = row_targets(escape);
-    const std::vector<bool> doubtful = find_doubtful_rows(rows, target);
+    const std::vector<RowTarget> target = row_targets(escape, settings_.escape_rays);
+    const std::vector<bool> doubtful =
+        find_doubtful_rows(row_sums(rows, geometry_.areas()), target);
     for_each_patch(0.8, 1.0, [&](std::uint32_t i, Scratch& scratch) {
       refine_row(i, doubtful, scratch, rows[i]);
     });
 
+    return close(rows, escape, target);
+  }
+
+  FormFactors run_on_links() {
+    const RefinedLinks refined =
+        refine_links(model_, shadow_rays_, tracer_, settings_, {}, progress_);
+    ExchangeRows rows = expand_links(refined.tree, shadow_rays_, refined.links, progress_);
+    for (auto& row : rows) {
+      for (ExchangeEntry& entry : row) entry.visibility_variance += kVarianceFloor;
+    }
+    ray_count_ = refined.ray_count;
+    pair_count_ = refined.candidate_count;
+    return close(rows, refined.escape, refined.target);
+  }
+
+  FormFactors close(ExchangeRows& rows, const std::vector<Escape>& escape,
+                    const std::vector<RowTarget>& target) const {
     FormFactors result;
     result.closure = enforce_closure(rows, geometry_.areas(), target);
     store_escape(rows, escape, result);
     result.exchange = compress_rows(rows);
-    result.ray_count = ray_count_ + n * settings_.escape_rays;
+    result.ray_count = ray_count_ + escape.size() * settings_.escape_rays;
     result.pair_count = pair_count_;
     return result;
   }
 
- private:
   struct Scratch {
     std::vector<FacingPatch> facing, mixed;
     std::vector<Ray> rays;
@@ -151,29 +170,6 @@ class FormFactorAssembly {
                    static_cast<float>(variance + kVarianceFloor)});
   }
 
-  std::vector<RowTarget> row_targets(const std::vector<Escape>& escape) const {
-    std::vector<RowTarget> target;
-    target.reserve(escape.size());
-    for (const Escape& e : escape) {
-      const double lost = e.sky + e.absorbed, count = settings_.escape_rays;
-      // Where no ray at all is lost, the row is taken as closed. Else the measurement is as sure as
-      // the rule of succession says; low-discrepancy rays err about half as much as random ones.
-      const double p = (lost * count + 1) / (count + 2);
-      target.push_back({1 - lost, lost > 0 ? 0.5 * std::sqrt(p * (1 - p) / count) : 0.0});
-    }
-    return target;
-  }
-
-  std::vector<bool> find_doubtful_rows(const ExchangeRows& rows,
-                                       const std::vector<RowTarget>& target) const {
-    const std::vector<double> sum = row_sums(rows, geometry_.areas());
-    std::vector<bool> doubtful(rows.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      doubtful[i] = std::abs(sum[i] - target[i].sum) > kRowSumTolerance + 3 * target[i].deviation;
-    }
-    return doubtful;
-  }
-
   /// What the rows of F leave of 1 is what escapes; its parts are shared as they were measured.
   void store_escape(const ExchangeRows& rows, const std::vector<Escape>& escape,
                     FormFactors& result) const {
@@ -215,12 +211,7 @@ class FormFactorAssembly {
 
 FormFactors compute_form_factors(const PatchModel& model, const RayTracer& tracer,
                                  const FormFactorSettings& settings, const Progress& progress) {
-  const auto in_range = [](int rays) {
-    return rays >= 1 && rays <= static_cast<int>(ShadowRays::kPointCount);
-  };
-  if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) || settings.escape_rays < 1) {
-    throw Error("form factors: rays per pair must be between 1 and 64, escape rays at least 1");
-  }
+  check_form_factor_settings(settings);
   return FormFactorAssembly(model, tracer, settings, progress).run();
 }
 

@@ -1,7 +1,5 @@
 #include "shadow_rays.h"
 
-#include <algorithm>
-
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
@@ -44,20 +42,28 @@ void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray>
     const auto [x, y] = ray_ends(i, j, k, hash);
     if (kernel(*x, *y) <= 0) continue;
     Ray& ray = rays[made++];
-    ray = Ray{};
-    ray.origin = x->position;
-    ray.t_near = 0;
-    ray.direction = to_float3(to_glm(y->position) - to_glm(x->position));
-    ray.t_far = 1;
+    ray = ray_between(*x, *y);
     ray.id = k;
   }
-  for (Ray& ray : rays.subspan(made)) {
-    ray = Ray{};
-    ray.mask = 0;
-    ray.t_near = ray.t_far = 0;
-    ray.direction = {1, 0, 0};
-    ray.id = kNone;
-  }
+  for (Ray& ray : rays.subspan(made)) ray = void_ray();
+}
+
+Ray ShadowRays::ray_between(const PatchPoint& x, const PatchPoint& y) {
+  Ray ray{};
+  ray.origin = x.position;
+  ray.t_near = 0;
+  ray.direction = to_float3(to_glm(y.position) - to_glm(x.position));
+  ray.t_far = 1;
+  return ray;
+}
+
+Ray ShadowRays::void_ray() {
+  Ray ray{};
+  ray.mask = 0;
+  ray.t_near = ray.t_far = 0;
+  ray.direction = {1, 0, 0};
+  ray.id = kNone;
+  return ray;
 }
 
 ShadowRays::Agreement ShadowRays::agreement(std::span<const Ray> rays,
@@ -76,20 +82,14 @@ ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
                                               std::span<const Ray> rays,
                                               std::span<const float> transmitted) const {
   const std::uint64_t hash = pair_hash(i, j);
-  double sum = 0, sum_of_squares = 0, visible = 0, visible_squared = 0;
+  VisibilityEstimate estimate;
   for (std::size_t k = 0; k < rays.size(); ++k) {
     if (is_void(rays[k])) continue;
     const auto [x, y] = ray_ends(i, j, rays[k].id, hash);
-    const double weight = kernel(*x, *y), part = transmitted[k];
-    sum += weight;
-    sum_of_squares += weight * weight;
-    visible += weight * part;
-    visible_squared += weight * part * part;
+    estimate.add(kernel(*x, *y), transmitted[k]);
   }
-  if (sum <= 0) return {0, 1};
-  // As sure as that many rays of equal weight (Kish's effective sample size).
-  const double part = visible / sum, effective = sum * sum / sum_of_squares;
-  return {part, std::max(0.0, visible_squared / sum - part * part) / effective};
+  if (estimate.is_empty()) return {0, 1};
+  return {estimate.part(), estimate.variance()};
 }
 
 }  // namespace rebounce

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -16,6 +17,30 @@ struct FacingPatch {
   double unoccluded;  ///< exchange area in m² with nothing between
 };
 
+/// What weighted rays say of how much light gets through.
+class VisibilityEstimate {
+ public:
+  /// A ray of `weight` >= 0 of whose light the part `transmitted` in [0, 1] gets through.
+  void add(double weight, double transmitted) {
+    sum_ += weight;
+    sum_of_squares_ += weight * weight;
+    visible_ += weight * transmitted;
+    visible_squared_ += weight * transmitted * transmitted;
+  }
+
+  bool is_empty() const { return sum_ <= 0; }  ///< no ray weighs anything: nothing below holds
+  double part() const { return visible_ / sum_; }
+
+  /// Variance of what single rays find.
+  double spread() const { return std::max(0.0, visible_squared_ / sum_ - part() * part()); }
+
+  /// Variance of part(): as sure as that many rays of equal weight (Kish's effective sample size).
+  double variance() const { return spread() / (sum_ * sum_ / sum_of_squares_); }
+
+ private:
+  double sum_ = 0, sum_of_squares_ = 0, visible_ = 0, visible_squared_ = 0;
+};
+
 /// The pairs of patches that face each other, and the shadow rays that find out how much of a
 /// pair's exchange gets through. Immutable, usable from any number of threads.
 class ShadowRays {
@@ -30,6 +55,13 @@ class ShadowRays {
       : geometry_(geometry), seed_(seed), kernel_tolerance_(kernel_tolerance) {}
 
   const PatchGeometry& geometry() const { return geometry_; }
+
+  /// Exchange area in m² of two patches with nothing between them, i <= j; of a patch with itself
+  /// if it is not flat.
+  double unoccluded(std::uint32_t i, std::uint32_t j) const {
+    return unoccluded(i, j, kernel_tolerance_);
+  }
+  double unoccluded(std::uint32_t i, std::uint32_t j, double tolerance) const;
 
   /// Writes to `facing` the patches j >= i that patch i would exchange light with, if `wanted`(j),
   /// in ascending order. Patch i itself is among them if it is not flat.
@@ -58,12 +90,19 @@ class ShadowRays {
   Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
                         std::span<const float> transmitted) const;
 
+  /// A ray from `x` to `y`.
+  static Ray ray_between(const PatchPoint& x, const PatchPoint& y);
+
+  /// One that stands for none and is never occluded.
+  static Ray void_ray();
+
+  static double kernel(const PatchPoint& x, const PatchPoint& y);
+
  private:
   // Pairs of points that are looked at for rays, at most.
   static constexpr std::uint32_t kCandidateCount = 4 * kPointCount;
 
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
-  static double kernel(const PatchPoint& x, const PatchPoint& y);
   void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
   std::pair<const PatchPoint*, const PatchPoint*> ray_ends(std::uint32_t i, std::uint32_t j,
                                                            std::uint32_t k,
@@ -74,16 +113,20 @@ class ShadowRays {
   double kernel_tolerance_;
 };
 
+inline double ShadowRays::unoccluded(std::uint32_t i, std::uint32_t j, double tolerance) const {
+  const PatchBounds &a = geometry_.bounds(i), &b = geometry_.bounds(j);
+  if (!a.may_face(b.centre, b.radius) || !b.may_face(a.centre, a.radius)) return 0;
+  return unoccluded_exchange_area(geometry_, i, j, tolerance);
+}
+
 template <typename Wanted>
 void ShadowRays::find_facing(std::uint32_t i, std::vector<FacingPatch>& facing,
                              const Wanted& wanted) const {
   facing.clear();
-  const PatchBounds& a = geometry_.bounds(i);
-  for (std::uint32_t j = a.is_flat() ? i + 1 : i; j < geometry_.patch_count(); ++j) {
+  for (std::uint32_t j = geometry_.bounds(i).is_flat() ? i + 1 : i; j < geometry_.patch_count();
+       ++j) {
     if (!wanted(j)) continue;
-    const PatchBounds& b = geometry_.bounds(j);
-    if (!a.may_face(b.centre, b.radius) || !b.may_face(a.centre, a.radius)) continue;
-    const double exchange = unoccluded_exchange_area(geometry_, i, j, kernel_tolerance_);
+    const double exchange = unoccluded(i, j);
     if (exchange > 0) facing.push_back({j, exchange});
   }
 }

@@ -32,6 +32,7 @@ inline constexpr char kOpacityMap[] = "mesh.opacity_map";  // a file without it 
 inline constexpr char kRowBegin[] = "form_factor.row_begin";
 inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
+inline constexpr char kLinksPatch[] = "links.patch";
 inline constexpr char kProbePosition[] = "probe.position";
 inline constexpr char kProbeGrid[] = "probe.grid";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
@@ -126,6 +127,17 @@ void visit_tensors_of_opacity(Maps& maps, Visit&& visit) {
   visit(tensor::kOpacityMap, maps.triangle_map);
   visit("mesh.opacity_begin", maps.begin);
   visit("mesh.opacity", maps.opacity);
+}
+
+template <typename Links, typename Visit>
+void visit_tensors_of_links(Links& links, Visit&& visit) {
+  visit(tensor::kLinksPatch, links.patch);
+  visit("links.first_child", links.first_child);
+  visit("links.count", links.count);
+  visit("links.pair", links.pair);
+  visit("links.exchange_area", links.exchange_area);
+  visit("links.gradient", links.gradient);
+  visit("links.scale", links.scale);
 }
 
 // visit(name, items, member) for each tensor that is a member of every item of an array.

@@ -179,6 +179,19 @@ ExchangeMatrix read_exchange(const SafetensorsFile& file) {
           file.tensor<float>(tensor::kExchangeArea, {kAnySize})};
 }
 
+/// Empty if the file has none.
+FormFactorLinks read_links(const SafetensorsFile& file, const PatchTable& patches) {
+  FormFactorLinks links;
+  if (!file.tensors().contains(tensor::kLinksPatch)) return links;
+  visit_tensors_of_links(links, TensorReader(file));
+  try {
+    check_links(links, patches.size());
+  } catch (const Error& error) {
+    refuse(file, error.what());
+  }
+  return links;
+}
+
 BuildRecord read_record(const SafetensorsFile& file) {
   BuildRecord record;
   visit_texts_of_record(record,
@@ -350,6 +363,7 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   data.exchange = read_exchange(file);
   data.record = read_record(file);
   check_transfer_data(data, file.name());
+  data.links = read_links(file, data.patches);
   data.transfer = read_operator(file, data);
   data.compressed_form_factors = read_compressed_form_factors(file, data.patches.area);
   return data;

@@ -181,6 +181,7 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   collect_textures(data.textures, collector);
   collect_probes(data.probes, collector);
   collect_exchange(data.exchange, collector);
+  if (!data.links.empty()) visit_tensors_of_links(data.links, collector);
   collect_operator(data.transfer.get(), collector);
   if (data.compressed_form_factors) {
     collect_hierarchical_operator(data.compressed_form_factors->storage(), kCompressedFormFactors,

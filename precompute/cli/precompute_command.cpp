@@ -204,6 +204,14 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
           "light that is gathered in the mean")
       ->check(CLI::Range(1e-5, 0.5));
   command
+      ->add_option("--link-epsilon", chosen->settings.form_factors.link_epsilon,
+                   "Find form factors by links between sets of patches of this error each, with "
+                   "fewer rays (0.0005 is usual); 0: look at all pairs of patches")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command->add_flag("--store-links", chosen->settings.store_links,
+                    "Store links, for solve --method hierarchical");
+  command
       ->add_option("--memory-limit", chosen->memory_limit_gib,
                    "Refuse to start what needs more GiB; by default half of the machine's memory")
       ->check(CLI::PositiveNumber);

@@ -12,6 +12,7 @@
 #include "rebounce/precompute/csv_writer.h"
 #include "rebounce/precompute/npz_writer.h"
 #include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/hierarchical_solver.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
@@ -21,6 +22,9 @@ namespace rebounce::cli {
 namespace {
 
 constexpr const char *kExact = "exact", *kCompressed = "compressed";  // F as methods see it
+
+// Gathering along links; they are another F than the solvers in solve_radiosity.h are given.
+constexpr const char* kHierarchical = "hierarchical";
 
 struct SolveOptions {
   std::string file, lights, method = kTransferMethod, form_factors = kExact, output;
@@ -128,9 +132,20 @@ SolveMethod method_of(const SolveOptions& chosen) {
   return named == kSolveMethods.end() ? SolveMethod::kGathering : named->method;
 }
 
+Solution solve_on_links(const SolveOptions& chosen, Engine& engine) {
+  const TransferData& data = engine.data();
+  if (data.links.empty()) {
+    throw Error(chosen.file + " has no links; make it again with precompute --store-links");
+  }
+  const LinkedFormFactors links(data.links, data.patches.area, data.patches.centroid);
+  HierarchicalSolver solver(links, {data.patches.area, data.patches.reflectance});
+  return solve_by_iteration(solver, engine, links, chosen.settings);
+}
+
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorOperator& form_factors) {
   if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
+  if (chosen.method == kHierarchical) return solve_on_links(chosen, engine);
   const TransferData& data = engine.data();
   const auto solver = make_solver(method_of(chosen), form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
@@ -181,12 +196,14 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
 
 void add_solve_command(CLI::App& app, const CommonOptions& options) {
   auto chosen = std::make_shared<SolveOptions>();
+  std::vector<std::string> methods = method_names();
+  methods.emplace_back(kHierarchical);
   CLI::App* command = app.add_subcommand("solve", "Relight a transfer file once");
   command->add_option("file", chosen->file, "Transfer file")->required();
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
   command->add_option("--method", chosen->method, "How to find the indirect light")
-      ->check(CLI::IsMember(method_names()))
+      ->check(CLI::IsMember(methods))
       ->capture_default_str();
   command
       ->add_option("--form-factors", chosen->form_factors,

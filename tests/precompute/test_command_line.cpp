@@ -313,6 +313,22 @@ TEST_F(CommandLine, EveryMethodReachesTheResidualItWasAsked) {
   }
 }
 
+TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
+  const std::string file =
+      precompute("box.safetensors", {"--store-links", "--link-epsilon", "0.0005"});
+  const std::string flat = path("flat.csv"), linked = path("linked.csv");
+  summary_of({"solve", file, "--lights", kLights, "-o", flat, "--method", "gauss-seidel"});
+  const json solved =
+      summary_of({"solve", file, "--lights", kLights, "-o", linked, "--method", "hierarchical"});
+  EXPECT_EQ(solved["method"], "hierarchical");
+  EXPECT_LT(difference(read_csv(flat), read_csv(linked), 6), 0.05);
+
+  const std::string without = precompute("pairs.safetensors");
+  expect_refused(
+      {"solve", without, "--lights", kLights, "-o", path("x.csv"), "--method", "hierarchical"},
+      "--store-links");
+}
+
 TEST_F(CommandLine, WritesTheSameSolutionAsCsvAndNpz) {
   const std::string file = precompute("box.safetensors");
   summary_of({"solve", file, "--lights", kLights, "-o", path("a.csv")});

@@ -36,6 +36,9 @@ struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
+  /// Store links too, for hierarchical radiosity: to form_factors.link_epsilon, or kLinkEpsilon if
+  /// that is 0.
+  bool store_links = false;
   ProbeSettings probes;  ///< by default none
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
@@ -68,6 +71,7 @@ struct BuildReport {
   std::vector<std::string> warnings;
   std::vector<std::pair<std::string, double>> seconds;  ///< by phase, in order
   std::uint64_t ray_count = 0, pair_count = 0, form_factor_count = 0;
+  std::size_t link_count = 0;  ///< that are stored
   ClosureReport closure;
   /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
   /// were not fitted to.

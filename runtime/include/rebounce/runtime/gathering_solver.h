@@ -16,7 +16,7 @@ class GatheringSolver final : public RadiositySolver {
 
  private:
   void begin(bool /*cold*/) override {}
-  SweepReport sweep() override;
+  SweepReport sweep() override { return gather_sweep(); }
 };
 
 }  // namespace rebounce

@@ -11,6 +11,7 @@
 
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/light_probes.h"
+#include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/opacity_maps.h"
 #include "rebounce/transfer/scene_description.h"
 #include "rebounce/transfer/transfer_operator.h"
@@ -84,6 +85,7 @@ struct TransferData {
   /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels, or null if that is not kept:
   /// see CompressedFormFactors.
   std::shared_ptr<const HierarchicalOperator> compressed_form_factors;
+  FormFactorLinks links;  ///< empty if they were not asked for
   std::shared_ptr<const TransferOperator> transfer;
   BuildRecord record;
 };

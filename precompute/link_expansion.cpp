@@ -1,0 +1,104 @@
+#include "link_expansion.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <atomic>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+class LinkExpansion {
+ public:
+  LinkExpansion(const LinkTree& tree, const ShadowRays& shadow_rays, std::span<const Link> links)
+      : tree_(tree), shadow_rays_(shadow_rays), links_(links) {
+    find_parents();
+    sort_by_node();
+  }
+
+  ExchangeRows run(const Progress& progress) const {
+    ExchangeRows rows(tree_.patches().size());
+    std::atomic<bool> stop = false;
+    std::atomic<std::size_t> done = 0;
+    const auto nodes = tree_.nodes();
+#pragma omp parallel for schedule(dynamic, 16)
+    for (std::uint32_t k = 0; k < nodes.size(); ++k) {
+      if (stop || !nodes[k].is_leaf()) continue;
+      expand_row(k, rows[tree_.leaf_patch(nodes[k])]);
+      const double part = static_cast<double>(++done) / static_cast<double>(rows.size());
+      if (progress && omp_get_thread_num() == 0 && !progress(part)) stop = true;
+    }
+    if (stop) throw Cancelled();
+    return rows;
+  }
+
+ private:
+  void find_parents() {
+    const auto nodes = tree_.nodes();
+    parent_.assign(nodes.size(), kNone);
+    for (std::uint32_t k = 0; k < nodes.size(); ++k) {
+      if (nodes[k].is_leaf()) continue;
+      parent_[nodes[k].first_child] = parent_[nodes[k].first_child + 1] = k;
+    }
+  }
+
+  void sort_by_node() {
+    begin_.assign(tree_.nodes().size() + 1, 0);
+    for (const Link& link : links_) {
+      ++begin_[link.a + 1];
+      if (link.a != link.b) ++begin_[link.b + 1];
+    }
+    for (std::size_t k = 1; k < begin_.size(); ++k) begin_[k] += begin_[k - 1];
+    of_node_.resize(begin_.back());
+    std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
+    for (std::uint32_t k = 0; k < links_.size(); ++k) {
+      of_node_[next[links_[k].a]++] = k;
+      if (links_[k].a != links_[k].b) of_node_[next[links_[k].b]++] = k;
+    }
+  }
+
+  void expand_row(std::uint32_t leaf, std::vector<ExchangeEntry>& row) const {
+    const std::uint32_t i = tree_.leaf_patch(tree_[leaf]);
+    for (std::uint32_t node = leaf; node != kNone; node = parent_[node]) {
+      for (std::uint64_t k = begin_[node]; k < begin_[node + 1]; ++k) {
+        const Link& link = links_[of_node_[k]];
+        if (link.exchange_area <= 0) continue;
+        const LinkNode& other = tree_[link.a == node ? link.b : link.a];
+        for (const std::uint32_t j : tree_.patches(other)) {
+          if (j >= i) append(link, i, j, row);
+        }
+      }
+    }
+    std::ranges::sort(row, {}, &ExchangeEntry::column);
+  }
+
+  void append(const Link& link, std::uint32_t i, std::uint32_t j,
+              std::vector<ExchangeEntry>& row) const {
+    ExchangeEntry entry{j, link.exchange_area, link.unoccluded_area, link.visibility_variance};
+    if (!tree_[link.a].is_leaf() || !tree_[link.b].is_leaf()) {
+      const double unoccluded = shadow_rays_.unoccluded(i, j);
+      const double visible = link.exchange_area / link.unoccluded_area;
+      entry.exchange_area = static_cast<float>(visible * unoccluded);
+      entry.unoccluded_area = static_cast<float>(unoccluded);
+    }
+    if (entry.exchange_area > 0) row.push_back(entry);
+  }
+
+  const LinkTree& tree_;
+  const ShadowRays& shadow_rays_;
+  const std::span<const Link> links_;
+  std::vector<std::uint32_t> parent_;
+  std::vector<std::uint64_t> begin_;    ///< [nodes + 1] of a node's links in of_node_
+  std::vector<std::uint32_t> of_node_;  ///< links of each node, node by node
+};
+
+}  // namespace
+
+ExchangeRows expand_links(const LinkTree& tree, const ShadowRays& shadow_rays,
+                          std::span<const Link> links, const Progress& progress) {
+  return LinkExpansion(tree, shadow_rays, links).run(progress);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,52 @@
+#include "rebounce/precompute/links.h"
+
+#include "link_sums.h"
+#include "rebounce/transfer/error.h"
+#include "refined_links.h"
+
+namespace rebounce {
+namespace {
+
+void copy_tree(const LinkTree& tree, FormFactorLinks& links) {
+  links.patch.assign(tree.patches().begin(), tree.patches().end());
+  for (const LinkNode& node : tree.nodes()) {
+    links.first_child.push_back(node.first_child);
+    links.count.push_back(node.count);
+  }
+}
+
+/// Without pairs that are hidden from each other.
+void copy_links(std::span<const Link> from, FormFactorLinks& links) {
+  for (const Link& link : from) {
+    if (link.exchange_area <= 0) continue;
+    const Float3 &g = link.gradient_a, &h = link.gradient_b;
+    links.pair.push_back({link.a, link.b});
+    links.exchange_area.push_back(link.exchange_area);
+    links.gradient.push_back({g[0], g[1], g[2], h[0], h[1], h[2]});
+  }
+}
+
+}  // namespace
+
+LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
+                      const FormFactorSettings& settings, std::span<const float> weight,
+                      const Progress& progress) {
+  check_form_factor_settings(settings);
+  if (!(settings.link_epsilon > 0)) throw Error("links: their error must be above 0");
+  if (!weight.empty() && weight.size() != model.patches.size()) {
+    throw Error("links: weights and patches differ in number");
+  }
+  const PatchGeometry geometry(model, tracer, settings.seed);
+  const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
+  const RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
+  LinkBuild build;
+  copy_tree(refined.tree, build.links);
+  copy_links(refined.links, build.links);
+  const std::vector<double> scale = scale_links(refined.tree, refined.links, refined.target);
+  build.links.scale.assign(scale.begin(), scale.end());
+  build.ray_count = refined.ray_count + model.patches.size() * settings.escape_rays;
+  build.candidate_count = refined.candidate_count;
+  return build;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,62 @@
+#include "refined_links.h"
+
+#include "link_sums.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tracer,
+                                    const FormFactorSettings& settings) {
+  const PatchTriangles triangles(model.mesh.triangle_patch, model.patches.size());
+  std::vector<Escape> escape(model.patches.size());
+#pragma omp parallel
+  {
+    EscapeScratch scratch;
+#pragma omp for schedule(dynamic, 16)
+    for (std::uint32_t i = 0; i < escape.size(); ++i) {
+      escape[i] = measure_escape(model.mesh, triangles[i], i, tracer, settings.escape_rays,
+                                 settings.seed, scratch);
+    }
+  }
+  return escape;
+}
+
+/// The part from `begin` to `end` of `progress`.
+Progress part_of(const Progress& progress, double begin, double end) {
+  if (!progress) return {};
+  return [&progress, begin, end](double part) { return progress(begin + part * (end - begin)); };
+}
+
+}  // namespace
+
+RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
+                          const RayTracer& tracer, const FormFactorSettings& settings,
+                          std::span<const float> weight, const Progress& progress) {
+  RefinedLinks result{LinkTree(model, shadow_rays.geometry(), weight), {}, {}, {}, 0, 0};
+  LinkRefinement refinement(result.tree, shadow_rays, tracer, settings);
+  refinement.run(part_of(progress, 0.0, 0.5));
+  result.escape = measure_escapes(model, tracer, settings);
+  result.target = row_targets(result.escape, settings.escape_rays);
+  const std::vector<double> ones(model.patches.size(), 1.0);
+  const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
+  refinement.revise(find_doubtful_rows(sum, result.target), part_of(progress, 0.5, 1.0));
+  result.links.assign(refinement.links().begin(), refinement.links().end());
+  result.ray_count = refinement.ray_count();
+  result.candidate_count = refinement.candidate_count();
+  return result;
+}
+
+void check_form_factor_settings(const FormFactorSettings& settings) {
+  const auto in_range = [](int rays) {
+    return rays >= 1 && rays <= static_cast<int>(ShadowRays::kPointCount);
+  };
+  if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) || settings.escape_rays < 1) {
+    throw Error("form factors: rays per pair must be between 1 and 64, escape rays at least 1");
+  }
+  if (!(settings.link_epsilon >= 0)) {
+    throw Error("form factors: the error of a link must not be negative");
+  }
+}
+
+}  // namespace rebounce

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "escape.h"
+#include "link_refinement.h"
+#include "link_tree.h"
+#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/progress.h"
+#include "row_targets.h"
+#include "shadow_rays.h"
+
+namespace rebounce {
+
+/// Links of a whole scene, once refined and once revised where rows do not add up.
+struct RefinedLinks {
+  LinkTree tree;
+  std::vector<Link> links;
+  std::vector<Escape> escape;     ///< [n]
+  std::vector<RowTarget> target;  ///< [n]
+  std::uint64_t ray_count = 0;    ///< without those of the escape
+  std::uint64_t candidate_count = 0;
+};
+
+/// Refines links to settings.link_epsilon, measures what escapes, and revises the links of
+/// patches whose row sum disagrees with that. `weight` as for LinkTree. Throws Cancelled.
+RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
+                          const RayTracer& tracer, const FormFactorSettings& settings,
+                          std::span<const float> weight, const Progress& progress);
+
+/// Throws Error if a setting is out of range.
+void check_form_factor_settings(const FormFactorSettings& settings);
+
+}  // namespace rebounce

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "closure.h"
+#include "escape.h"
+
+namespace rebounce {
+
+/// What the rows of F should add up to where `ray_count` rays of each patch measured its `escape`
+/// [n].
+std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count);
+
+/// The rows whose `sum` is off its target by so much that visibility must have been misjudged.
+std::vector<bool> find_doubtful_rows(std::span<const double> sum,
+                                     std::span<const RowTarget> target);
+
+}  // namespace rebounce

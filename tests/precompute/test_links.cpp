@@ -1,0 +1,325 @@
+// Links between sets of patches against all pairs: energy, reciprocity, closure, visibility.
+
+#include "rebounce/precompute/links.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <random>
+
+#include "rebounce/precompute/form_factors.h"
+#include "rebounce/runtime/gauss_seidel_solver.h"
+#include "rebounce/runtime/hierarchical_solver.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/form_factor_blocks.h"
+#include "test_scenes.h"
+
+namespace rebounce {
+namespace {
+
+Scene empty_room() {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {-1, 0, 2}, {3, 2.5, 8}, true);
+  return scene;
+}
+
+/// A room with a block that stands on its floor and one that hangs in the air.
+Scene furnished_room() {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
+  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
+  return scene;
+}
+
+PatchModel model_of(const Scene& scene, std::size_t patch_count = 600) {
+  return make_patch_model(scene, {.patch_count = patch_count});
+}
+
+LinkBuild links_of(const PatchModel& model, double epsilon = kLinkEpsilon,
+                   std::span<const float> weight = {}) {
+  return build_links(model, test::make_tracer(model), {.link_epsilon = epsilon}, weight);
+}
+
+FormFactors form_factors_of(const PatchModel& model, double epsilon) {
+  return compute_form_factors(model, test::make_tracer(model), {.link_epsilon = epsilon});
+}
+
+/// What several tests look at, made once: the furnished room, its links and all its pairs.
+struct Furnished {
+  PatchModel model = model_of(furnished_room());
+  LinkBuild build = links_of(model);
+  FormFactors pairs = form_factors_of(model, 0);
+};
+
+const Furnished& furnished() {
+  static const Furnished room;
+  return room;
+}
+
+std::vector<Float3> gather(const FormFactorOperator& form_factors, std::span<const Float3> in) {
+  std::vector<Float3> out(in.size());
+  std::vector<float> workspace(form_factors.workspace_size());
+  form_factors.gather(in, out, workspace);
+  return out;
+}
+
+LinkedFormFactors operator_of(const LinkBuild& build, const PatchTable& patches) {
+  return {build.links, patches.area, patches.centroid};
+}
+
+/// Light that changes smoothly from place to place.
+std::vector<Float3> smooth_light(const PatchTable& patches) {
+  std::vector<Float3> light;
+  for (const Float3& p : patches.centroid) {
+    light.push_back({1 + 0.5F * std::sin(p[0]), 2 + p[1], 1 + 0.3F * std::cos(p[2])});
+  }
+  return light;
+}
+
+/// |S - T| / |T| of the symmetric forms, Frobenius.
+double frobenius_difference(const ExchangeMatrix& s, const ExchangeMatrix& t,
+                            const PatchTable& patches) {
+  const std::size_t n = patches.size();
+  std::vector<double> row(n, 0.0);
+  double difference = 0, norm = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    std::ranges::fill(row, 0.0);
+    const auto add = [&](const ExchangeMatrix& m, double sign) {
+      for (std::uint64_t k = m.row_begin[i]; k < m.row_begin[i + 1]; ++k) {
+        row[m.column[k]] += sign * m.exchange_area[k];
+        const double scale = patches.area[i] * patches.area[m.column[k]];
+        if (sign < 0) norm += m.exchange_area[k] * m.exchange_area[k] / scale;
+      }
+    };
+    add(s, 1);
+    add(t, -1);
+    for (std::size_t j = i; j < n; ++j) {
+      difference += row[j] * row[j] / (patches.area[i] * patches.area[j]);
+    }
+  }
+  return std::sqrt(difference / norm);
+}
+
+TEST(Links, CarryTheEnergyOfThePairs) {
+  const auto& [model, build, pairs] = furnished();
+  const std::vector<Float3> ones(model.patches.size(), {1, 1, 1});
+  const std::vector<Float3> arrived = gather(operator_of(build, model.patches), ones);
+  double by_links = 0, by_pairs = 0;
+  for (std::size_t i = 0; i < ones.size(); ++i) by_links += model.patches.area[i] * arrived[i][0];
+  for (const float s : pairs.exchange.exchange_area) by_pairs += 2 * s;
+  EXPECT_NEAR(by_links / by_pairs, 1, 2e-3);
+  EXPECT_LT(build.links.pair.size(), pairs.exchange.column.size() / 2);
+}
+
+TEST(Links, AreReciprocal) {
+  const PatchModel& model = furnished().model;
+  const LinkedFormFactors links = operator_of(furnished().build, model.patches);
+  std::mt19937 engine(7);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  const auto random = [&] {
+    std::vector<Float3> light(model.patches.size());
+    for (Float3& x : light) x = {uniform(engine), uniform(engine), uniform(engine)};
+    return light;
+  };
+  const std::vector<Float3> x = random(), y = random();
+  const std::vector<Float3> fx = gather(links, x), fy = gather(links, y);
+  double there = 0, back = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    there += static_cast<double>(model.patches.area[i]) * y[i][0] * fx[i][0];
+    back += static_cast<double>(model.patches.area[i]) * x[i][0] * fy[i][0];
+  }
+  EXPECT_NEAR(there / back, 1, 1e-6);
+}
+
+TEST(Links, FurnaceInAClosedBox) {
+  const PatchModel model = model_of(empty_room());
+  const LinkedFormFactors links = operator_of(links_of(model), model.patches);
+  HierarchicalSolver solver(links, {model.patches.area, model.patches.reflectance});
+  const std::vector<Float3> emitted(model.patches.size(), {1, 1, 1});
+  const SolveResult result = solver.solve(emitted);
+  EXPECT_TRUE(result.converged);
+  for (const Float3& b : solver.radiosity()) EXPECT_NEAR(b[0], 2, 1e-3 * 2);  // reflectance 0.5
+}
+
+TEST(Links, GatherAndSolveLikeAllPairs) {
+  const PatchModel& model = furnished().model;
+  const LinkedFormFactors links = operator_of(furnished().build, model.patches);
+  const FormFactorBlocks pairs(furnished().pairs.exchange, model.patches.area);
+  const std::vector<Float3> light = smooth_light(model.patches);
+  EXPECT_LT(relative_difference(gather(links, light), gather(pairs, light), model.patches.area),
+            4e-3);
+
+  const RadiosityProblem problem{model.patches.area, model.patches.reflectance};
+  HierarchicalSolver hierarchical(links, problem);
+  GaussSeidelSolver flat(pairs, problem);
+  // One wall shines and nothing else does.
+  std::vector<Float3> emitted(model.patches.size(), {0, 0, 0});
+  for (std::size_t i = 0; i < emitted.size(); ++i) {
+    if (model.patches.centroid[i][0] < 1e-3F) emitted[i] = {1, 2, 3};
+  }
+  hierarchical.solve(emitted);
+  flat.solve(emitted);
+  EXPECT_LT(relative_difference(hierarchical.radiosity(), flat.radiosity(), model.patches.area),
+            1e-2);
+}
+
+TEST(Links, ExpandToAllPairs) {
+  const PatchModel& model = furnished().model;
+  const FormFactors links = form_factors_of(model, kLinkEpsilon);
+  EXPECT_LT(frobenius_difference(links.exchange, furnished().pairs.exchange, model.patches), 0.03);
+  EXPECT_LT(links.closure.row_sum_error_after, 1e-3);
+}
+
+TEST(Links, WithoutErrorAreAllPairs) {
+  const PatchModel model = model_of(furnished_room(), 300);
+  const FormFactors pairs = form_factors_of(model, 0), links = form_factors_of(model, 1e-30);
+  ASSERT_TRUE(std::ranges::equal(links.exchange.column, pairs.exchange.column));
+  for (std::size_t k = 0; k < pairs.exchange.column.size(); ++k) {
+    const float s = pairs.exchange.exchange_area[k];
+    EXPECT_NEAR(links.exchange.exchange_area[k], s, 1e-5F * s);
+  }
+  EXPECT_EQ(links.ray_count, pairs.ray_count);
+}
+
+TEST(Links, SmallerErrorsAreSmaller) {
+  const PatchModel& model = furnished().model;
+  const FormFactorBlocks pairs(furnished().pairs.exchange, model.patches.area);
+  const std::vector<Float3> light = smooth_light(model.patches);
+  const std::vector<Float3> truth = gather(pairs, light);
+  double last_error = 1;
+  for (const double epsilon : {3e-2, 3e-3, 3e-4}) {
+    const LinkBuild build = links_of(model, epsilon);
+    const double error = relative_difference(gather(operator_of(build, model.patches), light),
+                                             truth, model.patches.area);
+    EXPECT_LT(error, last_error) << epsilon;
+    last_error = error;
+  }
+}
+
+TEST(Links, WeightsDecideWhereErrorsMatter) {
+  const PatchModel& model = furnished().model;
+  const std::vector<float> ones(model.patches.size(), 1.0F), fewer(model.patches.size(), 0.1F);
+  const std::size_t unweighted = furnished().build.links.pair.size();
+  EXPECT_EQ(links_of(model, kLinkEpsilon, ones).links.pair.size(), unweighted);
+  EXPECT_EQ(links_of(model, 0.1 * kLinkEpsilon, fewer).links.pair.size(), unweighted);
+}
+
+TEST(Links, NothingGoesThroughAWall) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {3, 3, 3}, true);
+  test::add_box(scene, {3.1, 0, 0}, {6.1, 3, 3}, true);
+  const PatchModel model = model_of(scene);
+  const LinkedFormFactors links = operator_of(links_of(model), model.patches);
+  std::vector<Float3> light(model.patches.size(), {0, 0, 0});
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    if (model.patches.centroid[i][0] < 3.05F) light[i] = {1, 1, 1};
+  }
+  const std::vector<Float3> arrived = gather(links, light);
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    if (light[i][0] > 0) continue;
+    // What links may be wrong by; not a leak that would be seen.
+    EXPECT_NEAR(arrived[i][0], 0, kLinkEpsilon) << i;
+  }
+}
+
+/// Two rooms and a wall with a door, 1 x 2, between them.
+Scene rooms_with_a_door() {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {6, 3, 3}, true);
+  test::add_box(scene, {2.9, 0, 0}, {3.1, 3, 1}, false);
+  test::add_box(scene, {2.9, 0, 2}, {3.1, 3, 3}, false);
+  test::add_box(scene, {2.9, 2, 1}, {3.1, 3, 2}, false);
+  return scene;
+}
+
+TEST(Links, WhatGoesThroughADoorDoes) {
+  const PatchModel model = model_of(rooms_with_a_door(), 700);
+  const LinkedFormFactors links = operator_of(links_of(model), model.patches);
+  const FormFactorBlocks pairs(form_factors_of(model, 0).exchange, model.patches.area);
+  std::vector<Float3> light(model.patches.size(), {0, 0, 0});
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    if (model.patches.centroid[i][0] < 2.9F) light[i] = {1, 1, 1};
+  }
+  const auto through = [&](const FormFactorOperator& form_factors) {
+    const std::vector<Float3> arrived = gather(form_factors, light);
+    double sum = 0;
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      if (model.patches.centroid[i][0] > 3.1F) sum += model.patches.area[i] * arrived[i][0];
+    }
+    return sum;
+  };
+  const double truth = through(pairs);
+  ASSERT_GT(truth, 0.3);
+  EXPECT_NEAR(through(links) / truth, 1, 0.02);
+}
+
+TEST(Links, AreDimmedByGlass) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 3}, true);
+  Material glass = scene.materials[0];
+  glass.double_sided = true;
+  glass.transmission = 0.5F;
+  scene.materials.push_back(glass);
+  test::add_polygon(scene, std::array<glm::dvec3, 4>{{{2, 0, 0}, {2, 3, 0}, {2, 3, 3}, {2, 0, 3}}},
+                    1);
+  const PatchModel model = model_of(scene, 300);
+  const FormFactorBlocks pairs(form_factors_of(model, 0).exchange, model.patches.area);
+  const LinkBuild build = links_of(model);
+  std::vector<Float3> light(model.patches.size(), {0, 0, 0});
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    if (model.patches.centroid[i][0] < 1e-3F) light[i] = {1, 1, 1};
+  }
+  EXPECT_LT(relative_difference(gather(operator_of(build, model.patches), light),
+                                gather(pairs, light), model.patches.area),
+            1e-2);
+}
+
+TEST(Links, SameBitsForAnyNumberOfThreads) {
+  const PatchModel model = model_of(furnished_room(), 500);
+  const std::vector<Float3> light = smooth_light(model.patches);
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const LinkBuild one = links_of(model);
+  const std::vector<Float3> by_one = gather(operator_of(one, model.patches), light);
+  const FormFactors f_one = form_factors_of(model, kLinkEpsilon);
+  omp_set_num_threads(3);
+  const LinkBuild three = links_of(model);
+  const std::vector<Float3> by_three = gather(operator_of(three, model.patches), light);
+  const FormFactors f_three = form_factors_of(model, kLinkEpsilon);
+  omp_set_num_threads(before);
+  EXPECT_EQ(one.links.pair, three.links.pair);
+  EXPECT_EQ(one.links.exchange_area, three.links.exchange_area);
+  EXPECT_EQ(one.links.gradient, three.links.gradient);
+  EXPECT_EQ(one.links.scale, three.links.scale);
+  EXPECT_EQ(one.ray_count, three.ray_count);
+  EXPECT_EQ(by_one, by_three);
+  EXPECT_TRUE(std::ranges::equal(f_one.exchange.exchange_area, f_three.exchange.exchange_area));
+}
+
+TEST(Links, StopWhenAskedTo) {
+  const PatchModel model = model_of(furnished_room(), 300);
+  const RayTracer tracer = test::make_tracer(model);
+  EXPECT_THROW(
+      build_links(model, tracer, {.link_epsilon = kLinkEpsilon}, {}, [](double) { return false; }),
+      Cancelled);
+}
+
+TEST(Links, RefuseSettingsOutOfRange) {
+  const PatchModel model = model_of(furnished_room(), 50);
+  const RayTracer tracer = test::make_tracer(model);
+  const std::vector<float> few(3, 1.0F);
+  EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 0}), Error);
+  EXPECT_THROW(build_links(model, tracer, {.link_epsilon = -1}), Error);
+  EXPECT_THROW(build_links(model, tracer, {.probe_rays = 65, .link_epsilon = 1e-3}), Error);
+  EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 1e-3}, few), Error);
+}
+
+}  // namespace
+}  // namespace rebounce

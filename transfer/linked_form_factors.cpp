@@ -1,0 +1,270 @@
+#include "rebounce/transfer/linked_form_factors.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+#include <string>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+[[noreturn]] void refuse(const std::string& reason) {
+  throw Error("links: " + reason + "; make them again");
+}
+
+// Trees of fewer nodes than this are walked before threads have met at every level.
+constexpr std::size_t kWorthThreads = 16384;
+
+// Colour channels and one more, so that a colour is one vector.
+constexpr int kLanes = 4;
+using Lanes = std::array<float, kLanes>;
+
+void add(Lanes& to, float factor, const Lanes& from) {
+  for (int c = 0; c < kLanes; ++c) to[c] += factor * from[c];
+}
+
+/// Position of the first patch of each node.
+std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
+  std::vector<std::uint32_t> begin(links.first_child.size(), 0);
+  for (std::size_t k = 0; k < begin.size(); ++k) {
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) continue;
+    begin[child] = begin[k];
+    begin[child + 1] = begin[k] + links.count[child];
+  }
+  return begin;
+}
+
+/// Children follow each other level by level, and are as large as their parent together.
+void check_tree(const FormFactorLinks& links, std::size_t n) {
+  const std::size_t m = links.first_child.size();
+  if (n == 0 || m != 2 * n - 1 || links.count.size() != m || links.count[0] != n) {
+    refuse("not a binary tree over the patches");
+  }
+  std::size_t next = 1;
+  for (std::size_t k = 0; k < m; ++k) {
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) {
+      if (links.count[k] != 1) refuse("a leaf is not one patch");
+      continue;
+    }
+    if (child != next || child <= k || next + 2 > m) refuse("nodes are not in order of levels");
+    const std::uint64_t both =
+        static_cast<std::uint64_t>(links.count[child]) + links.count[child + 1];
+    if (both != links.count[k]) refuse("children are not as large as their parent");
+    next += 2;
+  }
+  if (next != m) refuse("a node has no parent");
+}
+
+void check_permutation(const FormFactorLinks& links, std::size_t n) {
+  std::vector<bool> there(n, false);
+  for (const std::uint32_t patch : links.patch) {
+    if (patch >= n || there[patch]) refuse("a patch is not there once");
+    there[patch] = true;
+  }
+}
+
+void check_values(const FormFactorLinks& links) {
+  const auto is_finite = [](float x) { return std::isfinite(x); };
+  const std::size_t m = links.first_child.size();
+  for (const auto& [a, b] : links.pair) {
+    if (a >= m || b >= m) refuse("no such node");
+  }
+  for (const float s : links.exchange_area) {
+    if (!(s >= 0) || !is_finite(s)) refuse("an exchange area is not finite and >= 0");
+  }
+  for (const auto& g : links.gradient) {
+    if (!std::ranges::all_of(g, is_finite)) refuse("a gradient is not finite");
+  }
+  for (const float s : links.scale) {
+    if (!(s > 0) || !is_finite(s)) refuse("a scale is not finite and > 0");
+  }
+}
+
+}  // namespace
+
+void check_links(const FormFactorLinks& links, std::size_t patch_count) {
+  const std::size_t l = links.pair.size();
+  if (links.patch.size() != patch_count || links.scale.size() != patch_count) {
+    refuse("they and the patches differ in number");
+  }
+  if (links.exchange_area.size() != l || links.gradient.size() != l) {
+    refuse("their arrays differ in number");
+  }
+  check_tree(links, patch_count);
+  check_permutation(links, patch_count);
+  check_values(links);
+}
+
+/// Of a node: in the pull, mean light and its first moments over the area; in the push, what
+/// arrived, m² lx, and its gradients, m lx.
+struct LinkedFormFactors::Light {
+  Lanes mean;
+  std::array<Lanes, 3> first;
+};
+
+LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
+                                     std::span<const Float3> centroid)
+    : scale_(links.scale) {
+  check_links(links, area.size());
+  if (centroid.size() != area.size()) refuse("centroids and areas differ in number");
+  build_tree(links, area, centroid);
+  sort_links(links);
+}
+
+/// Lays out the nodes, and their areas and centres.
+void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const float> area,
+                                   std::span<const Float3> centroid) {
+  const std::size_t m = links.first_child.size();
+  const std::vector<std::uint32_t> begin = first_positions(links);
+  node_.resize(m);
+  std::vector<std::array<double, 4>> sum(m);  // area times centroid, area
+  for (std::size_t k = m; k-- > 0;) {
+    Node& node = node_[k];
+    node.first_child = links.first_child[k];
+    if (node.first_child == kNone) node.patch = links.patch[begin[k]];
+    for (int axis = 0; axis < 4; ++axis) {
+      if (node.patch == kNone) {
+        sum[k][axis] = sum[node.first_child][axis] + sum[node.first_child + 1][axis];
+      } else {
+        const double a = area[node.patch];
+        sum[k][axis] = axis < 3 ? a * centroid[node.patch][axis] : a;
+      }
+    }
+    node.area = static_cast<float>(sum[k][3]);
+  }
+  for (std::size_t k = 0; k < m; ++k) {
+    if (node_[k].patch != kNone) continue;
+    for (std::uint32_t c = node_[k].first_child; c < node_[k].first_child + 2; ++c) {
+      node_[c].part = static_cast<float>(sum[c][3] / sum[k][3]);
+      for (int axis = 0; axis < 3; ++axis) {
+        node_[c].from_parent[axis] =
+            static_cast<float>(sum[c][axis] / sum[c][3] - sum[k][axis] / sum[k][3]);
+      }
+    }
+  }
+  level_begin_ = {0};
+  for (std::size_t begin_of_next = 1; begin_of_next < m;) {
+    // The next level begins with the first child of the first node of this one that has any.
+    level_begin_.push_back(static_cast<std::uint32_t>(begin_of_next));
+    std::size_t end = begin_of_next;
+    for (std::size_t k = level_begin_[level_begin_.size() - 2]; k < begin_of_next; ++k) {
+      if (node_[k].patch == kNone) end += 2;
+    }
+    begin_of_next = end;
+  }
+  level_begin_.push_back(static_cast<std::uint32_t>(m));
+}
+
+/// Every link twice, once for each of its nodes, by the node that gathers.
+void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
+  incoming_begin_.assign(node_.size() + 1, 0);
+  for (const auto& [a, b] : links.pair) {
+    ++incoming_begin_[a + 1];
+    if (a != b) ++incoming_begin_[b + 1];
+  }
+  for (std::size_t k = 0; k < node_.size(); ++k) incoming_begin_[k + 1] += incoming_begin_[k];
+  incoming_.resize(incoming_begin_.back());
+  std::vector<std::uint64_t> next(incoming_begin_.begin(), incoming_begin_.end() - 1);
+  for (std::size_t k = 0; k < links.pair.size(); ++k) {
+    const auto [a, b] = links.pair[k];
+    const float exchange = links.exchange_area[k];
+    const auto& g = links.gradient[k];
+    const Float3 of_a = {g[0], g[1], g[2]}, of_b = {g[3], g[4], g[5]};
+    incoming_[next[a]++] = {b, exchange, of_a, of_b};
+    if (a != b) incoming_[next[b]++] = {a, exchange, of_b, of_a};
+  }
+}
+
+std::size_t LinkedFormFactors::bytes() const {
+  return incoming_.size() * sizeof(Incoming) + incoming_begin_.size() * sizeof(std::uint64_t) +
+         2 * node_.size() * sizeof(Node);
+}
+
+std::size_t LinkedFormFactors::workspace_size() const {
+  return 2 * node_.size() * sizeof(Light) / sizeof(float);
+}
+
+void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
+                               std::span<float> workspace) const {
+  assert(in.size() == patch_count() && out.size() == patch_count() &&
+         workspace.size() >= workspace_size());
+  auto* light = reinterpret_cast<Light*>(workspace.data());
+  Light* arrived = light + node_.size();
+  pull(in, light);
+  gather_nodes(light, arrived);
+  push(arrived, out);
+}
+
+void LinkedFormFactors::pull(std::span<const Float3> in, Light* light) const {
+#pragma omp parallel if (node_.size() >= kWorthThreads)
+  for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
+#pragma omp for schedule(static)
+    for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
+      const Node& node = node_[k];
+      Light sum{};
+      if (node.patch != kNone) {
+        const Float3& x = in[node.patch];
+        const float s = scale_[node.patch];
+        sum.mean = {s * x[0], s * x[1], s * x[2], 0};
+      } else {
+        for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+          const Node& child = node_[c];
+          add(sum.mean, child.part, light[c].mean);
+          for (int axis = 0; axis < 3; ++axis) {
+            add(sum.first[axis], child.part, light[c].first[axis]);
+            add(sum.first[axis], child.part * child.from_parent[axis], light[c].mean);
+          }
+        }
+      }
+      light[k] = sum;
+    }
+  }
+}
+
+void LinkedFormFactors::gather_nodes(const Light* light, Light* arrived) const {
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t k = 0; k < node_.size(); ++k) {
+    Light sum{};
+    for (std::uint64_t l = incoming_begin_[k]; l < incoming_begin_[k + 1]; ++l) {
+      const Incoming& link = incoming_[l];
+      const Light& from = light[link.from];
+      add(sum.mean, link.exchange_area, from.mean);
+      for (int axis = 0; axis < 3; ++axis) {
+        add(sum.mean, link.gradient_from[axis], from.first[axis]);
+        add(sum.first[axis], link.gradient_to[axis], from.mean);
+      }
+    }
+    arrived[k] = sum;
+  }
+}
+
+void LinkedFormFactors::push(Light* arrived, std::span<Float3> out) const {
+#pragma omp parallel if (node_.size() >= kWorthThreads)
+  for (std::size_t level = 0; level + 1 < level_begin_.size(); ++level) {
+#pragma omp for schedule(static)
+    for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
+      const Node& node = node_[k];
+      const Light& here = arrived[k];
+      if (node.patch != kNone) {
+        const float factor = scale_[node.patch] / node.area;
+        for (int c = 0; c < kChannelCount; ++c) out[node.patch][c] = factor * here.mean[c];
+        continue;
+      }
+      for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+        const Node& child = node_[c];
+        add(arrived[c].mean, child.part, here.mean);
+        for (int axis = 0; axis < 3; ++axis) {
+          add(arrived[c].mean, child.part * child.from_parent[axis], here.first[axis]);
+          add(arrived[c].first[axis], child.part, here.first[axis]);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace rebounce
