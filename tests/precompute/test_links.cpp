@@ -204,9 +204,9 @@ TEST(Links, SmallerErrorsAreSmaller) {
 }
 
 TEST(Links, WeightsDecideWhereErrorsMatter) {
-  const PatchModel& model = furnished().model;
+  const PatchModel model = model_of(furnished_room(), 300);
   const std::vector<float> ones(model.patches.size(), 1.0F), fewer(model.patches.size(), 0.1F);
-  const std::size_t unweighted = furnished().build.links.pair.size();
+  const std::size_t unweighted = links_of(model).links.pair.size();
   EXPECT_EQ(links_of(model, kLinkEpsilon, ones).links.pair.size(), unweighted);
   EXPECT_EQ(links_of(model, 0.1 * kLinkEpsilon, fewer).links.pair.size(), unweighted);
 }
@@ -282,7 +282,7 @@ TEST(Links, AreDimmedByGlass) {
 }
 
 TEST(Links, SameBitsForAnyNumberOfThreads) {
-  const PatchModel model = model_of(furnished_room(), 500);
+  const PatchModel model = model_of(furnished_room(), 300);
   const std::vector<Float3> light = smooth_light(model.patches);
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
