@@ -164,15 +164,13 @@ class SceneBench {
                                       settings_.escape_rays, settings_.seed, scratch));
     }
     const std::vector<RowTarget> target = row_targets(escape, settings_.escape_rays);
-    std::vector<double> sums;
-    for (const auto& row : rows_.form_factor) {
-      sums.push_back(std::accumulate(row.begin(), row.end(), 0.0));
-    }
-    const std::vector<bool> doubtful = find_doubtful_rows(sums, target);
     for (std::size_t k = 0; k < target.size(); ++k) {
       auto& row = rows_.form_factor[k];
-      if (doubtful[k]) compute_row(rows_.patch[k], settings_.full_rays, row);
-      const double sum = std::accumulate(row.begin(), row.end(), 0.0);
+      double sum = std::accumulate(row.begin(), row.end(), 0.0);
+      if (is_doubtful_row(sum, target[k], geometry_.triangles(rows_.patch[k]).size())) {
+        compute_row(rows_.patch[k], settings_.full_rays, row);
+        sum = std::accumulate(row.begin(), row.end(), 0.0);
+      }
       if (sum <= 0) continue;
       for (double& f : row) f *= target[k].sum / sum;
     }

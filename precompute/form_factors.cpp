@@ -48,7 +48,7 @@ class FormFactorAssembly {
     });
     const std::vector<RowTarget> target = row_targets(escape, settings_.escape_rays);
     const std::vector<bool> doubtful =
-        find_doubtful_rows(row_sums(rows, geometry_.areas()), target);
+        find_doubtful_rows(row_sums(rows, geometry_.areas()), target, geometry_);
     for_each_patch(0.8, 1.0, [&](std::uint32_t i, Scratch& scratch) {
       refine_row(i, doubtful, scratch, rows[i]);
     });

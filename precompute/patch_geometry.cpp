@@ -299,7 +299,13 @@ double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, st
                          geometry.parts(j, std::max(kPartLevel[k], geometry.flat_level(j))));
   }
   if (a.size() * b.size() <= kFewNearTrianglePairs) return between_triangles(a, b, tolerance);
-  return 0.5 * (parts_to_patch(geometry, i, j) + parts_to_patch(geometry, j, i));
+  // The smaller patch tells better what it sees: a large part of the other, taken as a point beside
+  // it, would give it all that the whole part has. No patch gives more than all.
+  const double own = near.radius * near.radius, other = far.radius * far.radius;
+  const double exchange =
+      (other * parts_to_patch(geometry, i, j) + own * parts_to_patch(geometry, j, i)) /
+      (own + other);
+  return std::min({exchange, geometry.area(i), geometry.area(j)});
 }
 
 }  // namespace rebounce

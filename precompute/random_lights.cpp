@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "hemisphere_rays.h"
+#include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/transfer/area_norm.h"
 
@@ -17,8 +18,10 @@ using Exitance = std::vector<Float3>;
 
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
 
-// How near a point light comes to the surfaces, as a part of the free way between them.
-constexpr double kLeastPart = 0.05;
+// How near a point light comes to the surfaces: a part of the free way between them, and a mean
+// patch size where there is as much room. What is nearer lights parts of patches, which patches
+// cannot tell.
+constexpr double kLeastPart = 0.1;
 
 /// Lights of different kinds are drawn apart from the same seed.
 std::uint64_t bits_of(LightKind kind, std::uint64_t seed, int k) {
@@ -39,6 +42,25 @@ Float3 random_direction(std::uint64_t bits) {
   const double phi = 2 * std::numbers::pi * s.y;
   return to_float3(glm::dvec3(r * std::cos(phi), r * std::sin(phi), z));
 }
+
+/// Chooses patches in proportion to their areas.
+class PatchChoice {
+ public:
+  explicit PatchChoice(std::span<const float> area) {
+    for (const float a : area) choice_.add(a);
+    mean_size_ = std::sqrt(choice_.total() / static_cast<double>(area.size()));
+  }
+
+  std::uint32_t choose(double number) const {
+    return static_cast<std::uint32_t>(choice_.choose(number).index);
+  }
+
+  double mean_size() const { return mean_size_; }  ///< metres
+
+ private:
+  CumulativeChoice choice_;
+  double mean_size_;
+};
 
 std::vector<Light> random_spots(const TransferData& data, const RayTracer& tracer, int count,
                                 std::uint64_t seed) {
@@ -66,13 +88,10 @@ std::vector<Light> random_suns(int count, std::uint64_t seed) {
 
 /// One patch that gives off 1 lx for each of `count` lights.
 std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::uint64_t seed) {
-  std::vector<double> sum(patches.size());
-  double total = 0;
-  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] = total += patches.area[i];
+  const PatchChoice choice(patches.area);
   std::vector<Exitance> exitances(count, Exitance(patches.size(), Float3{0, 0, 0}));
   for (int k = 0; k < count; ++k) {
-    const double x = total * unit_square(bits_of(LightKind::kPatch, seed, k)).x;
-    exitances[k][std::ranges::upper_bound(sum, x) - sum.begin()] = {1, 1, 1};
+    exitances[k][choice.choose(unit_square(bits_of(LightKind::kPatch, seed, k)).x)] = {1, 1, 1};
   }
   return exitances;
 }
@@ -120,10 +139,11 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
   const DisplayMesh& mesh = data.mesh;
   const double open_reach = 0.25 * glm::distance(corner(mesh, false), corner(mesh, true));
   const PatchTriangles triangles(mesh.triangle_patch, data.patches.size());
+  const PatchChoice choice(data.patches.area);
   std::vector<Light> lights(count);
   for (int k = 0; k < count; ++k) {
     const std::uint64_t bits = mix_bits(seed + 0x51ED270BULL * k);
-    const auto patch = static_cast<std::uint32_t>(bits % data.patches.size());
+    const std::uint32_t patch = choice.choose(unit_square(mix_bits(bits + 3)).x);
     std::array<PatchPoint, 1> point;
     std::array<Ray, 1> ray;
     std::array<Hit, 1> hit;
@@ -132,8 +152,9 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
     tracer.intersect(ray, hit);
     const double reach = hit[0].triangle == kNone ? open_reach : hit[0].t;
     const double part = kLeastPart + (1 - 2 * kLeastPart) * unit_square(mix_bits(bits)).x;
-    lights[k].position =
-        to_float3(to_dvec3(ray[0].origin) + part * reach * to_dvec3(ray[0].direction));
+    const double clear = std::min(choice.mean_size(), 0.5 * reach);
+    const double distance = std::clamp(part * reach, clear, reach - clear);
+    lights[k].position = to_float3(to_dvec3(ray[0].origin) + distance * to_dvec3(ray[0].direction));
   }
   return lights;
 }

@@ -40,7 +40,8 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
   result.target = row_targets(result.escape, settings.escape_rays);
   const std::vector<double> ones(model.patches.size(), 1.0);
   const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
-  refinement.revise(find_doubtful_rows(sum, result.target), part_of(progress, 0.5, 1.0));
+  refinement.revise(find_doubtful_rows(sum, result.target, shadow_rays.geometry()),
+                    part_of(progress, 0.5, 1.0));
   result.links.assign(refinement.links().begin(), refinement.links().end());
   result.ray_count = refinement.ray_count();
   result.candidate_count = refinement.candidate_count();

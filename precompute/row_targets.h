@@ -5,6 +5,7 @@
 
 #include "closure.h"
 #include "escape.h"
+#include "rebounce/precompute/patch_geometry.h"
 
 namespace rebounce {
 
@@ -12,8 +13,12 @@ namespace rebounce {
 /// [n].
 std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count);
 
-/// The rows whose `sum` is off its target by so much that visibility must have been misjudged.
-std::vector<bool> find_doubtful_rows(std::span<const double> sum,
-                                     std::span<const RowTarget> target);
+/// True if the `sum` of a patch's row is off its target by so much that visibility must have been
+/// misjudged. `triangle_count` is that of the patch.
+bool is_doubtful_row(double sum, const RowTarget& target, std::size_t triangle_count);
+
+/// The same of every row [n].
+std::vector<bool> find_doubtful_rows(std::span<const double> sum, std::span<const RowTarget> target,
+                                     const PatchGeometry& geometry);
 
 }  // namespace rebounce

@@ -9,6 +9,7 @@
 #include "output_check.h"
 #include "picture_options.h"
 #include "rebounce/demo/image_file.h"
+#include "rebounce/demo/key_light.h"
 #include "rebounce/demo/patch_errors.h"
 #include "rebounce/demo/picture.h"
 #include "rebounce/precompute/reference_solution.h"
@@ -22,6 +23,7 @@ namespace {
 struct RenderOptions {
   std::string file, lights, camera, size = "1280x720", show = "radiosity", output;
   std::optional<float> exposure;
+  bool key_light = false;
 };
 
 void run(const RenderOptions& chosen, const CommonOptions& options) {
@@ -31,11 +33,13 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   settings.exposure = chosen.exposure;
   check_can_write(chosen.output);
   LightSetup setup;
-  const auto data = settings.show == Show::kPatches
+  const bool needs_no_light = settings.show == Show::kPatches || chosen.key_light;
+  const auto data = needs_no_light
                         ? std::make_shared<const TransferData>(load_transfer_file(chosen.file))
                         : load_lit_scene(chosen.file, chosen.lights, setup);
 
   Engine engine(data);
+  if (chosen.key_light) setup.lights = {make_key_light(*data, engine.tracer())};
   engine.relight(setup.lights, setup.sky);
   settings.camera = choose_camera(chosen.camera, engine);
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
@@ -75,8 +79,11 @@ void add_render_command(CLI::App& app, const CommonOptions& options) {
   CLI::App* command =
       app.add_subcommand("render", "Draw a picture of a relit scene, without a window");
   command->add_option("file", chosen->file, "Transfer file")->required();
-  command->add_option("--lights", chosen->lights,
-                      "Lights: .json, or a .glb that has some; by default those of the scene");
+  CLI::Option* lights =
+      command->add_option("--lights", chosen->lights,
+                          "Lights: .json, or a .glb that has some; by default those of the scene");
+  command->add_flag("--key-light", chosen->key_light, "One lamp at a place that suits the scene")
+      ->excludes(lights);
   command->add_option(
       "--camera", chosen->camera,
       "Name or number of a camera of the scene, or px,py,pz,tx,ty,tz[,degrees] in metres");

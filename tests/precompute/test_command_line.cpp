@@ -588,6 +588,9 @@ TEST_F(CommandLine, RefusesToRelightWithoutAnyLight) {
   summary_of({"precompute", write("dark.gltf", dark.dump()), "--patches", "300", "-o",
               path("dark.safetensors")});
   expect_refused({"solve", path("dark.safetensors"), "-o", path("x.csv")}, "--lights");
+  // A picture may have a lamp of its own.
+  summary_of({"render", path("dark.safetensors"), "--key-light", "--size", "32x24", "-o",
+              path("x.png")});
 }
 
 TEST_F(CommandLine, DrawsWhateverIsAskedFor) {

@@ -206,7 +206,7 @@ TEST(DenseTransfer, IntegratingSphere) {
   // uniform, rho / (1 - rho) / (4 pi).
   Scene scene = test::empty_scene({0.5F, 0.5F, 0.5F});
   test::add_ball(scene, 24, 12, true);
-  const Solved solved = solve(scene, 1);
+  const Solved solved = solve(scene, scene.triangle.size());
   const glm::dvec3 lamp(0.3, 0.2, -0.4);
   std::vector<Float3> m0;
   double total_area = 0;
