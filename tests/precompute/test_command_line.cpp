@@ -589,8 +589,8 @@ TEST_F(CommandLine, RefusesToRelightWithoutAnyLight) {
               path("dark.safetensors")});
   expect_refused({"solve", path("dark.safetensors"), "-o", path("x.csv")}, "--lights");
   // A picture may have a lamp of its own.
-  summary_of({"render", path("dark.safetensors"), "--key-light", "--size", "32x24", "-o",
-              path("x.png")});
+  summary_of(
+      {"render", path("dark.safetensors"), "--key-light", "--size", "32x24", "-o", path("x.png")});
 }
 
 TEST_F(CommandLine, DrawsWhateverIsAskedFor) {

@@ -32,9 +32,9 @@ struct PatchModel {
 };
 
 /// Subdivides the scene's large triangles (subdivision.h) and merges small ones: every lit side
-/// (lit_sides.h) is an element of one patch (element_clusters.h). Area, reflectance and emission are
-/// of what stops light (opacity_maps.h), textures integrated. Double-sided triangles get a second
-/// display triangle. The reconstruction weights are left to reconstruction_weights.h.
+/// (lit_sides.h) is an element of one patch (element_clusters.h). Area, reflectance and emission
+/// are of what stops light (opacity_maps.h), textures integrated. Double-sided triangles get a
+/// second display triangle. The reconstruction weights are left to reconstruction_weights.h.
 PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);
 
 }  // namespace rebounce

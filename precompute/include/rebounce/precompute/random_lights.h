@@ -26,8 +26,8 @@ std::string_view name(LightKind kind);
 
 /// `count` point lights at random places in the free space of the scene: on the way of a
 /// cosine-distributed ray from a random place of the surface to what it hits, between a tenth and
-/// nine tenths of it and, where there is room, a mean patch size off both ends. The same `seed`, the
-/// same lights.
+/// nine tenths of it and, where there is room, a mean patch size off both ends. The same `seed`,
+/// the same lights.
 std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
                                        std::uint64_t seed);
 

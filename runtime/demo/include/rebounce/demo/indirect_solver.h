@@ -14,8 +14,8 @@ namespace rebounce {
 /// How a frame finds its indirect light.
 struct IndirectMethod {
   std::optional<SolveMethod> iteration{};  ///< unset: one product with the stored operator
-  int sweeps = 1;                        ///< of an iteration, at least 1
-  bool warm = true;                      ///< an iteration starts from the frame before
+  int sweeps = 1;                          ///< of an iteration, at least 1
+  bool warm = true;                        ///< an iteration starts from the frame before
 
   bool operator==(const IndirectMethod&) const = default;
 };
