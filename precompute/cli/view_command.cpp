@@ -12,6 +12,7 @@
 #include "output_check.h"
 #include "picture_options.h"
 #include "rebounce/demo/key_light.h"
+#include "rebounce/demo/punctual_light.h"
 #include "rebounce/demo/viewer.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/engine.h"
@@ -62,7 +63,10 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
   ViewerSetup setup;
   setup.title = "Rebounce: " + data->record.scene_name;
   std::tie(setup.width, setup.height) = parse_size(chosen.size);
-  for (const Light& light : lights.lights) setup.lights.push_back({.light = light});
+  // Shadow maps are of lamps without a surface.
+  for (const Light& light : lights.lights) {
+    setup.lights.push_back({.light = punctual_equivalent(light)});
+  }
   setup.sky = lights.sky;
   setup.camera = choose_camera(chosen.camera, engine);
   setup.show = parse_show(chosen.show);

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "rebounce/demo/punctual_light.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/atomic_file.h"
@@ -147,7 +148,8 @@ class GlbBuilder {
     if (lights.empty()) return;
     document_["extensionsUsed"].push_back("KHR_lights_punctual");
     json& list = document_["extensions"]["KHR_lights_punctual"]["lights"];
-    for (const Light& light : lights) {
+    for (const Light& given : lights) {
+      const Light light = punctual_equivalent(given);
       json node = {{"extensions", {{"KHR_lights_punctual", {{"light", list.size()}}}}}};
       if (light.type != LightType::kDirectional) node["translation"] = light.position;
       if (light.type != LightType::kPoint) {
