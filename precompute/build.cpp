@@ -314,7 +314,11 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.patches.absorbed = std::move(form_factors.absorbed);
   data.mesh = std::move(model.mesh);
   data.exchange = std::move(form_factors.exchange);
-  compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh);
+  clock.run("weights", [&](const Progress& part) {
+    compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh,
+                                   part);
+    return true;
+  });
 
   if (settings.probes.grid[0] > 0 || settings.probes.spacing > 0) {
     data.probes = clock.run("probes", [&](const Progress& part) {

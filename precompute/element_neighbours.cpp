@@ -98,13 +98,17 @@ Pairs find_near_pairs(std::span<const Float3> point, std::size_t count, float re
   return pairs;
 }
 
-std::uint32_t find_between(const PatchPoint& a, const PatchPoint& b, const RayTracer& tracer) {
+std::array<Ray, 3> line_of_sight(const PatchPoint& a, const PatchPoint& b,
+                                 const RayTracer& tracer) {
   const glm::vec3 pa = to_glm(tracer.offset_point(a.position, a.normal));
   const glm::vec3 pb = to_glm(tracer.offset_point(b.position, b.normal));
   const float lift = kLift * glm::distance(pa, pb);
   const glm::vec3 above_a = pa + lift * to_glm(a.normal), above_b = pb + lift * to_glm(b.normal);
-  const std::array<Ray, 3> rays = {segment(above_a, above_b), segment(pa, above_a),
-                                   segment(pb, above_b)};
+  return {segment(above_a, above_b), segment(pa, above_a), segment(pb, above_b)};
+}
+
+std::uint32_t find_between(const PatchPoint& a, const PatchPoint& b, const RayTracer& tracer) {
+  const std::array<Ray, 3> rays = line_of_sight(a, b, tracer);
   std::array<Hit, 3> hits;
   tracer.intersect(rays, hits);
   const auto hit = std::ranges::find_if(hits, [](const Hit& h) { return h.triangle != kNone; });

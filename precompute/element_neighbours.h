@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <utility>
@@ -20,9 +21,12 @@ Pairs find_edge_neighbours(std::span<const Uint3> corner);
 /// For each point the `count` nearest others within `reach` metres. Ascending, each once.
 Pairs find_near_pairs(std::span<const Float3> point, std::size_t count, float reach);
 
-/// Finds what is between two points of the surface: on the way up from each along its normal, by a
-/// part of their distance, and across between the upper ends, so that a rounded surface does not
-/// hide its own points from each other. A triangle of the surface, or kNone.
+/// The line of sight between two points of the surface: across between points above them, and up to
+/// these along each one's normal by a part of the distance, so that a rounded surface does not hide
+/// its own points from each other.
+std::array<Ray, 3> line_of_sight(const PatchPoint& a, const PatchPoint& b, const RayTracer& tracer);
+
+/// Finds what stands in a line of sight: a triangle of the surface, or kNone.
 std::uint32_t find_between(const PatchPoint& a, const PatchPoint& b, const RayTracer& tracer);
 
 }  // namespace rebounce

@@ -1,6 +1,6 @@
 #include "point_finder.h"
 
-#include <algorithm>
+#include <cmath>
 #include <nanoflann.hpp>
 
 namespace rebounce {
@@ -22,6 +22,39 @@ struct PointSet {
 
 using PointTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSet>,
                                                       PointSet, 3, std::uint32_t>;
+
+/// What nanoflann asks of a set of results: the points in a ball that shrinks while it holds too
+/// many.
+class ShrinkingBall {
+ public:
+  ShrinkingBall(float radius, std::size_t most, std::vector<PointFinder::Found>& found)
+      : radius_squared_(radius * radius), most_(most), found_(found) {}
+
+  float radius() const { return std::sqrt(radius_squared_); }
+
+  // NOLINTBEGIN(readability-identifier-naming): nanoflann's names
+  bool full() const { return true; }
+  float worstDist() const { return radius_squared_; }
+  bool addPoint(float distance_squared, std::uint32_t index) {
+    if (distance_squared >= radius_squared_) return true;
+    found_.push_back({index, distance_squared});
+    while (found_.size() > most_ && radius_squared_ > 0) shrink();
+    return true;
+  }
+  // NOLINTEND(readability-identifier-naming)
+
+ private:
+  void shrink() {
+    radius_squared_ /= 2;
+    std::erase_if(found_, [this](const PointFinder::Found& f) {
+      return f.distance_squared >= radius_squared_;
+    });
+  }
+
+  float radius_squared_;
+  std::size_t most_;
+  std::vector<PointFinder::Found>& found_;
+};
 
 }  // namespace
 
@@ -48,13 +81,12 @@ std::vector<PointFinder::Found> PointFinder::nearest(const Float3& place, std::s
   return result;
 }
 
-std::vector<PointFinder::Found> PointFinder::within(const Float3& place, float radius) const {
-  std::vector<std::pair<std::uint32_t, float>> found;
-  impl_->tree.radiusSearch(place.data(), radius * radius, found, nanoflann::SearchParams());
-  std::ranges::sort(found);
-  std::vector<Found> result;
-  for (const auto& [index, distance_squared] : found) result.push_back({index, distance_squared});
-  return result;
+float PointFinder::within(const Float3& place, float radius, std::size_t most,
+                          std::vector<Found>& found) const {
+  found.clear();
+  ShrinkingBall ball(radius, most, found);
+  impl_->tree.findNeighbors(ball, place.data(), nanoflann::SearchParams());
+  return ball.radius();
 }
 
 }  // namespace rebounce

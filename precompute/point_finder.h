@@ -27,8 +27,11 @@ class PointFinder {
   /// The `count` points nearest to `place`, fewer if there are not so many; the nearest first.
   std::vector<Found> nearest(const Float3& place, std::size_t count) const;
 
-  /// All points within `radius` metres of `place`, in ascending order.
-  std::vector<Found> within(const Float3& place, float radius) const;
+  /// Puts all points within `radius` metres of `place` into `found`, in no particular order but
+  /// always the same; where they are more than `most`, only those within the largest of radius /
+  /// sqrt(2)^k that are not. Returns the radius that was taken.
+  float within(const Float3& place, float radius, std::size_t most,
+               std::vector<Found>& found) const;
 
  private:
   struct Impl;

@@ -3,23 +3,19 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
-#include <optional>
+#include <numeric>
 #include <vector>
 
-#include "element_neighbours.h"
+#include "giver_search.h"
 #include "local_max_entropy.h"
 #include "mean_preservation.h"
-#include "point_finder.h"
+#include "progress_part.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
 namespace {
-
-constexpr float kCreaseCosine = 0.766F;  // 40 degrees: rounder is meant to look smooth
-constexpr float kMostlyCovered = 0.9F;   // what little is left of such a patch is too noisy to show
 
 // Height of the rays that tell whether a triangle lies in the open, as a part of its size; and how
 // far their feet are drawn in from its corners, so that they keep clear of the walls beside it.
@@ -32,21 +28,19 @@ constexpr double kLeastProbeSize = 0.5;
 // A patch with less than this part of its area covered is open, and the other way round.
 constexpr double kLittle = 0.1;
 
-// Points of a patch that stand for it.
-constexpr std::size_t kSampleCount = 16;
-
 // How far a vertex looks for patches, in mean sizes of its own: chosen with bench_truth
-// (notes/patches.md). Farther where all near ones are mixed; how far off its plane, in parts of
-// that.
-constexpr float kReach = 1, kFartherReach = 2, kPlaneReach = 0.25F;
+// (notes/patches.md). Farther where all near ones are mixed.
+constexpr float kReach = 1, kFartherReach = 2;
 
 // How firmly the mean place of a vertex's patches is drawn to the vertex: a compromise of what is
 // best at edges and what leaves a vertex with many patches to average (notes/patches.md).
 constexpr double kRidge = 0.1;
 
-// Patches that give to a vertex, at most, and the part of its value below which one is left out.
-constexpr std::size_t kMostGivers = 16;
+// The part of a vertex's value below which a patch is left out.
 constexpr float kNegligible = 1e-3F;
+
+// Vertices between two looks at the progress.
+constexpr std::size_t kBatch = 1 << 14;
 
 // What a vertex takes away of patches beyond its own, at most, for the sake of the patches' means.
 constexpr double kMostNegative = 0.5;
@@ -92,29 +86,34 @@ Exposure find_exposure(const std::array<glm::dvec3, 3>& p, double least_size,
   return covered > 0 || divided ? Exposure::kMixed : Exposure::kOpen;
 }
 
-/// A place of a patch that gives its value to vertices around it.
-struct Sample {
-  glm::vec3 position{0}, normal{0};
-  std::uint32_t patch = kNone;
-  float share = 0;  ///< of area
-};
+/// The patches that each vertex's own triangles show.
+class VertexPatches {
+ public:
+  VertexPatches(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch)
+      : begin_(mesh.position.size() + 1, 0), end_(mesh.position.size()) {
+    for (const Uint3& corner : mesh.triangle) {
+      for (const std::uint32_t v : corner) ++begin_[v + 1];
+    }
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    std::copy(begin_.begin(), begin_.end() - 1, end_.begin());
+    patch_.resize(begin_.back());
+    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+      if (shown_patch[t] == kNone) continue;
+      for (const std::uint32_t v : mesh.triangle[t]) add(v, shown_patch[t]);
+    }
+  }
 
-/// What a patch gives to one vertex.
-struct Giver {
-  std::uint32_t patch;
-  float weight;
-  float distance_squared;  ///< of its nearest sample
-  glm::vec3 position;      ///< of that sample
-  glm::vec3 normal;
-};
+  std::span<const std::uint32_t> operator[](std::size_t v) const {
+    return {patch_.data() + begin_[v], patch_.data() + end_[v]};
+  }
 
-/// A display vertex with what its triangles say.
-struct Receiver {
-  glm::vec3 position{0};
-  glm::vec3 normal{0};    ///< unit, area-weighted over its triangles
-  glm::vec3 inset{0};     ///< a point of its largest triangle, clear of the surfaces at its edges
-  float reach = 0;        ///< metres
-  bool is_shown = false;  ///< some triangle of it shows a patch
+ private:
+  void add(std::uint32_t v, std::uint32_t patch) {
+    if (std::ranges::find((*this)[v], patch) == (*this)[v].end()) patch_[end_[v]++] = patch;
+  }
+
+  std::vector<std::uint32_t> begin_, end_;  ///< of each vertex, in patch_
+  std::vector<std::uint32_t> patch_;        ///< with room for all corners
 };
 
 class ReconstructionWeights {
@@ -125,27 +124,41 @@ class ReconstructionWeights {
         absorbed_(absorbed),
         tracer_(tracer),
         mesh_(mesh),
-        triangles_(mesh.triangle_patch, absorbed.size()) {
+        triangles_(mesh.triangle_patch, absorbed.size()),
+        own_patches_(mesh, shown_patch) {
     measure_patches();
-    make_samples();
     make_receivers();
   }
 
-  void compute() {
+  void compute(const Progress& progress) {
     const std::size_t count = mesh_.position.size();
+    const GiverSearch search(mesh_, triangles_, area_, absorbed_, tracer_);
     std::vector<VertexWeights> weights(count);
-#pragma omp parallel for schedule(dynamic, 256)
-    for (std::size_t v = 0; v < count; ++v) {
-      if (!receivers_[v].is_shown) continue;
-      std::vector<Giver> givers = find_givers(static_cast<std::uint32_t>(v));
-      centre_weights(receivers_[v], givers);
-      weights[v] = open_weights(givers);
+    for (std::size_t begin = 0; begin < count; begin += kBatch) {
+      report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
+      compute_batch(search, begin, std::min(begin + kBatch, count), weights);
     }
     preserve_patch_means(mesh_, triangles_, good_patches(), {kMostNegative, kMostGivers}, weights);
     write_weights(weights);
   }
 
  private:
+  /// The weights of vertices [begin, end) before the patches' means are looked after.
+  void compute_batch(const GiverSearch& search, std::size_t begin, std::size_t end,
+                     std::vector<VertexWeights>& weights) const {
+#pragma omp parallel
+    {
+      GiverSearch::Scratch scratch(search);
+#pragma omp for schedule(dynamic, 64)
+      for (std::size_t v = begin; v < end; ++v) {
+        if (!receivers_[v].is_shown) continue;
+        std::vector<Giver> givers = find_givers(search, v, scratch);
+        centre_weights(receivers_[v], givers);
+        weights[v] = open_weights(givers);
+      }
+    }
+  }
+
   /// The root of the patches' mean area, metres.
   double mean_patch_size() const {
     double area = 0;
@@ -185,24 +198,6 @@ class ReconstructionWeights {
     }
   }
 
-  void make_samples() {
-    const std::size_t n = triangles_.patch_count();
-    samples_.resize(n * kSampleCount);
-    positions_.resize(n * kSampleCount);
-#pragma omp parallel for schedule(dynamic, 64)
-    for (std::size_t i = 0; i < n; ++i) {
-      std::array<PatchPoint, kSampleCount> points;
-      spread_points(mesh_, triangles_[i], unit_square(mix_bits(i)), points);
-      for (std::size_t k = 0; k < kSampleCount; ++k) {
-        const std::size_t place = i * kSampleCount + k;
-        samples_[place] = {to_glm(points[k].position), to_glm(points[k].normal),
-                           static_cast<std::uint32_t>(i), area_[i] / kSampleCount};
-        positions_[place] = points[k].position;
-      }
-    }
-    finder_.emplace(positions_);
-  }
-
   void make_receivers() {
     receivers_.resize(mesh_.position.size());
     std::vector<glm::dvec3> normal(receivers_.size(), glm::dvec3(0));
@@ -232,36 +227,23 @@ class ReconstructionWeights {
       if (length > 0) receivers_[v].normal = glm::vec3(normal[v] / length);
       receivers_[v].reach = kReach * size_sum[v] / std::max(count[v], 1.0F);
     }
-    add_own_patches();
-  }
-
-  /// For each vertex the patches that its own triangles show.
-  void add_own_patches() {
-    own_patches_.resize(receivers_.size());
-    for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
-      if (shown_patch_[t] == kNone) continue;
-      for (const std::uint32_t v : mesh_.triangle[t]) {
-        std::vector<std::uint32_t>& own = own_patches_[v];
-        if (std::ranges::find(own, shown_patch_[t]) == own.end()) own.push_back(shown_patch_[t]);
-      }
-    }
-  }
-
-  bool is_own(std::uint32_t v, std::uint32_t patch) const {
-    return std::ranges::find(own_patches_[v], patch) != own_patches_[v].end();
   }
 
   /// Patches in the open, if need be from farther away; else those that are mixed, on whose rim the
   /// vertex lies; else its own.
-  std::vector<Giver> find_givers(std::uint32_t v) const {
-    std::vector<Giver> near = givers_within(v, receivers_[v].reach);
+  std::vector<Giver> find_givers(const GiverSearch& search, std::size_t v,
+                                 GiverSearch::Scratch& scratch) const {
+    const auto within = [&](float reach) {
+      return search.find(receivers_[v], own_patches_[v], reach, scratch);
+    };
+    std::vector<Giver> near = within(receivers_[v].reach);
     const auto is = [&](Exposure e) {
       return [this, e](const Giver& g) { return exposure_[g.patch] == e; };
     };
     if (std::ranges::any_of(near, is(Exposure::kOpen))) return only(near, is(Exposure::kOpen));
     if (std::ranges::any_of(near, is(Exposure::kMixed))) {
       const std::vector<Giver> farther =
-          only(givers_within(v, kFartherReach * receivers_[v].reach), is(Exposure::kOpen));
+          only(within(kFartherReach * receivers_[v].reach), is(Exposure::kOpen));
       if (!farther.empty()) return farther;
     }
     if (!near.empty()) return near;
@@ -275,49 +257,6 @@ class ReconstructionWeights {
   static std::vector<Giver> only(std::vector<Giver> givers, const Wanted& wanted) {
     std::erase_if(givers, [&](const Giver& g) { return !wanted(g); });
     return givers;
-  }
-
-  /// The patches with samples around a vertex that face as it does, about in its plane and in
-  /// sight, the heaviest kMostGivers of them.
-  std::vector<Giver> givers_within(std::uint32_t v, float reach) const {
-    std::vector<Giver> candidates = candidates_within(v, reach);
-    std::ranges::stable_sort(candidates, std::greater<>(), &Giver::weight);
-    std::vector<Giver> givers;
-    for (const Giver& giver : candidates) {
-      if (givers.size() == kMostGivers) break;
-      if (is_own(v, giver.patch) || in_sight(receivers_[v], giver)) givers.push_back(giver);
-    }
-    std::ranges::sort(givers, {}, &Giver::patch);
-    return givers;
-  }
-
-  /// The same, whether in sight or not, in ascending order: so are the samples.
-  std::vector<Giver> candidates_within(std::uint32_t v, float reach) const {
-    const Receiver& receiver = receivers_[v];
-    std::vector<Giver> givers;
-    for (const auto& [index, distance_squared] : finder_->within(mesh_.position[v], reach)) {
-      const Sample& sample = samples_[index];
-      if (absorbed_[sample.patch] > kMostlyCovered) continue;
-      if (glm::dot(sample.normal, receiver.normal) < kCreaseCosine) continue;
-      const float height = glm::dot(sample.position - receiver.position, receiver.normal);
-      if (std::abs(height) > kPlaneReach * reach) continue;
-      if (givers.empty() || givers.back().patch != sample.patch) {
-        givers.push_back({sample.patch, 0, reach * reach, {}, {}});
-      }
-      Giver& giver = givers.back();
-      const float fall = 1 - distance_squared / (reach * reach);
-      giver.weight += sample.share * fall * fall;
-      if (distance_squared > giver.distance_squared) continue;
-      giver.distance_squared = distance_squared;
-      giver.position = sample.position;
-      giver.normal = sample.normal;
-    }
-    return givers;
-  }
-
-  bool in_sight(const Receiver& receiver, const Giver& giver) const {
-    return find_between({to_float3(receiver.inset), to_float3(receiver.normal)},
-                        {to_float3(giver.position), to_float3(giver.normal)}, tracer_) == kNone;
   }
 
   /// Shifts the weights so that the centroids of the patches balance about the vertex.
@@ -380,22 +319,19 @@ class ReconstructionWeights {
   const RayTracer& tracer_;
   DisplayMesh& mesh_;
   const PatchTriangles triangles_;
+  const VertexPatches own_patches_;
   std::vector<float> area_;          ///< [n] m²
   std::vector<glm::vec3> centroid_;  ///< [n]
   std::vector<Exposure> exposure_;   ///< [n]
-  std::vector<Sample> samples_;      ///< [n][kSampleCount]
-  std::vector<Float3> positions_;    ///< theirs
-  std::optional<PointFinder> finder_;
-  std::vector<Receiver> receivers_;                      ///< [v]
-  std::vector<std::vector<std::uint32_t>> own_patches_;  ///< [v]
+  std::vector<Receiver> receivers_;  ///< [v]
 };
 
 }  // namespace
 
 void compute_reconstruction_weights(std::span<const std::uint32_t> shown_patch,
                                     std::span<const float> absorbed, const RayTracer& tracer,
-                                    DisplayMesh& mesh) {
-  ReconstructionWeights(shown_patch, absorbed, tracer, mesh).compute();
+                                    DisplayMesh& mesh, const Progress& progress) {
+  ReconstructionWeights(shown_patch, absorbed, tracer, mesh).compute(progress);
 }
 
 }  // namespace rebounce

@@ -2,6 +2,7 @@
 
 #include <span>
 
+#include "rebounce/precompute/progress.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -21,8 +22,9 @@ namespace rebounce {
 /// `shown_patch` [t] is the patch of each display triangle, or kNone. `absorbed` [n] is the part of
 /// each patch's view that meets back faces; where nothing better is left, the weights make up for
 /// it: the sum of weight x (1 - absorbed) is 1. `tracer` holds the surface of `mesh`.
+/// Throws Cancelled.
 void compute_reconstruction_weights(std::span<const std::uint32_t> shown_patch,
                                     std::span<const float> absorbed, const RayTracer& tracer,
-                                    DisplayMesh& mesh);
+                                    DisplayMesh& mesh, const Progress& progress = {});
 
 }  // namespace rebounce
