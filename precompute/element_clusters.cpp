@@ -5,116 +5,87 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <queue>
 
+#include "cluster_merging.h"
+#include "element_blocks.h"
 #include "element_neighbours.h"
+#include "progress_part.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kFeatureCount = 9;
-using Feature = std::array<double, kFeatureCount>;
+// Elements are merged in blocks first where there are this many times as many as patches; so many
+// times as many clusters as patches are left then, at least.
+constexpr std::size_t kManyElements = 16, kLeastClusters = 8;
 
-// A difference of one in normal or reflectance weighs like this many mean patch sizes of distance.
-constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0;
-
-// Each element's nearest others that may join it without an edge between.
+// Each cluster's nearest others that may join it without an edge between.
 constexpr std::size_t kNearCount = 8;
 
 // A patch is no longer than this many mean sizes: else, where much must not merge because of the
 // leak test, the walls around it would, at any price.
 constexpr double kLongest = 4;
 
+// What is no longer than these parts of the mean size merges without leak test; may merge around
+// itself; hides nothing.
+constexpr double kDetail = 1.0 / 16, kSmall = 0.5, kThing = 0.5;
+
 // Where there are still too many patches, rounds in which those that lie near each other become
-// neighbours, patches may be longer and the leak test is left to larger ones; all three lengths
-// double each time.
-constexpr int kRounds = 6;
+// neighbours, and what counts as detail and as small doubles. In the last of them patches may be
+// twice as long each time.
+constexpr int kRounds = 8, kRoundsOfLength = 6;
 
-// Elements of a patch between which lines of sight are drawn.
-constexpr std::size_t kWitnessCount = 4;
+// The part of the progress that is for blocks.
+constexpr double kBlocksProgress = 0.6;
 
-// What is no longer than this part of the mean size hides nothing, and may merge around itself.
-constexpr double kSmall = 0.5;
-
-// Only pieces of the mesh up to this many times that length are things and not walls.
-constexpr double kSmallPiece = 4;
-
-struct Cluster {
-  double area = 0;
-  Feature sum{};  ///< of area x feature
-  glm::dvec3 low{0}, high{0};
-  std::array<std::uint32_t, kWitnessCount> witness{};  ///< its largest elements
-  std::size_t witness_count = 0;
-  std::vector<std::uint32_t> neighbours;
-  bool emits = false;
-  std::uint32_t merged_into = kNone;
-};
-
-struct Candidate {
-  double cost;
-  std::uint32_t a, b;
-  bool operator<(const Candidate& other) const {  // the cheapest is the greatest
-    if (cost != other.cost) return cost > other.cost;
-    return std::pair(a, b) > std::pair(other.a, other.b);
-  }
-};
-
-class Merging {
+class ElementMerging {
  public:
-  Merging(const Elements& elements, const RayTracer& tracer, const ClusterSettings& settings)
-      : elements_(elements), tracer_(tracer), settings_(settings), alive_(elements.size()) {
+  ElementMerging(const Elements& elements, const RayTracer& tracer, const ClusterSettings& settings)
+      : scene_{elements, tracer, {}, {}}, settings_(settings) {
     const double area = std::accumulate(elements.area.begin(), elements.area.end(), 0.0);
     size_ = settings.patch_count > 0 ? std::sqrt(area / static_cast<double>(settings.patch_count))
                                      : settings.largest;
-    small_ = kSmall * size_;
-    longest_ = kLongest * size_;
-    clusters_.reserve(2 * elements.size());
-    elements_of_.assign(1 + *std::ranges::max_element(elements.triangle), {kNone, kNone});
+    limits_ = {kDetail * size_, kSmall * size_, 0, kThing * size_};
+    set_largest(kLongest * size_);
+    scene_.elements_of.assign(1 + *std::ranges::max_element(elements.triangle), {kNone, kNone});
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
-      clusters_.push_back(cluster_of(e));
-      auto& sides = elements_of_[elements.triangle[e]];
+      auto& sides = scene_.elements_of[elements.triangle[e]];
       sides[sides[0] == kNone ? 0 : 1] = e;
     }
   }
 
-  ElementPatches run() {
-    const Pairs edges = find_edge_neighbours(elements_.corner);
+  ElementPatches run(const Progress& progress) {
+    Pairs edges = find_edge_neighbours(scene_.elements.corner);
     measure_pieces(edges);
-    connect(edges);
-    connect_in_sight(find_near_pairs(elements_.centroid, kNearCount, static_cast<float>(size_)));
-    merge_cheapest();
-    for (int round = 0; round < kRounds && alive_ > settings_.patch_count; ++round) {
-      small_ *= 2;
-      longest_ *= 2;
-      queue_neighbours();
-      connect_near_clusters(size_ * std::exp2(round));
-      merge_cheapest();
+    const ElementClusters start = start_clusters(progress);
+    ClusterMerging merging(scene_, start.cluster, start.of_element, 0);
+    merging.set_limits(limits_);
+    connect(start, std::move(edges), merging);
+    const std::size_t wanted = std::max<std::size_t>(settings_.patch_count, 1);
+    const auto watch = [&, first = merging.alive_count()](std::size_t alive) {
+      const double done = static_cast<double>(first - alive) /
+                          static_cast<double>(std::max(first, wanted + 1) - wanted);
+      report_progress(progress, kBlocksProgress + (1 - kBlocksProgress) * std::min(done, 1.0));
+    };
+    const double any_cost = std::numeric_limits<double>::infinity();
+    merging.merge_cheapest(wanted, any_cost, watch);
+    for (int round = 1; round <= kRounds && merging.alive_count() > settings_.patch_count;
+         ++round) {
+      start_round(round, merging);
+      merging.merge_cheapest(wanted, any_cost, watch);
     }
-    return result();
+    return result(start, merging);
   }
 
  private:
-  Cluster cluster_of(std::uint32_t e) const {
-    Cluster cluster;
-    cluster.area = elements_.area[e];
-    for (int k = 0; k < 3; ++k) {
-      cluster.sum[k] = elements_.centroid[e][k];
-      cluster.sum[3 + k] = kNormalWeight * size_ * elements_.normal[e][k];
-      cluster.sum[6 + k] = kReflectanceWeight * size_ * elements_.reflectance[e][k];
-    }
-    for (double& s : cluster.sum) s *= cluster.area;
-    cluster.low = to_dvec3(elements_.low[e]);
-    cluster.high = to_dvec3(elements_.high[e]);
-    cluster.witness[0] = e;
-    cluster.witness_count = 1;
-    cluster.emits = elements_.emits[e] != 0;
-    return cluster;
+  void set_largest(double length) {
+    limits_.largest = settings_.largest > 0 ? std::min<double>(settings_.largest, length) : length;
   }
 
   /// Finds how long the connected piece of the mesh is that each element is of.
   void measure_pieces(const Pairs& edges) {
-    std::vector<std::uint32_t> piece(elements_.size());
+    const Elements& elements = scene_.elements;
+    std::vector<std::uint32_t> piece(elements.size());
     std::iota(piece.begin(), piece.end(), 0U);
     const auto find = [&](std::uint32_t e) {
       while (piece[e] != e) e = piece[e] = piece[piece[e]];
@@ -124,223 +95,84 @@ class Merging {
       const std::uint32_t low = std::min(find(a), find(b)), high = std::max(find(a), find(b));
       piece[high] = low;
     }
-    std::vector<glm::dvec3> low(elements_.size(), glm::dvec3(std::numeric_limits<double>::max()));
-    std::vector<glm::dvec3> high(elements_.size(), -low[0]);
-    for (std::uint32_t e = 0; e < elements_.size(); ++e) {
-      low[find(e)] = glm::min(low[find(e)], to_dvec3(elements_.low[e]));
-      high[find(e)] = glm::max(high[find(e)], to_dvec3(elements_.high[e]));
-    }
-    for (std::uint32_t e = 0; e < elements_.size(); ++e) {
-      piece_length_.push_back(glm::distance(low[find(e)], high[find(e)]));
-    }
-  }
-
-  static double cost(const Cluster& a, const Cluster& b) {
-    double distance_squared = 0;
-    for (std::size_t k = 0; k < kFeatureCount; ++k) {
-      const double d = a.sum[k] / a.area - b.sum[k] / b.area;
-      distance_squared += d * d;
-    }
-    return a.area * b.area / (a.area + b.area) * distance_squared;
-  }
-
-  void connect(const Pairs& pairs) {
-    for (const auto& [a, b] : pairs) {
-      if (clusters_[a].emits != clusters_[b].emits) continue;
-      clusters_[a].neighbours.push_back(b);
-      clusters_[b].neighbours.push_back(a);
-      queue_.push({cost(clusters_[a], clusters_[b]), a, b});
-    }
-  }
-
-  /// Connects those of the pairs of clusters that nothing large stands between.
-  void connect_in_sight(const Pairs& pairs) {
-    std::vector<std::uint8_t> in_sight(pairs.size());
-#pragma omp parallel for schedule(dynamic, 256)
-    for (std::size_t k = 0; k < pairs.size(); ++k) {
-      const auto [a, b] = pairs[k];
-      in_sight[k] = look_between(a, b, witness(a, 0), witness(b, 0)) == Sight::kFree ? 1 : 0;
-    }
-    Pairs seen;
-    for (std::size_t k = 0; k < pairs.size(); ++k) {
-      if (in_sight[k] != 0) seen.push_back(pairs[k]);
-    }
-    connect(seen);
-  }
-
-  /// Gives pairs that were refused another chance.
-  void queue_neighbours() {
-    for (std::uint32_t c = 0; c < clusters_.size(); ++c) {
-      if (!is_alive(c)) continue;
-      for (const std::uint32_t n : clusters_[c].neighbours) {
-        if (n > c && is_alive(n)) queue_.push({cost(clusters_[c], clusters_[n]), c, n});
+    std::vector<std::array<glm::vec3, 2>> box;  // of each piece, by its first element's number
+    std::vector<std::uint32_t> number(elements.size());
+    for (std::uint32_t e = 0; e < elements.size(); ++e) {
+      if (find(e) == e) {
+        number[e] = static_cast<std::uint32_t>(box.size());
+        box.push_back({elements.low(e), elements.high(e)});
       }
+      number[e] = number[find(e)];
+      box[number[e]][0] = glm::min(box[number[e]][0], elements.low(e));
+      box[number[e]][1] = glm::max(box[number[e]][1], elements.high(e));
+    }
+    for (const std::uint32_t n : number) {
+      scene_.piece_length.push_back(glm::distance(box[n][0], box[n][1]));
     }
   }
 
-  void connect_near_clusters(double reach) {
-    std::vector<std::uint32_t> cluster;
+  ElementClusters start_clusters(const Progress& progress) const {
+    const std::size_t count = std::max<std::size_t>(settings_.patch_count, 1);
+    if (scene_.elements.size() < kManyElements * count) return one_each(scene_.elements, size_);
+    return merge_in_blocks(scene_, {size_, kLeastClusters * count, limits_},
+                           part_of(progress, 0, kBlocksProgress));
+  }
+
+  /// Makes neighbours of clusters that meet at an edge, or that lie near each other in sight.
+  void connect(const ElementClusters& start, Pairs edges, ClusterMerging& merging) const {
+    for (auto& [a, b] : edges) {
+      const auto [low, high] = std::minmax(start.of_element[a], start.of_element[b]);
+      std::tie(a, b) = std::pair(low, high);
+    }
+    std::erase_if(edges, [](const auto& pair) { return pair.first == pair.second; });
+    std::ranges::sort(edges);
+    edges.erase(std::ranges::unique(edges).begin(), edges.end());
+    merging.connect(edges);
     std::vector<Float3> centroid;
-    for (std::uint32_t c = 0; c < clusters_.size(); ++c) {
-      if (!is_alive(c)) continue;
-      cluster.push_back(c);
-      const Cluster& of = clusters_[c];
-      centroid.push_back(to_float3(glm::dvec3(of.sum[0], of.sum[1], of.sum[2]) / of.area));
-    }
-    Pairs pairs = find_near_pairs(centroid, kNearCount, static_cast<float>(reach));
+    for (const Cluster& cluster : start.cluster) centroid.push_back(to_float3(cluster.centroid()));
+    const Pairs near = find_near_pairs(centroid, kNearCount, static_cast<float>(size_));
+    Pairs apart;
+    std::ranges::set_difference(near, edges, std::back_inserter(apart));
+    merging.connect_in_sight(apart);
+  }
+
+  void start_round(int round, ClusterMerging& merging) {
+    limits_.detail *= 2;
+    limits_.small *= 2;
+    if (round >= kRoundsOfLength)
+      set_largest(kLongest * size_ * std::exp2(round - kRoundsOfLength + 1));
+    merging.set_limits(limits_);
+    merging.queue_neighbours();
+    const std::vector<std::uint32_t> alive = merging.alive();
+    std::vector<Float3> centroid;
+    for (const std::uint32_t c : alive) centroid.push_back(to_float3(merging[c].centroid()));
+    Pairs pairs =
+        find_near_pairs(centroid, kNearCount, static_cast<float>(size_ * std::exp2(round - 1)));
     for (auto& [a, b] : pairs) {
-      a = cluster[a];
-      b = cluster[b];
+      a = alive[a];
+      b = alive[b];
     }
-    connect_in_sight(pairs);
+    merging.connect_in_sight(pairs);
   }
 
-  void merge_cheapest() {
-    while (alive_ > settings_.patch_count && !queue_.empty()) {
-      const Candidate pair = queue_.top();
-      queue_.pop();
-      if (is_alive(pair.a) && is_alive(pair.b) && may_merge(pair.a, pair.b)) merge(pair.a, pair.b);
-    }
-  }
-
-  bool is_alive(std::size_t c) const {
-    return clusters_[c].merged_into == kNone;
-  }
-
-  bool may_merge(std::uint32_t a, std::uint32_t b) const {
-    const double length = glm::distance(glm::min(clusters_[a].low, clusters_[b].low),
-                                        glm::max(clusters_[a].high, clusters_[b].high));
-    if (length > longest_ || (settings_.largest > 0 && length > settings_.largest)) return false;
-    const auto [free, blocked_by_itself, count] = look_between(a, b);
-    if (2 * free > count) return true;
-    const double piece =
-        std::max(piece_length_[clusters_[a].witness[0]], piece_length_[clusters_[b].witness[0]]);
-    return 2 * (free + blocked_by_itself) > count && length <= small_ &&
-           piece <= kSmallPiece * small_;
-  }
-
-  enum class Sight : std::uint8_t { kFree, kItself, kWall };
-
-  /// What stands between two points of clusters a and b. What is small hides nothing.
-  Sight look_between(std::uint32_t a, std::uint32_t b, const PatchPoint& from,
-                     const PatchPoint& to) const {
-    const std::uint32_t triangle = find_between(from, to, tracer_);
-    if (triangle == kNone) return Sight::kFree;
-    bool small = true;
-    for (const std::uint32_t e : elements_of_[triangle]) {
-      if (e == kNone) continue;
-      const std::uint32_t c = cluster_of_element(e);
-      if (c == a || c == b) return Sight::kItself;
-      small &= piece_length_[e] <= kSmall * size_;
-    }
-    const bool unlit = elements_of_[triangle] == std::array{kNone, kNone};
-    return small && !unlit ? Sight::kFree : Sight::kWall;
-  }
-
-  struct SightCount {
-    std::size_t free, blocked_by_itself, count;
-  };
-
-  SightCount look_between(std::uint32_t a, std::uint32_t b) const {
-    SightCount result{0, 0, clusters_[a].witness_count * clusters_[b].witness_count};
-    for (std::size_t i = 0; i < clusters_[a].witness_count; ++i) {
-      for (std::size_t j = 0; j < clusters_[b].witness_count; ++j) {
-        const Sight sight = look_between(a, b, witness(a, i), witness(b, j));
-        result.free += sight == Sight::kFree ? 1 : 0;
-        result.blocked_by_itself += sight == Sight::kItself ? 1 : 0;
-      }
-    }
-    return result;
-  }
-
-  std::uint32_t cluster_of_element(std::uint32_t e) const {
-    std::uint32_t c = e;
-    while (!is_alive(c)) c = clusters_[c].merged_into;
-    return c;
-  }
-
-  /// Lets every cluster point to the one that it is part of now, so that chains stay short.
-  void shorten_chains() {
-    for (std::size_t c = clusters_.size(); c-- > 0;) {  // what merged comes after its parts
-      const std::uint32_t next = clusters_[c].merged_into;
-      if (next != kNone && !is_alive(next)) clusters_[c].merged_into = clusters_[next].merged_into;
-    }
-  }
-
-  PatchPoint witness(std::uint32_t cluster, std::size_t k) const {
-    const std::uint32_t e = clusters_[cluster].witness[k];
-    return {elements_.centroid[e], elements_.normal[e]};
-  }
-
-  void merge(std::uint32_t a, std::uint32_t b) {
-    const auto merged = static_cast<std::uint32_t>(clusters_.size());
-    Cluster& whole = clusters_.emplace_back();
-    Cluster &first = clusters_[a], &second = clusters_[b];
-    whole.area = first.area + second.area;
-    for (std::size_t k = 0; k < kFeatureCount; ++k) whole.sum[k] = first.sum[k] + second.sum[k];
-    whole.low = glm::min(first.low, second.low);
-    whole.high = glm::max(first.high, second.high);
-    whole.emits = first.emits;
-    choose_witnesses(first, second, whole);
-    first.merged_into = second.merged_into = merged;
-    --alive_;
-    if (clusters_.size() >= next_shortening_) {
-      shorten_chains();
-      next_shortening_ += clusters_.size() / 8;
-    }
-    join_neighbours(first, second, whole);
-    for (const std::uint32_t n : whole.neighbours) {
-      clusters_[n].neighbours.push_back(merged);
-      queue_.push({cost(whole, clusters_[n]), n, merged});
-    }
-  }
-
-  void choose_witnesses(const Cluster& a, const Cluster& b, Cluster& whole) const {
-    std::vector<std::uint32_t> all(a.witness.begin(), a.witness.begin() + a.witness_count);
-    all.insert(all.end(), b.witness.begin(), b.witness.begin() + b.witness_count);
-    std::ranges::sort(all, [&](std::uint32_t x, std::uint32_t y) {
-      return std::pair(-elements_.area[x], x) < std::pair(-elements_.area[y], y);
-    });
-    whole.witness_count = std::min(all.size(), kWitnessCount);
-    std::copy_n(all.begin(), whole.witness_count, whole.witness.begin());
-  }
-
-  void join_neighbours(Cluster& a, Cluster& b, Cluster& whole) {
-    std::vector<std::uint32_t>& all = whole.neighbours;
-    for (Cluster* part : {&a, &b}) {
-      for (const std::uint32_t n : part->neighbours) {
-        if (is_alive(n)) all.push_back(n);
-      }
-      std::vector<std::uint32_t>().swap(part->neighbours);
-    }
-    std::ranges::sort(all);
-    all.erase(std::ranges::unique(all).begin(), all.end());
-  }
-
-  ElementPatches result() {
-    shorten_chains();
+  ElementPatches result(const ElementClusters& start, const ClusterMerging& merging) const {
     ElementPatches result;
-    std::vector<std::uint32_t> patch_of(clusters_.size(), kNone);
-    for (std::uint32_t e = 0; e < elements_.size(); ++e) {
-      std::uint32_t& patch = patch_of[cluster_of_element(e)];
+    std::vector<std::uint32_t> current(start.cluster.size());
+    for (std::uint32_t c = 0; c < current.size(); ++c) current[c] = merging.current(c);
+    std::vector<std::uint32_t> patch_of(2 * current.size(), kNone);
+    result.patch.reserve(start.of_element.size());
+    for (const std::uint32_t c : start.of_element) {
+      std::uint32_t& patch = patch_of[current[c]];
       if (patch == kNone) patch = static_cast<std::uint32_t>(result.patch_count++);
       result.patch.push_back(patch);
     }
     return result;
   }
 
-  const Elements& elements_;
-  const RayTracer& tracer_;
+  MergingScene scene_;
   const ClusterSettings& settings_;
-  double size_;     ///< the mean patch's, metres
-  double small_;    ///< what is no longer may merge around itself, metres
-  double longest_;  ///< patch that may be made, metres
-  std::size_t alive_;
-  std::vector<std::array<std::uint32_t, 2>> elements_of_;  ///< sides of each surface triangle
-  std::vector<double> piece_length_;                       ///< metres, by element
-  std::vector<Cluster> clusters_;
-  std::size_t next_shortening_ = 0;
-  std::priority_queue<Candidate> queue_;
+  double size_;  ///< the mean patch's, metres
+  MergingLimits limits_{};
 };
 
 }  // namespace
@@ -348,19 +180,31 @@ class Merging {
 void Elements::resize(std::size_t count) {
   triangle.resize(count);
   corner.resize(count);
-  centroid.resize(count);
-  low.resize(count);
-  high.resize(count);
   normal.resize(count);
   area.resize(count);
   reflectance.resize(count);
   emits.resize(count);
 }
 
+Float3 Elements::centroid(std::size_t e) const {
+  const auto& [a, b, c] = corner[e];
+  return to_float3((to_dvec3(position[a]) + to_dvec3(position[b]) + to_dvec3(position[c])) / 3.0);
+}
+
+glm::vec3 Elements::low(std::size_t e) const {
+  const auto& [a, b, c] = corner[e];
+  return glm::min(to_glm(position[a]), glm::min(to_glm(position[b]), to_glm(position[c])));
+}
+
+glm::vec3 Elements::high(std::size_t e) const {
+  const auto& [a, b, c] = corner[e];
+  return glm::max(to_glm(position[a]), glm::max(to_glm(position[b]), to_glm(position[c])));
+}
+
 ElementPatches merge_elements(const Elements& elements, const RayTracer& tracer,
-                              const ClusterSettings& settings) {
+                              const ClusterSettings& settings, const Progress& progress) {
   if (elements.size() == 0) return {};
-  return Merging(elements, tracer, settings).run();
+  return ElementMerging(elements, tracer, settings).run(progress);
 }
 
 }  // namespace rebounce

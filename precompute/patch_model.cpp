@@ -137,16 +137,25 @@ class PatchModelBuilder {
     return exitance;
   }
 
+  /// For each vertex the number of its position among those of the elements.
+  std::vector<std::uint32_t> weld_elements() {
+    WeldedPositions welded = weld_positions(model_.mesh.position);
+    elements_.position.resize(welded.count);
+    for (std::size_t v = 0; v < welded.id.size(); ++v) {
+      elements_.position[welded.id[v]] = model_.mesh.position[v];
+    }
+    return std::move(welded.id);
+  }
+
   /// The lit sides, with what they reflect and emit.
   void make_elements() {
     for (std::uint32_t t = 0; t < kind_.size(); ++t) {
       if (kind_[t] == SideKind::kLit) element_triangle_.push_back(t);
     }
-    const std::vector<std::uint32_t> position = weld_positions(model_.mesh.position).id;
+    const std::vector<std::uint32_t> position = weld_elements();
     const std::size_t count = element_triangle_.size();
     if (count == 0) throw Error("scene " + scene_.name + " has nothing that light falls on");
     elements_.resize(count);
-    exitance_.resize(count);
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t e = 0; e < count; ++e) {
       const std::uint32_t t = element_triangle_[e];
@@ -155,15 +164,12 @@ class PatchModelBuilder {
       const auto [a, b, c] = model_.mesh.triangle[t];
       elements_.triangle[e] = surface_of_[t];
       elements_.corner[e] = {position[a], position[b], position[c]};
-      elements_.centroid[e] = to_float3((p + q + r) / 3.0);
-      elements_.low[e] = to_float3(glm::min(p, glm::min(q, r)));
-      elements_.high[e] = to_float3(glm::max(p, glm::max(q, r)));
       elements_.normal[e] = to_float3(glm::normalize(cross));
       elements_.area[e] =
           static_cast<float>(0.5 * glm::length(cross) * model_.mesh.opacity.stopping_part(t));
       elements_.reflectance[e] = mean_reflectance(t);
-      exitance_[e] = mean_exitance(t);
-      elements_.emits[e] = std::ranges::any_of(exitance_[e], [](float m) { return m > 0; });
+      elements_.emits[e] =
+          std::ranges::any_of(mean_exitance(t), [](float m) { return m > 0; }) ? 1 : 0;
     }
   }
 
@@ -190,10 +196,12 @@ class PatchModelBuilder {
       const std::uint32_t i = merged.patch[e];
       const double part = elements_.area[e];
       area[i] += part;
-      centroid[i] += part * to_dvec3(elements_.centroid[e]);
+      centroid[i] += part * to_dvec3(elements_.centroid(e));
       normal[i] += part * to_dvec3(elements_.normal[e]);
       reflectance[i] += part * to_dvec3(elements_.reflectance[e]);
-      exitance[i] += part * to_dvec3(exitance_[e]);
+      if (elements_.emits[e] != 0) {
+        exitance[i] += part * to_dvec3(mean_exitance(element_triangle_[e]));
+      }
       first_normal[i] = elements_.normal[e];
     }
     PatchTable& patches = model_.patches;
@@ -270,7 +278,6 @@ class PatchModelBuilder {
   std::vector<std::uint32_t> surface_of_;        ///< surface triangle of each display triangle
   std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
   Elements elements_;
-  std::vector<Float3> exitance_;  ///< lx, of each element
   PatchModel model_;
   std::size_t clamped_count_ = 0;
 };

@@ -4,9 +4,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <glm/glm.hpp>
 #include <vector>
 
+#include "rebounce/precompute/progress.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/types.h"
 
@@ -14,17 +15,20 @@ namespace rebounce {
 
 /// The lit sides of display triangles, each an element of some patch.
 struct Elements {
-  std::vector<std::uint32_t> triangle;  ///< that of the surface which it is a side of
-  std::vector<Uint3> corner;            ///< numbers of positions, the same where positions are
-  std::vector<Float3> centroid;         ///< metres
-  std::vector<Float3> low, high;        ///< box around it, metres
-  std::vector<Float3> normal;           ///< unit
-  std::vector<float> area;              ///< m² of what stops light, > 0
-  std::vector<Float3> reflectance;      ///< [0, 1]
-  std::vector<std::uint8_t> emits;      ///< 1 if it does
+  std::vector<Float3> position;         ///< [p] metres; no two are the same
+  std::vector<std::uint32_t> triangle;  ///< [e] that of the surface which it is a side of
+  std::vector<Uint3> corner;            ///< [e] positions
+  std::vector<Float3> normal;           ///< [e] unit
+  std::vector<float> area;              ///< [e] m² of what stops light, > 0
+  std::vector<Float3> reflectance;      ///< [e] [0, 1]
+  std::vector<std::uint8_t> emits;      ///< [e] 1 if it does
 
   std::size_t size() const { return area.size(); }
   void resize(std::size_t count);
+
+  Float3 centroid(std::size_t e) const;
+  glm::vec3 low(std::size_t e) const;  ///< of the box around it
+  glm::vec3 high(std::size_t e) const;
 };
 
 /// Elements as patches.
@@ -54,12 +58,16 @@ struct ClusterSettings {
 /// The leak test, so that no patch lies on two sides of a wall or in two rooms: lines of sight are
 /// drawn between the elements of both, and a pair with a piece of mesh between it that is longer
 /// than half of a mean patch is not merged. Where it is its own surface that stands between (the
-/// two faces of a wall, the far side of a table's leg) only what is small may merge; where that
-/// leaves too many patches, what counts as small grows.
+/// two faces of a wall, the far side of a table's leg) only what is small may merge. What is far
+/// smaller than a patch merges without the test. Where all that leaves too many patches, what
+/// counts as small grows; patches grow longer only last.
+///
+/// Where there are many more elements than patches they are first merged in blocks of neighbours,
+/// on all threads, to clusters that are far smaller than patches.
 ///
 /// `tracer` holds the surface. Patches are numbered in the order of their first elements.
-/// Deterministic.
+/// Deterministic for any number of threads. Throws Cancelled.
 ElementPatches merge_elements(const Elements& elements, const RayTracer& tracer,
-                              const ClusterSettings& settings);
+                              const ClusterSettings& settings, const Progress& progress = {});
 
 }  // namespace rebounce

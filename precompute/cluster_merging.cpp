@@ -1,0 +1,251 @@
+#include "cluster_merging.h"
+
+#include <algorithm>
+
+#include "rebounce/runtime/float3_glm.h"
+
+namespace rebounce {
+namespace {
+
+// A difference of one in normal or reflectance weighs like this many mean patch sizes of distance.
+constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0;
+
+// Only pieces of the mesh up to this many times the length that may merge around itself are things
+// and not walls.
+constexpr double kSmallPiece = 4;
+
+// Mergings between two looks of who watches.
+constexpr std::size_t kWatchInterval = 1024;
+
+/// The largest of the elements of both, by area and then by number: so are those of each in order.
+void choose_witnesses(const Elements& elements, const Cluster& a, const Cluster& b,
+                      Cluster& whole) {
+  std::array<std::uint32_t, 2 * kWitnessCount> all{};
+  const auto end = std::merge(
+      a.witness.begin(), a.witness.begin() + a.witness_count, b.witness.begin(),
+      b.witness.begin() + b.witness_count, all.begin(), [&](std::uint32_t x, std::uint32_t y) {
+        return std::pair(-elements.area[x], x) < std::pair(-elements.area[y], y);
+      });
+  const auto count = std::min<std::size_t>(end - all.begin(), kWitnessCount);
+  whole.witness_count = static_cast<std::uint8_t>(count);
+  std::copy_n(all.begin(), count, whole.witness.begin());
+}
+
+}  // namespace
+
+Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
+  Cluster cluster;
+  cluster.area = elements.area[e];
+  const Float3 centroid = elements.centroid(e);
+  for (int k = 0; k < 3; ++k) {
+    cluster.sum[k] = centroid[k];
+    cluster.sum[3 + k] = kNormalWeight * size * elements.normal[e][k];
+    cluster.sum[6 + k] = kReflectanceWeight * size * elements.reflectance[e][k];
+  }
+  for (double& s : cluster.sum) s *= cluster.area;
+  cluster.low = elements.low(e);
+  cluster.high = elements.high(e);
+  cluster.witness[0] = e;
+  cluster.witness_count = 1;
+  cluster.emits = elements.emits[e] != 0;
+  return cluster;
+}
+
+Cluster join(const Elements& elements, const Cluster& a, const Cluster& b) {
+  Cluster whole;
+  whole.area = a.area + b.area;
+  for (std::size_t k = 0; k < whole.sum.size(); ++k) whole.sum[k] = a.sum[k] + b.sum[k];
+  whole.low = glm::min(a.low, b.low);
+  whole.high = glm::max(a.high, b.high);
+  whole.emits = a.emits;
+  choose_witnesses(elements, a, b, whole);
+  return whole;
+}
+
+double joint_length(const Cluster& a, const Cluster& b) {
+  return glm::distance(glm::min(a.low, b.low), glm::max(a.high, b.high));
+}
+
+double merging_cost(const Cluster& a, const Cluster& b) {
+  double distance_squared = 0;
+  for (std::size_t k = 0; k < a.sum.size(); ++k) {
+    const double d = a.sum[k] / a.area - b.sum[k] / b.area;
+    distance_squared += d * d;
+  }
+  return a.area * b.area / (a.area + b.area) * distance_squared;
+}
+
+ClusterMerging::ClusterMerging(const MergingScene& scene, std::vector<Cluster> clusters,
+                               std::span<const std::uint32_t> number_of, std::uint32_t first)
+    : scene_(scene),
+      clusters_(std::move(clusters)),
+      number_of_(number_of),
+      first_(first),
+      start_count_(static_cast<std::uint32_t>(clusters_.size())),
+      merged_into_(clusters_.size(), kNone),
+      neighbours_(clusters_.size()),
+      alive_(clusters_.size()) {
+  clusters_.reserve(2 * start_count_);
+  merged_into_.reserve(2 * start_count_);
+  neighbours_.reserve(2 * start_count_);
+}
+
+void ClusterMerging::connect(const Pairs& pairs) {
+  for (const auto& [a, b] : pairs) {
+    if (clusters_[a].emits != clusters_[b].emits) continue;
+    neighbours_[a].push_back(b);
+    neighbours_[b].push_back(a);
+    queue_.push({merging_cost(clusters_[a], clusters_[b]), a, b});
+  }
+}
+
+void ClusterMerging::connect_in_sight(const Pairs& pairs, double most) {
+  std::vector<std::uint8_t> in_sight(pairs.size());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    const Cluster &a = clusters_[pairs[k].first], &b = clusters_[pairs[k].second];
+    if (merging_cost(a, b) > most) continue;
+    const bool free =
+        joint_length(a, b) <= limits_.detail || is_in_sight(pairs[k].first, pairs[k].second);
+    in_sight[k] = free ? 1 : 0;
+  }
+  Pairs seen;
+  for (std::size_t k = 0; k < pairs.size(); ++k) {
+    if (in_sight[k] != 0) seen.push_back(pairs[k]);
+  }
+  connect(seen);
+}
+
+void ClusterMerging::queue_neighbours() {
+  for (const std::uint32_t c : alive()) {
+    for (const std::uint32_t n : neighbours_[c]) {
+      if (n > c && is_alive(n)) queue_.push({merging_cost(clusters_[c], clusters_[n]), c, n});
+    }
+  }
+}
+
+void ClusterMerging::merge_cheapest(std::size_t count, double most, const Watch& watch) {
+  while (alive_ > count && !queue_.empty() && queue_.top().cost <= most) {
+    const Candidate pair = queue_.top();
+    queue_.pop();
+    if (!is_alive(pair.a) || !is_alive(pair.b) || !may_merge(pair.a, pair.b)) continue;
+    merge(pair);
+    if (watch && alive_ % kWatchInterval == 0) watch(alive_);
+  }
+}
+
+bool ClusterMerging::may_merge(std::uint32_t a, std::uint32_t b) const {
+  const double length = joint_length(clusters_[a], clusters_[b]);
+  if (length > limits_.largest) return false;
+  if (length <= limits_.detail) return true;
+  const std::size_t count = std::size_t{clusters_[a].witness_count} * clusters_[b].witness_count;
+  std::size_t free = 0, blocked_by_itself = 0;
+  std::array<Ray, 3 * kWitnessCount> rays;
+  std::array<Hit, 3 * kWitnessCount> hits;
+  for (std::size_t i = 0; i < clusters_[a].witness_count; ++i) {
+    const std::size_t lines = clusters_[b].witness_count;
+    for (std::size_t j = 0; j < lines; ++j) {
+      const auto line = line_of_sight(witness(a, i), witness(b, j), scene_.tracer);
+      std::ranges::copy(line, rays.begin() + static_cast<std::ptrdiff_t>(3 * j));
+    }
+    scene_.tracer.intersect(std::span(rays).first(3 * lines), std::span(hits).first(3 * lines));
+    for (std::size_t j = 0; j < lines; ++j) {
+      const auto begin = hits.begin() + static_cast<std::ptrdiff_t>(3 * j);
+      const auto hit =
+          std::find_if(begin, begin + 3, [](const Hit& h) { return h.triangle != kNone; });
+      const Sight sight = hit == begin + 3 ? Sight::kFree : what_is_at(hit->triangle, a, b);
+      free += sight == Sight::kFree ? 1 : 0;
+      blocked_by_itself += sight == Sight::kItself ? 1 : 0;
+    }
+    if (2 * free > count) return true;
+  }
+  const float piece = std::max(scene_.piece_length[clusters_[a].witness[0]],
+                               scene_.piece_length[clusters_[b].witness[0]]);
+  return 2 * (free + blocked_by_itself) > count && length <= limits_.small &&
+         piece <= kSmallPiece * limits_.small;
+}
+
+bool ClusterMerging::is_in_sight(std::uint32_t a, std::uint32_t b) const {
+  const std::uint32_t triangle = find_between(witness(a, 0), witness(b, 0), scene_.tracer);
+  return triangle == kNone || what_is_at(triangle, a, b) == Sight::kFree;
+}
+
+/// What a triangle between clusters a and b is to them. What is small hides nothing.
+ClusterMerging::Sight ClusterMerging::what_is_at(std::uint32_t triangle, std::uint32_t a,
+                                                 std::uint32_t b) const {
+  bool small = true, lit = false;
+  for (const std::uint32_t e : scene_.elements_of[triangle]) {
+    if (e == kNone) continue;
+    lit = true;
+    const std::uint32_t start = number_of_[e] - first_;
+    if (start < start_count_) {
+      const std::uint32_t c = current(start);
+      if (c == a || c == b) return Sight::kItself;
+    }
+    small &= scene_.piece_length[e] <= limits_.thing;
+  }
+  return small && lit ? Sight::kFree : Sight::kWall;
+}
+
+PatchPoint ClusterMerging::witness(std::uint32_t c, std::size_t k) const {
+  const std::uint32_t e = clusters_[c].witness[k];
+  return {scene_.elements.centroid(e), scene_.elements.normal[e]};
+}
+
+void ClusterMerging::merge(const Candidate& pair) {
+  const auto merged = static_cast<std::uint32_t>(clusters_.size());
+  clusters_.push_back(join(scene_.elements, clusters_[pair.a], clusters_[pair.b]));
+  merged_into_[pair.a] = merged_into_[pair.b] = merged;
+  merged_into_.push_back(kNone);
+  --alive_;
+  const auto cost = static_cast<float>(pair.cost);
+  steps_.push_back({steps_.empty() ? cost : std::max(cost, steps_.back().height), pair.a, pair.b});
+  if (clusters_.size() >= next_shortening_) {
+    shorten_chains();
+    next_shortening_ += clusters_.size() / 8;
+  }
+  std::vector<std::uint32_t> all;
+  join_neighbours(pair.a, pair.b, all);
+  for (const std::uint32_t n : all) {
+    neighbours_[n].push_back(merged);
+    queue_.push({merging_cost(clusters_[merged], clusters_[n]), n, merged});
+  }
+  neighbours_.push_back(std::move(all));
+}
+
+/// Takes what is alive of the neighbours of a and b.
+void ClusterMerging::join_neighbours(std::uint32_t a, std::uint32_t b,
+                                     std::vector<std::uint32_t>& all) {
+  for (const std::uint32_t part : {a, b}) {
+    for (const std::uint32_t n : neighbours_[part]) {
+      if (is_alive(n)) all.push_back(n);
+    }
+    std::vector<std::uint32_t>().swap(neighbours_[part]);
+  }
+  std::ranges::sort(all);
+  all.erase(std::ranges::unique(all).begin(), all.end());
+}
+
+std::vector<std::uint32_t> ClusterMerging::alive() const {
+  std::vector<std::uint32_t> alive;
+  alive.reserve(alive_);
+  for (std::uint32_t c = 0; c < clusters_.size(); ++c) {
+    if (is_alive(c)) alive.push_back(c);
+  }
+  return alive;
+}
+
+std::uint32_t ClusterMerging::current(std::uint32_t c) const {
+  while (!is_alive(c)) c = merged_into_[c];
+  return c;
+}
+
+/// Lets every cluster point to the one that it is part of now, so that chains stay short.
+void ClusterMerging::shorten_chains() {
+  for (std::size_t c = clusters_.size(); c-- > 0;) {  // what merged comes after its parts
+    const std::uint32_t next = merged_into_[c];
+    if (next != kNone && !is_alive(next)) merged_into_[c] = merged_into_[next];
+  }
+}
+
+}  // namespace rebounce
