@@ -12,8 +12,6 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kBlockSize = 1 << 14;  // elements: what they need fits into a cache
-
 // Each element's nearest others that may join it without an edge between.
 constexpr std::size_t kNearCount = 8;
 

@@ -15,9 +15,9 @@
 namespace rebounce {
 namespace {
 
-// Elements are merged in blocks first where there are this many times as many as patches; so many
-// times as many clusters as patches are left then, at least.
-constexpr std::size_t kManyElements = 16, kLeastClusters = 8;
+// Elements are merged in blocks first where there are more than a few blocks of them and this many
+// times as many as patches; so many times as many clusters as patches are left then, at least.
+constexpr std::size_t kFewElements = 4 * kBlockSize, kManyElements = 16, kLeastClusters = 8;
 
 // Each cluster's nearest others that may join it without an edge between.
 constexpr std::size_t kNearCount = 8;
@@ -113,7 +113,9 @@ class ElementMerging {
 
   ElementClusters start_clusters(const Progress& progress) const {
     const std::size_t count = std::max<std::size_t>(settings_.patch_count, 1);
-    if (scene_.elements.size() < kManyElements * count) return one_each(scene_.elements, size_);
+    if (scene_.elements.size() < std::max(kFewElements, kManyElements * count)) {
+      return one_each(scene_.elements, size_);
+    }
     return merge_in_blocks(scene_, {size_, kLeastClusters * count, limits_},
                            part_of(progress, 0, kBlocksProgress));
   }
