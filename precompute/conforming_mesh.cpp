@@ -37,12 +37,14 @@ ConformingMesh::ConformingMesh(Scene& scene) : scene_(scene) {
   const auto count = static_cast<std::uint32_t>(scene.triangle.size());
   source_.resize(count);
   next_.resize(count);
-  std::vector<EdgeKey> edges;
   for (std::uint32_t t = 0; t < count; ++t) {
     source_[t] = t;
     next_[t] = t + 1 < count ? t + 1 : kNone;
-    for (int corner = 0; corner < 3; ++corner) attach_edge(t, corner, edges);
   }
+  first_edges_ = EdgeTable(count, position_count_, [&](std::uint32_t t) {
+    const auto& [a, b, c] = scene.triangle[t];
+    return Uint3{position_id_[a], position_id_[b], position_id_[c]};
+  });
 }
 
 ConformingMesh::EdgeKey ConformingMesh::edge(std::uint32_t t, int corner) const {
@@ -52,7 +54,7 @@ ConformingMesh::EdgeKey ConformingMesh::edge(std::uint32_t t, int corner) const 
 }
 
 float ConformingMesh::length_squared(EdgeKey key) const {
-  const std::uint32_t t = triangles_.at(key).front();
+  const std::uint32_t t = triangles(key).front().triangle();
   int corner = 0;
   while (edge(t, corner) != key) ++corner;
   const Uint3& v = scene_.triangle[t];
@@ -61,22 +63,33 @@ float ConformingMesh::length_squared(EdgeKey key) const {
   return glm::dot(d, d);
 }
 
+std::span<HalfEdge> ConformingMesh::half_edges(EdgeKey key) {
+  if (first_edges_.has_end(high_end(key))) return first_edges_.find(low_end(key), high_end(key));
+  return new_edges_.at(key);
+}
+
+std::span<const HalfEdge> ConformingMesh::triangles(EdgeKey key) const {
+  return const_cast<ConformingMesh*>(this)->half_edges(key);
+}
+
 void ConformingMesh::attach_edge(std::uint32_t t, int corner, std::vector<EdgeKey>& new_edges) {
   const EdgeKey key = edge(t, corner);
-  std::vector<std::uint32_t>& triangles = triangles_[key];
+  std::vector<HalfEdge>& triangles = new_edges_[key];
   if (triangles.empty()) new_edges.push_back(key);
-  triangles.push_back(t);
+  const bool ascends = position_id_[scene_.triangle[t][corner]] == low_end(key);
+  triangles.emplace_back(high_end(key), t, ascends);
 }
 
 ConformingMesh::EdgeSplit ConformingMesh::split_edge(EdgeKey key, double part) {
   assert(part > 0 && part < 1);
-  const auto found = triangles_.find(key);
-  const std::vector<std::uint32_t> triangles = std::move(found->second);
-  triangles_.erase(found);
+  const std::span<const HalfEdge> shared = triangles(key);
+  const std::vector<HalfEdge> around(shared.begin(), shared.end());
+  new_edges_.erase(key);
   const std::uint32_t id = position_count_++;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> new_vertex;
   EdgeSplit split;
-  for (const std::uint32_t t : triangles) {
+  for (const HalfEdge& half_edge : around) {
+    const std::uint32_t t = half_edge.triangle();
     int corner = 0;
     while (edge(t, corner) != key) ++corner;
     std::uint32_t a = scene_.triangle[t][corner], b = scene_.triangle[t][(corner + 1) % 3];
@@ -93,7 +106,7 @@ std::uint32_t ConformingMesh::split_triangle(std::uint32_t t, int corner, std::u
                                              std::vector<EdgeKey>& new_edges) {
   const Uint3 old = scene_.triangle[t];
   const std::uint32_t a = old[corner], b = old[(corner + 1) % 3], c = old[(corner + 2) % 3];
-  std::vector<std::uint32_t>& bc = triangles_.at(edge(t, (corner + 1) % 3));
+  const std::span<HalfEdge> bc = half_edges(edge(t, (corner + 1) % 3));
   const auto added = triangle_count();
   scene_.triangle[t] = {a, middle, c};
   scene_.triangle.push_back({middle, b, c});
@@ -102,7 +115,7 @@ std::uint32_t ConformingMesh::split_triangle(std::uint32_t t, int corner, std::u
   next_.push_back(next_[t]);
   next_[t] = added;
 
-  *std::find(bc.begin(), bc.end(), t) = added;
+  std::ranges::find(bc, t, &HalfEdge::triangle)->set_triangle(added);
   attach_edge(t, 0, new_edges);      // a, m
   attach_edge(t, 1, new_edges);      // m, c
   attach_edge(added, 0, new_edges);  // m, b

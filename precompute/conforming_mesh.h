@@ -5,6 +5,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "edge_table.h"
 #include "rebounce/precompute/scene.h"
 
 namespace rebounce {
@@ -40,7 +41,7 @@ class ConformingMesh {
   EdgeKey edge(std::uint32_t t, int corner) const;
 
   /// Triangles that share an edge, in the order in which they were joined to it.
-  std::span<const std::uint32_t> triangles(EdgeKey key) const { return triangles_.at(key); }
+  std::span<const HalfEdge> triangles(EdgeKey key) const;
 
   /// Metres squared.
   float length_squared(EdgeKey key) const;
@@ -61,6 +62,9 @@ class ConformingMesh {
   std::vector<std::uint32_t> finish();
 
  private:
+  static std::uint32_t low_end(EdgeKey key) { return static_cast<std::uint32_t>(key >> 32); }
+  static std::uint32_t high_end(EdgeKey key) { return static_cast<std::uint32_t>(key); }
+  std::span<HalfEdge> half_edges(EdgeKey key);
   void attach_edge(std::uint32_t t, int corner, std::vector<EdgeKey>& new_edges);
   std::uint32_t split_triangle(std::uint32_t t, int corner, std::uint32_t middle,
                                std::vector<EdgeKey>& new_edges);
@@ -71,7 +75,8 @@ class ConformingMesh {
   std::uint32_t position_count_ = 0;
   std::vector<std::uint32_t> source_;
   std::vector<std::uint32_t> next_;  ///< list of triangles in their final order
-  std::unordered_map<EdgeKey, std::vector<std::uint32_t>> triangles_;
+  EdgeTable first_edges_;  ///< those of the mesh as it was; what is split is no longer asked for
+  std::unordered_map<EdgeKey, std::vector<HalfEdge>> new_edges_;
 };
 
 }  // namespace rebounce

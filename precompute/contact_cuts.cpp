@@ -123,8 +123,9 @@ class ContactCuts {
   /// The longest edge of the triangles that share an edge.
   EdgeKey longest_around(EdgeKey key) const {
     EdgeKey longest = key;
-    for (const std::uint32_t t : mesh_.triangles(key)) {
-      if (is_longer(longest_edge(t), longest)) longest = longest_edge(t);
+    for (const HalfEdge& side : mesh_.triangles(key)) {
+      const EdgeKey of_triangle = longest_edge(side.triangle());
+      if (is_longer(of_triangle, longest)) longest = of_triangle;
     }
     return longest;
   }

@@ -2,34 +2,13 @@
 
 #include <algorithm>
 #include <array>
-#include <compare>
 
+#include "edge_table.h"
 #include "point_finder.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
 namespace {
-
-struct DirectedEdge {
-  std::uint32_t low, high;  ///< positions
-  bool ascends;             ///< runs from low to high
-  std::uint32_t element;
-
-  auto operator<=>(const DirectedEdge&) const = default;
-};
-
-std::vector<DirectedEdge> sorted_edges(std::span<const Uint3> corner) {
-  std::vector<DirectedEdge> edges;
-  edges.reserve(3 * corner.size());
-  for (std::uint32_t e = 0; e < corner.size(); ++e) {
-    for (int k = 0; k < 3; ++k) {
-      const std::uint32_t a = corner[e][k], b = corner[e][(k + 1) % 3];
-      if (a != b) edges.push_back({std::min(a, b), std::max(a, b), a < b, e});
-    }
-  }
-  std::ranges::sort(edges);
-  return edges;
-}
 
 /// The two sides of one triangle.
 bool are_two_sides(const Uint3& a, const Uint3& b) {
@@ -60,21 +39,21 @@ Ray segment(const glm::vec3& from, const glm::vec3& to) {
 }  // namespace
 
 Pairs find_edge_neighbours(std::span<const Uint3> corner) {
-  const std::vector<DirectedEdge> edges = sorted_edges(corner);
+  std::uint32_t end_count = 0;
+  for (const Uint3& ends : corner) end_count = std::max(end_count, 1 + std::ranges::max(ends));
+  const EdgeTable edges(static_cast<std::uint32_t>(corner.size()), end_count,
+                        [&](std::uint32_t e) { return corner[e]; });
   Pairs pairs;
-  for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
-    while (end < edges.size() && edges[end].low == edges[begin].low &&
-           edges[end].high == edges[begin].high) {
-      ++end;
-    }
-    // Sorted: those that descend come first.
-    for (std::size_t i = begin; i < end && !edges[i].ascends; ++i) {
-      for (std::size_t j = end; j-- > i + 1 && edges[j].ascends;) {
-        const auto [a, b] = std::minmax(edges[i].element, edges[j].element);
-        if (a != b && !are_two_sides(corner[a], corner[b])) pairs.emplace_back(a, b);
+  edges.for_each([&](std::uint32_t /*low*/, std::span<const HalfEdge> sides) {
+    for (std::size_t i = 0; i < sides.size(); ++i) {
+      for (std::size_t j = i + 1; j < sides.size(); ++j) {
+        const std::uint32_t a = sides[i].triangle(), b = sides[j].triangle();
+        if (sides[i].ascends() == sides[j].ascends() || are_two_sides(corner[a], corner[b]))
+          continue;
+        pairs.emplace_back(std::min(a, b), std::max(a, b));
       }
     }
-  }
+  });
   sort_and_unique(pairs);
   return pairs;
 }
@@ -82,17 +61,20 @@ Pairs find_edge_neighbours(std::span<const Uint3> corner) {
 Pairs find_near_pairs(std::span<const Float3> point, std::size_t count, float reach) {
   if (point.size() < 2) return {};
   const PointFinder finder(point);
-  std::vector<std::vector<PointFinder::Found>> found(point.size());
+  std::vector<std::uint32_t> near(count * point.size(), kNone);
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t k = 0; k < point.size(); ++k) {
-    found[k] = finder.nearest(point[k], count + 1);  // a point is its own nearest
+    std::size_t place = count * k;
+    for (const auto& [other, distance_squared] : finder.nearest(point[k], count + 1)) {
+      const bool wanted = other != k && distance_squared <= reach * reach;
+      if (wanted && place < count * (k + 1)) near[place++] = other;
+    }
   }
   Pairs pairs;
-  for (std::uint32_t k = 0; k < point.size(); ++k) {
-    for (const auto& [other, distance_squared] : found[k]) {
-      if (other == k || distance_squared > reach * reach) continue;
-      pairs.emplace_back(std::min(k, other), std::max(k, other));
-    }
+  for (std::size_t place = 0; place < near.size(); ++place) {
+    const auto k = static_cast<std::uint32_t>(place / count);
+    if (near[place] != kNone)
+      pairs.emplace_back(std::min(k, near[place]), std::max(k, near[place]));
   }
   sort_and_unique(pairs);
   return pairs;

@@ -34,10 +34,11 @@ class LitSides {
 
   std::vector<TriangleSides> find() {
     sides_.resize(scene_.triangle.size());
-    std::vector<std::vector<CoincidentSide>> front_cover(sides_.size()), back_cover(sides_.size());
+    std::vector<Cover> covers;
 #pragma omp parallel
     {
       Scratch scratch;
+      std::vector<Cover> found;
 #pragma omp for schedule(dynamic, 16)
       for (std::uint32_t t = 0; t < sides_.size(); ++t) {
         sides_[t].front = look_around(t, true, scratch);
@@ -46,17 +47,23 @@ class LitSides {
           sides_[t].front = SideKind::kLit;
         }
         if (sides_[t].front == SideKind::kLit) {
-          sides_[t].front = look_for_contact(t, true, scratch, front_cover[t]);
+          sides_[t].front = look_for_contact(t, true, scratch, found);
         }
         if (sides_[t].back == SideKind::kLit) {
-          sides_[t].back = look_for_contact(t, false, scratch, back_cover[t]);
+          sides_[t].back = look_for_contact(t, false, scratch, found);
         }
       }
+#pragma omp critical
+      std::ranges::move(found, std::back_inserter(covers));
     }
     // Later triangles give way to earlier ones that have not given way themselves.
-    for (std::size_t t = sides_.size(); t-- > 0;) {
-      if (is_covered(front_cover[t])) sides_[t].front = SideKind::kCovered;
-      if (is_covered(back_cover[t])) sides_[t].back = SideKind::kCovered;
+    std::ranges::sort(covers, [](const Cover& a, const Cover& b) {
+      return a.triangle != b.triangle ? a.triangle > b.triangle : a.front && !b.front;
+    });
+    for (const Cover& cover : covers) {
+      if (!is_covered(cover)) continue;
+      (cover.front ? sides_[cover.triangle].front : sides_[cover.triangle].back) =
+          SideKind::kCovered;
     }
     return std::move(sides_);
   }
@@ -66,6 +73,13 @@ class LitSides {
     std::vector<Ray> rays = std::vector<Ray>(kRaysPerSide);
     std::vector<Hit> hits;
     std::vector<CoincidentSide> sides;
+  };
+
+  /// A side, and those that together cover it.
+  struct Cover {
+    std::uint32_t triangle;
+    bool front;
+    std::vector<CoincidentSide> by;
   };
 
   struct Side {
@@ -108,10 +122,11 @@ class LitSides {
   }
 
   /// Looks at points all over a side for other surfaces in the same place. Returns kUnlit if it
-  /// lies on fronts everywhere; else lists in `cover` sides that together cover it, none if some
+  /// lies on fronts everywhere; else adds to `covers` the sides that together cover it, unless some
   /// point is bare. One that covers a point is enough for it: that of the earliest triangle.
   SideKind look_for_contact(std::uint32_t t, bool front, Scratch& scratch,
-                            std::vector<CoincidentSide>& cover) const {
+                            std::vector<Cover>& covers) const {
+    std::vector<CoincidentSide> cover;
     const Side side = side_of(t, front);
     const Float3 normal = to_float3(side.normal);
     const glm::dvec2 shift = unit_square(mix_bits(t));
@@ -131,12 +146,12 @@ class LitSides {
       if (sealed) ++sealed_count;
       if (sealed_count <= k && cover.size() <= k) break;
     }
-    if (cover.size() < kPointsPerSide) cover.clear();
+    if (cover.size() == kPointsPerSide) covers.push_back({t, front, std::move(cover)});
     return sealed_count == kPointsPerSide ? SideKind::kUnlit : SideKind::kLit;
   }
 
-  bool is_covered(const std::vector<CoincidentSide>& cover) const {
-    return !cover.empty() && std::ranges::all_of(cover, [&](const CoincidentSide& by) {
+  bool is_covered(const Cover& cover) const {
+    return std::ranges::all_of(cover.by, [&](const CoincidentSide& by) {
       return (by.front ? sides_[by.triangle].front : sides_[by.triangle].back) == SideKind::kLit;
     });
   }

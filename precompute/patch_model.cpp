@@ -4,7 +4,6 @@
 #include <array>
 #include <numbers>
 #include <numeric>
-#include <unordered_map>
 
 #include "contact_cuts.h"
 #include "rebounce/precompute/element_clusters.h"
@@ -42,7 +41,7 @@ class PatchModelBuilder {
   }
 
   PatchModel build() {
-    copy_surface();
+    take_surface();
     add_second_sides();
     find_openings();
     const RayTracer tracer = make_surface_tracer(model_.mesh);
@@ -58,19 +57,20 @@ class PatchModelBuilder {
 
  private:
   bool is_double_sided(std::uint32_t t) const {
-    return scene_.materials[scene_.triangle_material[t]].double_sided;
+    return scene_.materials[model_.mesh.triangle_material[t]].double_sided;
   }
 
-  void copy_surface() {
+  /// Takes the scene's surface over: what is left of the scene is its materials.
+  void take_surface() {
     DisplayMesh& mesh = model_.mesh;
-    mesh.position = scene_.position;
-    mesh.normal = scene_.normal;
-    mesh.base_color_texcoord = scene_.base_color_texcoord;
-    mesh.emissive_texcoord = scene_.emissive_texcoord;
-    mesh.vertex_color = scene_.vertex_color;
-    mesh.triangle = scene_.triangle;
-    mesh.triangle_material = scene_.triangle_material;
-    mesh.back_triangle.assign(scene_.triangle.size(), kNone);
+    mesh.position = std::move(scene_.position);
+    mesh.normal = std::move(scene_.normal);
+    mesh.base_color_texcoord = std::move(scene_.base_color_texcoord);
+    mesh.emissive_texcoord = std::move(scene_.emissive_texcoord);
+    mesh.vertex_color = std::move(scene_.vertex_color);
+    mesh.triangle = std::move(scene_.triangle);
+    mesh.triangle_material = std::move(scene_.triangle_material);
+    mesh.back_triangle.assign(mesh.triangle.size(), kNone);
     for (const TriangleSides& sides : sides_) kind_.push_back(sides.front);
     surface_of_.resize(mesh.triangle.size());
     std::iota(surface_of_.begin(), surface_of_.end(), 0U);
@@ -79,14 +79,13 @@ class PatchModelBuilder {
   /// Appends a copy with reversed winding and normals of every double-sided triangle.
   void add_second_sides() {
     DisplayMesh& mesh = model_.mesh;
-    std::unordered_map<std::uint32_t, std::uint32_t> back_vertex;
+    std::vector<std::uint32_t> back_vertex(mesh.position.size(), kNone);
     const auto back_of = [&](std::uint32_t v) {
-      const auto [entry, is_new] =
-          back_vertex.try_emplace(v, static_cast<std::uint32_t>(mesh.position.size()));
-      if (is_new) {
-        for (float& n : mesh.normal[copy_vertex(mesh, v)]) n = -n;
+      if (back_vertex[v] == kNone) {
+        back_vertex[v] = copy_vertex(mesh, v);
+        for (float& n : mesh.normal[back_vertex[v]]) n = -n;
       }
-      return entry->second;
+      return back_vertex[v];
     };
     for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
       if (!is_double_sided(t)) continue;
@@ -228,7 +227,7 @@ class PatchModelBuilder {
   /// Takes out triangles whose height is below the precision of rays: what stands on them or looks
   /// at them cannot be told.
   void drop_slivers() {
-    const float thinnest = RayTracer(scene_.position, scene_.triangle).offset_distance();
+    const float thinnest = ray_offset_distance(scene_.position);
     std::size_t kept = 0;
     for (std::size_t t = 0; t < scene_.triangle.size(); ++t) {
       const auto [a, b, c] = scene_.triangle[t];

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <glm/glm.hpp>
 #include <queue>
-#include <unordered_map>
 
 #include "conforming_mesh.h"
 #include "rebounce/runtime/float3_glm.h"
@@ -26,29 +25,30 @@ struct QueuedEdge {
 
 class Subdivision {
  public:
-  Subdivision(Scene& scene, std::span<const std::uint8_t> patches_per_triangle)
-      : mesh_(scene), patches_per_triangle_(patches_per_triangle) {
+  Subdivision(Scene& scene, std::span<const std::uint8_t> patches_per_triangle,
+              const SubdivisionSettings& settings)
+      : mesh_(scene), patches_per_triangle_(patches_per_triangle), settings_(settings) {
     for (std::uint32_t t = 0; t < mesh_.triangle_count(); ++t) {
       patch_count_ += patches_per_triangle[t];
+    }
+    longest_ = kLongestEdge * mean_patch_size(scene, patches_per_triangle, settings.patch_count);
+    for (std::uint32_t t = 0; t < mesh_.triangle_count(); ++t) {
       for (int corner = 0; corner < 3; ++corner) {
+        const Uint3& v = scene.triangle[t];
+        const glm::vec3 side =
+            to_glm(scene.position[v[corner]]) - to_glm(scene.position[v[(corner + 1) % 3]]);
+        if (is_short(glm::dot(side, side))) continue;
         const EdgeKey key = mesh_.edge(t, corner);
-        if (mesh_.triangles(key).front() == t) enqueue(key);
+        if (mesh_.triangles(key).front().triangle() == t) enqueue(key);
       }
     }
   }
 
-  void run(const SubdivisionSettings& settings) {
-    const double longest =
-        kLongestEdge * mean_patch_size(mesh_.scene(), patches_per_triangle_, settings.patch_count);
-    while (!queue_.empty()) {
-      const QueuedEdge edge = queue_.top();
-      const bool enough = settings.patch_count > 0 && patch_count_ >= settings.patch_count &&
-                          edge.length_squared <= longest * longest;
-      const bool fine = settings.patch_size > 0 &&
-                        edge.length_squared <= settings.patch_size * settings.patch_size;
-      if (enough || fine) break;
+  void run() {
+    while (!queue_.empty() && !is_short(queue_.top().length_squared)) {
+      const EdgeKey longest = queue_.top().key;
       queue_.pop();
-      const ConformingMesh::EdgeSplit split = mesh_.split_edge(edge.key, 0.5);
+      const ConformingMesh::EdgeSplit split = mesh_.split_edge(longest, 0.5);
       for (const auto& [kept, added] : split.triangles) {
         patch_count_ += patches_per_triangle_[mesh_.source(kept)];
       }
@@ -59,37 +59,56 @@ class Subdivision {
   std::vector<std::uint32_t> finish() { return mesh_.finish(); }
 
  private:
-  void enqueue(EdgeKey key) { queue_.push({mesh_.length_squared(key), key}); }
+  /// True if such an edge is not split, now or later: there are never fewer patches.
+  bool is_short(float length_squared) const {
+    const bool enough = settings_.patch_count > 0 && patch_count_ >= settings_.patch_count &&
+                        length_squared <= longest_ * longest_;
+    const bool fine =
+        settings_.patch_size > 0 && length_squared <= settings_.patch_size * settings_.patch_size;
+    return enough || fine;
+  }
+
+  void enqueue(EdgeKey key) {
+    const float length_squared = mesh_.length_squared(key);
+    if (!is_short(length_squared)) queue_.push({length_squared, key});
+  }
 
   ConformingMesh mesh_;
   std::span<const std::uint8_t> patches_per_triangle_;
+  const SubdivisionSettings& settings_;
   std::size_t patch_count_ = 0;
+  double longest_ = 0;  ///< metres: shorter edges are split only while there are too few patches
   std::priority_queue<QueuedEdge> queue_;
 };
 
 }  // namespace
 
 WeldedPositions weld_positions(std::span<const Float3> position) {
-  struct Hash {
-    std::size_t operator()(const Float3& p) const {
-      std::uint64_t hash = 0;
-      for (const float x : p) {
-        // Adding zero makes -0 and +0 one.
-        hash = (hash ^ std::bit_cast<std::uint32_t>(x + 0.0F)) * 0x9E3779B97F4A7C15ULL;
-        hash ^= hash >> 29;
-      }
-      return hash;
+  const auto hash = [](const Float3& p) {
+    std::uint64_t bits = 0;
+    for (const float x : p) {
+      // Adding zero makes -0 and +0 one.
+      bits = (bits ^ std::bit_cast<std::uint32_t>(x + 0.0F)) * 0x9E3779B97F4A7C15ULL;
+      bits ^= bits >> 29;
     }
+    return bits;
   };
+  // Vertices by the hash of their positions, each at its place or at the next that was free.
+  std::vector<std::uint32_t> table(std::bit_ceil(position.size() + position.size() / 2 + 1), kNone);
   WeldedPositions welded;
   welded.id.reserve(position.size());
-  std::unordered_map<Float3, std::uint32_t, Hash> id_of;
-  id_of.reserve(position.size());
-  for (const Float3& p : position) {
-    welded.id.push_back(
-        id_of.try_emplace(p, static_cast<std::uint32_t>(id_of.size())).first->second);
+  for (std::uint32_t v = 0; v < position.size(); ++v) {
+    std::size_t place = hash(position[v]) & (table.size() - 1);
+    while (table[place] != kNone && position[table[place]] != position[v]) {
+      place = (place + 1) & (table.size() - 1);
+    }
+    if (table[place] == kNone) {
+      table[place] = v;
+      welded.id.push_back(welded.count++);
+    } else {
+      welded.id.push_back(welded.id[table[place]]);
+    }
   }
-  welded.count = static_cast<std::uint32_t>(id_of.size());
   return welded;
 }
 
@@ -109,8 +128,8 @@ double mean_patch_size(const Scene& scene, std::span<const std::uint8_t> patches
 std::vector<std::uint32_t> subdivide(Scene& scene,
                                      std::span<const std::uint8_t> patches_per_triangle,
                                      const SubdivisionSettings& settings) {
-  Subdivision subdivision(scene, patches_per_triangle);
-  subdivision.run(settings);
+  Subdivision subdivision(scene, patches_per_triangle, settings);
+  subdivision.run();
   return subdivision.finish();
 }
 

@@ -1,6 +1,7 @@
 #include "vertex_split.h"
 
 #include <algorithm>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -29,9 +30,15 @@ class VertexTriangles {
     }
   }
 
-  std::span<const std::uint32_t> operator[](std::uint32_t v) const {
-    return {triangle_.data() + begin_[v], triangle_.data() + begin_[v + 1]};
+  /// The part for vertex `v` of a list with an entry for each triangle of each vertex.
+  template <typename List>
+  auto of(List& list, std::uint32_t v) const {
+    return std::span(list).subspan(begin_[v], begin_[v + 1] - begin_[v]);
   }
+
+  std::span<const std::uint32_t> operator[](std::uint32_t v) const { return of(triangle_, v); }
+
+  std::size_t corner_count() const { return triangle_.size(); }
 
  private:
   std::vector<std::uint32_t> begin_, triangle_;
@@ -41,10 +48,11 @@ class VertexSplitter {
  public:
   VertexSplitter(const DisplayMesh& mesh, const RayTracer& tracer) : mesh_(mesh), tracer_(tracer) {}
 
-  /// The groups of the `around` triangles of a vertex that share it: numbers in order of first use.
-  std::vector<std::uint32_t> groups(std::uint32_t v, std::span<const std::uint32_t> around) const {
-    std::vector<std::uint32_t> label(around.size());
-    for (std::uint32_t k = 0; k < label.size(); ++k) label[k] = k;
+  /// Writes to `label` the groups of the `around` triangles of a vertex that share it: numbers in
+  /// order of first use.
+  void find_groups(std::uint32_t v, std::span<const std::uint32_t> around,
+                   std::span<std::uint32_t> label) const {
+    std::iota(label.begin(), label.end(), 0U);
     for (std::size_t a = 0; a < around.size(); ++a) {
       for (std::size_t b = a + 1; b < around.size(); ++b) {
         if (label[a] == label[b] || !are_joined(v, around[a], around[b])) continue;
@@ -52,13 +60,10 @@ class VertexSplitter {
         std::ranges::replace(label, std::uint32_t{merged}, std::uint32_t{kept});
       }
     }
-    std::vector<std::uint32_t> first(label);
-    std::ranges::sort(first);
-    first.erase(std::ranges::unique(first).begin(), first.end());
-    for (std::uint32_t& l : label) {
-      l = static_cast<std::uint32_t>(std::ranges::lower_bound(first, l) - first.begin());
+    std::uint32_t count = 0;
+    for (std::size_t k = 0; k < label.size(); ++k) {  // a group's number is that of its first
+      label[k] = label[k] == k ? count++ : label[label[k]];
     }
-    return label;
   }
 
  private:
@@ -102,15 +107,19 @@ std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v) {
 std::size_t split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
   const VertexTriangles around(mesh);
   const auto vertex_count = static_cast<std::uint32_t>(mesh.position.size());
-  std::vector<std::vector<std::uint32_t>> group(vertex_count);
+  std::vector<std::uint32_t> groups(around.corner_count());
   const VertexSplitter splitter(mesh, tracer);
 #pragma omp parallel for schedule(dynamic, 256)
-  for (std::uint32_t v = 0; v < vertex_count; ++v) group[v] = splitter.groups(v, around[v]);
   for (std::uint32_t v = 0; v < vertex_count; ++v) {
-    std::vector<std::uint32_t> vertex_of{v};
-    for (std::size_t k = 0; k < group[v].size(); ++k) {
-      while (vertex_of.size() <= group[v][k]) vertex_of.push_back(copy_vertex(mesh, v));
-      std::ranges::replace(mesh.triangle[around[v][k]], v, vertex_of[group[v][k]]);
+    splitter.find_groups(v, around[v], around.of(groups, v));
+  }
+  std::vector<std::uint32_t> vertex_of;
+  for (std::uint32_t v = 0; v < vertex_count; ++v) {
+    const std::span<const std::uint32_t> group = around.of(groups, v);
+    vertex_of.assign(1, v);
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      while (vertex_of.size() <= group[k]) vertex_of.push_back(copy_vertex(mesh, v));
+      std::ranges::replace(mesh.triangle[around[v][k]], v, vertex_of[group[k]]);
     }
   }
   return mesh.position.size() - vertex_count;

@@ -9,7 +9,9 @@
 #include <numeric>
 #include <utility>
 
+#include "edge_table.h"
 #include "hemisphere_rays.h"
+#include "rebounce/precompute/subdivision.h"
 
 namespace rebounce {
 namespace {
@@ -43,19 +45,6 @@ glm::dvec3 area_vector(const Corners& corner) {
   return glm::cross(corner[1] - corner[0], corner[2] - corner[0]) / 2.0;
 }
 
-// [v] The same number for vertices at the same position.
-std::vector<std::uint32_t> weld(const std::vector<Float3>& position) {
-  std::vector<std::pair<Float3, std::uint32_t>> order(position.size());
-  for (std::uint32_t v = 0; v < order.size(); ++v) order[v] = {position[v], v};
-  std::sort(order.begin(), order.end());
-  std::vector<std::uint32_t> place(position.size());
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    const bool is_same = i > 0 && order[i].first == order[i - 1].first;
-    place[order[i].second] = is_same ? place[order[i - 1].second] : order[i].second;
-  }
-  return place;
-}
-
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t size) : parent_(size) {
@@ -73,41 +62,18 @@ class DisjointSets {
   std::vector<std::uint32_t> parent_;
 };
 
-struct Edge {
-  std::array<std::uint32_t, 2> ends;  // ascending
-  std::uint32_t triangle;
-  bool ascends;  // the triangle runs through it from the first end to the second
-
-  bool operator<(const Edge& other) const {
-    return ends != other.ends ? ends < other.ends : triangle < other.triangle;
-  }
-};
-
-std::vector<Edge> sorted_edges(const Scene& scene, const std::vector<std::uint32_t>& place) {
-  std::vector<Edge> edges;
-  edges.reserve(3 * scene.triangle.size());
-  for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = place[scene.triangle[t][k]];
-      const std::uint32_t b = place[scene.triangle[t][(k + 1) % 3]];
-      edges.push_back({{std::min(a, b), std::max(a, b)}, t, a < b});
-    }
-  }
-  std::sort(edges.begin(), edges.end());
-  return edges;
-}
-
 // [t] The piece of each triangle, numbered by their first triangles.
-std::vector<std::uint32_t> find_pieces(const Scene& scene,
-                                       const std::vector<std::uint32_t>& place) {
-  const std::vector<Edge> edges = sorted_edges(scene, place);
+std::vector<std::uint32_t> find_pieces(const Scene& scene, const WeldedPositions& place) {
+  const auto corner = [&](std::uint32_t t) {
+    const auto& [a, b, c] = scene.triangle[t];
+    return Uint3{place.id[a], place.id[b], place.id[c]};
+  };
+  const EdgeTable edges(static_cast<std::uint32_t>(scene.triangle.size()), place.count, corner);
   DisjointSets sets(scene.triangle.size());
-  for (std::size_t first = 0, last = 0; first < edges.size(); first = last) {
-    while (last < edges.size() && edges[last].ends == edges[first].ends) ++last;
-    const bool is_consistent =
-        last - first == 2 && edges[first].ascends != edges[first + 1].ascends;
-    if (is_consistent) sets.join(edges[first].triangle, edges[first + 1].triangle);
-  }
+  edges.for_each([&](std::uint32_t /*low*/, std::span<const HalfEdge> sides) {
+    const bool is_consistent = sides.size() == 2 && sides[0].ascends() != sides[1].ascends();
+    if (is_consistent) sets.join(sides[0].triangle(), sides[1].triangle());
+  });
   std::vector<std::uint32_t> piece(scene.triangle.size());
   for (std::uint32_t t = 0; t < piece.size(); ++t) piece[t] = sets.find(t);
   return piece;
@@ -115,11 +81,11 @@ std::vector<std::uint32_t> find_pieces(const Scene& scene,
 
 // [t] Whether another triangle has the same corners: one of the two is the other's second side, and
 // which of them a ray meets is chance.
-std::vector<bool> find_coincident(const Scene& scene, const std::vector<std::uint32_t>& place) {
+std::vector<bool> find_coincident(const Scene& scene, const WeldedPositions& place) {
   std::vector<std::pair<Uint3, std::uint32_t>> corners(scene.triangle.size());
   for (std::uint32_t t = 0; t < corners.size(); ++t) {
     Uint3 corner{};
-    for (std::size_t k = 0; k < 3; ++k) corner[k] = place[scene.triangle[t][k]];
+    for (std::size_t k = 0; k < 3; ++k) corner[k] = place.id[scene.triangle[t][k]];
     std::sort(corner.begin(), corner.end());
     corners[t] = {corner, t};
   }
@@ -208,7 +174,7 @@ class InsideOutSearch {
  public:
   InsideOutSearch(const Scene& scene, const RayTracer& tracer)
       : scene_(scene), sights_(scene, tracer), exposure_(scene.triangle.size()) {
-    const auto place = weld(scene.position);
+    const WeldedPositions place = weld_positions(scene.position);
     piece_ = find_pieces(scene, place);
     coincident_ = find_coincident(scene, place);
     for (std::uint32_t t = 0; t < piece_.size(); ++t) {

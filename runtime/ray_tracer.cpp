@@ -229,11 +229,7 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   rtcSetSceneBuildQuality(impl_->scene,
                           impl_->has_porous() ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   rtcCommitScene(impl_->scene);
-  float largest = 0;
-  for (const Float3& p : position) {
-    for (const float x : p) largest = std::max(largest, std::abs(x));
-  }
-  impl_->offset_distance = largest * 0x1p-18F;
+  impl_->offset_distance = ray_offset_distance(position);
   throw_if_failed(impl_->device, "building the acceleration structure");
 }
 
@@ -316,6 +312,14 @@ Float3 RayTracer::offset_point(const Float3& point, const Float3& geometric_norm
 
 float RayTracer::offset_distance() const {
   return impl_->offset_distance;
+}
+
+float ray_offset_distance(std::span<const Float3> position) {
+  float largest = 0;
+  for (const Float3& p : position) {
+    for (const float x : p) largest = std::max(largest, std::abs(x));
+  }
+  return largest * 0x1p-18F;
 }
 
 RayTracer make_surface_tracer(const DisplayMesh& mesh) {

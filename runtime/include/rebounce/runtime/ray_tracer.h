@@ -87,6 +87,9 @@ class RayTracer {
   std::unique_ptr<Impl> impl_;
 };
 
+/// The offset_distance() of a tracer over these positions.
+float ray_offset_distance(std::span<const Float3> position);
+
 /// The tracer of what is shown: of the first surface_count triangles of `mesh`.
 RayTracer make_surface_tracer(const DisplayMesh& mesh);
 
