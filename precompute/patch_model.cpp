@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <numeric>
 
@@ -114,6 +115,18 @@ class PatchModelBuilder {
     return {to_dvec3(mesh.position[a]), to_dvec3(mesh.position[b]), to_dvec3(mesh.position[c])};
   }
 
+  double area_of(std::uint32_t t) const {
+    const auto [p, q, r] = corners(t);
+    return 0.5 * glm::length(glm::cross(q - p, r - p));
+  }
+
+  /// Samples of its textures that a display triangle of a patch needs: the patch has them all.
+  int sample_count(std::uint32_t t) const {
+    const double part = area_of(t) / patch_area_;
+    return static_cast<int>(
+        std::min(std::ceil(part * kMostTextureSamples), 1.0 * kMostTextureSamples));
+  }
+
   /// Mean reflectance of a display triangle, textures integrated.
   Float3 mean_reflectance(std::uint32_t t) const {
     const DisplayMesh& mesh = model_.mesh;
@@ -121,7 +134,7 @@ class PatchModelBuilder {
     return mean_base_color(
         scene_, scene_.materials[mesh.triangle_material[t]],
         {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]},
-        {mesh.vertex_color[a], mesh.vertex_color[b], mesh.vertex_color[c]});
+        {mesh.vertex_color[a], mesh.vertex_color[b], mesh.vertex_color[c]}, sample_count(t));
   }
 
   /// Mean emitted exitance of a display triangle in lx, textures integrated.
@@ -131,9 +144,18 @@ class PatchModelBuilder {
     Float3 exitance = mean_emitted_luminance(
         scene_, scene_.materials[mesh.triangle_material[t]],
         {mesh.emissive_texcoord[a], mesh.emissive_texcoord[b], mesh.emissive_texcoord[c]},
-        {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]});
+        {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]},
+        sample_count(t));
     for (float& m : exitance) m *= std::numbers::pi_v<float>;
     return exitance;
+  }
+
+  /// What a patch has of area if there are as many as are wanted, m².
+  double mean_patch_area() const {
+    if (settings_.patch_count == 0) return std::pow(static_cast<double>(settings_.patch_size), 2);
+    double area = 0;
+    for (const std::uint32_t t : element_triangle_) area += area_of(t);
+    return area / static_cast<double>(settings_.patch_count);
   }
 
   /// For each vertex the number of its position among those of the elements.
@@ -155,6 +177,7 @@ class PatchModelBuilder {
     const std::size_t count = element_triangle_.size();
     if (count == 0) throw Error("scene " + scene_.name + " has nothing that light falls on");
     elements_.resize(count);
+    patch_area_ = mean_patch_area();
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t e = 0; e < count; ++e) {
       const std::uint32_t t = element_triangle_[e];
@@ -277,6 +300,7 @@ class PatchModelBuilder {
   std::vector<std::uint32_t> surface_of_;        ///< surface triangle of each display triangle
   std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
   Elements elements_;
+  double patch_area_ = 0;  ///< the mean patch's, m²
   PatchModel model_;
   std::size_t clamped_count_ = 0;
 };

@@ -11,9 +11,8 @@ namespace rebounce {
 namespace {
 
 // Samples along one side of a triangle, whose square is the number of samples: 16 catch the slope
-// inside a texel; 1,024 stratified ones bring the mean of black-and-white noise within about 1 %.
+// inside a texel.
 constexpr int kMinSubdivision = 4;
-constexpr int kMaxSubdivision = 32;
 
 // IEC 61966-2-1.
 std::array<float, 256> make_linear_table() {
@@ -23,6 +22,11 @@ std::array<float, 256> make_linear_table() {
     table[i] = static_cast<float>(encoded <= 0.04045 ? encoded / 12.92
                                                      : std::pow((encoded + 0.055) / 1.055, 2.4));
   }
+  return table;
+}
+
+const std::array<float, 256>& linear_of_srgb() {
+  static const std::array<float, 256> table = make_linear_table();
   return table;
 }
 
@@ -68,7 +72,8 @@ const std::uint8_t* pixel(const Image& image, int column, int row) {
 }
 
 Float3 linear_color(const std::uint8_t* rgba) {
-  return {srgb_to_linear(rgba[0]), srgb_to_linear(rgba[1]), srgb_to_linear(rgba[2])};
+  const std::array<float, 256>& linear = linear_of_srgb();
+  return {linear[rgba[0]], linear[rgba[1]], linear[rgba[2]]};
 }
 
 // Alpha is not sRGB-encoded.
@@ -110,8 +115,9 @@ std::array<float, N> interpolated(const std::array<std::array<float, N>, 3>& cor
 }
 
 // How many parts to divide each side into for about one sample per texel that the triangle touches:
-// its area in texels, and as many as its longest side crosses.
-int subdivision(const Image& image, const std::array<Float2, 3>& texcoord) {
+// its area in texels, and as many as its longest side crosses; for no more than about `most`.
+int subdivision(const Image& image, const std::array<Float2, 3>& texcoord,
+                int most = kMostTextureSamples) {
   std::array<std::array<double, 2>, 3> side{};
   double longest = 0;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -123,8 +129,8 @@ int subdivision(const Image& image, const std::array<Float2, 3>& texcoord) {
   }
   const double area = std::abs(side[0][0] * side[1][1] - side[0][1] * side[1][0]) / 2;
   const double parts = std::ceil(std::sqrt(area + longest));
-  if (!(parts < kMaxSubdivision)) return kMaxSubdivision;
-  return std::max(kMinSubdivision, static_cast<int>(parts));
+  const double finest = std::ceil(std::sqrt(most));
+  return std::max(kMinSubdivision, static_cast<int>(parts < finest ? parts : finest));
 }
 
 // Averages value(barycentric) over the triangle: one sample in each of n² congruent parts, its
@@ -179,8 +185,7 @@ auto opacity_over(const Scene& scene, const Material& material,
 }  // namespace
 
 float srgb_to_linear(std::uint8_t value) {
-  static const std::array<float, 256> table = make_linear_table();
-  return table[value];
+  return linear_of_srgb()[value];
 }
 
 Float3 sample_texture(const Texture& texture, const Image& image, Float2 texcoord) {
@@ -189,7 +194,7 @@ Float3 sample_texture(const Texture& texture, const Image& image, Float2 texcoor
 
 Float3 mean_base_color(const Scene& scene, const Material& material,
                        const std::array<Float2, 3>& texcoord,
-                       const std::array<Float3, 3>& vertex_color) {
+                       const std::array<Float3, 3>& vertex_color, int most) {
   if (material.base_color_texture == kNone) {
     return product(material.base_color, interpolated(vertex_color, kCentroid));
   }
@@ -199,21 +204,21 @@ Float3 mean_base_color(const Scene& scene, const Material& material,
     return product(sample_texture(texture, image, interpolated(texcoord, place)),
                    interpolated(vertex_color, place));
   };
-  const Float3 mean =
-      mean_color(subdivision(image, texcoord), color, opacity_over(scene, material, texcoord));
+  const Float3 mean = mean_color(subdivision(image, texcoord, most), color,
+                                 opacity_over(scene, material, texcoord));
   return product(material.base_color, mean);
 }
 
 Float3 mean_emitted_luminance(const Scene& scene, const Material& material,
                               const std::array<Float2, 3>& texcoord,
-                              const std::array<Float2, 3>& base_color_texcoord) {
+                              const std::array<Float2, 3>& base_color_texcoord, int most) {
   if (material.emissive_texture == kNone) return material.emitted_luminance;
   const Texture& texture = scene.textures.at(material.emissive_texture);
   const Image& image = scene.images.at(material.emissive_texture);
   const auto color = [&](const std::array<double, 3>& place) {
     return sample_texture(texture, image, interpolated(texcoord, place));
   };
-  const Float3 mean = mean_color(subdivision(image, texcoord), color,
+  const Float3 mean = mean_color(subdivision(image, texcoord, most), color,
                                  opacity_over(scene, material, base_color_texcoord));
   return product(material.emitted_luminance, mean);
 }
