@@ -286,8 +286,8 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.record.scene_name = scene.name;
   data.record.scene_hash = scene.hash;
 
-  PatchModel model = clock.run("patches", [&](const Progress&) {
-    return make_patch_model(std::move(scene), settings.subdivision);
+  PatchModel model = clock.run("patches", [&](const Progress& part) {
+    return make_patch_model(std::move(scene), settings.subdivision, part);
   });
   describe_patches(model, report);
   const BuildSettings decided = decide(settings, model.patches.size());

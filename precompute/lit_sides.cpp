@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "hemisphere_rays.h"
+#include "progress_part.h"
 
 namespace rebounce {
 namespace {
@@ -17,6 +18,9 @@ constexpr std::uint32_t kRaysPerSide = 256, kFirstRays = 4;
 // Backs nearer than this part of the scene's diagonal may be of the solid that a side is in; those
 // farther off may be of a room that is lit.
 constexpr double kBuriedReach = 1.0 / 16;
+
+// Triangles between two looks at the progress.
+constexpr std::size_t kBatch = 1 << 15;
 
 // Points at which a side is looked at for copies of itself.
 constexpr std::uint32_t kPointsPerSide = 32;
@@ -32,15 +36,38 @@ class LitSides {
     buried_reach_ = kBuriedReach * glm::distance(low, high);
   }
 
-  std::vector<TriangleSides> find() {
-    sides_.resize(scene_.triangle.size());
+  std::vector<TriangleSides> find(const Progress& progress) {
+    const std::size_t count = scene_.triangle.size();
+    sides_.resize(count);
     std::vector<Cover> covers;
+    for (std::size_t begin = 0; begin < count; begin += kBatch) {
+      report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
+      look_at(begin, std::min(begin + kBatch, count), covers);
+    }
+    // Later triangles give way to earlier ones that have not given way themselves.
+    std::ranges::sort(covers, [](const Cover& a, const Cover& b) {
+      return a.triangle != b.triangle ? a.triangle > b.triangle : a.front && !b.front;
+    });
+    for (const Cover& cover : covers) {
+      if (!is_covered(cover)) continue;
+      (cover.front ? sides_[cover.triangle].front : sides_[cover.triangle].back) =
+          SideKind::kCovered;
+    }
+    return std::move(sides_);
+  }
+
+ private:
+  struct Cover;
+
+  /// Looks at the sides of triangles [begin, end) by themselves.
+  void look_at(std::size_t begin, std::size_t end, std::vector<Cover>& covers) {
 #pragma omp parallel
     {
       Scratch scratch;
       std::vector<Cover> found;
 #pragma omp for schedule(dynamic, 16)
-      for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+      for (std::size_t k = begin; k < end; ++k) {
+        const auto t = static_cast<std::uint32_t>(k);
         sides_[t].front = look_around(t, true, scratch);
         if (is_double_sided(t)) sides_[t].back = look_around(t, false, scratch);
         if (sides_[t].front == SideKind::kUnlit && sides_[t].back != SideKind::kLit) {
@@ -56,19 +83,8 @@ class LitSides {
 #pragma omp critical
       std::ranges::move(found, std::back_inserter(covers));
     }
-    // Later triangles give way to earlier ones that have not given way themselves.
-    std::ranges::sort(covers, [](const Cover& a, const Cover& b) {
-      return a.triangle != b.triangle ? a.triangle > b.triangle : a.front && !b.front;
-    });
-    for (const Cover& cover : covers) {
-      if (!is_covered(cover)) continue;
-      (cover.front ? sides_[cover.triangle].front : sides_[cover.triangle].back) =
-          SideKind::kCovered;
-    }
-    return std::move(sides_);
   }
 
- private:
   struct Scratch {
     std::vector<Ray> rays = std::vector<Ray>(kRaysPerSide);
     std::vector<Hit> hits;
@@ -164,8 +180,9 @@ class LitSides {
 
 }  // namespace
 
-std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer) {
-  return LitSides(scene, tracer).find();
+std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer,
+                                          const Progress& progress) {
+  return LitSides(scene, tracer).find(progress);
 }
 
 }  // namespace rebounce

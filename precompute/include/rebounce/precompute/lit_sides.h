@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "rebounce/precompute/progress.h"
 #include "rebounce/precompute/scene.h"
 #include "rebounce/runtime/ray_tracer.h"
 
@@ -41,7 +42,9 @@ struct TriangleSides {
 ///   points cannot tell which: a side that is covered all over by others gives way to them.
 ///
 /// kOpening is not found here. `tracer` holds all triangles of the scene. Deterministic.
-std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer);
+/// Throws Cancelled.
+std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer,
+                                          const Progress& progress = {});
 
 /// A side that lies where a point of a surface is.
 struct CoincidentSide {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "rebounce/precompute/progress.h"
 #include "rebounce/precompute/scene.h"
 #include "rebounce/precompute/subdivision.h"
 #include "rebounce/transfer/transfer_data.h"
@@ -35,6 +36,8 @@ struct PatchModel {
 /// (lit_sides.h) is an element of one patch (element_clusters.h). Area, reflectance and emission
 /// are of what stops light (opacity_maps.h), textures integrated. Double-sided triangles get a
 /// second display triangle. The reconstruction weights are left to reconstruction_weights.h.
-PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings);
+/// Throws Error if nothing of the scene can have patches, Cancelled if asked to stop.
+PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings,
+                            const Progress& progress = {});
 
 }  // namespace rebounce
