@@ -90,21 +90,26 @@ ClusterMerging::ClusterMerging(const MergingScene& scene, std::vector<Cluster> c
   neighbours_.reserve(2 * start_count_);
 }
 
+void ClusterMerging::queue(std::uint32_t a, std::uint32_t b) {
+  const double cost = merging_cost(clusters_[a], clusters_[b]);
+  if (cost <= limits_.cost) queue_.push({cost, a, b});
+}
+
 void ClusterMerging::connect(const Pairs& pairs) {
   for (const auto& [a, b] : pairs) {
     if (clusters_[a].emits != clusters_[b].emits) continue;
     neighbours_[a].push_back(b);
     neighbours_[b].push_back(a);
-    queue_.push({merging_cost(clusters_[a], clusters_[b]), a, b});
+    queue(a, b);
   }
 }
 
-void ClusterMerging::connect_in_sight(const Pairs& pairs, double most) {
+void ClusterMerging::connect_in_sight(const Pairs& pairs) {
   std::vector<std::uint8_t> in_sight(pairs.size());
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const Cluster &a = clusters_[pairs[k].first], &b = clusters_[pairs[k].second];
-    if (merging_cost(a, b) > most) continue;
+    if (merging_cost(a, b) > limits_.cost) continue;
     const bool free =
         joint_length(a, b) <= limits_.detail || is_in_sight(pairs[k].first, pairs[k].second);
     in_sight[k] = free ? 1 : 0;
@@ -119,13 +124,13 @@ void ClusterMerging::connect_in_sight(const Pairs& pairs, double most) {
 void ClusterMerging::queue_neighbours() {
   for (const std::uint32_t c : alive()) {
     for (const std::uint32_t n : neighbours_[c]) {
-      if (n > c && is_alive(n)) queue_.push({merging_cost(clusters_[c], clusters_[n]), c, n});
+      if (n > c && is_alive(n)) queue(c, n);
     }
   }
 }
 
-void ClusterMerging::merge_cheapest(std::size_t count, double most, const Watch& watch) {
-  while (alive_ > count && !queue_.empty() && queue_.top().cost <= most) {
+void ClusterMerging::merge_cheapest(std::size_t count, const Watch& watch) {
+  while (alive_ > count && !queue_.empty()) {
     const Candidate pair = queue_.top();
     queue_.pop();
     if (!is_alive(pair.a) || !is_alive(pair.b) || !may_merge(pair.a, pair.b)) continue;
@@ -138,31 +143,35 @@ bool ClusterMerging::may_merge(std::uint32_t a, std::uint32_t b) const {
   const double length = joint_length(clusters_[a], clusters_[b]);
   if (length > limits_.largest) return false;
   if (length <= limits_.detail) return true;
-  const std::size_t count = std::size_t{clusters_[a].witness_count} * clusters_[b].witness_count;
-  std::size_t free = 0, blocked_by_itself = 0;
-  std::array<Ray, 3 * kWitnessCount> rays;
-  std::array<Hit, 3 * kWitnessCount> hits;
-  for (std::size_t i = 0; i < clusters_[a].witness_count; ++i) {
-    const std::size_t lines = clusters_[b].witness_count;
-    for (std::size_t j = 0; j < lines; ++j) {
-      const auto line = line_of_sight(witness(a, i), witness(b, j), scene_.tracer);
-      std::ranges::copy(line, rays.begin() + static_cast<std::ptrdiff_t>(3 * j));
-    }
-    scene_.tracer.intersect(std::span(rays).first(3 * lines), std::span(hits).first(3 * lines));
-    for (std::size_t j = 0; j < lines; ++j) {
-      const auto begin = hits.begin() + static_cast<std::ptrdiff_t>(3 * j);
-      const auto hit =
-          std::find_if(begin, begin + 3, [](const Hit& h) { return h.triangle != kNone; });
-      const Sight sight = hit == begin + 3 ? Sight::kFree : what_is_at(hit->triangle, a, b);
-      free += sight == Sight::kFree ? 1 : 0;
-      blocked_by_itself += sight == Sight::kItself ? 1 : 0;
-    }
-    if (2 * free > count) return true;
-  }
+  const SightCount lines = look_between(a, b);
+  if (2 * lines.free > lines.count) return true;
   const float piece = std::max(scene_.piece_length[clusters_[a].witness[0]],
                                scene_.piece_length[clusters_[b].witness[0]]);
-  return 2 * (free + blocked_by_itself) > count && length <= limits_.small &&
+  return 2 * (lines.free + lines.blocked_by_itself) > lines.count && length <= limits_.small &&
          piece <= kSmallPiece * limits_.small;
+}
+
+/// Looks along the lines between all witnesses of both, until most are free.
+ClusterMerging::SightCount ClusterMerging::look_between(std::uint32_t a, std::uint32_t b) const {
+  const std::size_t to_count = clusters_[b].witness_count;
+  SightCount lines{0, 0, clusters_[a].witness_count * to_count};
+  std::array<Ray, 3 * kWitnessCount> rays;
+  std::array<Hit, 3 * kWitnessCount> hits;
+  for (std::size_t i = 0; i < clusters_[a].witness_count && 2 * lines.free <= lines.count; ++i) {
+    for (std::size_t j = 0; j < to_count; ++j) {
+      std::ranges::copy(line_of_sight(witness(a, i), witness(b, j), scene_.tracer), &rays[3 * j]);
+    }
+    scene_.tracer.intersect(std::span(rays).first(3 * to_count),
+                            std::span(hits).first(3 * to_count));
+    for (std::size_t j = 0; j < to_count; ++j) {
+      const std::span<const Hit> line = std::span(hits).subspan(3 * j, 3);
+      const auto hit = std::ranges::find_if(line, [](const Hit& h) { return h.triangle != kNone; });
+      const Sight sight = hit == line.end() ? Sight::kFree : what_is_at(hit->triangle, a, b);
+      lines.free += sight == Sight::kFree ? 1 : 0;
+      lines.blocked_by_itself += sight == Sight::kItself ? 1 : 0;
+    }
+  }
+  return lines;
 }
 
 bool ClusterMerging::is_in_sight(std::uint32_t a, std::uint32_t b) const {
@@ -208,7 +217,7 @@ void ClusterMerging::merge(const Candidate& pair) {
   join_neighbours(pair.a, pair.b, all);
   for (const std::uint32_t n : all) {
     neighbours_[n].push_back(merged);
-    queue_.push({merging_cost(clusters_[merged], clusters_[n]), n, merged});
+    queue(n, merged);
   }
   neighbours_.push_back(std::move(all));
 }

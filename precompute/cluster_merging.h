@@ -48,12 +48,13 @@ double joint_length(const Cluster& a, const Cluster& b);
 /// criterion, in m² of area x m² of distance between features.
 double merging_cost(const Cluster& a, const Cluster& b);
 
-/// What clusters may merge, in metres: see merge_elements().
+/// What clusters may merge: see merge_elements(). Lengths are in metres.
 struct MergingLimits {
   double detail;   ///< longer ones must not merge through what stands between them
   double small;    ///< longer ones must not merge around themselves
   double largest;  ///< patch that may be made
   double thing;    ///< pieces of the mesh that are longer hide what is behind them
+  double cost = std::numeric_limits<double>::infinity();  ///< the most that a merging may cost
 };
 
 /// What all merging of the elements of a scene shares.
@@ -86,17 +87,14 @@ class ClusterMerging {
   /// Makes neighbours of pairs of clusters, unless only one of them emits.
   void connect(const Pairs& pairs);
 
-  /// The same for those that may be detail or have nothing between them, and would cost no more
-  /// than `most`.
-  void connect_in_sight(const Pairs& pairs, double most = std::numeric_limits<double>::infinity());
+  /// The same for those that are detail or have nothing between them.
+  void connect_in_sight(const Pairs& pairs);
 
   /// Gives neighbours that were refused another chance.
   void queue_neighbours();
 
-  /// Merges neighbours, the cheapest first, until `count` clusters are left or none may merge that
-  /// cost at most `most`.
-  void merge_cheapest(std::size_t count, double most = std::numeric_limits<double>::infinity(),
-                      const Watch& watch = {});
+  /// Merges neighbours, the cheapest first, until `count` clusters are left or none may merge.
+  void merge_cheapest(std::size_t count, const Watch& watch = {});
 
   std::size_t alive_count() const { return alive_; }
   /// Numbers of the clusters that are left.
@@ -118,8 +116,14 @@ class ClusterMerging {
 
   enum class Sight : std::uint8_t { kFree, kItself, kWall };
 
+  struct SightCount {
+    std::size_t free, blocked_by_itself, count;
+  };
+
+  void queue(std::uint32_t a, std::uint32_t b);
   bool is_alive(std::uint32_t c) const { return merged_into_[c] == kNone; }
   bool may_merge(std::uint32_t a, std::uint32_t b) const;
+  SightCount look_between(std::uint32_t a, std::uint32_t b) const;
   bool is_in_sight(std::uint32_t a, std::uint32_t b) const;
   Sight what_is_at(std::uint32_t triangle, std::uint32_t a, std::uint32_t b) const;
   PatchPoint witness(std::uint32_t c, std::size_t k) const;

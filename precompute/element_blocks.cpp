@@ -3,6 +3,9 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
 #include <numeric>
 #include <span>
 
@@ -11,6 +14,8 @@
 
 namespace rebounce {
 namespace {
+
+constexpr std::size_t kBlockSize = 1 << 12;  // elements: what they need fits into a cache
 
 // Each element's nearest others that may join it without an edge between.
 constexpr std::size_t kNearCount = 8;
@@ -28,7 +33,8 @@ class BlockMerging {
         settings_(settings),
         order_(scene.elements.size()),
         place_(order_.size()),
-        most_cost_(kBlockCost * settings.size * settings.size * settings.size * settings.size / 8) {
+        limits_(settings.limits) {
+    limits_.cost = kBlockCost * std::pow(settings.size, 4) / 8;
     std::iota(order_.begin(), order_.end(), 0U);
     begin_.push_back(0);
     split(0, order_.size());
@@ -97,14 +103,14 @@ class BlockMerging {
       centroid.push_back(scene_.elements.centroid(e));
     }
     ClusterMerging merging(scene_, start_clusters(b), place_, begin_[b]);
-    merging.set_limits(settings_.limits);
+    merging.set_limits(limits_);
     const Pairs edges = find_edge_neighbours(corner);
     const Pairs near = find_near_pairs(centroid, kNearCount, static_cast<float>(settings_.size));
     Pairs apart;
     std::ranges::set_difference(near, edges, std::back_inserter(apart));
     merging.connect(edges);
-    merging.connect_in_sight(apart, most_cost_);
-    merging.merge_cheapest(1, most_cost_);
+    merging.connect_in_sight(apart);
+    merging.merge_cheapest(1);
     return merging.steps();
   }
 
@@ -157,7 +163,7 @@ class BlockMerging {
   std::vector<std::uint32_t> order_;  ///< elements, those of a block together
   std::vector<std::uint32_t> place_;  ///< [e] in order_
   std::vector<std::uint32_t> begin_;  ///< of each block in order_
-  double most_cost_;
+  MergingLimits limits_;
 };
 
 }  // namespace

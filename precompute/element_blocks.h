@@ -9,9 +9,6 @@
 
 namespace rebounce {
 
-/// Elements of a block, at most: what they need fits into a cache.
-inline constexpr std::size_t kBlockSize = 1 << 14;
-
 /// Clusters that elements were merged into.
 struct ElementClusters {
   std::vector<Cluster> cluster;

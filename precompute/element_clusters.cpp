@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
+
 #include <numeric>
 
 #include "cluster_merging.h"
@@ -15,9 +15,9 @@
 namespace rebounce {
 namespace {
 
-// Elements are merged in blocks first where there are more than a few blocks of them and this many
-// times as many as patches; so many times as many clusters as patches are left then, at least.
-constexpr std::size_t kFewElements = 4 * kBlockSize, kManyElements = 16, kLeastClusters = 8;
+// Elements are merged in blocks first where they are not few and this many times as many as
+// patches; so many times as many clusters as patches are left then, at least.
+constexpr std::size_t kFewElements = 1 << 16, kManyElements = 16, kLeastClusters = 8;
 
 // Each cluster's nearest others that may join it without an edge between.
 constexpr std::size_t kNearCount = 8;
@@ -45,7 +45,8 @@ class ElementMerging {
     const double area = std::accumulate(elements.area.begin(), elements.area.end(), 0.0);
     size_ = settings.patch_count > 0 ? std::sqrt(area / static_cast<double>(settings.patch_count))
                                      : settings.largest;
-    limits_ = {kDetail * size_, kSmall * size_, 0, kThing * size_};
+    limits_ = {
+        .detail = kDetail * size_, .small = kSmall * size_, .largest = 0, .thing = kThing * size_};
     set_largest(kLongest * size_);
     scene_.elements_of.assign(1 + *std::ranges::max_element(elements.triangle), {kNone, kNone});
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
@@ -67,12 +68,11 @@ class ElementMerging {
                           static_cast<double>(std::max(first, wanted + 1) - wanted);
       report_progress(progress, kBlocksProgress + (1 - kBlocksProgress) * std::min(done, 1.0));
     };
-    const double any_cost = std::numeric_limits<double>::infinity();
-    merging.merge_cheapest(wanted, any_cost, watch);
+    merging.merge_cheapest(wanted, watch);
     for (int round = 1; round <= kRounds && merging.alive_count() > settings_.patch_count;
          ++round) {
       start_round(round, merging);
-      merging.merge_cheapest(wanted, any_cost, watch);
+      merging.merge_cheapest(wanted, watch);
     }
     return result(start, merging);
   }
