@@ -1,7 +1,9 @@
 #include "rebounce/precompute/element_clusters.h"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
+#include <algorithm>
 #include <random>
 
 #include "rebounce/precompute/subdivision.h"
@@ -110,6 +112,62 @@ TEST(ElementClusters, LampsAreNotMergedWithWalls) {
     const bool emits = model.patches.emitted_exitance[model.mesh.triangle_patch[t]][0] > 0;
     EXPECT_EQ(lamp, emits);
   }
+}
+
+/// Metres from corner to corner of the box around each patch.
+std::vector<double> patch_lengths(const PatchModel& model) {
+  std::vector<glm::vec3> low(model.patches.size(), glm::vec3(1e9F)), high(low.size(), -low[0]);
+  for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+    const std::uint32_t patch = model.mesh.triangle_patch[t];
+    if (patch == kNone) continue;
+    for (const std::uint32_t v : model.mesh.triangle[t]) {
+      low[patch] = glm::min(low[patch], to_glm(model.mesh.position[v]));
+      high[patch] = glm::max(high[patch], to_glm(model.mesh.position[v]));
+    }
+  }
+  std::vector<double> length;
+  for (std::size_t i = 0; i < low.size(); ++i) length.push_back(glm::distance(low[i], high[i]));
+  return length;
+}
+
+TEST(ElementClusters, WhatHidesItselfDoesNotMakePatchesGrow) {
+  // A thicket, of which hardly two pieces see each other, in a room.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 4}, true);
+  std::mt19937 engine(4);
+  const auto number = [&] { return engine() * 0x1p-32 - 0.5; };
+  for (int leaf = 0; leaf < 8000; ++leaf) {
+    const glm::dvec3 p = glm::dvec3(2, 1, 2) + 1.2 * glm::dvec3(number(), number(), number());
+    const auto step = [&] { return 0.3 * glm::dvec3(number(), number(), number()); };
+    test::add_polygon(scene, std::vector<glm::dvec3>{p, p + step(), p + step()});
+  }
+  const PatchModel model = make_patch_model(scene, {.patch_count = 400});
+  EXPECT_NEAR(static_cast<double>(model.patches.size()), 400, 40);
+  double area = 0;
+  for (const float a : model.patches.area) area += a;
+  const double size = std::sqrt(area / 400);
+  EXPECT_LT(std::ranges::max(patch_lengths(model)), 4.01 * size);
+}
+
+TEST(ElementClusters, ManyElementsMakeTheSamePatchesOnAnyNumberOfThreads) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {5, 3, 4}, true);
+  subdivide(scene, std::vector<std::uint8_t>(scene.triangle.size(), 1), {.patch_count = 80000});
+  const int threads = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const PatchModel alone = make_patch_model(scene, {.patch_count = 1000});
+  omp_set_num_threads(3);
+  const PatchModel shared = make_patch_model(scene, {.patch_count = 1000});
+  omp_set_num_threads(threads);
+  EXPECT_EQ(alone.patches.size(), 1000U);
+  EXPECT_EQ(alone.mesh.triangle_patch, shared.mesh.triangle_patch);
+  EXPECT_EQ(alone.patches.centroid, shared.patches.centroid);
+  // The box around a disc of the mean area is 1.6 mean sizes long, and patches have ragged rims.
+  std::vector<double> length = patch_lengths(alone);
+  std::ranges::sort(length);
+  const double size = std::sqrt(94.0 / 1000);
+  EXPECT_LT(length[length.size() / 2], 2 * size);
+  EXPECT_LT(length.back(), 4.01 * size);
 }
 
 TEST(ElementClusters, DisconnectedLeavesBecomeFewPatches) {

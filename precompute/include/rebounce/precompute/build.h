@@ -56,7 +56,7 @@ struct BuildSettings {
 struct CostEstimate {
   std::size_t patch_count = 0;
   std::uint64_t peak_bytes = 0;
-  double seconds = 0;  ///< rough: from the number of pairs and the flops of the inversion
+  double seconds = 0;  ///< rough: from pairs, the flops of the inversion, and vertices
 };
 
 struct BuildReport {
