@@ -20,7 +20,7 @@ struct FormFactorSettings {
   int full_rays = 64;
   /// Rays per patch that measure what escapes or meets back faces. More: better row sums in open
   /// scenes; closed rooms do not need them.
-  int escape_rays = 1024;
+  int escape_rays = 4096;
   /// Relative error aimed at by the unoccluded kernel.
   double kernel_tolerance = 3e-4;
   /// Above 0: visibility is found for links between sets of patches (links.h) instead of for all
