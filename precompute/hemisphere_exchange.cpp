@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "escape.h"
+
 namespace rebounce {
 namespace {
 
@@ -10,14 +12,13 @@ constexpr double kLowDiscrepancy = 0.25;
 
 }  // namespace
 
-std::vector<MetPatch> count_met_patches(const DisplayMesh& mesh, std::span<const Hit> hits) {
+std::vector<MetPatch> count_met_patches(const PatchModel& model, std::span<const Hit> hits) {
   std::vector<std::uint32_t> patches;
   patches.reserve(hits.size());
   for (const Hit& hit : hits) {
     if (hit.triangle == kNone) continue;
-    const std::uint32_t side = hit.front ? hit.triangle : mesh.back_triangle[hit.triangle];
-    if (side == kNone || mesh.triangle_patch[side] == kNone) continue;
-    patches.push_back(mesh.triangle_patch[side]);
+    const std::uint32_t patch = patch_at(model, hit);
+    if (patch != kNone) patches.push_back(patch);
   }
   std::ranges::sort(patches);
   std::vector<MetPatch> met;
@@ -44,14 +45,14 @@ HemisphereExchange::HemisphereExchange(const std::vector<std::vector<MetPatch>>&
     auto own = std::ranges::lower_bound(met[i], i, {}, &MetPatch::patch);
     auto other = met_by[i].begin();
     while (own != met[i].end() || other != met_by[i].end()) {
-      const bool take_own = other == met_by[i].end() ||
-                            (own != met[i].end() && own->patch <= other->patch);
+      const bool take_own =
+          other == met_by[i].end() || (own != met[i].end() && own->patch <= other->patch);
       const bool take_other =
           own == met[i].end() || (other != met_by[i].end() && other->patch <= own->patch);
       const std::uint32_t j = take_own ? own->patch : other->patch;
       // A patch's rays to itself count for either side.
-      const std::uint32_t count = (take_own ? (j == i ? 2 : 1) * own->count : 0) +
-                                  (take_other ? other->count : 0);
+      const std::uint32_t count =
+          (take_own ? (j == i ? 2 : 1) * own->count : 0) + (take_other ? other->count : 0);
       pairs_[i].push_back({j, count, count * area_per_ray(i, j)});
       if (take_own) ++own;
       if (take_other) ++other;
@@ -74,8 +75,7 @@ double HemisphereExchange::variance(std::uint32_t i, std::uint32_t j, double tru
   return kLowDiscrepancy * unit * (truth + unit);
 }
 
-double HemisphereExchange::expected_count(std::uint32_t i, std::uint32_t j,
-                                          double exchange) const {
+double HemisphereExchange::expected_count(std::uint32_t i, std::uint32_t j, double exchange) const {
   return exchange / area_per_ray(i, j);
 }
 

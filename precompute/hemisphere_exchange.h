@@ -15,9 +15,9 @@ struct MetPatch {
   std::uint32_t count;
 };
 
-/// Counts what the `hits` of one patch's hemisphere rays say, by patch in ascending order. Rays that
-/// met a side without a patch are left out.
-std::vector<MetPatch> count_met_patches(const DisplayMesh& mesh, std::span<const Hit> hits);
+/// Counts what the `hits` of one patch's hemisphere rays say, by patch in ascending order. A side
+/// that another covers stands for that one; rays that met a side without a patch are left out.
+std::vector<MetPatch> count_met_patches(const PatchModel& model, std::span<const Hit> hits);
 
 /// What pairs of patches exchange as hemisphere rays have it: a Monte Carlo estimate without bias,
 /// visibility and all bends of the patches included, and rows that add up. Coarse for what is far

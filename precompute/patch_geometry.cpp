@@ -294,7 +294,8 @@ std::span<const PatchPart> PatchGeometry::parts(std::size_t patch, int level) co
 }
 
 bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
-  if (geometry.triangles(i).size() * geometry.triangles(j).size() <= kFewTrianglePairs) return false;
+  if (geometry.triangles(i).size() * geometry.triangles(j).size() <= kFewTrianglePairs)
+    return false;
   return i == j || !(relative_reach(geometry, i, j) < kPartReach.back());
 }
 
