@@ -31,7 +31,7 @@ class Planner {
  public:
   Planner(const HierarchicalOperator::Storage& storage, ClusterSweepPlan& plan)
       : blocks_(storage.blocks),
-        layout_(storage.blocks, storage.matrix_count),
+        layout_(storage),
         plan_(plan),
         step_at_(HierarchicalOperator::position_count(storage.area.size()) / kAlignment, 0) {}
 
@@ -57,10 +57,9 @@ class Planner {
       if (!blocks_[b].on_diagonal()) continue;
       const HierarchicalLayout::Place& place = layout_.places[b];
       plan_.steps.push_back({.diagonal = blocks_[b],
-                             .basis = place.row.basis,
+                             .basis = basis_of(blocks_[b], place.row),
                              .values = place.values,
                              .coefficient = place.row.coefficient});
-      note_side(blocks_[b]);
     }
     add_missing_steps();
     std::ranges::sort(plan_.steps, {}, [](const Step& step) { return step.diagonal.row_begin; });
@@ -88,9 +87,10 @@ class Planner {
     }
   }
 
-  void note_side(const TransferBlock& block) {
-    if (block.kind != TransferBlock::Kind::kDense) return;
-    plan_.largest_side = std::max({plan_.largest_side, block.row_count, block.column_count});
+  /// Where the basis at an end of a block begins.
+  std::uint64_t basis_of(const TransferBlock& block, const HierarchicalLayout::End& end) const {
+    const bool has_basis = block.kind == TransferBlock::Kind::kLowRank && has_values(block);
+    return has_basis ? layout_.basis_index(end, 0, 0) : 0;
   }
 
   void add_block(std::size_t b) {
@@ -100,18 +100,22 @@ class Planner {
     const std::uint32_t column_step =
         step_at_[(block.column_begin + block.column_count) / kAlignment - 1];
     const bool dense = block.kind == TransferBlock::Kind::kDense;
-    Product product{place.values,    block.row_count,    block.column_count,
-                    block.row_begin, block.column_begin, dense};
+    const Product product{.core = {.values = place.values,
+                                   .rows = dense ? block.row_count : block.row_rank,
+                                   .columns = dense ? block.column_count : block.column_rank,
+                                   .row = place.row.coefficient,
+                                   .column = place.column.coefficient,
+                                   .direction = CoreBlock::Direction::kBoth},
+                          .row_begin = block.row_begin,
+                          .column_begin = block.column_begin,
+                          .dense = dense};
     if (!dense) {
-      product = {place.values,          block.row_rank,           block.column_rank,
-                 place.row.coefficient, place.column.coefficient, false};
-      add_bases(row_bases_[row_step], {place.row.basis, block.row_rank, block.row_count,
+      add_bases(row_bases_[row_step], {basis_of(block, place.row), block.row_rank, block.row_count,
                                        block.row_begin, place.row.coefficient});
       add_bases(column_bases_[column_step],
-                {place.column.basis, block.column_rank, block.column_count, block.column_begin,
-                 place.column.coefficient});
+                {basis_of(block, place.column), block.column_rank, block.column_count,
+                 block.column_begin, place.column.coefficient});
     }
-    note_side(block);
     row_products_[row_step].push_back(product);
     column_products_[column_step].push_back(product);
   }

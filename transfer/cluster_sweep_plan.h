@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "block_kernels.h"
 #include "hierarchical_layout.h"
 
 namespace rebounce {
@@ -12,17 +13,16 @@ namespace rebounce {
 /// positions send in a forward sweep, and send in a backward one; those below it the other way
 /// round.
 struct ClusterSweepPlan {
-  /// Bases of one cluster that are used together: [rank][size].
+  /// Bases of one cluster that are used together.
   struct Bases {
     std::uint64_t values;
     std::uint32_t rank, size, begin, coefficient;
   };
 
-  /// A core or a dense block below the diagonal.
+  /// A core or a dense block below the diagonal; its row and column are coefficients.
   struct Product {
-    std::uint64_t values;
-    std::uint32_t rows, columns;
-    std::uint32_t row, column;  ///< first coefficients, or positions if `dense`
+    CoreBlock core;
+    std::uint32_t row_begin, column_begin;  ///< positions
     bool dense;
   };
 
@@ -43,7 +43,6 @@ struct ClusterSweepPlan {
   /// Blocks whose rows begin in a step's block, and blocks whose columns end in it.
   std::vector<Product> row_products, column_products;
   std::uint32_t coefficient_count = 0;
-  std::uint32_t largest_side = 0;  ///< of a dense block
 };
 
 }  // namespace rebounce

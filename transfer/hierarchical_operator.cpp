@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "block_kernels.h"
 #include "hierarchical_plan.h"
@@ -23,31 +24,34 @@ std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
 
-/// The vectors of an apply, three to each light.
+/// The vectors of an apply to some lights.
 struct WorkVectors {
-  PlanarVectors<float> x;             ///< by position, times the root of the area
-  PlanarVectors<float> coefficients;  ///< of x in the bases
-  PlanarVectors<float> products;      ///< of cores and dense blocks
-  PlanarVectors<float> y;             ///< by position, what arrives
+  std::size_t light_count;
+  PlanarVectors<float> x;       ///< by position, times the root of the area
+  Coefficients<float> sent;     ///< of x in the bases
+  Coefficients<float> arrived;  ///< products of cores and dense blocks
+  PlanarVectors<float> y;       ///< by position, what arrives
 
-  WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t light_count,
-              float* buffer) {
-    const auto take = [&](std::size_t size) {
-      const PlanarVectors<float> taken{buffer, round_up(size, kLine), kChannelCount * light_count};
-      buffer += taken.stride * taken.count;
-      return taken;
-    };
-    x = take(positions);
-    coefficients = take(layout.coefficient_count);
-    products = take(layout.product_count);
-    y = take(positions);
+  WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
+              float* buffer)
+      : light_count(lights) {
+    const std::size_t vector = vector_size(positions), coefficients = coefficients_size(layout);
+    const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
+    x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
+    sent = {take(light_count * coefficients), coefficients};
+    arrived = {take(light_count * coefficients), coefficients};
+    y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
   }
 
   static std::size_t size(std::size_t positions, const HierarchicalLayout& layout,
                           std::size_t light_count) {
-    return (2 * round_up(positions, kLine) + round_up(layout.coefficient_count, kLine) +
-            round_up(layout.product_count, kLine)) *
-           kChannelCount * light_count;
+    return 2 * (kChannelCount * vector_size(positions) + coefficients_size(layout)) * light_count;
+  }
+
+ private:
+  static std::size_t vector_size(std::size_t positions) { return round_up(positions, kLine); }
+  static std::size_t coefficients_size(const HierarchicalLayout& layout) {
+    return round_up(layout.coefficient_count * kChannelLanes, kLine);
   }
 };
 
@@ -60,70 +64,81 @@ PlanarVectors<float> to(const PlanarVectors<float>& vectors, std::size_t begin) 
   return {vectors.data + begin, vectors.stride, vectors.count};
 }
 
-/// The phases of an apply, one entry of the plan at a time.
+template <typename T>
+Coefficients<const float> from(const Coefficients<T>& coefficients, std::size_t begin) {
+  return {coefficients.data + begin * kChannelLanes, coefficients.stride};
+}
+
+Coefficients<float> to(const Coefficients<float>& coefficients, std::size_t begin) {
+  return {coefficients.data + begin * kChannelLanes, coefficients.stride};
+}
+
+/// The phases of an apply.
 template <typename Basis, typename Value>
 class Phases {
  public:
-  Phases(const BasisKernels<Basis>& bases, const CoreKernels<Value>& cores, const Basis* basis,
-         const Value* value, const std::array<std::uint32_t, kChannelCount>& channel_matrix,
+  Phases(const BasisKernels<Basis>& bases, CoreKernel<Value> multiply_cores, const Basis* basis,
+         const Value* value, const ChannelLanes& lanes, float product_scale,
          const WorkVectors& work)
       : bases_(bases),
-        cores_(cores),
+        multiply_cores_(multiply_cores),
         basis_(basis),
         value_(value),
-        channel_matrix_(channel_matrix),
+        lanes_(lanes),
+        product_scale_(product_scale),
         work_(work) {}
 
   void project(const HierarchicalPlan::Projection& p) const {
-    bases_.project(basis_ + p.basis, p.rank, p.size, from(work_.x, p.begin),
-                   to(work_.coefficients, p.coefficient));
+    const HierarchicalLayout::Cluster& cluster = p.cluster;
+    if (cluster.rank == 0) return take_light(cluster);
+    bases_.project({basis_ + cluster.values, cluster.rank, cluster.size},
+                   {p.first_rank, p.last_rank}, from(work_.x, cluster.begin),
+                   to(work_.sent, cluster.coefficient));
   }
 
-  void multiply(const HierarchicalPlan::Core& core) const {
-    const PlanarVectors<float>& in = core.dense ? work_.x : work_.coefficients;
-    const CoreMatrices<Value> matrices{value_ + core.values, core.rows, core.columns,
-                                       channel_matrix_};
-    kernel(core.direction)(matrices, {.row_in = from(in, core.row_in),
-                                      .column_in = from(in, core.column_in),
-                                      .row_out = to(work_.products, core.row_out),
-                                      .column_out = to(work_.products, core.column_out)});
+  void multiply(std::span<const CoreBlock> cores) const {
+    multiply_cores_(value_, cores, lanes_, work_.light_count, from(work_.sent, 0), work_.arrived);
   }
 
   void expand(const HierarchicalPlan::Expansion& e) const {
-    if (e.rank == 0) return add_products(e);
-    bases_.expand(basis_ + e.basis, e.rank, e.size, e.count, from(work_.products, e.coefficient),
-                  to(work_.y, e.begin));
+    const HierarchicalLayout::Cluster& cluster = e.cluster;
+    const Range positions{e.begin - cluster.begin, e.end - cluster.begin};
+    if (cluster.rank == 0) return add_light(cluster, positions);
+    bases_.expand({basis_ + cluster.values, cluster.rank, cluster.size},
+                  {e.first_rank, e.last_rank}, positions, from(work_.arrived, cluster.coefficient),
+                  to(work_.y, cluster.begin));
   }
 
  private:
-  typename CoreKernels<Value>::Product kernel(HierarchicalPlan::Direction direction) const {
-    switch (direction) {
-      case HierarchicalPlan::Direction::kToRows:
-        return cores_.to_rows;
-      case HierarchicalPlan::Direction::kToColumns:
-        return cores_.to_columns;
-      case HierarchicalPlan::Direction::kBoth:
-        break;
+  void take_light(const HierarchicalLayout::Cluster& cluster) const {
+    const PlanarVectors<const float> x = from(work_.x, cluster.begin);
+    const Coefficients<float> sent = to(work_.sent, cluster.coefficient);
+    for (std::size_t v = 0; v < x.count; ++v) {
+      float* const lane = sent.data + v / kChannelCount * sent.stride + v % kChannelCount;
+      for (std::size_t k = 0; k < cluster.size; ++k) {
+        lane[k * kChannelLanes] = x.data[v * x.stride + k];
+      }
     }
-    return cores_.both;
   }
 
-  void add_products(const HierarchicalPlan::Expansion& e) const {
-    // Other light goes through two bases on its way.
-    constexpr float kByteScale = HierarchicalOperator::kByteScale;
-    constexpr float kScale = sizeof(Basis) == 1 ? kByteScale * kByteScale : 1;
-    for (std::size_t v = 0; v < work_.y.count; ++v) {
-      float* y = work_.y.data + v * work_.y.stride + e.begin;
-      const float* product = work_.products.data + v * work_.products.stride + e.coefficient;
-      for (std::size_t k = 0; k < e.count; ++k) y[k] += kScale * product[k];
+  void add_light(const HierarchicalLayout::Cluster& cluster, Range positions) const {
+    const PlanarVectors<float> y = to(work_.y, cluster.begin);
+    const Coefficients<const float> arrived = from(work_.arrived, cluster.coefficient);
+    for (std::size_t v = 0; v < y.count; ++v) {
+      const float* const lane =
+          arrived.data + v / kChannelCount * arrived.stride + v % kChannelCount;
+      for (std::size_t k = positions.begin; k < positions.end; ++k) {
+        y.data[v * y.stride + k] += product_scale_ * lane[k * kChannelLanes];
+      }
     }
   }
 
   const BasisKernels<Basis>& bases_;
-  const CoreKernels<Value>& cores_;
+  CoreKernel<Value> multiply_cores_;
   const Basis* basis_;
   const Value* value_;
-  const std::array<std::uint32_t, kChannelCount>& channel_matrix_;
+  const ChannelLanes& lanes_;
+  float product_scale_;  ///< of light that goes through no bases, which other light does twice
   const WorkVectors& work_;
 };
 
@@ -188,9 +203,8 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
     }
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.core_parts.size() - 1; ++part) {
-      for (std::uint32_t k = plan.core_parts[part]; k < plan.core_parts[part + 1]; ++k) {
-        phases.multiply(plan.cores[k]);
-      }
+      const std::uint32_t first = plan.core_parts[part], last = plan.core_parts[part + 1];
+      phases.multiply(std::span(plan.cores).subspan(first, last - first));
     }
 #pragma omp for schedule(dynamic, 1)
     for (const HierarchicalPlan::Arrival& arrival : plan.arrivals) {
@@ -216,8 +230,7 @@ std::size_t HierarchicalOperator::position_count(std::size_t patch_count) {
 }
 
 HierarchicalOperator::HierarchicalOperator(Storage storage)
-    : storage_(stream(storage)),
-      layout_(std::make_shared<HierarchicalLayout>(storage_.blocks, storage_.matrix_count)) {
+    : storage_(stream(storage)), layout_(std::make_shared<HierarchicalLayout>(storage_)) {
   sqrt_area_.reserve(patch_count());
   inverse_.reserve(patch_count());
   const float scale = product_scale(storage_.precision);
@@ -232,7 +245,8 @@ HierarchicalOperator::HierarchicalOperator(Storage storage)
 
 std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
-         storage_.bases_q8.size_bytes() + storage_.blocks.size() * sizeof(TransferBlock) +
+         storage_.bases_q16.size_bytes() + storage_.bases_q8.size_bytes() +
+         storage_.blocks.size() * sizeof(TransferBlock) +
          storage_.patch.size() * sizeof(std::uint32_t);
 }
 
@@ -253,9 +267,10 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const WorkVectors work(position_count(patch_count()), *layout_, light_count, aligned);
   const BlockKernelSet& kernels = block_kernels();
   const Exchange exchange{storage_.patch, sqrt_area_, inverse_, work};
-  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
-                                const auto* core) {
-    const Phases phases(bases, cores, basis, core, storage_.channel_matrix, work);
+  const ChannelLanes lanes(storage_.channel_matrix, storage_.matrix_count);
+  const auto apply_phases = [&](const auto& bases, auto multiply_cores, const auto* basis,
+                                const auto* core, float basis_scale) {
+    const Phases phases(bases, multiply_cores, basis, core, lanes, basis_scale * basis_scale, work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
   const std::uint16_t* const f16 = storage_.values_f16.data();
@@ -263,11 +278,15 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const std::uint64_t first_core = layout_->basis_value_count;
   switch (storage_.precision) {
     case Precision::kF16:
-      return apply_phases(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core);
+      return apply_phases(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core, 1);
     case Precision::kF32:
-      return apply_phases(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
+      return apply_phases(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core, 1);
+    case Precision::kQ16:
+      return apply_phases(kernels.bases_q16, kernels.cores_f16, storage_.bases_q16.data(), f16,
+                          kShortScale);
     case Precision::kQ8:
-      return apply_phases(kernels.bases_q8, kernels.cores_f16, storage_.bases_q8.data(), f16);
+      return apply_phases(kernels.bases_q8, kernels.cores_f16, storage_.bases_q8.data(), f16,
+                          kByteScale);
   }
 }
 

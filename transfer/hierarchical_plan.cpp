@@ -73,15 +73,16 @@ class Planner {
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       if (has_values(storage_.blocks[b])) add_core(storage_.blocks[b], layout_.places[b]);
     }
+    mark_groups_in();
     for (const Layout::Cluster& cluster : layout_.clusters) add_projections(cluster);
     add_arrivals();
     count_bases();
     using Projection = Plan::Projection;
-    plan_.projection_parts = share_out(
-        plan_.projections, [](const Projection& p) { return std::uint64_t{p.rank} * p.size; });
-    plan_.core_parts = share_out(plan_.cores, [](const Plan::Core& core) {
-      return std::uint64_t{core.rows} * core.columns;
+    plan_.projection_parts = share_out(plan_.projections, [](const Projection& p) {
+      return std::max<std::uint64_t>(p.last_rank - p.first_rank, 1) * p.cluster.size;
     });
+    plan_.core_parts = share_out(
+        plan_.cores, [](const CoreBlock& core) { return std::uint64_t{core.rows} * core.columns; });
   }
 
  private:
@@ -91,59 +92,78 @@ class Planner {
         !block.on_diagonal() && wanted_.any(block.column_begin, block.column_count);
     if (!to_rows && !to_columns) return;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
-    using Direction = Plan::Direction;
-    Plan::Core core{.values = place.values,
-                    .rows = dense ? block.row_count : block.row_rank,
-                    .columns = dense ? block.column_count : block.column_rank,
-                    .row_in = dense ? block.row_begin : place.row.coefficient,
-                    .column_in = dense ? block.column_begin : place.column.coefficient,
-                    .row_out = place.row.coefficient,
-                    .column_out = place.column.coefficient,
-                    .dense = dense,
-                    .direction = !to_columns ? Direction::kToRows
-                                 : !to_rows  ? Direction::kToColumns
-                                             : Direction::kBoth};
+    using Direction = CoreBlock::Direction;
+    const CoreBlock core{.values = place.values,
+                         .rows = dense ? block.row_count : block.row_rank,
+                         .columns = dense ? block.column_count : block.column_rank,
+                         .row = place.row.coefficient,
+                         .column = place.column.coefficient,
+                         .direction = !to_columns ? Direction::kToRows
+                                      : !to_rows  ? Direction::kToColumns
+                                                  : Direction::kBoth};
     plan_.cores.push_back(core);
     plan_.value_count += std::uint64_t{storage_.matrix_count} * core.rows * core.columns;
-    if (dense) {
-      if (to_rows) dense_.push_back({0, 0, 0, block.row_begin, block.row_count, core.row_out});
-      if (to_columns) {
-        dense_.push_back({0, 0, 0, block.column_begin, block.column_count, core.column_out});
-      }
-      return;
+    if (to_rows) {
+      add_way(dense, {block.column_begin, core.columns, core.column},
+              {block.row_begin, core.rows, core.row});
     }
-    if (to_rows) mark(in_, core.column_in, core.columns), mark(out_, core.row_out, core.rows);
-    if (to_columns) mark(in_, core.row_in, core.rows), mark(out_, core.column_out, core.columns);
+    if (to_columns) {
+      add_way(dense, {block.row_begin, core.rows, core.row},
+              {block.column_begin, core.columns, core.column});
+    }
+  }
+
+  /// One end of a core: its first position, its coefficients, the first of them.
+  struct CoreEnd {
+    std::uint32_t begin, count, coefficient;
+  };
+
+  static Layout::Cluster without_ranks(const CoreEnd& end) {
+    return {.begin = end.begin, .size = end.count, .rank = 0, .coefficient = end.coefficient};
+  }
+
+  void add_way(bool dense, const CoreEnd& from, const CoreEnd& to) {
+    if (dense) {
+      plan_.projections.push_back({without_ranks(from), 0, 0});
+      dense_.push_back(without_ranks(to));
+    } else {
+      mark(in_, from.coefficient, from.count);
+      mark(out_, to.coefficient, to.count);
+    }
   }
 
   static void mark(std::vector<bool>& marks, std::uint32_t begin, std::uint32_t count) {
     std::fill_n(marks.begin() + begin, count, true);
   }
 
-  /// visit(first, last) for the longest runs of marked coefficients of a cluster.
-  template <typename Visit>
-  static void visit_marked(const std::vector<bool>& marks, const Layout::Cluster& cluster,
-                           const Visit& visit) {
-    const std::uint32_t end = cluster.coefficient + cluster.rank;
-    for (std::uint32_t c = cluster.coefficient; c < end;) {
-      if (!marks[c]) {
-        ++c;
-        continue;
-      }
-      const std::uint32_t first = c;
-      while (c < end && marks[c]) ++c;
-      visit(first, c);
+  /// Ranks whose values are interleaved are projected together.
+  void mark_groups_in() {
+    const std::uint32_t group = layout_.rank_group;
+    for (std::uint32_t c = 0; c < layout_.coefficient_count; c += group) {
+      const auto first = in_.begin() + c;
+      const auto last = in_.begin() + std::min(c + group, layout_.coefficient_count);
+      if (std::find(first, last, true) != last) std::fill(first, last, true);
     }
   }
 
-  static std::uint64_t basis_at(const Layout::Cluster& cluster, std::uint32_t coefficient) {
-    return cluster.values + std::uint64_t{coefficient - cluster.coefficient} * cluster.size;
+  /// visit(first, last) for the longest runs of ranks of a cluster with marked coefficients.
+  template <typename Visit>
+  static void visit_marked(const std::vector<bool>& marks, const Layout::Cluster& cluster,
+                           const Visit& visit) {
+    for (std::uint32_t r = 0; r < cluster.rank;) {
+      if (!marks[cluster.coefficient + r]) {
+        ++r;
+        continue;
+      }
+      const std::uint32_t first = r;
+      while (r < cluster.rank && marks[cluster.coefficient + r]) ++r;
+      visit(first, r);
+    }
   }
 
   void add_projections(const Layout::Cluster& cluster) {
     visit_marked(in_, cluster, [&](std::uint32_t first, std::uint32_t last) {
-      plan_.projections.push_back(
-          {basis_at(cluster, first), last - first, cluster.size, cluster.begin, first});
+      plan_.projections.push_back({cluster, first, last});
     });
   }
 
@@ -188,17 +208,14 @@ class Planner {
       if (from >= to) continue;
       visit_marked(out_, cluster, [&](std::uint32_t first, std::uint32_t last) {
         wanted_.visit_intervals(from, to, [&](std::uint32_t at, std::uint32_t stop) {
-          plan_.expansions.push_back({basis_at(cluster, first) + at - cluster.begin, last - first,
-                                      cluster.size, at, stop - at, first});
+          plan_.expansions.push_back({cluster, first, last, at, stop});
         });
       });
     }
-    for (const Plan::Expansion& products : dense_) {
-      const std::uint32_t from = std::max(begin, products.begin);
-      const std::uint32_t to = std::min(end, products.begin + products.count);
-      if (from >= to) continue;
-      plan_.expansions.push_back(
-          {0, 0, 0, from, to - from, products.coefficient + from - products.begin});
+    for (const Layout::Cluster& end_of_block : dense_) {
+      const std::uint32_t from = std::max(begin, end_of_block.begin);
+      const std::uint32_t to = std::min(end, end_of_block.begin + end_of_block.size);
+      if (from < to) plan_.expansions.push_back({end_of_block, 0, 0, from, to});
     }
   }
 
@@ -217,7 +234,7 @@ class Planner {
   std::size_t positions_;
   WantedRuns wanted_;
   std::vector<bool> in_, out_;          ///< which coefficients are needed, before and after cores
-  std::vector<Plan::Expansion> dense_;  ///< products of dense blocks, whole
+  std::vector<Layout::Cluster> dense_;  ///< where light comes out of dense blocks
 };
 
 }  // namespace

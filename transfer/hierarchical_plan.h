@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "block_kernels.h"
 #include "hierarchical_layout.h"
 
 namespace rebounce {
@@ -14,29 +15,18 @@ namespace rebounce {
 /// own, whatever thread works on them: no sum depends on the number of threads.
 class HierarchicalPlan {
  public:
-  /// Some bases of a cluster, and the light that goes through them.
+  /// Ranks [first, last) of a cluster, and the light that goes through them. A cluster without
+  /// ranks is one end of a dense block: its light goes in as it is.
   struct Projection {
-    std::uint64_t basis;
-    std::uint32_t rank, size, begin, coefficient;
+    HierarchicalLayout::Cluster cluster;
+    std::uint32_t first_rank, last_rank;
   };
 
-  enum class Direction : std::uint8_t { kBoth, kToRows, kToColumns };
-
-  /// A core or a dense block. What goes in are coefficients, or positions if `dense`; what comes
-  /// out are always coefficients.
-  struct Core {
-    std::uint64_t values;
-    std::uint32_t rows, columns;
-    std::uint32_t row_in, column_in, row_out, column_out;
-    bool dense;
-    Direction direction;
-  };
-
-  /// Positions [begin, begin + count) of bases [rank][size], or if `rank` is 0 of what came out of
-  /// a dense block.
+  /// Positions [begin, end) and ranks [first, last) of a cluster. A cluster without ranks is one
+  /// end of a dense block: its light is what came out.
   struct Expansion {
-    std::uint64_t basis;
-    std::uint32_t rank, size, begin, count, coefficient;
+    HierarchicalLayout::Cluster cluster;
+    std::uint32_t first_rank, last_rank, begin, end;
   };
 
   /// Positions that one thread works out from the first addition to the last.
@@ -53,7 +43,7 @@ class HierarchicalPlan {
                    std::vector<std::uint32_t> targets);
 
   std::vector<Projection> projections;
-  std::vector<Core> cores;
+  std::vector<CoreBlock> cores;
   std::vector<Expansion> expansions;
   std::vector<std::uint32_t> targets;
   std::vector<Arrival> arrivals;

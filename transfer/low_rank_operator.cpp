@@ -82,12 +82,13 @@ void LowRankOperator::project(const float* x, float* tile_coefficient, float* co
   for (std::size_t t = 0; t < tiles; ++t) {
     const std::size_t begin = t * rank * kTile;
     const PlanarVectors<const float> in{x + t * kTile, stride(), kChannelCount};
-    const PlanarVectors<float> out{tile_coefficient + t * coefficient_size(), rank_stride_,
-                                   kChannelCount};
+    const Coefficients<float> out{tile_coefficient + t * coefficient_size(), coefficient_size()};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.project(storage_.basis_f16.data() + begin, rank, kTile, in, out);
+      kernels.bases_f16.project({storage_.basis_f16.data() + begin, rank, kTile}, {0, rank}, in,
+                                out);
     } else {
-      kernels.bases_f32.project(storage_.basis_f32.data() + begin, rank, kTile, in, out);
+      kernels.bases_f32.project({storage_.basis_f32.data() + begin, rank, kTile}, {0, rank}, in,
+                                out);
     }
   }
   std::fill_n(coefficient, coefficient_size(), 0.0F);
@@ -95,7 +96,7 @@ void LowRankOperator::project(const float* x, float* tile_coefficient, float* co
     const float* const part = tile_coefficient + t * coefficient_size();
     for (int c = 0; c < kChannelCount; ++c) {
       for (std::size_t r = 0; r < storage_.rank; ++r) {
-        coefficient[c * rank_stride_ + r] += part[c * rank_stride_ + r];
+        coefficient[c * rank_stride_ + r] += part[r * kChannelLanes + c];
       }
     }
   }
@@ -119,23 +120,25 @@ void LowRankOperator::multiply_cores(const float* in, float* out) const {
     for (std::size_t v = 0; j + v < rank; ++v) sum[v] += core[j + v] * x[j + v];
     float total = 0;
     for (const float s : sum) total += s;
-    out[channel * rank_stride_ + row] = total;
+    out[row * kChannelLanes + channel] = total;
   }
 }
 
 void LowRankOperator::expand_tiles(const float* coefficient, float* y) const {
   const std::size_t tiles = tile_count(patch_count()), rank = storage_.rank;
   const BlockKernelSet& kernels = block_kernels();
-  const PlanarVectors<const float> in{coefficient, rank_stride_, kChannelCount};
+  const Coefficients<const float> in{coefficient, coefficient_size()};
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < tiles; ++t) {
     for (int c = 0; c < kChannelCount; ++c) std::fill_n(y + c * stride() + t * kTile, kTile, 0.0F);
     const std::size_t begin = t * rank * kTile;
     const PlanarVectors<float> out{y + t * kTile, stride(), kChannelCount};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.expand(storage_.basis_f16.data() + begin, rank, kTile, kTile, in, out);
+      kernels.bases_f16.expand({storage_.basis_f16.data() + begin, rank, kTile}, {0, rank},
+                               {0, kTile}, in, out);
     } else {
-      kernels.bases_f32.expand(storage_.basis_f32.data() + begin, rank, kTile, kTile, in, out);
+      kernels.bases_f32.expand({storage_.basis_f32.data() + begin, rank, kTile}, {0, rank},
+                               {0, kTile}, in, out);
     }
   }
 }

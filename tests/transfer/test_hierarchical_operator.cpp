@@ -305,77 +305,146 @@ PlanarVectors<float> planar(std::vector<float>& data, std::size_t count) {
   return {data.data(), data.size() / count, count};
 }
 
+template <typename T>
+Coefficients<T> side_by_side(std::vector<std::remove_const_t<T>>& data, std::size_t lights) {
+  return {data.data(), data.size() / lights};
+}
+
+/// A basis of plain numbers [rank][size], and how far products with it may be off.
+struct PlainBasis {
+  std::vector<float> value;
+  std::size_t rank, size;
+  double allowed;
+};
+
+constexpr std::size_t kStride = 310, kRankStride = 140;
+
+/// Where coefficient r of vector v is.
+std::size_t coefficient_at(std::size_t v, std::size_t r) {
+  return (v / 3 * kRankStride + r) * kChannelLanes + v % 3;
+}
+
 template <typename Value>
-void check_bases(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
-                 const std::vector<float>& plain, std::size_t rank, std::size_t size,
-                 std::size_t count) {
-  constexpr std::size_t kStride = 100, kRankStride = 20;
-  const double allowed = kAllowed * (sizeof(Value) == 1 ? 128 : 1);
+void check_project(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
+                   const PlainBasis& plain, std::size_t written, std::size_t lights) {
   Random random;
-  const std::vector<float> x = random.floats(count * kStride), y = random.floats(count * kStride);
-  const std::vector<float> scale = random.floats(count * kRankStride);
-  std::vector<float> coefficient(count * kRankStride, kUntouched), sum = y;
-  kernels.project(basis.data(), rank, size, planar(x, count), planar(coefficient, count));
-  for (std::size_t v = 0; v < count; ++v) {
+  const std::vector<float> x = random.floats(3 * lights * kStride);
+  std::vector<float> sent(lights * kRankStride * kChannelLanes, kUntouched);
+  kernels.project(basis.data(), plain.rank, plain.size, planar(x, 3 * lights),
+                  side_by_side<float>(sent, lights));
+  for (std::size_t v = 0; v < 3 * lights; ++v) {
     for (std::size_t r = 0; r < kRankStride; ++r) {
-      double expected = r < rank ? 0 : kUntouched;
-      for (std::size_t k = 0; k < size && r < rank; ++k) {
-        expected += plain[r * size + k] * x[v * kStride + k];
+      double expected = r < written ? 0 : kUntouched;
+      for (std::size_t k = 0; k < plain.size && r < plain.rank; ++k) {
+        expected += plain.value[r * plain.size + k] * x[v * kStride + k];
       }
-      EXPECT_NEAR(coefficient[v * kRankStride + r], expected, allowed);
+      EXPECT_NEAR(sent[coefficient_at(v, r)], expected, plain.allowed);
     }
   }
-  for (std::size_t part = 16; part <= size; part += 16) {
-    sum = y;
-    kernels.expand(basis.data() + size - part, rank, size, part, planar(scale, count),
-                   planar(sum, count));
-    for (std::size_t v = 0; v < count; ++v) {
-      for (std::size_t k = 0; k < kStride; ++k) {
-        double expected = y[v * kStride + k];
-        for (std::size_t r = 0; r < rank && k < part; ++r) {
-          expected += plain[r * size + size - part + k] * scale[v * kRankStride + r];
-        }
-        EXPECT_NEAR(sum[v * kStride + k], expected, allowed);
+}
+
+/// Of the last `part` positions and the ranks from `first` on; `values` begins with those
+/// positions.
+template <typename Value>
+void check_expand(const BasisKernels<Value>& kernels, const Value* values, const PlainBasis& plain,
+                  std::size_t first, std::size_t part, std::size_t lights) {
+  Random random;
+  const std::vector<float> y = random.floats(3 * lights * kStride);
+  std::vector<float> arrived = random.floats(lights * kRankStride * kChannelLanes), sum = y;
+  kernels.expand(values, first, plain.rank - first, plain.size, part,
+                 side_by_side<const float>(arrived, lights), planar(sum, 3 * lights));
+  for (std::size_t v = 0; v < 3 * lights; ++v) {
+    for (std::size_t k = 0; k < kStride; ++k) {
+      double expected = y[v * kStride + k];
+      for (std::size_t r = first; r < plain.rank && k < part; ++r) {
+        expected +=
+            plain.value[r * plain.size + plain.size - part + k] * arrived[coefficient_at(v, r)];
       }
+      EXPECT_NEAR(sum[v * kStride + k], expected, plain.allowed);
     }
   }
 }
 
 template <typename Value>
-void check_core(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
-                const std::vector<float>& plain, std::size_t rows, std::size_t columns,
-                std::size_t lights) {
-  constexpr std::size_t kStride = 110;
-  const std::size_t count = 3 * lights;
-  const CoreMatrices<Value> matrices{values.data(), rows, columns, {1, 0, 1}};
+void check_bases(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
+                 const PlainBasis& plain, std::size_t lights) {
+  check_project(kernels, basis, plain, plain.rank, lights);
+  for (std::size_t part = 16; part <= plain.size; part += 16) {
+    check_expand(kernels, basis.data() + plain.size - part, plain, 0, part, lights);
+  }
+}
+
+/// A basis as the integer kernels have it.
+std::vector<std::int16_t> in_rank_groups(const PlainBasis& plain) {
+  constexpr std::size_t kGroup = HierarchicalOperator::kRankGroup;
+  std::vector<std::int16_t> values((plain.rank + kGroup - 1) / kGroup * kGroup * plain.size, 0);
+  for (std::size_t r = 0; r < plain.rank; ++r) {
+    for (std::size_t k = 0; k < plain.size; ++k) {
+      values[(r / kGroup * plain.size + k) * kGroup + r % kGroup] =
+          static_cast<std::int16_t>(plain.value[r * plain.size + k]);
+    }
+  }
+  return values;
+}
+
+/// Integers up to the largest.
+PlainBasis integer_basis(std::size_t rank, std::size_t size) {
+  constexpr float kLargest = HierarchicalOperator::kLargestShort;
   Random random;
-  const std::vector<float> row_in = random.floats(count * kStride);
-  const std::vector<float> column_in = random.floats(count * kStride);
-  for (const bool to_rows : {true, false}) {
-    for (const bool to_columns : {true, false}) {
-      if (!to_rows && !to_columns) continue;
-      std::vector<float> row_out(count * kStride, kUntouched), column_out = row_out;
-      const auto product = !to_columns ? kernels.to_rows
-                           : !to_rows  ? kernels.to_columns
-                                       : kernels.both;
-      product(matrices, {planar(row_in, count), planar(column_in, count), planar(row_out, count),
-                         planar(column_out, count)});
-      for (std::size_t v = 0; v < count; ++v) {
-        const float* s = plain.data() + matrices.channel_matrix[v % 3] * rows * columns;
-        for (std::size_t i = 0; i < kStride; ++i) {
-          double expected = to_rows && i < rows ? 0 : kUntouched;
-          for (std::size_t j = 0; j < columns && to_rows && i < rows; ++j) {
-            expected += s[i * columns + j] * column_in[v * kStride + j];
+  PlainBasis plain{random.floats(rank * size), rank, size, 0};
+  for (float& value : plain.value) value = std::round(kLargest * value);
+  plain.value.front() = -kLargest;
+  // Each of up to 310 numbers up to 1 is off by half a 4,095th at most, and times up to 4,095.
+  plain.allowed = 0.5 * static_cast<double>(std::max(rank, size));
+  return plain;
+}
+
+void check_integer_bases(const BasisKernels<std::int16_t>& kernels, std::size_t rank,
+                         std::size_t size, std::size_t lights) {
+  const PlainBasis plain = integer_basis(rank, size);
+  const std::vector<std::int16_t> basis = in_rank_groups(plain);
+  check_project(kernels, basis, plain, (rank + 3) / 4 * 4, lights);
+  for (std::size_t part = 16; part <= size; part += 16) {
+    for (std::size_t first = 0; first < std::min<std::size_t>(4, rank); ++first) {
+      check_expand(kernels, basis.data() + 4 * (size - part), plain, first, part, lights);
+    }
+  }
+}
+
+template <typename Value>
+void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
+                const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
+                std::size_t lights) {
+  using Direction = CoreBlock::Direction;
+  constexpr std::uint32_t kMatrices = 2, kRow = 3, kColumn = 99, kEnd = 200;
+  constexpr std::array<std::uint32_t, 3> kMatrix{1, 0, 1};
+  Random random;
+  const std::vector<float> in = random.floats(lights * kEnd * kChannelLanes);
+  for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
+    const std::vector<CoreBlock> cores{{8, rows, columns, kRow, kColumn, direction}};
+    std::vector<float> out(lights * kEnd * kChannelLanes, kUntouched);
+    multiply_cores(values.data(), cores, ChannelLanes(kMatrix, kMatrices), lights,
+                   {in.data(), kEnd * kChannelLanes}, {out.data(), kEnd * kChannelLanes});
+    for (std::size_t v = 0; v < 3 * lights; ++v) {
+      const auto at = [v](std::size_t k) { return (v / 3 * kEnd + k) * kChannelLanes + v % 3; };
+      const auto entry = [&](std::size_t i, std::size_t j) {
+        return plain[8 + (i * columns + j) * kMatrices + kMatrix[v % 3]];
+      };
+      for (std::uint32_t k = 0; k < kEnd; ++k) {
+        double expected = kUntouched;
+        if (direction != Direction::kToColumns && k >= kRow && k < kRow + rows) {
+          expected = 0;
+          for (std::uint32_t j = 0; j < columns; ++j) {
+            expected += entry(k - kRow, j) * in[at(kColumn + j)];
           }
-          EXPECT_NEAR(row_out[v * kStride + i], expected, kAllowed);
         }
-        for (std::size_t j = 0; j < kStride; ++j) {
-          double expected = to_columns && j < columns ? 0 : kUntouched;
-          for (std::size_t i = 0; i < rows && to_columns && j < columns; ++i) {
-            expected += s[i * columns + j] * row_in[v * kStride + i];
+        if (direction != Direction::kToRows && k >= kColumn && k < kColumn + columns) {
+          expected = 0;
+          for (std::uint32_t i = 0; i < rows; ++i) {
+            expected += entry(i, k - kColumn) * in[at(kRow + i)];
           }
-          EXPECT_NEAR(column_out[v * kStride + j], expected, kAllowed);
         }
+        EXPECT_NEAR(out[at(k)], expected, kAllowed);
       }
     }
   }
@@ -384,7 +453,7 @@ void check_core(const CoreKernels<Value>& kernels, const std::vector<Value>& val
 void check_kernels(const BlockKernelSet& kernels) {
   SCOPED_TRACE(kernels.instruction_set);
   Random random;
-  const std::vector<float> values = random.floats(2 * 96 * 96 + HierarchicalOperator::kPadding);
+  const std::vector<float> values = random.floats(2 * 96 * 96 + 8 + HierarchicalOperator::kPadding);
   const std::vector<std::uint16_t> half = to_half(values);
   std::vector<std::int8_t> bytes(values.size());
   std::ranges::transform(values, bytes.begin(),
@@ -393,27 +462,73 @@ void check_kernels(const BlockKernelSet& kernels) {
   for (const std::size_t lights : {1U, 2U, 3U}) {
     for (const std::size_t rank : {1U, 2U, 3U, 4U, 7U, 17U}) {
       for (const std::size_t size : {16U, 32U, 48U, 96U}) {
-        check_bases(kernels.bases_f32, values, values, rank, size, 3 * lights);
-        check_bases(kernels.bases_f16, half, values, rank, size, 3 * lights);
-        check_bases(kernels.bases_q8, bytes, plain_bytes, rank, size, 3 * lights);
+        check_bases(kernels.bases_f32, values, {values, rank, size, kAllowed}, lights);
+        check_bases(kernels.bases_f16, half, {values, rank, size, kAllowed}, lights);
+        check_bases(kernels.bases_q8, bytes, {plain_bytes, rank, size, 128 * kAllowed}, lights);
+        check_integer_bases(kernels.bases_q16, rank, size, lights);
       }
-      for (const std::size_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
-        check_core(kernels.cores_f32, values, values, rank, columns, lights);
-        check_core(kernels.cores_f16, half, values, rank, columns, lights);
+      const auto rows = static_cast<std::uint32_t>(rank);
+      for (const std::uint32_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
+        check_core(kernels.cores_f32, values, values, rows, columns, lights);
+        check_core(kernels.cores_f16, half, values, rows, columns, lights);
       }
     }
     check_core(kernels.cores_f32, values, values, 48, 96, lights);
     check_core(kernels.cores_f16, half, values, 96, 32, lights);
   }
+  check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
+}
+
+std::vector<const BlockKernelSet*> runnable_kernels() {
+  std::vector<const BlockKernelSet*> sets{&kBlockKernelsPortable};
+#if defined(__x86_64__)
+  const InstructionSet widest = widest_instruction_set();
+  if (widest >= InstructionSet::kAvx2) sets.push_back(&kBlockKernelsAvx2);
+  if (widest >= InstructionSet::kAvx512) sets.push_back(&kBlockKernelsAvx512);
+#endif
+  return sets;
 }
 
 TEST(BlockKernels, EveryInstructionSetAgrees) {
-  check_kernels(kBlockKernelsPortable);
-#if defined(__x86_64__)
-  const InstructionSet widest = widest_instruction_set();
-  if (widest >= InstructionSet::kAvx2) check_kernels(kBlockKernelsAvx2);
-  if (widest >= InstructionSet::kAvx512) check_kernels(kBlockKernelsAvx512);
-#endif
+  for (const BlockKernelSet* set : runnable_kernels()) check_kernels(*set);
+}
+
+TEST(BlockKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
+  constexpr std::size_t kRank = 134, kSize = 304;
+  const std::vector<std::int16_t> basis = in_rank_groups(integer_basis(kRank, kSize));
+  Random random;
+  const std::vector<float> x = random.floats(3 * kStride);
+  std::vector<std::vector<float>> results;
+  for (const BlockKernelSet* set : runnable_kernels()) {
+    std::vector<float> sent(kRankStride * kChannelLanes, 0), y = x;
+    set->bases_q16.project(basis.data(), kRank, kSize, planar(x, 3), side_by_side<float>(sent, 1));
+    set->bases_q16.expand(basis.data(), 1, kRank - 1, kSize, kSize,
+                          side_by_side<const float>(sent, 1), planar(y, 3));
+    for (std::size_t k = 0; k < sent.size(); k += kChannelLanes) sent[k + 3] = 0;
+    sent.insert(sent.end(), y.begin(), y.end());
+    results.push_back(sent);
+  }
+  for (const std::vector<float>& result : results) EXPECT_EQ(result, results.front());
+}
+
+// The largest light at all positions and the largest values: nothing overflows.
+TEST(BlockKernels, SumsOfIntegersHaveRoomForTheLargest) {
+  constexpr std::size_t kRank = 128, kSize = 128;
+  constexpr auto kLargest = static_cast<float>(HierarchicalOperator::kLargestShort);
+  const PlainBasis plain{std::vector<float>(kRank * kSize, kLargest), kRank, kSize, 0};
+  const std::vector<std::int16_t> basis = in_rank_groups(plain);
+  const std::vector<float> x(3 * kStride, 1.0F);
+  for (const BlockKernelSet* set : runnable_kernels()) {
+    SCOPED_TRACE(set->instruction_set);
+    std::vector<float> sent(kRankStride * kChannelLanes), y(3 * kStride, 0.0F);
+    set->bases_q16.project(basis.data(), kRank, kSize, planar(x, 3), side_by_side<float>(sent, 1));
+    for (std::size_t r = 0; r < kRank; ++r) {
+      EXPECT_FLOAT_EQ(sent[coefficient_at(0, r)], kSize * kLargest);
+    }
+    set->bases_q16.expand(basis.data(), 0, kRank, kSize, kSize, side_by_side<const float>(sent, 1),
+                          planar(y, 3));
+    EXPECT_FLOAT_EQ(y.front(), kRank * kLargest * kSize * kLargest);
+  }
 }
 
 }  // namespace

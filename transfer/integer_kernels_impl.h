@@ -1,0 +1,252 @@
+#pragma once
+
+// Products with bases of 16-bit integers, written once over a vector type `N` of integers. Included
+// by one file per instruction set; everything is in an unnamed namespace so that no two sets share
+// an instantiation.
+//
+// One instruction multiplies neighbouring pairs of 16-bit integers and adds the two products to a
+// sum of 32 bits: twice the products of a multiply-add of floats, and the values need no widening.
+// The light is rounded to integers for it, with a scale for each channel of a chunk of positions;
+// so are the coefficients on the way back. A magnitude of 4,095 at both ends leaves room for chunks
+// of 128: 128 x 4095 x 4095 < 2^31.
+//
+// A basis is [strip of 64 positions][rank / 4][position][4 ranks]: both ways read it from the first
+// value to the last. Coefficients are sums over positions, for which pairs must be neighbouring
+// positions: a shuffle within 128 bits makes (2 positions)(4 ranks) into (4 ranks)(2 positions).
+// Light is a sum over ranks, and its pairs are neighbours as they are. Neither way is left with
+// sums over all the lanes of a vector, which cost as much as the products where clusters are small.
+//
+// Integer sums do not depend on their order, and floats are converted, scaled and added in the same
+// one everywhere: all instruction sets give the same bits.
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "block_kernels.h"
+#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/types.h"
+#include "vector_load.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kRankGroup = HierarchicalOperator::kRankGroup;
+constexpr std::size_t kBasisStrip = HierarchicalOperator::kStrip;
+
+// Positions or ranks whose products are added as integers.
+constexpr std::size_t kChunk = 128;
+
+/// A number for each channel; the last is not used.
+using ChannelFloats = std::array<float, kChannelLanes>;
+
+/// What light of these magnitudes at most is multiplied by to become integers, and what brings them
+/// back.
+struct IntegerScales {
+  ChannelFloats to, back;
+
+  explicit IntegerScales(const ChannelFloats& largest) {
+    constexpr float kLargest = HierarchicalOperator::kLargestShort, kDark = 1e-30F;
+    for (std::size_t c = 0; c < kChannelLanes; ++c) {
+      const float most = std::max(largest[c], kDark);
+      to[c] = kLargest / most;
+      back[c] = most / kLargest;
+    }
+  }
+};
+
+/// The light of a chunk of positions: of each channel (pair of positions)(4 times the pair).
+struct IntegerLight {
+  alignas(64) std::int16_t value[kChannelCount][kChunk * kRankGroup];
+  ChannelFloats back;
+};
+
+template <typename N>
+REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std::size_t count,
+                                        IntegerLight& light) {
+  const IntegerScales scales(N::largest_of_planes(x, stride, count));
+  light.back = scales.back;
+  for (std::size_t k = 0; k < count; k += 16) {
+    for (std::size_t c = 0; c < kChannelCount; ++c) {
+      N::round_positions(x + c * stride + k, scales.to[c], light.value[c] + k * kRankGroup);
+    }
+  }
+}
+
+/// Part of a basis within a strip: kRankGroup values of a position, those of the next position,
+/// the next group after `group_step`.
+struct StripBasis {
+  const std::int16_t* values;
+  std::size_t group_step;
+};
+
+/// From a position of a cluster on, all groups of ranks from `group` on.
+inline StripBasis strip_at(const ClusterBasis<std::int16_t>& basis, std::size_t position,
+                           std::size_t group) {
+  const std::size_t groups = (basis.rank + kRankGroup - 1) / kRankGroup;
+  const std::size_t begin = position / kBasisStrip * kBasisStrip;
+  const std::size_t width = std::min(kBasisStrip, basis.size - begin);
+  return {basis.values + (begin * groups + group * width + position - begin) * kRankGroup,
+          width * kRankGroup};
+}
+
+// The next functions are not inlined: their sums need all registers, which g++ 12 would otherwise
+// share out among the constants of everything around them.
+
+/// kGroups groups of ranks of `count` positions, a chunk at most, whose strips begin with `first`
+/// and `second`.
+template <typename N, std::size_t kGroups>
+[[gnu::noinline]] void project_groups(StripBasis first, StripBasis second, std::size_t count,
+                                      const IntegerLight& light, bool add_to, float* coefficient) {
+  N sum[kChannelCount][kGroups];
+  unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
+    unroll<kGroups>([&](auto g) REBOUNCE_INLINE { sum[c][g] = N::zero(); });
+  });
+  const auto add_strip = [&](StripBasis strip, std::size_t begin, std::size_t end) REBOUNCE_INLINE {
+    for (std::size_t k = begin; k < end; k += N::kWidth, strip.values += N::kWidth) {
+      N b[kGroups];
+      unroll<kGroups>([&](auto g) REBOUNCE_INLINE {
+        b[g] = N::load(strip.values + g * strip.group_step).pairs_of_positions();
+      });
+      unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
+        const N l = N::load(light.value[c] + k);
+        unroll<kGroups>([&](auto g)
+                            REBOUNCE_INLINE { sum[c][g] = add_products(sum[c][g], b[g], l); });
+      });
+    }
+  };
+  add_strip(first, 0, std::min(count, kBasisStrip) * kRankGroup);
+  add_strip(second, kBasisStrip * kRankGroup, count * kRankGroup);
+  N::template store_coefficients<kGroups>(sum[0], sum[1], sum[2], light.back, add_to, coefficient);
+}
+
+template <typename N>
+void project_integers(const ClusterBasis<std::int16_t>& basis, Range ranks,
+                      PlanarVectors<const float> x, Coefficients<float> coefficient) {
+  IntegerLight light;
+  const std::size_t first_group = ranks.begin / kRankGroup;
+  const std::size_t groups = (ranks.end + kRankGroup - 1) / kRankGroup - first_group;
+  for (std::size_t v = 0; v < x.count; v += kChannelCount) {
+    float* const to = coefficient.data + v / kChannelCount * coefficient.stride;
+    for (std::size_t k = 0; k < basis.size; k += kChunk) {
+      const std::size_t count = std::min(basis.size - k, kChunk);
+      round_light<N>(x.data + v * x.stride + k, x.stride, count, light);
+      for_each_four(groups, [&]<std::size_t kGroups>(std::size_t g) {
+        const std::size_t group = first_group + g;
+        const StripBasis first = strip_at(basis, k, group);
+        const StripBasis second =
+            count > kBasisStrip ? strip_at(basis, k + kBasisStrip, group) : StripBasis{};
+        project_groups<N, kGroups>(first, second, count, light, k > 0,
+                                   to + group * kRankGroup * kChannelLanes);
+      });
+    }
+  }
+}
+
+/// The coefficients of a chunk of ranks: of each group (channel)(rank).
+struct IntegerCoefficients {
+  static constexpr std::size_t kGroupSize = kRankGroup * kChannelLanes;
+  alignas(64) std::int16_t value[kChunk / kRankGroup * kGroupSize];
+  ChannelFloats back;
+  std::size_t group_count;
+};
+
+/// Of the ranks within a chunk; those of its groups that are not among them are zero.
+template <typename N>
+REBOUNCE_INLINE inline void round_coefficients(const float* from, Range ranks,
+                                               IntegerCoefficients& to) {
+  constexpr std::size_t kGroupSize = IntegerCoefficients::kGroupSize;
+  const IntegerScales scales(N::largest_of_lanes(from + ranks.begin * kChannelLanes,
+                                                 (ranks.end - ranks.begin) * kChannelLanes));
+  to.back = scales.back;
+  to.group_count = (ranks.end + kRankGroup - 1) / kRankGroup;
+  const typename N::CoefficientRounding round(scales.to);
+  const auto round_part = [&](std::size_t group) {
+    const std::size_t at = group * kGroupSize;
+    float some[kGroupSize];
+    for (std::size_t k = 0; k < kGroupSize; ++k) {
+      const std::size_t rank = (at + k) / kChannelLanes;
+      some[k] = rank >= ranks.begin && rank < ranks.end ? from[at + k] : 0;
+    }
+    round(some, to.value + at);
+  };
+  for (std::size_t g = 0; g < to.group_count; ++g) {
+    round(from + g * kGroupSize, to.value + g * kGroupSize);
+  }
+  if (ranks.begin % kRankGroup != 0) round_part(0);
+  if (ranks.end % kRankGroup != 0) round_part(to.group_count - 1);
+}
+
+/// y of kWide vectors of positions; groups of ranks are dealt out among kSplit sums, so that there
+/// are twelve of them or more.
+template <typename N, std::size_t kWide>
+[[gnu::noinline]] void expand_integer_strip(StripBasis strip,
+                                            const IntegerCoefficients& coefficient, float* y,
+                                            std::size_t y_stride) {
+  constexpr std::size_t kSums = kChannelCount * kWide;
+  constexpr std::size_t kSplit = kSums < 12 ? 12 / kSums : 1;
+  N sum[kSplit][kChannelCount][kWide];
+  unroll<kSplit>([&](auto s) REBOUNCE_INLINE {
+    unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
+      unroll<kWide>([&](auto w) REBOUNCE_INLINE { sum[s][c][w] = N::zero(); });
+    });
+  });
+  const auto add_group = [&](std::size_t g, auto s) REBOUNCE_INLINE {
+    const std::int16_t* const group = coefficient.value + g * IntegerCoefficients::kGroupSize;
+    N four[kChannelCount];
+    unroll<kChannelCount>(
+        [&](auto c) REBOUNCE_INLINE { four[c] = N::repeat_four(group + c * kRankGroup); });
+    unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+      const N b = N::load(strip.values + w * N::kWidth);
+      unroll<kChannelCount>(
+          [&](auto c) REBOUNCE_INLINE { sum[s][c][w] = add_products(sum[s][c][w], b, four[c]); });
+    });
+    strip.values += strip.group_step;
+  };
+  std::size_t g = 0;
+  for (; g + kSplit <= coefficient.group_count; g += kSplit) {
+    unroll<kSplit>([&](auto s) REBOUNCE_INLINE { add_group(g + s, s); });
+  }
+  for (; g < coefficient.group_count; ++g) {
+    add_group(g, std::integral_constant<std::size_t, 0>{});
+  }
+  unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
+    unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+      unroll<kSplit - 1>(
+          [&](auto s) REBOUNCE_INLINE { sum[0][c][w] = add(sum[0][c][w], sum[s + 1][c][w]); });
+    });
+    N::template add_positions<kWide>(sum[0][c], coefficient.back[c], y + c * y_stride);
+  });
+}
+
+template <typename N>
+void expand_integers(const ClusterBasis<std::int16_t>& basis, Range ranks, Range positions,
+                     Coefficients<const float> coefficient, PlanarVectors<float> y) {
+  IntegerCoefficients rounded;
+  for (std::size_t v = 0; v < y.count; v += kChannelCount) {
+    const float* const from = coefficient.data + v / kChannelCount * coefficient.stride;
+    float* const to = y.data + v * y.stride;
+    for (std::size_t r = ranks.begin / kRankGroup * kRankGroup; r < ranks.end; r += kChunk) {
+      const Range in_chunk{std::max(ranks.begin, r) - r, std::min(ranks.end - r, kChunk)};
+      round_coefficients<N>(from + r * kChannelLanes, in_chunk, rounded);
+      for (std::size_t k = positions.begin; k < positions.end;) {
+        const std::size_t strip_end = (k / kBasisStrip + 1) * kBasisStrip;
+        const std::size_t end = std::min(positions.end, strip_end);
+        const auto add_strips = [&]<std::size_t kSize>() {
+          for (; k + kSize <= end; k += kSize) {
+            expand_integer_strip<N, kSize * kRankGroup / N::kWidth>(
+                strip_at(basis, k, r / kRankGroup), rounded, to + k, y.stride);
+          }
+        };
+        if constexpr (N::kStrip >= 64) add_strips.template operator()<64>();
+        if constexpr (N::kStrip >= 48) add_strips.template operator()<48>();
+        if constexpr (N::kStrip >= 32) add_strips.template operator()<32>();
+        add_strips.template operator()<std::min<std::size_t>(N::kStrip, 16)>();
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rebounce
