@@ -29,33 +29,30 @@ struct Coefficients {
   std::size_t stride;
 };
 
-/// Some of the ranks or of the positions of a cluster.
-struct Range {
-  std::size_t begin, end;
-};
-
-/// The bases over a cluster, [rank][size]; those of std::int16_t in the order of
-/// integer_kernels_impl.h. The size is a multiple of HierarchicalOperator::kAlignment.
-template <typename Value>
-struct ClusterBasis {
-  const Value* values;
-  std::size_t rank, size;
+/// Ranks and positions of the bases over a cluster, [rank][size]; those of std::int16_t in the
+/// order of integer_kernels_impl.h. Sizes and positions are multiples of
+/// HierarchicalOperator::kAlignment.
+struct BasisPart {
+  std::uint64_t values;                   ///< where the bases of the cluster begin
+  std::uint32_t rank, size;               ///< of the cluster
+  std::uint32_t coefficient, position;    ///< its first ones
+  std::uint32_t first_rank, last_rank;    ///< [first, last) of them
+  std::uint32_t first_place, last_place;  ///< positions in the cluster, likewise
 };
 
 /// Products with the bases of the hierarchical operator, for one instruction set. Integers stand
-/// for themselves: their scale is elsewhere. Light and coefficients begin with those of the
-/// cluster.
+/// for themselves: their scale is elsewhere.
 template <typename Value>
 struct BasisKernels {
-  /// coefficient[r] = sum over k of basis[r][k] x[k] for the lights of x and the given ranks. Of
-  /// std::int16_t, ranks begin with a multiple of HierarchicalOperator::kRankGroup, and
-  /// coefficients are written up to the next one.
-  void (*project)(const ClusterBasis<Value>& basis, Range ranks, PlanarVectors<const float> x,
-                  Coefficients<float> coefficient);
+  /// coefficient[r] = sum over k of basis[r][k] x[k] for the lights of x and the ranks of each
+  /// part, over all positions of its cluster. Of std::int16_t, ranks begin with a multiple of
+  /// HierarchicalOperator::kRankGroup, and coefficients are written up to the next one.
+  void (*project)(const Value* values, std::span<const BasisPart> parts,
+                  PlanarVectors<const float> x, Coefficients<float> coefficient);
 
-  /// y[k] += sum over r of basis[r][k] coefficient[r] for the lights of y, the given ranks and the
-  /// given positions, which begin and end with multiples of HierarchicalOperator::kAlignment.
-  void (*expand)(const ClusterBasis<Value>& basis, Range ranks, Range positions,
+  /// y[k] += sum over r of basis[r][k] coefficient[r] for the lights of y, the ranks and the
+  /// positions of one part after the other.
+  void (*expand)(const Value* values, std::span<const BasisPart> parts,
                  Coefficients<const float> coefficient, PlanarVectors<float> y);
 };
 

@@ -96,17 +96,22 @@ REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, c
 }
 
 template <typename V, typename Value>
-void project(const ClusterBasis<Value>& basis, Range ranks, PlanarVectors<const float> x,
+void project(const Value* values, std::span<const BasisPart> parts, PlanarVectors<const float> x,
              Coefficients<float> coefficient) {
-  const Value* const values = basis.values + ranks.begin * basis.size;
-  float* const to = coefficient.data + ranks.begin * kChannelLanes;
-  for_each_four(ranks.end - ranks.begin, [&]<std::size_t kRows>(std::size_t r) REBOUNCE_INLINE {
-    for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
-      project_rows<V, kRows, kVectors>(
-          values + r * basis.size, basis.size, x.data + v * x.stride, x.stride,
-          to + lane_of(v, coefficient.stride) + r * kChannelLanes, coefficient.stride);
-    });
-  });
+  for (const BasisPart& part : parts) {
+    const Value* const basis = values + part.values + std::size_t{part.first_rank} * part.size;
+    const float* const from = x.data + part.position;
+    float* const to =
+        coefficient.data + std::size_t{part.coefficient + part.first_rank} * kChannelLanes;
+    for_each_four(
+        part.last_rank - part.first_rank, [&]<std::size_t kRows>(std::size_t r) REBOUNCE_INLINE {
+          for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
+            project_rows<V, kRows, kVectors>(
+                basis + r * part.size, part.size, from + v * x.stride, x.stride,
+                to + lane_of(v, coefficient.stride) + r * kChannelLanes, coefficient.stride);
+          });
+        });
+  }
 }
 
 /// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve of them or
@@ -150,24 +155,27 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
 }
 
 template <typename V, typename Value>
-void expand(const ClusterBasis<Value>& basis, Range ranks, Range positions,
+void expand(const Value* values, std::span<const BasisPart> parts,
             Coefficients<const float> coefficient, PlanarVectors<float> y) {
-  const Value* const values = basis.values + ranks.begin * basis.size;
-  const float* const from = coefficient.data + ranks.begin * kChannelLanes;
-  for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
-    const float* const c = from + lane_of(v, coefficient.stride);
-    float* const yv = y.data + v * y.stride;
-    std::size_t k = positions.begin;
-    const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
-      for (; k + kSize <= positions.end; k += kSize) {
-        expand_strip<V, kSize, kVectors>(values + k, ranks.end - ranks.begin, basis.size, c,
-                                         coefficient.stride, yv + k, y.stride);
-      }
-    };
-    if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
-    if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
-    add_strips.template operator()<16>();
-  });
+  for (const BasisPart& part : parts) {
+    const Value* const basis = values + part.values + std::size_t{part.first_rank} * part.size;
+    const float* const from =
+        coefficient.data + std::size_t{part.coefficient + part.first_rank} * kChannelLanes;
+    for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
+      const float* const c = from + lane_of(v, coefficient.stride);
+      float* const yv = y.data + v * y.stride + part.position;
+      std::size_t k = part.first_place;
+      const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
+        for (; k + kSize <= part.last_place; k += kSize) {
+          expand_strip<V, kSize, kVectors>(basis + k, part.last_rank - part.first_rank, part.size,
+                                           c, coefficient.stride, yv + k, y.stride);
+        }
+      };
+      if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
+      if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
+      add_strips.template operator()<16>();
+    });
+  }
 }
 
 using Direction = CoreBlock::Direction;

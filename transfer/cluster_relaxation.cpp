@@ -193,18 +193,12 @@ class ClusterRelaxation final : public Relaxation {
     return sum;
   }
 
-  ClusterBasis<Basis> basis_of(const Plan::Bases& bases) const {
-    return {basis_values_ + bases.values, bases.rank, bases.size};
+  void project(const BasisPart& basis) {
+    bases_.project(basis_values_, {&basis, 1}, radiosity_.from(0), sent_.to(0));
   }
 
-  void project(const Plan::Bases& bases) {
-    bases_.project(basis_of(bases), {0, bases.rank}, radiosity_.from(bases.begin),
-                   sent_.to(bases.coefficient));
-  }
-
-  void expand(const Plan::Bases& bases, Planes& arrived) {
-    bases_.expand(basis_of(bases), {0, bases.rank}, {0, bases.size},
-                  arrived_.from(bases.coefficient), arrived.to(bases.begin));
+  void expand(const BasisPart& basis, Planes& arrived) {
+    bases_.expand(basis_values_, {&basis, 1}, arrived_.from(0), arrived.to(0));
   }
 
   void send_to_rows(const Plan::Product& product) {
@@ -254,11 +248,9 @@ class ClusterRelaxation final : public Relaxation {
     }
     if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
     if (block.row_rank > 0) {
-      const Plan::Bases bases{step.basis, block.row_rank, block.row_count, block.row_begin,
-                              step.coefficient};
-      project(bases);
+      project(step.basis);
       multiply(diagonal_core(step, block.row_rank, block.row_rank), CoreBlock::Direction::kToRows);
-      expand(bases, received_);
+      expand(step.basis, received_);
     }
     return relax_at_once(begin, end);
   }
@@ -358,7 +350,7 @@ std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::
     case Precision::kF32:
       return make(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
     case Precision::kQ16:
-      break;
+      break;  // refused by CompressedFormFactors
     case Precision::kQ8:
       return make(kernels.bases_q8, kernels.cores_f16, exchange.bases_q8.data(), f16);
   }

@@ -8,6 +8,8 @@
 namespace rebounce {
 namespace {
 
+constexpr std::uint64_t kStrip = HierarchicalOperator::kStrip;
+
 // More values than any memory holds: sums of block sizes stay far from the end of 64 bits.
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 48;
 
@@ -53,11 +55,8 @@ bool has_values(const TransferBlock& block) {
 
 HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
                                        std::uint32_t matrix_count, Precision precision)
-    : places(blocks.size()), rank_group(1), strip(kNone) {
-  if (precision == Precision::kQ16) {
-    rank_group = HierarchicalOperator::kRankGroup;
-    strip = HierarchicalOperator::kStrip;
-  }
+    : places(blocks.size()),
+      rank_group(precision == Precision::kQ16 ? HierarchicalOperator::kRankGroup : 1) {
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
     total += block.value_count(matrix_count);
@@ -78,10 +77,12 @@ std::uint64_t HierarchicalLayout::basis_index(const End& end, std::uint64_t rank
                                               std::uint64_t position) const {
   const Cluster& cluster = clusters[end.cluster];
   const std::uint64_t r = end.coefficient - cluster.coefficient + rank;
-  const std::uint64_t begin = position / strip * strip;
-  const std::uint64_t width = std::min<std::uint64_t>(strip, cluster.size - begin);
+  if (rank_group == 1) return cluster.values + r * cluster.size + position;
+  const std::uint64_t begin = position / kStrip * kStrip;
+  const std::uint64_t width = std::min(kStrip, cluster.size - begin);
+  const std::uint64_t pair = (position - begin) / 2;
   return cluster.values + begin * filled_rank(cluster) +
-         (r / rank_group * width + position - begin) * rank_group + r % rank_group;
+         (r / rank_group * width + 2 * pair) * rank_group + r % rank_group * 2 + position % 2;
 }
 
 void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {

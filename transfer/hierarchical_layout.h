@@ -12,8 +12,8 @@ namespace rebounce {
 /// Coefficients are numbered like the rows of the bases: those of a cluster one after the other, up
 /// to a multiple of `rank_group`. Those of dense blocks, whose bases are the identity, follow.
 struct HierarchicalLayout {
-  /// All bases over one cluster of positions: [strip][rank / rank_group][position][rank_group] with
-  /// `strip` positions or what is left of the cluster, the last ranks filled up with zeros.
+  /// All bases over one cluster of positions: [rank][size], or in 16 bits in strips and groups of
+  /// ranks, the last of which is filled up with zeros (HierarchicalOperator::Order).
   struct Cluster {
     std::uint32_t begin = 0, size = 0;  ///< positions
     std::uint32_t rank = 0;
@@ -48,7 +48,7 @@ struct HierarchicalLayout {
   std::uint64_t basis_value_count = 0;
   std::uint64_t core_value_count = 0;  ///< cores and dense entries
   std::uint32_t coefficient_count = 0;
-  std::uint32_t rank_group, strip;
+  std::uint32_t rank_group;  ///< ranks that are kept together: 1, or in 16 bits kRankGroup
 
   /// `value_count` values with the zeros that follow them.
   static std::uint64_t padded(std::uint64_t value_count);

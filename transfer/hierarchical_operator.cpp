@@ -55,22 +55,18 @@ struct WorkVectors {
   }
 };
 
+PlanarVectors<const float> constant(const PlanarVectors<float>& vectors) {
+  return {vectors.data, vectors.stride, vectors.count};
+}
+
+Coefficients<const float> constant(const Coefficients<float>& coefficients) {
+  return {coefficients.data, coefficients.stride};
+}
+
+/// Entries [first, last).
 template <typename T>
-PlanarVectors<const float> from(const PlanarVectors<T>& vectors, std::size_t begin) {
-  return {vectors.data + begin, vectors.stride, vectors.count};
-}
-
-PlanarVectors<float> to(const PlanarVectors<float>& vectors, std::size_t begin) {
-  return {vectors.data + begin, vectors.stride, vectors.count};
-}
-
-template <typename T>
-Coefficients<const float> from(const Coefficients<T>& coefficients, std::size_t begin) {
-  return {coefficients.data + begin * kChannelLanes, coefficients.stride};
-}
-
-Coefficients<float> to(const Coefficients<float>& coefficients, std::size_t begin) {
-  return {coefficients.data + begin * kChannelLanes, coefficients.stride};
+std::span<const T> between(const std::vector<T>& all, std::uint32_t first, std::uint32_t last) {
+  return std::span(all).subspan(first, last - first);
 }
 
 /// The phases of an apply.
@@ -88,49 +84,39 @@ class Phases {
         product_scale_(product_scale),
         work_(work) {}
 
-  void project(const HierarchicalPlan::Projection& p) const {
-    const HierarchicalLayout::Cluster& cluster = p.cluster;
-    if (cluster.rank == 0) return take_light(cluster);
-    bases_.project({basis_ + cluster.values, cluster.rank, cluster.size},
-                   {p.first_rank, p.last_rank}, from(work_.x, cluster.begin),
-                   to(work_.sent, cluster.coefficient));
+  void project(std::span<const BasisPart> parts) const {
+    bases_.project(basis_, parts, constant(work_.x), work_.sent);
+  }
+
+  void take_light(const HierarchicalPlan::DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.x.count; ++v) {
+      const float* const x = work_.x.data + v * work_.x.stride + end.position;
+      float* const lane = lane_of(work_.sent, v, end.coefficient);
+      for (std::size_t k = 0; k < end.count; ++k) lane[k * kChannelLanes] = x[k];
+    }
   }
 
   void multiply(std::span<const CoreBlock> cores) const {
-    multiply_cores_(value_, cores, lanes_, work_.light_count, from(work_.sent, 0), work_.arrived);
+    multiply_cores_(value_, cores, lanes_, work_.light_count, constant(work_.sent), work_.arrived);
   }
 
-  void expand(const HierarchicalPlan::Expansion& e) const {
-    const HierarchicalLayout::Cluster& cluster = e.cluster;
-    const Range positions{e.begin - cluster.begin, e.end - cluster.begin};
-    if (cluster.rank == 0) return add_light(cluster, positions);
-    bases_.expand({basis_ + cluster.values, cluster.rank, cluster.size},
-                  {e.first_rank, e.last_rank}, positions, from(work_.arrived, cluster.coefficient),
-                  to(work_.y, cluster.begin));
+  void expand(std::span<const BasisPart> parts) const {
+    bases_.expand(basis_, parts, constant(work_.arrived), work_.y);
+  }
+
+  void add_light(const HierarchicalPlan::DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.y.count; ++v) {
+      const float* const lane = lane_of(work_.arrived, v, end.coefficient);
+      float* const y = work_.y.data + v * work_.y.stride + end.position;
+      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale_ * lane[k * kChannelLanes];
+    }
   }
 
  private:
-  void take_light(const HierarchicalLayout::Cluster& cluster) const {
-    const PlanarVectors<const float> x = from(work_.x, cluster.begin);
-    const Coefficients<float> sent = to(work_.sent, cluster.coefficient);
-    for (std::size_t v = 0; v < x.count; ++v) {
-      float* const lane = sent.data + v / kChannelCount * sent.stride + v % kChannelCount;
-      for (std::size_t k = 0; k < cluster.size; ++k) {
-        lane[k * kChannelLanes] = x.data[v * x.stride + k];
-      }
-    }
-  }
-
-  void add_light(const HierarchicalLayout::Cluster& cluster, Range positions) const {
-    const PlanarVectors<float> y = to(work_.y, cluster.begin);
-    const Coefficients<const float> arrived = from(work_.arrived, cluster.coefficient);
-    for (std::size_t v = 0; v < y.count; ++v) {
-      const float* const lane =
-          arrived.data + v / kChannelCount * arrived.stride + v % kChannelCount;
-      for (std::size_t k = positions.begin; k < positions.end; ++k) {
-        y.data[v * y.stride + k] += product_scale_ * lane[k * kChannelLanes];
-      }
-    }
+  /// The coefficients of a channel of a light, kChannelLanes floats from one to the next.
+  static float* lane_of(const Coefficients<float>& coefficients, std::size_t v, std::size_t first) {
+    return coefficients.data + v / kChannelCount * coefficients.stride + first * kChannelLanes +
+           v % kChannelCount;
   }
 
   const BasisKernels<Basis>& bases_;
@@ -194,23 +180,24 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
     for (std::size_t k = 0; k < work.x.stride; k += kGathered) {
       exchange.gather(initial_exitance, k, std::min(k + kGathered, work.x.stride));
     }
+#pragma omp for schedule(dynamic, 1) nowait
+    for (std::size_t k = 0; k < plan.dense_in.size(); ++k) phases.take_light(plan.dense_in[k]);
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.projection_parts.size() - 1; ++part) {
-      for (std::uint32_t k = plan.projection_parts[part]; k < plan.projection_parts[part + 1];
-           ++k) {
-        phases.project(plan.projections[k]);
-      }
+      phases.project(
+          between(plan.projections, plan.projection_parts[part], plan.projection_parts[part + 1]));
     }
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.core_parts.size() - 1; ++part) {
-      const std::uint32_t first = plan.core_parts[part], last = plan.core_parts[part + 1];
-      phases.multiply(std::span(plan.cores).subspan(first, last - first));
+      phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]));
     }
 #pragma omp for schedule(dynamic, 1)
     for (const HierarchicalPlan::Arrival& arrival : plan.arrivals) {
       clear(work.y, arrival.begin, arrival.end);
-      for (std::uint32_t k = arrival.first_expansion; k < arrival.last_expansion; ++k) {
-        phases.expand(plan.expansions[k]);
+      phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
+      for (const HierarchicalPlan::DenseEnd& end :
+           between(plan.dense_out, arrival.first_dense, arrival.last_dense)) {
+        phases.add_light(end);
       }
       const std::span targets(plan.targets);
       exchange.scatter(targets.subspan(arrival.first_target, arrival.target_count()),

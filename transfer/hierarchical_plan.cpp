@@ -77,9 +77,8 @@ class Planner {
     for (const Layout::Cluster& cluster : layout_.clusters) add_projections(cluster);
     add_arrivals();
     count_bases();
-    using Projection = Plan::Projection;
-    plan_.projection_parts = share_out(plan_.projections, [](const Projection& p) {
-      return std::max<std::uint64_t>(p.last_rank - p.first_rank, 1) * p.cluster.size;
+    plan_.projection_parts = share_out(plan_.projections, [](const BasisPart& part) {
+      return std::uint64_t{part.last_rank - part.first_rank} * part.size;
     });
     plan_.core_parts = share_out(
         plan_.cores, [](const CoreBlock& core) { return std::uint64_t{core.rows} * core.columns; });
@@ -113,19 +112,11 @@ class Planner {
     }
   }
 
-  /// One end of a core: its first position, its coefficients, the first of them.
-  struct CoreEnd {
-    std::uint32_t begin, count, coefficient;
-  };
-
-  static Layout::Cluster without_ranks(const CoreEnd& end) {
-    return {.begin = end.begin, .size = end.count, .rank = 0, .coefficient = end.coefficient};
-  }
-
-  void add_way(bool dense, const CoreEnd& from, const CoreEnd& to) {
+  /// What goes into a core and comes out of it; of low rank, whatever the positions.
+  void add_way(bool dense, const Plan::DenseEnd& from, const Plan::DenseEnd& to) {
     if (dense) {
-      plan_.projections.push_back({without_ranks(from), 0, 0});
-      dense_.push_back(without_ranks(to));
+      plan_.dense_in.push_back(from);
+      dense_out_.push_back(to);
     } else {
       mark(in_, from.coefficient, from.count);
       mark(out_, to.coefficient, to.count);
@@ -161,9 +152,23 @@ class Planner {
     }
   }
 
+  static BasisPart part_of(const Layout::Cluster& cluster, std::uint32_t first_rank,
+                           std::uint32_t last_rank, std::uint32_t first_place,
+                           std::uint32_t last_place) {
+    return {.values = cluster.values,
+            .rank = cluster.rank,
+            .size = cluster.size,
+            .coefficient = cluster.coefficient,
+            .position = cluster.begin,
+            .first_rank = first_rank,
+            .last_rank = last_rank,
+            .first_place = first_place,
+            .last_place = last_place};
+  }
+
   void add_projections(const Layout::Cluster& cluster) {
     visit_marked(in_, cluster, [&](std::uint32_t first, std::uint32_t last) {
-      plan_.projections.push_back({cluster, first, last});
+      plan_.projections.push_back(part_of(cluster, first, last, 0, cluster.size));
     });
   }
 
@@ -194,6 +199,9 @@ class Planner {
       arrival.first_expansion = static_cast<std::uint32_t>(plan_.expansions.size());
       add_expansions(arrival.begin, arrival.end);
       arrival.last_expansion = static_cast<std::uint32_t>(plan_.expansions.size());
+      arrival.first_dense = static_cast<std::uint32_t>(plan_.dense_out.size());
+      add_dense_ends(arrival.begin, arrival.end);
+      arrival.last_dense = static_cast<std::uint32_t>(plan_.dense_out.size());
       arrival.first_target = target;
       while (target < plan_.targets.size() && plan_.targets[target] < arrival.end) ++target;
       arrival.last_target = target;
@@ -208,14 +216,20 @@ class Planner {
       if (from >= to) continue;
       visit_marked(out_, cluster, [&](std::uint32_t first, std::uint32_t last) {
         wanted_.visit_intervals(from, to, [&](std::uint32_t at, std::uint32_t stop) {
-          plan_.expansions.push_back({cluster, first, last, at, stop});
+          plan_.expansions.push_back(
+              part_of(cluster, first, last, at - cluster.begin, stop - cluster.begin));
         });
       });
     }
-    for (const Layout::Cluster& end_of_block : dense_) {
-      const std::uint32_t from = std::max(begin, end_of_block.begin);
-      const std::uint32_t to = std::min(end, end_of_block.begin + end_of_block.size);
-      if (from < to) plan_.expansions.push_back({end_of_block, 0, 0, from, to});
+  }
+
+  void add_dense_ends(std::uint32_t begin, std::uint32_t end) {
+    for (const Plan::DenseEnd& whole : dense_out_) {
+      const std::uint32_t from = std::max(begin, whole.position);
+      const std::uint32_t to = std::min(end, whole.position + whole.count);
+      if (from < to) {
+        plan_.dense_out.push_back({from, to - from, whole.coefficient + from - whole.position});
+      }
     }
   }
 
@@ -233,8 +247,8 @@ class Planner {
   Plan& plan_;
   std::size_t positions_;
   WantedRuns wanted_;
-  std::vector<bool> in_, out_;          ///< which coefficients are needed, before and after cores
-  std::vector<Layout::Cluster> dense_;  ///< where light comes out of dense blocks
+  std::vector<bool> in_, out_;  ///< which coefficients are needed, before and after cores
+  std::vector<Plan::DenseEnd> dense_out_;  ///< whole
 };
 
 }  // namespace

@@ -15,24 +15,16 @@ namespace rebounce {
 /// own, whatever thread works on them: no sum depends on the number of threads.
 class HierarchicalPlan {
  public:
-  /// Ranks [first, last) of a cluster, and the light that goes through them. A cluster without
-  /// ranks is one end of a dense block: its light goes in as it is.
-  struct Projection {
-    HierarchicalLayout::Cluster cluster;
-    std::uint32_t first_rank, last_rank;
-  };
-
-  /// Positions [begin, end) and ranks [first, last) of a cluster. A cluster without ranks is one
-  /// end of a dense block: its light is what came out.
-  struct Expansion {
-    HierarchicalLayout::Cluster cluster;
-    std::uint32_t first_rank, last_rank, begin, end;
+  /// Positions at an end of a dense block, whose bases are the identity.
+  struct DenseEnd {
+    std::uint32_t position, count, coefficient;
   };
 
   /// Positions that one thread works out from the first addition to the last.
   struct Arrival {
     std::uint32_t begin, end;  ///< positions, multiples of kAlignment
     std::uint32_t first_expansion, last_expansion;
+    std::uint32_t first_dense, last_dense;
     std::uint32_t first_target, last_target;
 
     std::uint32_t target_count() const { return last_target - first_target; }
@@ -42,9 +34,10 @@ class HierarchicalPlan {
   HierarchicalPlan(const HierarchicalOperator::Storage& storage, const HierarchicalLayout& layout,
                    std::vector<std::uint32_t> targets);
 
-  std::vector<Projection> projections;
+  std::vector<BasisPart> projections;
   std::vector<CoreBlock> cores;
-  std::vector<Expansion> expansions;
+  std::vector<BasisPart> expansions;
+  std::vector<DenseEnd> dense_in, dense_out;  ///< those out cut at the arrivals
   std::vector<std::uint32_t> targets;
   std::vector<Arrival> arrivals;
   /// [first, last) of the parts of about equal work that threads take in turn.

@@ -10,17 +10,18 @@
 // so are the coefficients on the way back. A magnitude of 4,095 at both ends leaves room for chunks
 // of 128: 128 x 4095 x 4095 < 2^31.
 //
-// A basis is [strip of 64 positions][rank / 4][position][4 ranks]: both ways read it from the first
-// value to the last. Coefficients are sums over positions, for which pairs must be neighbouring
-// positions: a shuffle within 128 bits makes (2 positions)(4 ranks) into (4 ranks)(2 positions).
-// Light is a sum over ranks, and its pairs are neighbours as they are. Neither way is left with
-// sums over all the lanes of a vector, which cost as much as the products where clusters are small.
+// A basis is [strip of 64 positions][rank / 4][position / 2][4 ranks][2 positions]: both ways read
+// it from the first value to the last. Coefficients are sums over positions, and their pairs are
+// neighbours as they are. Light is a sum over ranks: a shuffle within 128 bits makes (4 ranks)(2
+// positions) into (2 positions)(4 ranks). Neither way is left with sums over all the lanes of a
+// vector, which cost as much as the products where clusters are small.
 //
 // Integer sums do not depend on their order, and floats are converted, scaled and added in the same
 // one everywhere: all instruction sets give the same bits.
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -41,17 +42,19 @@ constexpr std::size_t kChunk = 128;
 /// A number for each channel; the last is not used.
 using ChannelFloats = std::array<float, kChannelLanes>;
 
-/// What light of these magnitudes at most is multiplied by to become integers, and what brings them
-/// back.
+/// Powers of two by which light of these magnitudes at most becomes integers below 4,096, and which
+/// bring it back.
 struct IntegerScales {
   ChannelFloats to, back;
 
   explicit IntegerScales(const ChannelFloats& largest) {
-    constexpr float kLargest = HierarchicalOperator::kLargestShort, kDark = 1e-30F;
+    constexpr std::uint32_t kExponent = 0x7F800000, kOne = 127U << 23, kElevenBits = 11U << 23;
+    constexpr std::uint32_t kDark = kOne - (100U << 23);  // anything below 2^-100 is as dark
     for (std::size_t c = 0; c < kChannelLanes; ++c) {
-      const float most = std::max(largest[c], kDark);
-      to[c] = kLargest / most;
-      back[c] = most / kLargest;
+      const std::uint32_t bits = std::bit_cast<std::uint32_t>(largest[c]) & kExponent;
+      const std::uint32_t power = std::max(bits, kDark);
+      to[c] = std::bit_cast<float>(2 * kOne + kElevenBits - power);
+      back[c] = std::bit_cast<float>(power - kElevenBits);
     }
   }
 };
@@ -74,20 +77,20 @@ REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std:
   }
 }
 
-/// Part of a basis within a strip: kRankGroup values of a position, those of the next position,
-/// the next group after `group_step`.
+/// Part of a basis within a strip: the values of a group of ranks, those of the next one
+/// `group_step` later.
 struct StripBasis {
   const std::int16_t* values;
   std::size_t group_step;
 };
 
 /// From a position of a cluster on, all groups of ranks from `group` on.
-inline StripBasis strip_at(const ClusterBasis<std::int16_t>& basis, std::size_t position,
+inline StripBasis strip_at(const std::int16_t* values, const BasisPart& part, std::size_t position,
                            std::size_t group) {
-  const std::size_t groups = (basis.rank + kRankGroup - 1) / kRankGroup;
+  const std::size_t groups = (part.rank + kRankGroup - 1) / kRankGroup;
   const std::size_t begin = position / kBasisStrip * kBasisStrip;
-  const std::size_t width = std::min(kBasisStrip, basis.size - begin);
-  return {basis.values + (begin * groups + group * width + position - begin) * kRankGroup,
+  const std::size_t width = std::min(kBasisStrip, part.size - begin);
+  return {values + part.values + (begin * groups + group * width + position - begin) * kRankGroup,
           width * kRankGroup};
 }
 
@@ -106,9 +109,8 @@ template <typename N, std::size_t kGroups>
   const auto add_strip = [&](StripBasis strip, std::size_t begin, std::size_t end) REBOUNCE_INLINE {
     for (std::size_t k = begin; k < end; k += N::kWidth, strip.values += N::kWidth) {
       N b[kGroups];
-      unroll<kGroups>([&](auto g) REBOUNCE_INLINE {
-        b[g] = N::load(strip.values + g * strip.group_step).pairs_of_positions();
-      });
+      unroll<kGroups>([&](auto g)
+                          REBOUNCE_INLINE { b[g] = N::load(strip.values + g * strip.group_step); });
       unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
         const N l = N::load(light.value[c] + k);
         unroll<kGroups>([&](auto g)
@@ -121,28 +123,51 @@ template <typename N, std::size_t kGroups>
   N::template store_coefficients<kGroups>(sum[0], sum[1], sum[2], light.back, add_to, coefficient);
 }
 
+/// Positions of a cluster whose light is rounded together.
+struct LightChunk {
+  std::size_t begin, count;
+};
+
 template <typename N>
-void project_integers(const ClusterBasis<std::int16_t>& basis, Range ranks,
+REBOUNCE_INLINE inline void project_chunk(const std::int16_t* values, const BasisPart& part,
+                                          const LightChunk& chunk, const IntegerLight& light,
+                                          float* coefficient) {
+  const std::size_t first_group = part.first_rank / kRankGroup;
+  const std::size_t groups = (part.last_rank + kRankGroup - 1) / kRankGroup - first_group;
+  StripBasis first = strip_at(values, part, chunk.begin, first_group), second{};
+  if (chunk.count > kBasisStrip) {
+    second = strip_at(values, part, chunk.begin + kBasisStrip, first_group);
+  }
+  float* const to = coefficient + (part.coefficient + first_group * kRankGroup) * kChannelLanes;
+  for_each_four(groups, [&]<std::size_t kGroups>(std::size_t g) {
+    project_groups<N, kGroups>(first, second, chunk.count, light, chunk.begin > 0,
+                               to + g * kRankGroup * kChannelLanes);
+    first.values += kGroups * first.group_step;
+    second.values += kGroups * second.group_step;
+  });
+}
+
+template <typename N>
+void project_integers(const std::int16_t* values, std::span<const BasisPart> parts,
                       PlanarVectors<const float> x, Coefficients<float> coefficient) {
   IntegerLight light;
-  const std::size_t first_group = ranks.begin / kRankGroup;
-  const std::size_t groups = (ranks.end + kRankGroup - 1) / kRankGroup - first_group;
-  for (std::size_t v = 0; v < x.count; v += kChannelCount) {
-    float* const to = coefficient.data + v / kChannelCount * coefficient.stride;
-    for (std::size_t k = 0; k < basis.size; k += kChunk) {
-      const std::size_t count = std::min(basis.size - k, kChunk);
-      round_light<N>(x.data + v * x.stride + k, x.stride, count, light);
-      for_each_four(groups, [&]<std::size_t kGroups>(std::size_t g) {
-        const std::size_t group = first_group + g;
-        const StripBasis first = strip_at(basis, k, group);
-        const StripBasis second =
-            count > kBasisStrip ? strip_at(basis, k + kBasisStrip, group) : StripBasis{};
-        project_groups<N, kGroups>(first, second, count, light, k > 0,
-                                   to + group * kRankGroup * kChannelLanes);
-      });
+  for (const BasisPart& part : parts) {
+    for (std::size_t v = 0; v < x.count; v += kChannelCount) {
+      const float* const from = x.data + v * x.stride + part.position;
+      float* const to = coefficient.data + v / kChannelCount * coefficient.stride;
+      for (std::size_t k = 0; k < part.size; k += kChunk) {
+        const LightChunk chunk{k, std::min(part.size - k, kChunk)};
+        round_light<N>(from + k, x.stride, chunk.count, light);
+        project_chunk<N>(values, part, chunk, light, to);
+      }
     }
   }
 }
+
+/// Ranks within a chunk.
+struct RankRange {
+  std::size_t begin, end;
+};
 
 /// The coefficients of a chunk of ranks: of each group (channel)(rank).
 struct IntegerCoefficients {
@@ -154,7 +179,7 @@ struct IntegerCoefficients {
 
 /// Of the ranks within a chunk; those of its groups that are not among them are zero.
 template <typename N>
-REBOUNCE_INLINE inline void round_coefficients(const float* from, Range ranks,
+REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange ranks,
                                                IntegerCoefficients& to) {
   constexpr std::size_t kGroupSize = IntegerCoefficients::kGroupSize;
   const IntegerScales scales(N::largest_of_lanes(from + ranks.begin * kChannelLanes,
@@ -179,13 +204,13 @@ REBOUNCE_INLINE inline void round_coefficients(const float* from, Range ranks,
 }
 
 /// y of kWide vectors of positions; groups of ranks are dealt out among kSplit sums, so that there
-/// are twelve of them or more.
+/// are N::kLeastSums of them or more.
 template <typename N, std::size_t kWide>
 [[gnu::noinline]] void expand_integer_strip(StripBasis strip,
                                             const IntegerCoefficients& coefficient, float* y,
                                             std::size_t y_stride) {
   constexpr std::size_t kSums = kChannelCount * kWide;
-  constexpr std::size_t kSplit = kSums < 12 ? 12 / kSums : 1;
+  constexpr std::size_t kSplit = std::max<std::size_t>(N::kLeastSums / kSums, 1);
   N sum[kSplit][kChannelCount][kWide];
   unroll<kSplit>([&](auto s) REBOUNCE_INLINE {
     unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
@@ -198,7 +223,7 @@ template <typename N, std::size_t kWide>
     unroll<kChannelCount>(
         [&](auto c) REBOUNCE_INLINE { four[c] = N::repeat_four(group + c * kRankGroup); });
     unroll<kWide>([&](auto w) REBOUNCE_INLINE {
-      const N b = N::load(strip.values + w * N::kWidth);
+      const N b = N::load(strip.values + w * N::kWidth).by_position();
       unroll<kChannelCount>(
           [&](auto c) REBOUNCE_INLINE { sum[s][c][w] = add_products(sum[s][c][w], b, four[c]); });
     });
@@ -220,29 +245,43 @@ template <typename N, std::size_t kWide>
   });
 }
 
+/// The chunk of ranks from `first_rank` on.
 template <typename N>
-void expand_integers(const ClusterBasis<std::int16_t>& basis, Range ranks, Range positions,
+REBOUNCE_INLINE inline void expand_chunk(const std::int16_t* values, const BasisPart& part,
+                                         std::size_t first_rank,
+                                         const IntegerCoefficients& coefficient, float* y,
+                                         std::size_t y_stride) {
+  float* const to = y + part.position;
+  for (std::size_t k = part.first_place; k < part.last_place;) {
+    const std::size_t strip_end = (k / kBasisStrip + 1) * kBasisStrip;
+    const std::size_t end = std::min<std::size_t>(part.last_place, strip_end);
+    const auto add_strips = [&]<std::size_t kSize>() {
+      for (; k + kSize <= end; k += kSize) {
+        expand_integer_strip<N, kSize * kRankGroup / N::kWidth>(
+            strip_at(values, part, k, first_rank / kRankGroup), coefficient, to + k, y_stride);
+      }
+    };
+    if constexpr (N::kStrip >= 64) add_strips.template operator()<64>();
+    if constexpr (N::kStrip >= 48) add_strips.template operator()<48>();
+    if constexpr (N::kStrip >= 32) add_strips.template operator()<32>();
+    add_strips.template operator()<std::min<std::size_t>(N::kStrip, 16)>();
+  }
+}
+
+template <typename N>
+void expand_integers(const std::int16_t* values, std::span<const BasisPart> parts,
                      Coefficients<const float> coefficient, PlanarVectors<float> y) {
   IntegerCoefficients rounded;
-  for (std::size_t v = 0; v < y.count; v += kChannelCount) {
-    const float* const from = coefficient.data + v / kChannelCount * coefficient.stride;
-    float* const to = y.data + v * y.stride;
-    for (std::size_t r = ranks.begin / kRankGroup * kRankGroup; r < ranks.end; r += kChunk) {
-      const Range in_chunk{std::max(ranks.begin, r) - r, std::min(ranks.end - r, kChunk)};
-      round_coefficients<N>(from + r * kChannelLanes, in_chunk, rounded);
-      for (std::size_t k = positions.begin; k < positions.end;) {
-        const std::size_t strip_end = (k / kBasisStrip + 1) * kBasisStrip;
-        const std::size_t end = std::min(positions.end, strip_end);
-        const auto add_strips = [&]<std::size_t kSize>() {
-          for (; k + kSize <= end; k += kSize) {
-            expand_integer_strip<N, kSize * kRankGroup / N::kWidth>(
-                strip_at(basis, k, r / kRankGroup), rounded, to + k, y.stride);
-          }
-        };
-        if constexpr (N::kStrip >= 64) add_strips.template operator()<64>();
-        if constexpr (N::kStrip >= 48) add_strips.template operator()<48>();
-        if constexpr (N::kStrip >= 32) add_strips.template operator()<32>();
-        add_strips.template operator()<std::min<std::size_t>(N::kStrip, 16)>();
+  for (const BasisPart& part : parts) {
+    for (std::size_t v = 0; v < y.count; v += kChannelCount) {
+      const float* const from = coefficient.data + v / kChannelCount * coefficient.stride +
+                                std::size_t{part.coefficient} * kChannelLanes;
+      const std::size_t first_group = part.first_rank / kRankGroup;
+      for (std::size_t r = first_group * kRankGroup; r < part.last_rank; r += kChunk) {
+        const RankRange ranks{std::max<std::size_t>(part.first_rank, r) - r,
+                              std::min(part.last_rank - r, kChunk)};
+        round_coefficients<N>(from + r * kChannelLanes, ranks, rounded);
+        expand_chunk<N>(values, part, r, rounded, y.data + v * y.stride, y.stride);
       }
     }
   }

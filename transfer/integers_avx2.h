@@ -15,7 +15,8 @@ namespace {
 
 struct Shorts16 {
   static constexpr std::size_t kWidth = 16;
-  static constexpr std::size_t kStrip = 16;
+  static constexpr std::size_t kStrip = 8;
+  static constexpr std::size_t kLeastSums = 1;  ///< an addition is one cycle
   __m256i v;
 
   static Shorts16 zero() { return {_mm256_setzero_si256()}; }
@@ -25,9 +26,10 @@ struct Shorts16 {
   static Shorts16 repeat_four(const std::int16_t* p) {
     return {_mm256_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))};
   }
-  Shorts16 pairs_of_positions() const {
+  /// (4 ranks)(2 positions) as (2 positions)(4 ranks).
+  Shorts16 by_position() const {
     const __m256i order = _mm256_broadcastsi128_si256(
-        _mm_setr_epi8(0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15));
+        _mm_setr_epi8(0, 1, 4, 5, 8, 9, 12, 13, 2, 3, 6, 7, 10, 11, 14, 15));
     return {_mm256_shuffle_epi8(v, order)};
   }
   friend Shorts16 add_products(Shorts16 sum, Shorts16 a, Shorts16 b) {

@@ -16,6 +16,7 @@ namespace {
 struct Shorts32 {
   static constexpr std::size_t kWidth = 32;
   static constexpr std::size_t kStrip = 64;
+  static constexpr std::size_t kLeastSums = 12;  ///< a product is four cycles in its sum
   __m512i v;
 
   static Shorts32 zero() { return {_mm512_setzero_si512()}; }
@@ -23,9 +24,10 @@ struct Shorts32 {
   static Shorts32 repeat_four(const std::int16_t* p) {
     return {_mm512_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))};
   }
-  Shorts32 pairs_of_positions() const {
+  /// (4 ranks)(2 positions) as (2 positions)(4 ranks).
+  Shorts32 by_position() const {
     const __m512i order =
-        _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15));
+        _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 4, 5, 8, 9, 12, 13, 2, 3, 6, 7, 10, 11, 14, 15));
     return {_mm512_shuffle_epi8(v, order)};
   }
   friend Shorts32 add_products(Shorts32 sum, Shorts32 a, Shorts32 b) {

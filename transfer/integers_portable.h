@@ -23,7 +23,8 @@ struct Shorts8 {
   using Shorts = std::int16_t __attribute__((vector_size(16)));
   using Sums = std::int32_t __attribute__((vector_size(16)));
   static constexpr std::size_t kWidth = 8;
-  static constexpr std::size_t kStrip = 8;
+  static constexpr std::size_t kStrip = 4;
+  static constexpr std::size_t kLeastSums = 1;
   Sums v;
 
   static Shorts8 zero() { return {Sums{}}; }
@@ -38,9 +39,10 @@ struct Shorts8 {
     using Pair = std::int64_t __attribute__((vector_size(16)));
     return {std::bit_cast<Sums>(Pair{four, four})};
   }
-  Shorts8 pairs_of_positions() const {
+  /// (4 ranks)(2 positions) as (2 positions)(4 ranks).
+  Shorts8 by_position() const {
     const auto s = std::bit_cast<Shorts>(v);
-    return {std::bit_cast<Sums>(__builtin_shufflevector(s, s, 0, 4, 1, 5, 2, 6, 3, 7))};
+    return {std::bit_cast<Sums>(__builtin_shufflevector(s, s, 0, 2, 4, 6, 1, 3, 5, 7))};
   }
   friend Shorts8 add_products(const Shorts8& sum, const Shorts8& a, const Shorts8& b) {
     return {sum.v + products(a, b)};

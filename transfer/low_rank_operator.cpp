@@ -20,6 +20,21 @@ constexpr std::size_t kVector = 16;
   throw Error("low-rank operator: " + reason + "; make the file again");
 }
 
+/// The basis of one tile of patches as the kernels have it.
+BasisPart basis_of_tile(std::size_t tile, std::size_t rank) {
+  constexpr auto kSize = static_cast<std::uint32_t>(LowRankOperator::kTile);
+  const auto ranks = static_cast<std::uint32_t>(rank);
+  return {.values = tile * rank * kSize,
+          .rank = ranks,
+          .size = kSize,
+          .coefficient = 0,
+          .position = static_cast<std::uint32_t>(tile * kSize),
+          .first_rank = 0,
+          .last_rank = ranks,
+          .first_place = 0,
+          .last_place = kSize};
+}
+
 }  // namespace
 
 std::size_t LowRankOperator::tile_count(std::size_t patch_count) {
@@ -76,19 +91,17 @@ std::size_t LowRankOperator::workspace_size() const {
 }
 
 void LowRankOperator::project(const float* x, float* tile_coefficient, float* coefficient) const {
-  const std::size_t tiles = tile_count(patch_count()), rank = storage_.rank;
+  const std::size_t tiles = tile_count(patch_count());
   const BlockKernelSet& kernels = block_kernels();
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < tiles; ++t) {
-    const std::size_t begin = t * rank * kTile;
-    const PlanarVectors<const float> in{x + t * kTile, stride(), kChannelCount};
+    const BasisPart part = basis_of_tile(t, storage_.rank);
+    const PlanarVectors<const float> in{x, stride(), kChannelCount};
     const Coefficients<float> out{tile_coefficient + t * coefficient_size(), coefficient_size()};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.project({storage_.basis_f16.data() + begin, rank, kTile}, {0, rank}, in,
-                                out);
+      kernels.bases_f16.project(storage_.basis_f16.data(), {&part, 1}, in, out);
     } else {
-      kernels.bases_f32.project({storage_.basis_f32.data() + begin, rank, kTile}, {0, rank}, in,
-                                out);
+      kernels.bases_f32.project(storage_.basis_f32.data(), {&part, 1}, in, out);
     }
   }
   std::fill_n(coefficient, coefficient_size(), 0.0F);
@@ -125,20 +138,18 @@ void LowRankOperator::multiply_cores(const float* in, float* out) const {
 }
 
 void LowRankOperator::expand_tiles(const float* coefficient, float* y) const {
-  const std::size_t tiles = tile_count(patch_count()), rank = storage_.rank;
+  const std::size_t tiles = tile_count(patch_count());
   const BlockKernelSet& kernels = block_kernels();
   const Coefficients<const float> in{coefficient, coefficient_size()};
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < tiles; ++t) {
     for (int c = 0; c < kChannelCount; ++c) std::fill_n(y + c * stride() + t * kTile, kTile, 0.0F);
-    const std::size_t begin = t * rank * kTile;
-    const PlanarVectors<float> out{y + t * kTile, stride(), kChannelCount};
+    const BasisPart part = basis_of_tile(t, storage_.rank);
+    const PlanarVectors<float> out{y, stride(), kChannelCount};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.expand({storage_.basis_f16.data() + begin, rank, kTile}, {0, rank},
-                               {0, kTile}, in, out);
+      kernels.bases_f16.expand(storage_.basis_f16.data(), {&part, 1}, in, out);
     } else {
-      kernels.bases_f32.expand({storage_.basis_f32.data() + begin, rank, kTile}, {0, rank},
-                               {0, kTile}, in, out);
+      kernels.bases_f32.expand(storage_.basis_f32.data(), {&part, 1}, in, out);
     }
   }
 }

@@ -121,16 +121,46 @@ TEST(HierarchicalOperator, BytesAreAsGoodAsTheirBits) {
   }
 }
 
+TEST(HierarchicalOperator, ShortsAreAsGoodAsTheirBits) {
+  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+    const HierarchicalOperator::Storage storage = random_hierarchical_storage(500, matrices, 5);
+    const HierarchicalOperator exact(storage);
+    const HierarchicalOperator shorts(HierarchicalOperator::encode_shorts(storage));
+    EXPECT_LT(shorts.bytes(), exact.bytes());
+    const std::vector<Float3> m0 = random_light(500, 1);
+    const std::vector<float>& area = storage.area;
+    // Light is rounded to 11 or 12 bits on its way, twice.
+    EXPECT_LT(relative_difference(product(shorts, m0), multiply_expansion(shorts, m0), area), 5e-4);
+    const double error = relative_difference(product(shorts, m0), product(exact, m0), area);
+    EXPECT_LT(error, 1e-3);
+    EXPECT_GT(error, 0);
+  }
+}
+
+TEST(HierarchicalOperator, RefusesShortsWhoseSumsCouldOverflow) {
+  HierarchicalOperator::Storage storage =
+      HierarchicalOperator::encode_shorts(random_hierarchical_storage(100, 1, 1));
+  std::vector<std::int16_t> bases(storage.bases_q16.begin(), storage.bases_q16.end());
+  for (const std::int16_t value : {4096, -4096, -32768}) {
+    bases[7] = value;
+    storage.bases_q16 = SharedArray(std::vector<std::int16_t>(bases));
+    expect_error([&] { HierarchicalOperator op(storage); }, "beyond +-4095");
+  }
+}
+
 TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
-  const HierarchicalOperator op(random_hierarchical_storage(777, 3, 6));
+  const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 6);
   const std::vector<Float3> m0 = random_light(777, 2);
   const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const std::vector<Float3> one = product(op, m0);
-  omp_set_num_threads(5);
-  const std::vector<Float3> five = product(op, m0);
+  for (const Precision precision : {Precision::kF32, Precision::kQ16}) {
+    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    omp_set_num_threads(1);
+    const std::vector<Float3> one = product(op, m0);
+    omp_set_num_threads(5);
+    const std::vector<Float3> five = product(op, m0);
+    EXPECT_EQ(one, five);
+  }
   omp_set_num_threads(before);
-  EXPECT_EQ(one, five);
 }
 
 std::vector<Float3> batch_product(const TransferOperator& op, std::size_t lights,
@@ -148,7 +178,8 @@ TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
         random_hierarchical_storage(n, matrices, 40 + matrices);
     for (const HierarchicalOperator& op :
          {HierarchicalOperator(storage),
-          HierarchicalOperator(HierarchicalOperator::encode_half(storage))}) {
+          HierarchicalOperator(HierarchicalOperator::encode_half(storage)),
+          HierarchicalOperator(HierarchicalOperator::encode_shorts(storage))}) {
       for (const std::size_t lights : {1U, 2U, 3U, 5U}) {
         const std::vector<Float3> m0 = random_light(lights * n, lights);
         const std::vector<Float3> batch = batch_product(op, lights, m0);
@@ -164,10 +195,13 @@ TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
   }
 }
 
-TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
-  const std::size_t n = 777;
-  const HierarchicalOperator op(random_hierarchical_storage(n, 3, 12));
+/// Light at the receivers differs by `allowed` of the largest at most.
+void check_receivers(const HierarchicalOperator& op, float allowed) {
+  const std::size_t n = op.patch_count();
   const std::vector<Float3> m0 = random_light(n, 4), whole = product(op, m0);
+  float most = 0;
+  for (const Float3& h : whole)
+    most = std::max({most, std::abs(h[0]), std::abs(h[1]), std::abs(h[2])});
   std::vector<float> workspace(op.workspace_size(), std::nanf(""));
   constexpr Float3 kUnset = {-1, -2, -3};
   std::uint64_t previous = 0;
@@ -183,7 +217,8 @@ TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouch
     for (const std::uint32_t p : patches) expected[p] = whole[p];
     for (std::size_t i = 0; i < n; ++i) {
       for (int c = 0; c < kChannelCount; ++c) {
-        EXPECT_NEAR(h[i][c], expected[i][c], 2e-6F * std::abs(expected[i][c]));
+        const bool untouched = expected[i] == kUnset;
+        EXPECT_NEAR(h[i][c], expected[i][c], untouched ? 0 : allowed * most);
       }
     }
     EXPECT_TRUE(receivers.value_count() > previous || count == 0);
@@ -191,6 +226,13 @@ TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouch
   }
   EXPECT_EQ(op.receivers(std::vector<std::uint32_t>{}).value_count(), 0U);
   expect_error([&] { (void)op.receivers(std::vector<std::uint32_t>{777}); }, "does not exist");
+}
+
+TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
+  const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 12);
+  check_receivers(HierarchicalOperator(storage), 1e-6F);
+  // Coefficients are rounded by the largest of those that are wanted.
+  check_receivers(HierarchicalOperator(HierarchicalOperator::encode_shorts(storage)), 5e-4F);
 }
 
 TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
@@ -317,11 +359,26 @@ struct PlainBasis {
   double allowed;
 };
 
-constexpr std::size_t kStride = 310, kRankStride = 140;
+constexpr std::size_t kStride = 330, kRankStride = 150, kFirstPosition = 16, kFirstCoefficient = 4;
 
 /// Where coefficient r of vector v is.
 std::size_t coefficient_at(std::size_t v, std::size_t r) {
-  return (v / 3 * kRankStride + r) * kChannelLanes + v % 3;
+  return (v / 3 * kRankStride + kFirstCoefficient + r) * kChannelLanes + v % 3;
+}
+
+/// Ranks from `first_rank` on and the last `places` positions of a cluster.
+BasisPart part_of(const PlainBasis& plain, std::size_t first_rank, std::size_t places) {
+  const auto rank = static_cast<std::uint32_t>(plain.rank);
+  const auto size = static_cast<std::uint32_t>(plain.size);
+  return {.values = 0,
+          .rank = rank,
+          .size = size,
+          .coefficient = kFirstCoefficient,
+          .position = kFirstPosition,
+          .first_rank = static_cast<std::uint32_t>(first_rank),
+          .last_rank = rank,
+          .first_place = size - static_cast<std::uint32_t>(places),
+          .last_place = size};
 }
 
 template <typename Value>
@@ -330,35 +387,38 @@ void check_project(const BasisKernels<Value>& kernels, const std::vector<Value>&
   Random random;
   const std::vector<float> x = random.floats(3 * lights * kStride);
   std::vector<float> sent(lights * kRankStride * kChannelLanes, kUntouched);
-  kernels.project(basis.data(), plain.rank, plain.size, planar(x, 3 * lights),
+  const BasisPart part = part_of(plain, 0, plain.size);
+  kernels.project(basis.data(), {&part, 1}, planar(x, 3 * lights),
                   side_by_side<float>(sent, lights));
   for (std::size_t v = 0; v < 3 * lights; ++v) {
-    for (std::size_t r = 0; r < kRankStride; ++r) {
+    for (std::size_t r = 0; r < kRankStride - kFirstCoefficient; ++r) {
       double expected = r < written ? 0 : kUntouched;
       for (std::size_t k = 0; k < plain.size && r < plain.rank; ++k) {
-        expected += plain.value[r * plain.size + k] * x[v * kStride + k];
+        expected += plain.value[r * plain.size + k] * x[v * kStride + kFirstPosition + k];
       }
       EXPECT_NEAR(sent[coefficient_at(v, r)], expected, plain.allowed);
     }
   }
 }
 
-/// Of the last `part` positions and the ranks from `first` on; `values` begins with those
-/// positions.
 template <typename Value>
-void check_expand(const BasisKernels<Value>& kernels, const Value* values, const PlainBasis& plain,
-                  std::size_t first, std::size_t part, std::size_t lights) {
+void check_expand(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
+                  const PlainBasis& plain, std::size_t first_rank, std::size_t places,
+                  std::size_t lights) {
   Random random;
   const std::vector<float> y = random.floats(3 * lights * kStride);
   std::vector<float> arrived = random.floats(lights * kRankStride * kChannelLanes), sum = y;
-  kernels.expand(values, first, plain.rank - first, plain.size, part,
-                 side_by_side<const float>(arrived, lights), planar(sum, 3 * lights));
+  const BasisPart part = part_of(plain, first_rank, places);
+  kernels.expand(basis.data(), {&part, 1}, side_by_side<const float>(arrived, lights),
+                 planar(sum, 3 * lights));
   for (std::size_t v = 0; v < 3 * lights; ++v) {
     for (std::size_t k = 0; k < kStride; ++k) {
       double expected = y[v * kStride + k];
-      for (std::size_t r = first; r < plain.rank && k < part; ++r) {
+      const bool reached =
+          k >= kFirstPosition + part.first_place && k < kFirstPosition + part.last_place;
+      for (std::size_t r = first_rank; r < plain.rank && reached; ++r) {
         expected +=
-            plain.value[r * plain.size + plain.size - part + k] * arrived[coefficient_at(v, r)];
+            plain.value[r * plain.size + k - kFirstPosition] * arrived[coefficient_at(v, r)];
       }
       EXPECT_NEAR(sum[v * kStride + k], expected, plain.allowed);
     }
@@ -369,19 +429,26 @@ template <typename Value>
 void check_bases(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
                  const PlainBasis& plain, std::size_t lights) {
   check_project(kernels, basis, plain, plain.rank, lights);
-  for (std::size_t part = 16; part <= plain.size; part += 16) {
-    check_expand(kernels, basis.data() + plain.size - part, plain, 0, part, lights);
+  for (std::size_t places = 16; places <= plain.size; places += 16) {
+    check_expand(kernels, basis, plain, 0, places, lights);
   }
+  if (plain.rank > 1) check_expand(kernels, basis, plain, 1, plain.size, lights);
 }
 
-/// A basis as the integer kernels have it.
-std::vector<std::int16_t> in_rank_groups(const PlainBasis& plain) {
-  constexpr std::size_t kGroup = HierarchicalOperator::kRankGroup;
-  std::vector<std::int16_t> values((plain.rank + kGroup - 1) / kGroup * kGroup * plain.size, 0);
-  for (std::size_t r = 0; r < plain.rank; ++r) {
-    for (std::size_t k = 0; k < plain.size; ++k) {
-      values[(r / kGroup * plain.size + k) * kGroup + r % kGroup] =
-          static_cast<std::int16_t>(plain.value[r * plain.size + k]);
+/// A basis in the order of the file: strips of 64 positions, groups of four ranks, pairs of
+/// positions.
+std::vector<std::int16_t> in_strips(const PlainBasis& plain) {
+  std::vector<std::int16_t> values;
+  for (std::size_t strip = 0; strip < plain.size; strip += 64) {
+    for (std::size_t group = 0; group < plain.rank; group += 4) {
+      for (std::size_t k = strip; k < std::min(strip + 64, plain.size); k += 2) {
+        for (std::size_t r = group; r < group + 4; ++r) {
+          for (std::size_t i = k; i < k + 2; ++i) {
+            const float value = r < plain.rank ? plain.value[r * plain.size + i] : 0;
+            values.push_back(static_cast<std::int16_t>(value));
+          }
+        }
+      }
     }
   }
   return values;
@@ -394,19 +461,19 @@ PlainBasis integer_basis(std::size_t rank, std::size_t size) {
   PlainBasis plain{random.floats(rank * size), rank, size, 0};
   for (float& value : plain.value) value = std::round(kLargest * value);
   plain.value.front() = -kLargest;
-  // Each of up to 310 numbers up to 1 is off by half a 4,095th at most, and times up to 4,095.
-  plain.allowed = 0.5 * static_cast<double>(std::max(rank, size));
+  // Light up to 1 is a multiple of 2^-11 at most, off by half of that, and times up to 4,095.
+  plain.allowed = static_cast<double>(std::max(rank, size));
   return plain;
 }
 
 void check_integer_bases(const BasisKernels<std::int16_t>& kernels, std::size_t rank,
                          std::size_t size, std::size_t lights) {
   const PlainBasis plain = integer_basis(rank, size);
-  const std::vector<std::int16_t> basis = in_rank_groups(plain);
+  const std::vector<std::int16_t> basis = in_strips(plain);
   check_project(kernels, basis, plain, (rank + 3) / 4 * 4, lights);
-  for (std::size_t part = 16; part <= size; part += 16) {
-    for (std::size_t first = 0; first < std::min<std::size_t>(4, rank); ++first) {
-      check_expand(kernels, basis.data() + 4 * (size - part), plain, first, part, lights);
+  for (std::size_t places = 16; places <= size; places += 16) {
+    for (std::size_t first = 0; first < std::min<std::size_t>(6, rank); ++first) {
+      check_expand(kernels, basis, plain, first, places, lights);
     }
   }
 }
@@ -493,41 +560,53 @@ TEST(BlockKernels, EveryInstructionSetAgrees) {
   for (const BlockKernelSet* set : runnable_kernels()) check_kernels(*set);
 }
 
-TEST(BlockKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
-  constexpr std::size_t kRank = 134, kSize = 304;
-  const std::vector<std::int16_t> basis = in_rank_groups(integer_basis(kRank, kSize));
-  Random random;
-  const std::vector<float> x = random.floats(3 * kStride);
-  std::vector<std::vector<float>> results;
-  for (const BlockKernelSet* set : runnable_kernels()) {
-    std::vector<float> sent(kRankStride * kChannelLanes, 0), y = x;
-    set->bases_q16.project(basis.data(), kRank, kSize, planar(x, 3), side_by_side<float>(sent, 1));
-    set->bases_q16.expand(basis.data(), 1, kRank - 1, kSize, kSize,
-                          side_by_side<const float>(sent, 1), planar(y, 3));
-    for (std::size_t k = 0; k < sent.size(); k += kChannelLanes) sent[k + 3] = 0;
-    sent.insert(sent.end(), y.begin(), y.end());
-    results.push_back(sent);
-  }
-  for (const std::vector<float>& result : results) EXPECT_EQ(result, results.front());
+/// What comes of x by way of coefficients and back: those, and the light.
+std::vector<float> there_and_back(const BlockKernelSet& set, const PlainBasis& plain,
+                                  const std::vector<float>& x) {
+  const std::vector<std::int16_t> basis = in_strips(plain);
+  const BasisPart part = part_of(plain, 0, plain.size);
+  std::vector<float> sent(kRankStride * kChannelLanes, 0.0F), y(3 * kStride, 0.0F);
+  set.bases_q16.project(basis.data(), {&part, 1}, planar(x, 3), side_by_side<float>(sent, 1));
+  for (std::size_t k = 3; k < sent.size(); k += kChannelLanes) sent[k] = 0;  // no channel's
+  set.bases_q16.expand(basis.data(), {&part, 1}, side_by_side<const float>(sent, 1), planar(y, 3));
+  sent.insert(sent.end(), y.begin(), y.end());
+  return sent;
 }
 
-// The largest light at all positions and the largest values: nothing overflows.
+TEST(BlockKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
+  const PlainBasis plain = integer_basis(134, 304);
+  Random random;
+  const std::vector<float> x = random.floats(3 * kStride);
+  const std::vector<float> expected = there_and_back(kBlockKernelsPortable, plain, x);
+  for (const BlockKernelSet* set : runnable_kernels()) {
+    EXPECT_EQ(there_and_back(*set, plain, x), expected) << set->instruction_set;
+  }
+}
+
 TEST(BlockKernels, SumsOfIntegersHaveRoomForTheLargest) {
   constexpr std::size_t kRank = 128, kSize = 128;
   constexpr auto kLargest = static_cast<float>(HierarchicalOperator::kLargestShort);
   const PlainBasis plain{std::vector<float>(kRank * kSize, kLargest), kRank, kSize, 0};
-  const std::vector<std::int16_t> basis = in_rank_groups(plain);
-  const std::vector<float> x(3 * kStride, 1.0F);
+  // Just below a power of two: it becomes the largest integer that there is.
+  const float light = std::nextafter(1.0F, 0.0F);
   for (const BlockKernelSet* set : runnable_kernels()) {
     SCOPED_TRACE(set->instruction_set);
-    std::vector<float> sent(kRankStride * kChannelLanes), y(3 * kStride, 0.0F);
-    set->bases_q16.project(basis.data(), kRank, kSize, planar(x, 3), side_by_side<float>(sent, 1));
-    for (std::size_t r = 0; r < kRank; ++r) {
-      EXPECT_FLOAT_EQ(sent[coefficient_at(0, r)], kSize * kLargest);
+    const std::vector<float> result =
+        there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
+    const double sent = kSize * kLargest * light, y = kRank * kLargest * sent;
+    EXPECT_NEAR(result[coefficient_at(0, 0)] / sent, 1, 3e-4);
+    EXPECT_NEAR(result[kRankStride * kChannelLanes + kFirstPosition] / y, 1, 6e-4);
+  }
+}
+
+TEST(BlockKernels, NoLightStaysNone) {
+  const PlainBasis plain = integer_basis(7, 48);
+  for (const float light : {0.0F, 1e-42F}) {
+    for (const BlockKernelSet* set : runnable_kernels()) {
+      const std::vector<float> result =
+          there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
+      for (const float value : result) EXPECT_LE(std::abs(value), 1e-20F);
     }
-    set->bases_q16.expand(basis.data(), 0, kRank, kSize, kSize, side_by_side<const float>(sent, 1),
-                          planar(y, 3));
-    EXPECT_FLOAT_EQ(y.front(), kRank * kLargest * kSize * kLargest);
   }
 }
 

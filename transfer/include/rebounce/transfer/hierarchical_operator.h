@@ -63,13 +63,12 @@ class HierarchicalOperator final : public TransferOperator {
   /// entries are +-127; cores are divided by them, with this for 1 at each end.
   static constexpr float kByteScale = 128;
 
-  /// In 16 bits likewise: the largest are +-kLargestShort, and kShortScale stands for 1. So few that
-  /// sums of 128 products with such numbers fit 32 bits.
+  /// In 16 bits likewise: the largest are +-kLargestShort, and kShortScale stands for 1. So few
+  /// that sums of 128 products with such numbers fit 32 bits.
   static constexpr std::int16_t kLargestShort = 4095;
   static constexpr float kShortScale = 4096;
 
-  /// Of bases in 16 bits, so many ranks have their values side by side, in strips of so many
-  /// positions.
+  /// Of bases in 16 bits, so many ranks are kept together, and so many positions.
   static constexpr std::uint32_t kRankGroup = 4, kStrip = 64;
 
   enum class Order : std::uint8_t {
@@ -77,10 +76,11 @@ class HierarchicalOperator final : public TransferOperator {
     kByBlock,
     /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
     /// the order of their blocks, U^T before V^T; then cores and dense entries by block, the
-    /// matrices of an entry side by side; zeros to the next multiple of 64 values, at least kPadding
+    /// matrices of an entry side by side; zeros to the next multiple of 64 values, at least
+    /// kPadding
     /// of them. Bases in an array of their own are followed by zeros likewise. Those in 16 bits are
-    /// [strip][rank / kRankGroup][position][kRankGroup] in each cluster: strips of kStrip positions
-    /// or what is left of it, the last ranks filled up with zeros.
+    /// [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster: strips of
+    /// kStrip positions or what is left of it, the last ranks filled up with zeros.
     kStreamed,
   };
 
