@@ -36,23 +36,6 @@ REBOUNCE_INLINE inline void for_each_group(std::size_t vector_count, const Work&
   for (; v < vector_count; v += kChannels) work.template operator()<kChannels>(v);
 }
 
-/// Calls work.template operator()<rows>(first) for groups of four rows, and for what is left.
-template <typename Work>
-REBOUNCE_INLINE inline void for_each_four(std::size_t rows, const Work& work) {
-  std::size_t r = 0;
-  for (; r + 4 <= rows; r += 4) work.template operator()<4>(r);
-  switch (rows - r) {
-    case 3:
-      return work.template operator()<3>(r);
-    case 2:
-      return work.template operator()<2>(r);
-    case 1:
-      return work.template operator()<1>(r);
-    default:
-      return;
-  }
-}
-
 /// The sums over the lanes of kCount vectors, four at most, in the first lanes.
 template <std::size_t kCount, typename V>
 REBOUNCE_INLINE inline auto sums_of(const V (&sum)[kCount]) {
@@ -103,7 +86,7 @@ void project(const Value* values, std::span<const BasisPart> parts, PlanarVector
     const float* const from = x.data + part.position;
     float* const to =
         coefficient.data + std::size_t{part.coefficient + part.first_rank} * kChannelLanes;
-    for_each_four(
+    for_each_rows<4>(
         part.last_rank - part.first_rank, [&]<std::size_t kRows>(std::size_t r) REBOUNCE_INLINE {
           for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
             project_rows<V, kRows, kVectors>(
@@ -179,16 +162,6 @@ void expand(const Value* values, std::span<const BasisPart> parts,
 }
 
 using Direction = CoreBlock::Direction;
-
-/// Calls work.template operator()<rows>(first) for groups of kMost rows, and for what is left.
-template <std::size_t kMost, typename Work>
-REBOUNCE_INLINE inline void for_each_rows(std::size_t rows, const Work& work) {
-  std::size_t r = 0;
-  for (; r + kMost <= rows; r += kMost) work.template operator()<kMost>(r);
-  unroll<kMost - 1>([&](auto left) REBOUNCE_INLINE {
-    if (rows - r == left + 1) work.template operator()<left + 1>(r);
-  });
-}
 
 /// Columns from `begin` on, as many as fill kWide vectors or are left, for one light. The lanes of
 /// a vector are the channels of neighbouring entries of a row: ranks are 5 in the mean, and vectors

@@ -192,7 +192,8 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
       phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]));
     }
 #pragma omp for schedule(dynamic, 1)
-    for (const HierarchicalPlan::Arrival& arrival : plan.arrivals) {
+    for (std::size_t k = plan.arrivals.size(); k > 0; --k) {
+      const HierarchicalPlan::Arrival& arrival = plan.arrivals[k - 1];
       clear(work.y, arrival.begin, arrival.end);
       phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
       for (const HierarchicalPlan::DenseEnd& end :

@@ -139,7 +139,7 @@ REBOUNCE_INLINE inline void project_chunk(const std::int16_t* values, const Basi
     second = strip_at(values, part, chunk.begin + kBasisStrip, first_group);
   }
   float* const to = coefficient + (part.coefficient + first_group * kRankGroup) * kChannelLanes;
-  for_each_four(groups, [&]<std::size_t kGroups>(std::size_t g) {
+  for_each_rows<4>(groups, [&]<std::size_t kGroups>(std::size_t g) {
     project_groups<N, kGroups>(first, second, chunk.count, light, chunk.begin > 0,
                                to + g * kRankGroup * kChannelLanes);
     first.values += kGroups * first.group_step;
@@ -187,20 +187,18 @@ REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange rank
   to.back = scales.back;
   to.group_count = (ranks.end + kRankGroup - 1) / kRankGroup;
   const typename N::CoefficientRounding round(scales.to);
-  const auto round_part = [&](std::size_t group) {
-    const std::size_t at = group * kGroupSize;
-    float some[kGroupSize];
-    for (std::size_t k = 0; k < kGroupSize; ++k) {
-      const std::size_t rank = (at + k) / kChannelLanes;
-      some[k] = rank >= ranks.begin && rank < ranks.end ? from[at + k] : 0;
-    }
-    round(some, to.value + at);
-  };
   for (std::size_t g = 0; g < to.group_count; ++g) {
     round(from + g * kGroupSize, to.value + g * kGroupSize);
   }
-  if (ranks.begin % kRankGroup != 0) round_part(0);
-  if (ranks.end % kRankGroup != 0) round_part(to.group_count - 1);
+  if (ranks.begin % kRankGroup != 0) {
+    const RankRange wanted{ranks.begin % kRankGroup, std::min(ranks.end, kRankGroup)};
+    round.some(from, wanted, to.value);
+  }
+  if (ranks.end % kRankGroup != 0) {
+    const std::size_t last = (to.group_count - 1) * kRankGroup;
+    const RankRange wanted{std::max(ranks.begin, last) - last, ranks.end - last};
+    round.some(from + last * kChannelLanes, wanted, to.value + last * kChannelLanes);
+  }
 }
 
 /// y of kWide vectors of positions; groups of ranks are dealt out among kSplit sums, so that there

@@ -60,7 +60,8 @@ struct Shorts16 {
   static void round_positions(const float* x, float scale, std::int16_t* to) {
     const __m256 by = _mm256_set1_ps(scale);
     // Of positions 0 to 3, 8 to 11, 4 to 7, 12 to 15.
-    const __m256i pairs = _mm256_packs_epi32(wide(x, by), wide(x + 8, by));
+    const __m256i pairs =
+        _mm256_packs_epi32(wide(_mm256_loadu_ps(x), by), wide(_mm256_loadu_ps(x + 8), by));
     store_lanes(to, _mm256_permutevar8x32_epi32(pairs, lane_order(0, 1)));
     store_lanes(to + kWidth, _mm256_permutevar8x32_epi32(pairs, lane_order(4, 5)));
     store_lanes(to + 2 * kWidth, _mm256_permutevar8x32_epi32(pairs, lane_order(2, 3)));
@@ -90,7 +91,22 @@ struct Shorts16 {
     explicit CoefficientRounding(const ChannelFloats& scales)
         : scale(_mm256_broadcast_ps(reinterpret_cast<const __m128*>(scales.data()))) {}
     void operator()(const float* from, std::int16_t* to) const {
-      const __m256i ranks = _mm256_packs_epi32(wide(from, scale), wide(from + 8, scale));
+      round(_mm256_loadu_ps(from), _mm256_loadu_ps(from + 8), to);
+    }
+    /// Ranks that are not wanted become zero.
+    void some(const float* from, RankRange wanted, std::int16_t* to) const {
+      const __m256i rank = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1);
+      const auto load = [&](int first) {
+        const __m256i r = _mm256_add_epi32(rank, _mm256_set1_epi32(first));
+        const __m256i keep = _mm256_andnot_si256(
+            _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(wanted.begin)), r),
+            _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(wanted.end)), r));
+        return _mm256_maskload_ps(from + 4 * first, keep);
+      };
+      round(load(0), load(2), to);
+    }
+    void round(__m256 first, __m256 second, std::int16_t* to) const {
+      const __m256i ranks = _mm256_packs_epi32(wide(first, scale), wide(second, scale));
       const __m128i even = _mm256_castsi256_si128(ranks), odd = _mm256_extracti128_si256(ranks, 1);
       const __m128i low = _mm_unpacklo_epi16(even, odd), high = _mm_unpackhi_epi16(even, odd);
       _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_unpacklo_epi32(low, high));
@@ -126,8 +142,8 @@ struct Shorts16 {
     _mm_storeu_ps(floats.data(), v);
     return floats;
   }
-  static __m256i wide(const float* x, __m256 scale) {
-    return _mm256_cvtps_epi32(_mm256_mul_ps(_mm256_loadu_ps(x), scale));
+  static __m256i wide(__m256 x, __m256 scale) {
+    return _mm256_cvtps_epi32(_mm256_mul_ps(x, scale));
   }
   /// Four times lane a, four times lane b.
   static __m256i lane_order(int a, int b) { return _mm256_setr_epi32(a, a, a, a, b, b, b, b); }

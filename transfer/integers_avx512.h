@@ -92,9 +92,15 @@ struct Shorts32 {
   struct CoefficientRounding {
     explicit CoefficientRounding(const ChannelFloats& scales)
         : scale(_mm512_broadcast_f32x4(_mm_loadu_ps(scales.data()))) {}
-    void operator()(const float* from, std::int16_t* to) const {
+    void operator()(const float* from, std::int16_t* to) const { round(_mm512_loadu_ps(from), to); }
+    /// Ranks that are not wanted become zero.
+    void some(const float* from, RankRange wanted, std::int16_t* to) const {
+      const unsigned below = 1U << (4 * wanted.begin), up_to = 1U << (4 * wanted.end);
+      round(_mm512_maskz_loadu_ps(static_cast<__mmask16>(up_to - below), from), to);
+    }
+    void round(__m512 coefficients, std::int16_t* to) const {
       const __m256i rounded =
-          _mm512_cvtsepi32_epi16(_mm512_cvtps_epi32(_mm512_mul_ps(_mm512_loadu_ps(from), scale)));
+          _mm512_cvtsepi32_epi16(_mm512_cvtps_epi32(_mm512_mul_ps(coefficients, scale)));
       const __m256i order = _mm256_setr_epi16(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
       _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_permutexvar_epi16(order, rounded));
     }

@@ -95,10 +95,13 @@ struct Shorts8 {
   /// Rounds a group of coefficients: (rank)(channel) to (channel)(rank).
   struct CoefficientRounding {
     explicit CoefficientRounding(const ChannelFloats& scales) : scale(scales) {}
-    void operator()(const float* from, std::int16_t* to) const {
-      for (std::size_t c = 0; c < scale.size(); ++c) {
-        for (std::size_t r = 0; r < kRankGroup; ++r) {
-          to[c * kRankGroup + r] = rounded(from[r * scale.size() + c] * scale[c]);
+    void operator()(const float* from, std::int16_t* to) const { some(from, {0, kRankGroup}, to); }
+    /// Ranks that are not wanted become zero.
+    void some(const float* from, RankRange wanted, std::int16_t* to) const {
+      std::fill_n(to, IntegerCoefficients::kGroupSize, std::int16_t{0});
+      for (std::size_t c = 0; c < kChannelLanes; ++c) {
+        for (std::size_t r = wanted.begin; r < wanted.end; ++r) {
+          to[c * kRankGroup + r] = rounded(from[r * kChannelLanes + c] * scale[c]);
         }
       }
     }

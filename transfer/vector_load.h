@@ -44,5 +44,15 @@ REBOUNCE_INLINE inline void unroll(const Work& work) {
   (std::make_index_sequence<kCount>{});
 }
 
+/// Calls work.template operator()<rows>(first) for groups of kMost rows, and for what is left.
+template <std::size_t kMost, typename Work>
+REBOUNCE_INLINE inline void for_each_rows(std::size_t rows, const Work& work) {
+  std::size_t r = 0;
+  for (; r + kMost <= rows; r += kMost) work.template operator()<kMost>(r);
+  unroll<kMost - 1>([&](auto left) REBOUNCE_INLINE {
+    if (rows - r == left + 1) work.template operator()<left + 1>(r);
+  });
+}
+
 }  // namespace
 }  // namespace rebounce
