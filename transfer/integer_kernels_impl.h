@@ -7,8 +7,8 @@
 // One instruction multiplies neighbouring pairs of 16-bit integers and adds the two products to a
 // sum of 32 bits: twice the products of a multiply-add of floats, and the values need no widening.
 // The light is rounded to integers for it, with a scale for each channel of a chunk of positions;
-// so are the coefficients on the way back. A magnitude of 4,095 at both ends leaves room for chunks
-// of 128: 128 x 4095 x 4095 < 2^31.
+// so are the coefficients on the way back. The scale is the largest with which no sum of products
+// can overflow, 11 bits where the light is even over a chunk of 128 and up to 15 where it is not.
 //
 // A basis is [strip of 64 positions][rank / 4][position / 2][4 ranks][2 positions]: both ways read
 // it from the first value to the last. Coefficients are sums over positions, and their pairs are
@@ -42,19 +42,28 @@ constexpr std::size_t kChunk = 128;
 /// A number for each channel; the last is not used.
 using ChannelFloats = std::array<float, kChannelLanes>;
 
-/// Powers of two by which light of these magnitudes at most becomes integers below 4,096, and which
-/// bring it back.
+/// Of the light in a chunk, the largest magnitude and the sum of all.
+struct Magnitudes {
+  ChannelFloats largest, sum;
+};
+
+/// Powers of two by which light becomes integers, and which bring it back: with the largest of them
+/// below 2^15 and their sum below 2^19, sums of products with values up to 4,095 stay below 2^31.
 struct IntegerScales {
   ChannelFloats to, back;
 
-  explicit IntegerScales(const ChannelFloats& largest) {
-    constexpr std::uint32_t kExponent = 0x7F800000, kOne = 127U << 23, kElevenBits = 11U << 23;
+  explicit IntegerScales(const Magnitudes& light) {
+    constexpr std::uint32_t kExponent = 0x7F800000, kOne = 127U << 23;
+    constexpr std::uint32_t kLargest = 14U << 23, kSum = 18U << 23;
     constexpr std::uint32_t kDark = kOne - (100U << 23);  // anything below 2^-100 is as dark
+    const auto power = [=](float magnitude) {
+      return std::max(std::bit_cast<std::uint32_t>(magnitude) & kExponent, kDark);
+    };
     for (std::size_t c = 0; c < kChannelLanes; ++c) {
-      const std::uint32_t bits = std::bit_cast<std::uint32_t>(largest[c]) & kExponent;
-      const std::uint32_t power = std::max(bits, kDark);
-      to[c] = std::bit_cast<float>(2 * kOne + kElevenBits - power);
-      back[c] = std::bit_cast<float>(power - kElevenBits);
+      const std::uint32_t one =
+          std::max(power(light.largest[c]) - kLargest, power(light.sum[c]) - kSum);
+      to[c] = std::bit_cast<float>(2 * kOne - one);
+      back[c] = std::bit_cast<float>(one);
     }
   }
 };
@@ -68,7 +77,7 @@ struct IntegerLight {
 template <typename N>
 REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std::size_t count,
                                         IntegerLight& light) {
-  const IntegerScales scales(N::largest_of_planes(x, stride, count));
+  const IntegerScales scales(N::magnitudes_of_planes(x, stride, count));
   light.back = scales.back;
   for (std::size_t k = 0; k < count; k += 16) {
     for (std::size_t c = 0; c < kChannelCount; ++c) {
@@ -182,8 +191,8 @@ template <typename N>
 REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange ranks,
                                                IntegerCoefficients& to) {
   constexpr std::size_t kGroupSize = IntegerCoefficients::kGroupSize;
-  const IntegerScales scales(N::largest_of_lanes(from + ranks.begin * kChannelLanes,
-                                                 (ranks.end - ranks.begin) * kChannelLanes));
+  const IntegerScales scales(N::magnitudes_of_lanes(from + ranks.begin * kChannelLanes,
+                                                    (ranks.end - ranks.begin) * kChannelLanes));
   to.back = scales.back;
   to.group_count = (ranks.end + kRankGroup - 1) / kRankGroup;
   const typename N::CoefficientRounding round(scales.to);

@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "integer_kernels_impl.h"
+#include "integers_x86.h"
 
 namespace rebounce {
 namespace {
@@ -37,24 +38,24 @@ struct Shorts16 {
   }
   friend Shorts16 add(Shorts16 a, Shorts16 b) { return {_mm256_add_epi32(a.v, b.v)}; }
 
-  /// The largest magnitudes among three planes of `count` floats.
-  static ChannelFloats largest_of_planes(const float* x, std::size_t stride, std::size_t count) {
-    __m256 r = _mm256_setzero_ps(), g = r, b = r;
-    for (std::size_t k = 0; k < count; k += 8) {
-      r = larger(r, _mm256_loadu_ps(x + k));
-      g = larger(g, _mm256_loadu_ps(x + k + stride));
-      b = larger(b, _mm256_loadu_ps(x + k + 2 * stride));
+  /// Of three planes of `count` floats.
+  static Magnitudes magnitudes_of_planes(const float* x, std::size_t stride, std::size_t count) {
+    Running r, g, b;
+    for (std::size_t k = 0; k < count; k += 16) {
+      r.add(_mm256_loadu_ps(x + k), _mm256_loadu_ps(x + k + 8));
+      g.add(_mm256_loadu_ps(x + k + stride), _mm256_loadu_ps(x + k + stride + 8));
+      b.add(_mm256_loadu_ps(x + k + 2 * stride), _mm256_loadu_ps(x + k + 2 * stride + 8));
     }
-    __m128 lane[] = {largest_four(r), largest_four(g), largest_four(b), _mm_setzero_ps()};
-    _MM_TRANSPOSE4_PS(lane[0], lane[1], lane[2], lane[3]);
-    return floats(_mm_max_ps(_mm_max_ps(lane[0], lane[1]), _mm_max_ps(lane[2], lane[3])));
+    return rebounce::magnitudes_of_planes(r.fours(), g.fours(), b.fours());
   }
-  /// The largest magnitudes of each channel among `count` floats of coefficients, fours all.
-  static ChannelFloats largest_of_lanes(const float* x, std::size_t count) {
-    __m256 most = _mm256_setzero_ps();
-    for (; count >= 8; count -= 8, x += 8) most = larger(most, _mm256_loadu_ps(x));
-    if (count > 0) most = larger(most, _mm256_zextps128_ps256(_mm_loadu_ps(x)));
-    return floats(largest_four(most));
+  /// Of each channel among `count` floats of coefficients.
+  static Magnitudes magnitudes_of_lanes(const float* x, std::size_t count) {
+    Running running;
+    for (; count >= 16; count -= 16, x += 16)
+      running.add(_mm256_loadu_ps(x), _mm256_loadu_ps(x + 8));
+    running.add(load_some(x, std::min<std::size_t>(count, 8)),
+                load_some(x + 8, count < 8 ? 0 : count - 8));
+    return running.fours().magnitudes();
   }
 
   static void round_positions(const float* x, float scale, std::int16_t* to) {
@@ -130,17 +131,23 @@ struct Shorts16 {
   static void store_lanes(std::int16_t* to, __m256i lanes) {
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), lanes);
   }
-  static __m256 larger(__m256 most, __m256 x) {
-    return _mm256_max_ps(most, _mm256_andnot_ps(_mm256_set1_ps(-0.0F), x));
-  }
-  /// The largest of its fours of lanes.
-  static __m128 largest_four(__m256 v) {
-    return _mm_max_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
-  }
-  static ChannelFloats floats(__m128 v) {
-    ChannelFloats floats;
-    _mm_storeu_ps(floats.data(), v);
-    return floats;
+  /// Magnitudes by lanes, of sixteen floats at a time. All instruction sets add up in this order.
+  struct Running {
+    __m256 largest = _mm256_setzero_ps(), first_sum = largest, second_sum = largest;
+
+    void add(__m256 first, __m256 second) {
+      first = _mm256_andnot_ps(_mm256_set1_ps(-0.0F), first);
+      second = _mm256_andnot_ps(_mm256_set1_ps(-0.0F), second);
+      largest = _mm256_max_ps(largest, _mm256_max_ps(first, second));
+      first_sum = _mm256_add_ps(first_sum, first);
+      second_sum = _mm256_add_ps(second_sum, second);
+    }
+    FourMagnitudes fours() const { return {largest, _mm256_add_ps(first_sum, second_sum)}; }
+  };
+  static __m256 load_some(const float* x, std::size_t count) {
+    const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+    return _mm256_maskload_ps(x,
+                              _mm256_cmpgt_epi32(_mm256_set1_epi32(static_cast<int>(count)), lane));
   }
   static __m256i wide(__m256 x, __m256 scale) {
     return _mm256_cvtps_epi32(_mm256_mul_ps(x, scale));

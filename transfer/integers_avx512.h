@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "integer_kernels_impl.h"
+#include "integers_x86.h"
 
 namespace rebounce {
 namespace {
@@ -37,25 +38,24 @@ struct Shorts32 {
   }
   friend Shorts32 add(Shorts32 a, Shorts32 b) { return {_mm512_add_epi32(a.v, b.v)}; }
 
-  /// The largest magnitudes among three planes of `count` floats.
-  static ChannelFloats largest_of_planes(const float* x, std::size_t stride, std::size_t count) {
-    __m512 r = _mm512_setzero_ps(), g = r, b = r;
+  /// Of three planes of `count` floats.
+  static Magnitudes magnitudes_of_planes(const float* x, std::size_t stride, std::size_t count) {
+    Running r, g, b;
     for (std::size_t k = 0; k < count; k += 16) {
-      r = larger(r, _mm512_loadu_ps(x + k));
-      g = larger(g, _mm512_loadu_ps(x + k + stride));
-      b = larger(b, _mm512_loadu_ps(x + k + 2 * stride));
+      r.add(_mm512_loadu_ps(x + k));
+      g.add(_mm512_loadu_ps(x + k + stride));
+      b.add(_mm512_loadu_ps(x + k + 2 * stride));
     }
-    __m128 lane[] = {largest_four(r), largest_four(g), largest_four(b), _mm_setzero_ps()};
-    _MM_TRANSPOSE4_PS(lane[0], lane[1], lane[2], lane[3]);
-    return floats(_mm_max_ps(_mm_max_ps(lane[0], lane[1]), _mm_max_ps(lane[2], lane[3])));
+    return rebounce::magnitudes_of_planes(r.fours(), g.fours(), b.fours());
   }
-  /// The largest magnitudes of each channel among `count` floats of coefficients.
-  static ChannelFloats largest_of_lanes(const float* x, std::size_t count) {
-    __m512 most = _mm512_setzero_ps();
+  /// Of each channel among `count` floats of coefficients.
+  static Magnitudes magnitudes_of_lanes(const float* x, std::size_t count) {
+    Running running;
     std::size_t k = 0;
-    for (; k + 16 <= count; k += 16) most = larger(most, _mm512_loadu_ps(x + k));
+    for (; k + 16 <= count; k += 16) running.add(_mm512_loadu_ps(x + k));
     const auto rest = static_cast<__mmask16>((1U << (count - k)) - 1);
-    return floats(largest_four(larger(most, _mm512_maskz_loadu_ps(rest, x + k))));
+    running.add(_mm512_maskz_loadu_ps(rest, x + k));
+    return running.fours().magnitudes();
   }
 
   static void round_positions(const float* x, float scale, std::int16_t* to) {
@@ -123,19 +123,23 @@ struct Shorts32 {
   }
 
  private:
-  static __m512 larger(__m512 most, __m512 x) { return _mm512_max_ps(most, _mm512_abs_ps(x)); }
-  /// The largest of its fours of lanes.
-  static __m128 largest_four(__m512 v) {
-    const __m256 half =
-        _mm256_max_ps(_mm512_castps512_ps256(v),
-                      _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(v), 1)));
-    return _mm_max_ps(_mm256_castps256_ps128(half), _mm256_extractf128_ps(half, 1));
-  }
-  static ChannelFloats floats(__m128 v) {
-    ChannelFloats floats;
-    _mm_storeu_ps(floats.data(), v);
-    return floats;
-  }
+  /// Magnitudes by lanes. All instruction sets add up in this order.
+  struct Running {
+    __m512 largest = _mm512_setzero_ps(), sum = largest;
+
+    void add(__m512 x) {
+      x = _mm512_abs_ps(x);
+      largest = _mm512_max_ps(largest, x);
+      sum = _mm512_add_ps(sum, x);
+    }
+    FourMagnitudes fours() const {
+      const auto half = [](__m512 v) {
+        return _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(v), 1));
+      };
+      return {_mm256_max_ps(_mm512_castps512_ps256(largest), half(largest)),
+              _mm256_add_ps(_mm512_castps512_ps256(sum), half(sum))};
+    }
+  };
   static __m512 scaled(__m512i sums, float back) {
     return _mm512_mul_ps(_mm512_cvtepi32_ps(sums), _mm512_set1_ps(back));
   }

@@ -3,6 +3,7 @@
 // The portable vector type of the integer kernels; see integer_kernels_impl.h.
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -49,23 +50,31 @@ struct Shorts8 {
   }
   friend Shorts8 add(const Shorts8& a, const Shorts8& b) { return {a.v + b.v}; }
 
-  /// The largest magnitudes among three planes of `count` floats.
-  static ChannelFloats largest_of_planes(const float* x, std::size_t stride, std::size_t count) {
-    ChannelFloats most{};
+  /// Of three planes of `count` floats.
+  static Magnitudes magnitudes_of_planes(const float* x, std::size_t stride, std::size_t count) {
+    Magnitudes result{};
     for (std::size_t c = 0; c < kChannelCount; ++c) {
-      for (std::size_t k = 0; k < count; ++k) {
-        most[c] = std::max(most[c], std::abs(x[c * stride + k]));
-      }
+      const Magnitudes four = magnitudes_of_lanes(x + c * stride, count);
+      result.largest[c] =
+          std::max({four.largest[0], four.largest[1], four.largest[2], four.largest[3]});
+      result.sum[c] = (four.sum[0] + four.sum[1]) + (four.sum[2] + four.sum[3]);
     }
-    return most;
+    return result;
   }
-  /// The largest magnitudes of each channel among `count` floats of coefficients.
-  static ChannelFloats largest_of_lanes(const float* x, std::size_t count) {
-    ChannelFloats most{};
+  /// Of each channel among `count` floats of coefficients, or of every fourth float. All
+  /// instruction sets add up in this order.
+  static Magnitudes magnitudes_of_lanes(const float* x, std::size_t count) {
+    std::array<float, 16> largest{}, sum{};
     for (std::size_t k = 0; k < count; ++k) {
-      most[k % kChannelLanes] = std::max(most[k % kChannelLanes], std::abs(x[k]));
+      largest[k % 16] = std::max(largest[k % 16], std::abs(x[k]));
+      sum[k % 16] += std::abs(x[k]);
     }
-    return most;
+    Magnitudes result;
+    for (std::size_t c = 0; c < kChannelLanes; ++c) {
+      result.largest[c] = std::max({largest[c], largest[c + 4], largest[c + 8], largest[c + 12]});
+      result.sum[c] = (sum[c] + sum[c + 8]) + (sum[c + 4] + sum[c + 12]);
+    }
+    return result;
   }
 
   static void round_positions(const float* x, float scale, std::int16_t* to) {
