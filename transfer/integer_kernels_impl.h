@@ -16,6 +16,13 @@
 // positions) into (2 positions)(4 ranks). Neither way is left with sums over all the lanes of a
 // vector, which cost as much as the products where clusters are small.
 //
+// `N` is kWidth integers of 16 bits or half as many sums of 32: load, zero, repeat_four (four ranks
+// of a channel for every position), by_position (that shuffle), add_products, add. Around the
+// products it has magnitudes_of_planes and magnitudes_of_lanes, round_positions (of 16 positions)
+// and CoefficientRounding, which make integers, and store_coefficients and add_positions, which
+// make floats of sums. kStrip positions are what its registers have room for, kLeastSums what hides
+// the latency of a sum.
+//
 // Integer sums do not depend on their order, and floats are converted, scaled and added in the same
 // one everywhere: all instruction sets give the same bits.
 
