@@ -21,9 +21,6 @@ namespace {
 
 constexpr std::size_t kAlignment = HierarchicalOperator::kAlignment;
 
-// Form factors are the same for all channels.
-const ChannelLanes kOneMatrix({0, 0, 0}, 1);
-
 /// Three vectors, one to each channel, with room for whole vectors at the end.
 class Planes {
  public:
@@ -217,7 +214,7 @@ class ClusterRelaxation final : public Relaxation {
 
   void multiply(CoreBlock core, CoreBlock::Direction direction) {
     core.direction = direction;
-    multiply_cores_(core_values_, {&core, 1}, kOneMatrix, 1, sent_.from(0), arrived_.to(0));
+    multiply_cores_(core_values_, {&core, 1}, lanes_, 1, sent_.from(0), arrived_.to(0));
   }
 
   /// Of a dense block, radiosity as it is for coefficients.
@@ -320,6 +317,7 @@ class ClusterRelaxation final : public Relaxation {
   const HierarchicalOperator::Storage& exchange_;
   const BasisKernels<Basis>& bases_;
   CoreKernel<Value> multiply_cores_;
+  ChannelLanes lanes_{{0, 0, 0}, 1};  ///< one matrix for all channels
   const Basis* basis_values_;
   const Value* core_values_;
   float value_scale_;  ///< what a product with stored values is to be multiplied by
