@@ -118,11 +118,15 @@ BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
     settings.operator_kind =
         patch_count <= kDensePatchCount ? OperatorKind::kDense : OperatorKind::kHierarchical;
   }
-  const bool dense = settings.operator_kind == OperatorKind::kDense;
-  if (!settings.precision) settings.precision = dense ? Precision::kF32 : Precision::kF16;
-  if (settings.precision == Precision::kQ8 &&
-      settings.operator_kind != OperatorKind::kHierarchical) {
-    throw Error("8 bits are for hierarchical operators alone; use f16 or f32, or ask for one");
+  const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
+  if (!settings.precision) {
+    const bool dense = settings.operator_kind == OperatorKind::kDense;
+    settings.precision = hierarchical ? Precision::kQ16 : dense ? Precision::kF32 : Precision::kF16;
+  }
+  const bool integers =
+      settings.precision == Precision::kQ16 || settings.precision == Precision::kQ8;
+  if (integers && !hierarchical) {
+    throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
   }
   if (settings.operator_kind != OperatorKind::kHierarchical) settings.tolerance = 0;
   return settings;

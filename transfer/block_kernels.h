@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "rebounce/transfer/types.h"
 
@@ -16,52 +17,80 @@ struct PlanarVectors {
   std::size_t stride, count;
 };
 
-/// Products with the bases of the hierarchical operator, for one instruction set. Counts of
-/// positions are multiples of HierarchicalOperator::kAlignment; ranks are anything. An int8_t
-/// stands for itself: its scale is elsewhere.
+/// A coefficient of the three channels and one float more, so that they are a vector.
+inline constexpr std::size_t kChannelLanes = 4;
+
+/// Coefficients of light in bases, its channels side by side: coefficient r of light l is the
+/// kChannelLanes floats from l times `stride` + r times kChannelLanes, of which the last is not
+/// used.
+template <typename T>
+struct Coefficients {
+  T* data;
+  std::size_t stride;
+};
+
+/// Ranks and positions of the bases over a cluster, [rank][size]; those of std::int16_t in the
+/// order of integer_kernels_impl.h. Sizes and positions are multiples of
+/// HierarchicalOperator::kAlignment.
+struct BasisPart {
+  std::uint64_t values;                   ///< where the bases of the cluster begin
+  std::uint32_t rank, size;               ///< of the cluster
+  std::uint32_t coefficient, position;    ///< its first ones
+  std::uint32_t first_rank, last_rank;    ///< [first, last) of them
+  std::uint32_t first_place, last_place;  ///< positions in the cluster, likewise
+};
+
+/// Products with the bases of the hierarchical operator, for one instruction set. Integers stand
+/// for themselves: their scale is elsewhere.
 template <typename Value>
 struct BasisKernels {
-  /// coefficient[v][r] = sum over k of basis[r][k] x[v][k], basis [rank][size].
-  void (*project)(const Value* basis, std::size_t rank, std::size_t size,
-                  PlanarVectors<const float> x, PlanarVectors<float> coefficient);
+  /// coefficient[r] = sum over k of basis[r][k] x[k] for the lights of x and the ranks of each
+  /// part, over all positions of its cluster. Of std::int16_t, ranks begin with a multiple of
+  /// HierarchicalOperator::kRankGroup, and coefficients are written up to the next one.
+  void (*project)(const Value* values, std::span<const BasisPart> parts,
+                  PlanarVectors<const float> x, Coefficients<float> coefficient);
 
-  /// y[v][k] += sum over r of basis[r][k] coefficient[v][r] for `count` columns of a basis
-  /// [rank][size].
-  void (*expand)(const Value* basis, std::size_t rank, std::size_t size, std::size_t count,
-                 PlanarVectors<const float> coefficient, PlanarVectors<float> y);
+  /// y[k] += sum over r of basis[r][k] coefficient[r] for the lights of y, the ranks and the
+  /// positions of one part after the other.
+  void (*expand)(const Value* values, std::span<const BasisPart> parts,
+                 Coefficients<const float> coefficient, PlanarVectors<float> y);
 };
 
-/// The cores or the entries of a block, S [matrix][rows][columns] of any size; whole vectors are
-/// read at the end of each.
+/// A core S or a dense block, [rows][columns][matrix].
+struct CoreBlock {
+  enum class Direction : std::uint8_t { kBoth, kToRows, kToColumns };
+
+  std::uint64_t values;
+  std::uint32_t rows, columns;
+  std::uint32_t row, column;  ///< first coefficients at its ends
+  Direction direction;
+};
+
+/// What serves the channels of an entry of kMatrices neighbouring values: lanes of four entries.
+struct ChannelLanes {
+  ChannelLanes(const std::array<std::uint32_t, kChannelCount>& channel_matrix,
+               std::uint32_t matrices);
+
+  alignas(32) std::array<std::uint16_t, 16> value;  ///< of [entry][lane]; the last lane is blue's
+  std::size_t matrix_count;
+};
+
+/// out(row) = S in(column) and out(column) = S^T in(row), as its direction says, for one core after
+/// the other and each light; what was there before is overwritten. Sixteen values are read from the
+/// beginning of each entry.
 template <typename Value>
-struct CoreMatrices {
-  const Value* data;
-  std::size_t rows, columns;
-  std::array<std::uint32_t, kChannelCount> channel_matrix;
-};
-
-/// What goes into the cores and what comes out, in the same order of channels and lights.
-struct CoreVectors {
-  PlanarVectors<const float> row_in, column_in;
-  PlanarVectors<float> row_out, column_out;
-};
-
-/// Products with cores and dense blocks; what was there before is overwritten.
-template <typename Value>
-struct CoreKernels {
-  using Product = void (*)(const CoreMatrices<Value>& s, const CoreVectors& vectors);
-  Product both;        ///< row_out = S column_in and column_out = S^T row_in, S read once
-  Product to_rows;     ///< row_out = S column_in
-  Product to_columns;  ///< column_out = S^T row_in
-};
+using CoreKernel = void (*)(const Value* values, std::span<const CoreBlock> cores,
+                            const ChannelLanes& lanes, std::size_t light_count,
+                            Coefficients<const float> in, Coefficients<float> out);
 
 struct BlockKernelSet {
   const char* instruction_set;
   BasisKernels<float> bases_f32;
   BasisKernels<std::uint16_t> bases_f16;
+  BasisKernels<std::int16_t> bases_q16;
   BasisKernels<std::int8_t> bases_q8;
-  CoreKernels<float> cores_f32;
-  CoreKernels<std::uint16_t> cores_f16;
+  CoreKernel<float> cores_f32;
+  CoreKernel<std::uint16_t> cores_f16;
 };
 
 extern const BlockKernelSet kBlockKernelsPortable;

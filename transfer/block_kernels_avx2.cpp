@@ -2,10 +2,11 @@
 
 #include "block_kernels.h"
 #include "block_kernels_impl.h"
+#include "integers_avx2.h"
 #include "vector_avx2.h"
 
 namespace rebounce {
 
-const BlockKernelSet kBlockKernelsAvx2 = make_block_kernels<Vector8>("avx2");
+const BlockKernelSet kBlockKernelsAvx2 = make_block_kernels<Vector8, Shorts16>("avx2");
 
 }  // namespace rebounce

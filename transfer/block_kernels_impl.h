@@ -8,10 +8,13 @@
 // multiply-adds, and as many as AVX2 has room for. A value that was loaded and widened serves the
 // three channels of a light, and of two lights where the registers suffice.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "block_kernels.h"
+#include "integer_kernels_impl.h"
 #include "rebounce/transfer/types.h"
 #include "vector_load.h"
 
@@ -33,23 +36,6 @@ REBOUNCE_INLINE inline void for_each_group(std::size_t vector_count, const Work&
   for (; v < vector_count; v += kChannels) work.template operator()<kChannels>(v);
 }
 
-/// Calls work.template operator()<rows>(first) for groups of four rows, and for what is left.
-template <typename Work>
-REBOUNCE_INLINE inline void for_each_four(std::size_t rows, const Work& work) {
-  std::size_t r = 0;
-  for (; r + 4 <= rows; r += 4) work.template operator()<4>(r);
-  switch (rows - r) {
-    case 3:
-      return work.template operator()<3>(r);
-    case 2:
-      return work.template operator()<2>(r);
-    case 1:
-      return work.template operator()<1>(r);
-    default:
-      return;
-  }
-}
-
 /// The sums over the lanes of kCount vectors, four at most, in the first lanes.
 template <std::size_t kCount, typename V>
 REBOUNCE_INLINE inline auto sums_of(const V (&sum)[kCount]) {
@@ -64,10 +50,15 @@ REBOUNCE_INLINE inline auto sums_of(const V (&sum)[kCount]) {
   }
 }
 
+/// Where the coefficient of vector v, a channel of a light, is among those of a rank.
+constexpr std::size_t lane_of(std::size_t v, std::size_t light_stride) {
+  return v / kChannels * light_stride + v % kChannels;
+}
+
 template <typename V, std::size_t kRows, std::size_t kVectors, typename Value>
 REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, const float* x,
                                          std::size_t x_stride, float* coefficient,
-                                         std::size_t stride) {
+                                         std::size_t light_stride) {
   V sum[kVectors][kRows];
   unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
     unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[v][r] = V::zero(); });
@@ -80,29 +71,38 @@ REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, c
       unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[v][r] = multiply_add(b[r], xv, sum[v][r]); });
     });
   }
-  unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
-    store_first<kRows>(sums_of(sum[v]), coefficient + v * stride);
+  unroll<kVectors / kChannels>([&](auto l) REBOUNCE_INLINE {
+    constexpr std::size_t kFirst = l * kChannels;
+    store_side_by_side<kRows>(sums_of(sum[kFirst]), sums_of(sum[kFirst + 1]),
+                              sums_of(sum[kFirst + 2]), coefficient + l * light_stride);
   });
 }
 
 template <typename V, typename Value>
-void project(const Value* basis, std::size_t rank, std::size_t size, PlanarVectors<const float> x,
-             PlanarVectors<float> coefficient) {
-  for_each_four(rank, [&]<std::size_t kRows>(std::size_t r) REBOUNCE_INLINE {
-    for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
-      project_rows<V, kRows, kVectors>(basis + r * size, size, x.data + v * x.stride, x.stride,
-                                       coefficient.data + v * coefficient.stride + r,
-                                       coefficient.stride);
-    });
-  });
+void project(const Value* values, std::span<const BasisPart> parts, PlanarVectors<const float> x,
+             Coefficients<float> coefficient) {
+  for (const BasisPart& part : parts) {
+    const Value* const basis = values + part.values + std::size_t{part.first_rank} * part.size;
+    const float* const from = x.data + part.position;
+    float* const to =
+        coefficient.data + std::size_t{part.coefficient + part.first_rank} * kChannelLanes;
+    for_each_rows<4>(
+        part.last_rank - part.first_rank, [&]<std::size_t kRows>(std::size_t r) REBOUNCE_INLINE {
+          for_each_group<V>(x.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
+            project_rows<V, kRows, kVectors>(
+                basis + r * part.size, part.size, from + v * x.stride, x.stride,
+                to + lane_of(v, coefficient.stride) + r * kChannelLanes, coefficient.stride);
+          });
+        });
+  }
 }
 
 /// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve of them or
 /// more.
 template <typename V, std::size_t kSize, std::size_t kVectors, typename Value>
 REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
-                                         const float* coefficient, std::size_t stride, float* y,
-                                         std::size_t y_stride) {
+                                         const float* coefficient, std::size_t light_stride,
+                                         float* y, std::size_t y_stride) {
   constexpr std::size_t kWide = kSize / V::kWidth;
   constexpr std::size_t kSums = kVectors * kWide;
   constexpr std::size_t kSplit = kSums < 12 ? 12 / kSums : 1;
@@ -118,7 +118,7 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
     unroll<kWide>([&](auto k)
                       REBOUNCE_INLINE { b[k] = load_values<V>(basis + r * size + k * V::kWidth); });
     unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
-      const V c = V::broadcast(coefficient[v * stride + r]);
+      const V c = V::broadcast(coefficient[lane_of(v, light_stride) + r * kChannelLanes]);
       unroll<kWide>([&](auto k)
                         REBOUNCE_INLINE { sum[s][v][k] = multiply_add(b[k], c, sum[s][v][k]); });
     });
@@ -138,111 +138,133 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
 }
 
 template <typename V, typename Value>
-void expand(const Value* basis, std::size_t rank, std::size_t size, std::size_t count,
-            PlanarVectors<const float> coefficient, PlanarVectors<float> y) {
-  for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
-    const float* c = coefficient.data + v * coefficient.stride;
-    float* yv = y.data + v * y.stride;
-    std::size_t k = 0;
-    const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
-      for (; k + kSize <= count; k += kSize) {
-        expand_strip<V, kSize, kVectors>(basis + k, rank, size, c, coefficient.stride, yv + k,
-                                         y.stride);
-      }
-    };
-    if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
-    if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
-    add_strips.template operator()<16>();
-  });
+void expand(const Value* values, std::span<const BasisPart> parts,
+            Coefficients<const float> coefficient, PlanarVectors<float> y) {
+  for (const BasisPart& part : parts) {
+    const Value* const basis = values + part.values + std::size_t{part.first_rank} * part.size;
+    const float* const from =
+        coefficient.data + std::size_t{part.coefficient + part.first_rank} * kChannelLanes;
+    for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
+      const float* const c = from + lane_of(v, coefficient.stride);
+      float* const yv = y.data + v * y.stride + part.position;
+      std::size_t k = part.first_place;
+      const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
+        for (; k + kSize <= part.last_place; k += kSize) {
+          expand_strip<V, kSize, kVectors>(basis + k, part.last_rank - part.first_rank, part.size,
+                                           c, coefficient.stride, yv + k, y.stride);
+        }
+      };
+      if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
+      if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
+      add_strips.template operator()<16>();
+    });
+  }
 }
 
-/// Columns [begin, begin + width) of S [rows][columns], width at most that of V, for kLights
-/// vectors. Lanes beyond them read on into the next row: column_in is zero there, and column_out is
-/// not stored.
-template <typename V, bool kToRows, bool kToColumns, std::size_t kLights, typename Value>
-REBOUNCE_INLINE inline void multiply_columns(const Value* s, std::size_t rows, std::size_t columns,
-                                             std::size_t begin, const CoreVectors& vectors,
-                                             std::size_t first) {
-  constexpr std::size_t kStep = kChannels;  // from a channel of one light to that of the next
-  const std::size_t width = columns - begin < V::kWidth ? columns - begin : V::kWidth;
-  const std::size_t in_stride = vectors.row_in.stride, out_stride = vectors.row_out.stride;
-  const float* const row_in = vectors.row_in.data + first * in_stride;
-  float* const row_out = vectors.row_out.data + first * out_stride;
-  V column_in[kLights], column_out[kLights];
-  unroll<kLights>([&](auto l) REBOUNCE_INLINE {
-    column_out[l] = V::zero();
-    if constexpr (kToRows) {
-      column_in[l] =
-          V::load_some(vectors.column_in.data + (first + kStep * l) * in_stride + begin, width);
-    }
+using Direction = CoreBlock::Direction;
+
+/// Columns from `begin` on, as many as fill kWide vectors or are left, for one light. The lanes of
+/// a vector are the channels of neighbouring entries of a row: ranks are 5 in the mean, and vectors
+/// of as many entries as there are lanes would be two thirds empty. Lanes beyond the last column
+/// read on into the next row: what comes in there is zero, and what comes out is not stored.
+template <typename V, Direction kDirection, std::size_t kWide, typename Value>
+REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBlock& core,
+                                             std::size_t begin, const ChannelLanes& lanes,
+                                             const float* in, float* out) {
+  constexpr bool kToRows = kDirection != Direction::kToColumns;
+  constexpr bool kToColumns = kDirection != Direction::kToRows;
+  constexpr std::size_t kEntries = V::kWidth / kChannelLanes, kLast = kWide - 1;
+  const typename V::template EntryLanes<Value> entry(lanes);
+  const std::size_t step = core.columns * lanes.matrix_count;
+  const std::size_t last_lanes =
+      (std::min(core.columns - begin, kWide * kEntries) - kLast * kEntries) * kChannelLanes;
+  const Value* const s = values + begin * lanes.matrix_count;
+  const float* const row_in = in + core.row * kChannelLanes;
+  const float* const column_in = in + (core.column + begin) * kChannelLanes;
+  float* const row_out = out + core.row * kChannelLanes;
+  float* const column_out = out + (core.column + begin) * kChannelLanes;
+  V from_columns[kWide], to_columns[kWide];
+  unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+    to_columns[w] = V::zero();
+    if constexpr (kToRows && w < kLast) from_columns[w] = V::load(column_in + w * V::kWidth);
   });
-  for_each_four(rows, [&]<std::size_t kRows>(std::size_t i) REBOUNCE_INLINE {
-    V b[kRows];
-    unroll<kRows>([&](auto r)
-                      REBOUNCE_INLINE { b[r] = load_values<V>(s + (i + r) * columns + begin); });
-    unroll<kLights>([&](auto l) REBOUNCE_INLINE {
-      if constexpr (kToColumns) {
-        unroll<kRows>([&](auto r) REBOUNCE_INLINE {
-          const V in = V::broadcast(row_in[kStep * l * in_stride + i + r]);
-          column_out[l] = multiply_add(b[r], in, column_out[l]);
-        });
-      }
-      if constexpr (kToRows) {
-        V product[kRows];
-        unroll<kRows>([&](auto r) REBOUNCE_INLINE { product[r] = multiply(b[r], column_in[l]); });
-        float* const out = row_out + kStep * l * out_stride + i;
-        if (begin == 0) {
-          store_first<kRows>(sums_of(product), out);
-        } else {
-          add_first<kRows>(sums_of(product), out);
+  if constexpr (kToRows) {
+    from_columns[kLast] = V::load_some(column_in + kLast * V::kWidth, last_lanes);
+  }
+  for_each_rows<kEntries>(core.rows, [&]<std::size_t kRows>(std::size_t i) REBOUNCE_INLINE {
+    V product[kEntries];
+    unroll<kEntries>([&](auto r) REBOUNCE_INLINE { product[r] = V::zero(); });
+    unroll<kRows>([&](auto r) REBOUNCE_INLINE {
+      unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+        const V b = entry.load(s + (i + r) * step + w * kEntries * lanes.matrix_count);
+        if constexpr (kToColumns) {
+          to_columns[w] =
+              multiply_add(b, V::repeat_four(row_in + (i + r) * kChannelLanes), to_columns[w]);
         }
-      }
+        if constexpr (kToRows) product[r] = multiply_add(b, from_columns[w], product[r]);
+      });
     });
+    if constexpr (kToRows) {
+      V sum = V::sums_of_fours(product);
+      if (begin > 0)
+        sum = add(sum, V::load_some(row_out + i * kChannelLanes, kRows * kChannelLanes));
+      sum.store_some(row_out + i * kChannelLanes, kRows * kChannelLanes);
+    }
   });
   if constexpr (kToColumns) {
-    unroll<kLights>([&](auto l) REBOUNCE_INLINE {
-      column_out[l].store_some(vectors.column_out.data + (first + kStep * l) * out_stride + begin,
-                               width);
-    });
+    unroll<kLast>([&](auto w) REBOUNCE_INLINE { to_columns[w].store(column_out + w * V::kWidth); });
+    to_columns[kLast].store_some(column_out + kLast * V::kWidth, last_lanes);
   }
 }
 
-template <typename V, bool kToRows, bool kToColumns, typename Value>
-void multiply_core(const CoreMatrices<Value>& s, const CoreVectors& vectors) {
-  const std::size_t rows = s.rows, columns = s.columns, count = vectors.row_in.count;
-  for (std::size_t c = 0; c < kChannels; ++c) {
-    const Value* values = s.data + s.channel_matrix[c] * rows * columns;
-    for (std::size_t j = 0; j < columns; j += V::kWidth) {
-      std::size_t v = c;
-      for (; v + kChannels < count; v += 2 * kChannels) {
-        multiply_columns<V, kToRows, kToColumns, 2>(values, rows, columns, j, vectors, v);
-      }
-      if (v < count) {
-        multiply_columns<V, kToRows, kToColumns, 1>(values, rows, columns, j, vectors, v);
+template <typename V, Direction kDirection, typename Value>
+REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& core,
+                                          const ChannelLanes& lanes, const float* in, float* out) {
+  constexpr std::size_t kEntries = V::kWidth / kChannelLanes;
+  std::size_t j = 0;
+  for (; j + kEntries < core.columns; j += 2 * kEntries) {
+    multiply_columns<V, kDirection, 2>(values, core, j, lanes, in, out);
+  }
+  if (j < core.columns) multiply_columns<V, kDirection, 1>(values, core, j, lanes, in, out);
+}
+
+template <typename V, typename Value>
+void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
+                    const ChannelLanes& lanes, std::size_t light_count,
+                    Coefficients<const float> in, Coefficients<float> out) {
+  for (std::size_t l = 0; l < light_count; ++l) {
+    const float* const from = in.data + l * in.stride;
+    float* const to = out.data + l * out.stride;
+    for (const CoreBlock& core : cores) {
+      const Value* const s = values + core.values;
+      switch (core.direction) {
+        case Direction::kBoth:
+          multiply_core<V, Direction::kBoth>(s, core, lanes, from, to);
+          break;
+        case Direction::kToRows:
+          multiply_core<V, Direction::kToRows>(s, core, lanes, from, to);
+          break;
+        case Direction::kToColumns:
+          multiply_core<V, Direction::kToColumns>(s, core, lanes, from, to);
+          break;
       }
     }
   }
 }
-
 template <typename V, typename Value>
 constexpr BasisKernels<Value> make_basis_kernels() {
   return {project<V, Value>, expand<V, Value>};
 }
 
-template <typename V, typename Value>
-constexpr CoreKernels<Value> make_core_kernels() {
-  return {multiply_core<V, true, true, Value>, multiply_core<V, true, false, Value>,
-          multiply_core<V, false, true, Value>};
-}
-
-template <typename V>
+template <typename V, typename N>
 constexpr BlockKernelSet make_block_kernels(const char* instruction_set) {
   return {instruction_set,
           make_basis_kernels<V, float>(),
           make_basis_kernels<V, std::uint16_t>(),
+          {project_integers<N>, expand_integers<N>},
           make_basis_kernels<V, std::int8_t>(),
-          make_core_kernels<V, float>(),
-          make_core_kernels<V, std::uint16_t>()};
+          multiply_cores<V, float>,
+          multiply_cores<V, std::uint16_t>};
 }
 
 }  // namespace

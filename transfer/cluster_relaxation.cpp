@@ -44,15 +44,36 @@ class Planes {
   std::vector<float> values_;
 };
 
+/// Coefficients of three channels.
+class CoefficientArray {
+ public:
+  explicit CoefficientArray(std::size_t size) : values_(size * kChannelLanes) {}
+
+  float& at(int channel, std::size_t index) { return values_[index * kChannelLanes + channel]; }
+  float at(int channel, std::size_t index) const {
+    return values_[index * kChannelLanes + channel];
+  }
+
+  Coefficients<float> to(std::size_t begin) {
+    return {values_.data() + begin * kChannelLanes, values_.size()};
+  }
+  Coefficients<const float> from(std::size_t begin) const {
+    return {values_.data() + begin * kChannelLanes, values_.size()};
+  }
+
+ private:
+  std::vector<float> values_;
+};
+
 template <typename Basis, typename Value>
 class ClusterRelaxation final : public Relaxation {
  public:
   ClusterRelaxation(const HierarchicalOperator::Storage& exchange, const BasisKernels<Basis>& bases,
-                    const CoreKernels<Value>& cores, const Basis* basis_values,
+                    CoreKernel<Value> multiply_cores, const Basis* basis_values,
                     const Value* core_values)
       : exchange_(exchange),
         bases_(bases),
-        cores_(cores),
+        multiply_cores_(multiply_cores),
         basis_values_(basis_values),
         core_values_(core_values),
         value_scale_(product_scale(exchange.precision)),
@@ -64,8 +85,7 @@ class ClusterRelaxation final : public Relaxation {
         upper_(positions()),
         received_(positions()),
         sent_(plan_.coefficient_count),
-        arrived_(plan_.coefficient_count),
-        product_(plan_.largest_side) {}
+        arrived_(plan_.coefficient_count) {}
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     area_ = problem.area;
@@ -170,52 +190,47 @@ class ClusterRelaxation final : public Relaxation {
     return sum;
   }
 
-  void project(const Plan::Bases& bases) {
-    bases_.project(basis_values_ + bases.values, bases.rank, bases.size,
-                   radiosity_.from(bases.begin), sent_.to(bases.coefficient));
+  void project(const BasisPart& basis) {
+    bases_.project(basis_values_, {&basis, 1}, radiosity_.from(0), sent_.to(0));
   }
 
-  void expand(const Plan::Bases& bases, Planes& arrived) {
-    bases_.expand(basis_values_ + bases.values, bases.rank, bases.size, bases.size,
-                  arrived_.from(bases.coefficient), arrived.to(bases.begin));
+  void expand(const BasisPart& basis, Planes& arrived) {
+    bases_.expand(basis_values_, {&basis, 1}, arrived_.from(0), arrived.to(0));
   }
 
   void send_to_rows(const Plan::Product& product) {
-    if (!product.dense) {
-      to_rows(product.values, product.rows, product.columns, sent_.from(product.column),
-              arrived_.to(product.row));
-      return;
-    }
-    to_rows(product.values, product.rows, product.columns, radiosity_.from(product.column),
-            product_.to(0));
-    add_product(product.rows, lower_, product.row);
+    const CoreBlock& core = product.core;
+    if (product.dense) send(product.column_begin, core.columns, core.column);
+    multiply(core, CoreBlock::Direction::kToRows);
+    if (product.dense) add_arrived(core.row, core.rows, lower_, product.row_begin);
   }
 
   void send_to_columns(const Plan::Product& product) {
-    if (!product.dense) {
-      to_columns(product, sent_.from(product.row), arrived_.to(product.column));
-      return;
-    }
-    to_columns(product, radiosity_.from(product.row), product_.to(0));
-    add_product(product.columns, upper_, product.column);
+    const CoreBlock& core = product.core;
+    if (product.dense) send(product.row_begin, core.rows, core.row);
+    multiply(core, CoreBlock::Direction::kToColumns);
+    if (product.dense) add_arrived(core.column, core.columns, upper_, product.column_begin);
   }
 
-  /// out = S in
-  void to_rows(std::uint64_t values, std::size_t rows, std::size_t columns,
-               const PlanarVectors<const float>& in, const PlanarVectors<float>& out) const {
-    cores_.to_rows({core_values_ + values, rows, columns, {0, 0, 0}}, {in, in, out, out});
+  void multiply(CoreBlock core, CoreBlock::Direction direction) {
+    core.direction = direction;
+    multiply_cores_(core_values_, {&core, 1}, lanes_, 1, sent_.from(0), arrived_.to(0));
   }
 
-  /// out = S^T in
-  void to_columns(const Plan::Product& product, const PlanarVectors<const float>& in,
-                  const PlanarVectors<float>& out) const {
-    cores_.to_columns({core_values_ + product.values, product.rows, product.columns, {0, 0, 0}},
-                      {in, in, out, out});
-  }
-
-  void add_product(std::size_t count, Planes& to, std::size_t begin) const {
+  /// Of a dense block, radiosity as it is for coefficients.
+  void send(std::size_t begin, std::size_t count, std::size_t coefficient) {
     for (int c = 0; c < kChannelCount; ++c) {
-      for (std::size_t k = 0; k < count; ++k) to.at(c, begin + k) += product_.at(c, k);
+      for (std::size_t k = 0; k < count; ++k) {
+        sent_.at(c, coefficient + k) = radiosity_.at(c, begin + k);
+      }
+    }
+  }
+
+  void add_arrived(std::size_t coefficient, std::size_t count, Planes& to, std::size_t begin) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      for (std::size_t k = 0; k < count; ++k) {
+        to.at(c, begin + k) += arrived_.at(c, coefficient + k);
+      }
     }
   }
 
@@ -230,14 +245,21 @@ class ClusterRelaxation final : public Relaxation {
     }
     if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
     if (block.row_rank > 0) {
-      const Plan::Bases bases{step.basis, block.row_rank, block.row_count, block.row_begin,
-                              step.coefficient};
-      project(bases);
-      to_rows(step.values, block.row_rank, block.row_rank, sent_.from(step.coefficient),
-              arrived_.to(step.coefficient));
-      expand(bases, received_);
+      project(step.basis);
+      multiply(diagonal_core(step, block.row_rank, block.row_rank), CoreBlock::Direction::kToRows);
+      expand(step.basis, received_);
     }
     return relax_at_once(begin, end);
+  }
+
+  static CoreBlock diagonal_core(const Plan::Step& step, std::uint32_t rows,
+                                 std::uint32_t columns) {
+    return {.values = step.values,
+            .rows = rows,
+            .columns = columns,
+            .row = step.coefficient,
+            .column = step.coefficient,
+            .direction = CoreBlock::Direction::kToRows};
   }
 
   /// Relaxes positions that see nothing of each other but what has been received.
@@ -262,24 +284,29 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   double relax_rows(const Plan::Step& step, SweepDirection direction) {
-    const std::size_t begin = step.diagonal.row_begin, size = step.diagonal.row_count;
+    const std::uint32_t begin = step.diagonal.row_begin, size = step.diagonal.row_count;
+    send(begin, size, step.coefficient);
+    CoreBlock row_block = diagonal_core(step, 1, size);
     double changed_squared = 0;
-    for (std::size_t k = 0; k < size; ++k) {
-      const std::size_t row = direction == SweepDirection::kForward ? k : size - 1 - k;
-      Float3 inside;
-      to_rows(step.values + row * size, 1, size, radiosity_.from(begin),
-              {inside.data(), 1, kChannelCount});
-      changed_squared += relax_position(begin + row, inside);
+    for (std::uint32_t k = 0; k < size; ++k) {
+      const std::uint32_t row = direction == SweepDirection::kForward ? k : size - 1 - k;
+      row_block.values = step.values + std::uint64_t{row} * size;
+      multiply(row_block, CoreBlock::Direction::kToRows);
+      changed_squared += relax_position(begin + row, step.coefficient);
+      for (int c = 0; c < kChannelCount; ++c) {
+        sent_.at(c, step.coefficient + row) = radiosity_.at(c, begin + row);
+      }
     }
     return changed_squared;
   }
 
-  double relax_position(std::size_t position, const Float3& inside) {
+  /// `inside`: the coefficient that has come from within its block.
+  double relax_position(std::size_t position, std::size_t inside) {
     double changed_squared = 0;
     for (int c = 0; c < kChannelCount; ++c) {
       float& x = radiosity_.at(c, position);
-      const float next = light_.at(c, position) +
-                         reflectance_.at(c, position) * (received_.at(c, position) + inside[c]);
+      const float received = received_.at(c, position) + arrived_.at(c, inside);
+      const float next = light_.at(c, position) + reflectance_.at(c, position) * received;
       const double change = static_cast<double>(next) - x;
       changed_squared += change * change;
       x = next;
@@ -289,14 +316,15 @@ class ClusterRelaxation final : public Relaxation {
 
   const HierarchicalOperator::Storage& exchange_;
   const BasisKernels<Basis>& bases_;
-  const CoreKernels<Value>& cores_;
+  CoreKernel<Value> multiply_cores_;
+  ChannelLanes lanes_{{0, 0, 0}, 1};  ///< one matrix for all channels
   const Basis* basis_values_;
   const Value* core_values_;
   float value_scale_;  ///< what a product with stored values is to be multiplied by
   ClusterSweepPlan plan_;
   Planes light_, reflectance_, radiosity_;  ///< A^1/2 M0, rho x value_scale, A^1/2 B
   Planes lower_, upper_, received_;         ///< L x, L^T x, and both and D x
-  Planes sent_, arrived_, product_;         ///< coefficients of x, of cores; of one dense block
+  CoefficientArray sent_, arrived_;         ///< coefficients of x, of cores
   std::span<const float> area_;
   Known known_ = Known::kNothing;
 };
@@ -305,8 +333,7 @@ class ClusterRelaxation final : public Relaxation {
 
 std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::Storage& exchange) {
   const BlockKernelSet& kernels = block_kernels();
-  const std::uint64_t first_core =
-      HierarchicalLayout(exchange.blocks, exchange.matrix_count).basis_value_count;
+  const std::uint64_t first_core = HierarchicalLayout(exchange).basis_value_count;
   const auto make = [&](const auto& bases, const auto& cores, const auto* basis_values,
                         const auto* core_values) -> std::unique_ptr<Relaxation> {
     return std::make_unique<ClusterRelaxation<std::remove_cvref_t<decltype(*basis_values)>,
@@ -320,6 +347,8 @@ std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::
       return make(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core);
     case Precision::kF32:
       return make(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
+    case Precision::kQ16:
+      break;  // refused by CompressedFormFactors
     case Precision::kQ8:
       return make(kernels.bases_q8, kernels.cores_f16, exchange.bases_q8.data(), f16);
   }

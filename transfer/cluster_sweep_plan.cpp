@@ -7,7 +7,6 @@ namespace {
 
 constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
 
-using Bases = ClusterSweepPlan::Bases;
 using Product = ClusterSweepPlan::Product;
 using Step = ClusterSweepPlan::Step;
 
@@ -31,7 +30,7 @@ class Planner {
  public:
   Planner(const HierarchicalOperator::Storage& storage, ClusterSweepPlan& plan)
       : blocks_(storage.blocks),
-        layout_(storage.blocks, storage.matrix_count),
+        layout_(storage),
         plan_(plan),
         step_at_(HierarchicalOperator::position_count(storage.area.size()) / kAlignment, 0) {}
 
@@ -57,10 +56,9 @@ class Planner {
       if (!blocks_[b].on_diagonal()) continue;
       const HierarchicalLayout::Place& place = layout_.places[b];
       plan_.steps.push_back({.diagonal = blocks_[b],
-                             .basis = place.row.basis,
+                             .basis = basis_of(blocks_[b], place.row, blocks_[b].row_rank),
                              .values = place.values,
                              .coefficient = place.row.coefficient});
-      note_side(blocks_[b]);
     }
     add_missing_steps();
     std::ranges::sort(plan_.steps, {}, [](const Step& step) { return step.diagonal.row_begin; });
@@ -88,9 +86,21 @@ class Planner {
     }
   }
 
-  void note_side(const TransferBlock& block) {
-    if (block.kind != TransferBlock::Kind::kDense) return;
-    plan_.largest_side = std::max({plan_.largest_side, block.row_count, block.column_count});
+  /// The basis at an end of a block, which begins where the cluster's does or later.
+  BasisPart basis_of(const TransferBlock& block, const HierarchicalLayout::End& end,
+                     std::uint32_t rank) const {
+    if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) return {};
+    const HierarchicalLayout::Cluster& cluster = layout_.clusters[end.cluster];
+    const std::uint32_t first = end.coefficient - cluster.coefficient;
+    return {.values = cluster.values,
+            .rank = cluster.rank,
+            .size = cluster.size,
+            .coefficient = cluster.coefficient,
+            .position = cluster.begin,
+            .first_rank = first,
+            .last_rank = first + rank,
+            .first_place = 0,
+            .last_place = cluster.size};
   }
 
   void add_block(std::size_t b) {
@@ -100,39 +110,39 @@ class Planner {
     const std::uint32_t column_step =
         step_at_[(block.column_begin + block.column_count) / kAlignment - 1];
     const bool dense = block.kind == TransferBlock::Kind::kDense;
-    Product product{place.values,    block.row_count,    block.column_count,
-                    block.row_begin, block.column_begin, dense};
+    const Product product{.core = {.values = place.values,
+                                   .rows = dense ? block.row_count : block.row_rank,
+                                   .columns = dense ? block.column_count : block.column_rank,
+                                   .row = place.row.coefficient,
+                                   .column = place.column.coefficient,
+                                   .direction = CoreBlock::Direction::kBoth},
+                          .row_begin = block.row_begin,
+                          .column_begin = block.column_begin,
+                          .dense = dense};
     if (!dense) {
-      product = {place.values,          block.row_rank,           block.column_rank,
-                 place.row.coefficient, place.column.coefficient, false};
-      add_bases(row_bases_[row_step], {place.row.basis, block.row_rank, block.row_count,
-                                       block.row_begin, place.row.coefficient});
-      add_bases(column_bases_[column_step],
-                {place.column.basis, block.column_rank, block.column_count, block.column_begin,
-                 place.column.coefficient});
+      add_basis(row_bases_[row_step], basis_of(block, place.row, block.row_rank));
+      add_basis(column_bases_[column_step], basis_of(block, place.column, block.column_rank));
     }
-    note_side(block);
     row_products_[row_step].push_back(product);
     column_products_[column_step].push_back(product);
   }
 
   /// Joins bases that follow each other.
-  static void add_bases(std::vector<Bases>& all, const Bases& bases) {
-    for (Bases& before : all) {
-      if (before.begin == bases.begin && before.size == bases.size &&
-          before.coefficient + before.rank == bases.coefficient) {
-        before.rank += bases.rank;
+  static void add_basis(std::vector<BasisPart>& all, const BasisPart& basis) {
+    for (BasisPart& before : all) {
+      if (before.coefficient == basis.coefficient && before.last_rank == basis.first_rank) {
+        before.last_rank = basis.last_rank;
         return;
       }
     }
-    all.push_back(bases);
+    all.push_back(basis);
   }
 
   const std::vector<TransferBlock>& blocks_;
   HierarchicalLayout layout_;
   ClusterSweepPlan& plan_;
   std::vector<std::uint32_t> step_at_;  ///< of each kAlignment positions
-  ByStep<Bases> row_bases_, column_bases_;
+  ByStep<BasisPart> row_bases_, column_bases_;
   ByStep<Product> row_products_, column_products_;
 };
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "block_kernels.h"
 #include "hierarchical_layout.h"
 
 namespace rebounce {
@@ -12,24 +13,18 @@ namespace rebounce {
 /// positions send in a forward sweep, and send in a backward one; those below it the other way
 /// round.
 struct ClusterSweepPlan {
-  /// Bases of one cluster that are used together: [rank][size].
-  struct Bases {
-    std::uint64_t values;
-    std::uint32_t rank, size, begin, coefficient;
-  };
-
-  /// A core or a dense block below the diagonal.
+  /// A core or a dense block below the diagonal; its row and column are coefficients.
   struct Product {
-    std::uint64_t values;
-    std::uint32_t rows, columns;
-    std::uint32_t row, column;  ///< first coefficients, or positions if `dense`
+    CoreBlock core;
+    std::uint32_t row_begin, column_begin;  ///< positions
     bool dense;
   };
 
   /// A block on the diagonal, and ranges of what belongs to it.
   struct Step {
     TransferBlock diagonal;
-    std::uint64_t basis = 0, values = 0;  ///< U^T; S or the entries
+    BasisPart basis{};         ///< U^T
+    std::uint64_t values = 0;  ///< S or the entries
     std::uint32_t coefficient = 0;
     std::uint32_t last_row_bases = 0, last_column_bases = 0;  ///< one past, from the step before on
     std::uint32_t last_row_product = 0, last_column_product = 0;
@@ -38,12 +33,12 @@ struct ClusterSweepPlan {
   explicit ClusterSweepPlan(const HierarchicalOperator::Storage& storage);
 
   std::vector<Step> steps;  ///< by position
-  /// Row ends of clusters that begin in a step's block, column ends of clusters that end in it.
-  std::vector<Bases> row_bases, column_bases;
+  /// Bases of row ends of clusters that begin in a step's block, of column ends of clusters that
+  /// end in it; those that follow each other are joined.
+  std::vector<BasisPart> row_bases, column_bases;
   /// Blocks whose rows begin in a step's block, and blocks whose columns end in it.
   std::vector<Product> row_products, column_products;
   std::uint32_t coefficient_count = 0;
-  std::uint32_t largest_side = 0;  ///< of a dense block
 };
 
 }  // namespace rebounce

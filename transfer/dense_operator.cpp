@@ -124,6 +124,8 @@ std::string precision_name(Precision precision) {
   switch (precision) {
     case Precision::kF16:
       return "f16";
+    case Precision::kQ16:
+      return "q16";
     case Precision::kQ8:
       return "q8";
     case Precision::kF32:
@@ -138,8 +140,8 @@ std::size_t DenseOperator::tile_count(std::size_t patch_count) {
 }
 
 DenseOperator::DenseOperator(Storage storage) : storage_(std::move(storage)) {
-  if (storage_.precision == Precision::kQ8) {
-    throw Error("dense operator: 8 bits are not precise enough; use f16 or f32");
+  if (storage_.precision != Precision::kF16 && storage_.precision != Precision::kF32) {
+    throw Error("dense operator: it has no bases to hold as integers; use f16 or f32");
   }
   const std::size_t values = storage_.matrix_count * tile_count(patch_count()) * kTileSize;
   const bool half = storage_.precision == Precision::kF16;

@@ -8,6 +8,8 @@
 namespace rebounce {
 namespace {
 
+constexpr std::uint64_t kStrip = HierarchicalOperator::kStrip;
+
 // More values than any memory holds: sums of block sizes stay far from the end of 64 bits.
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 48;
 
@@ -52,8 +54,9 @@ bool has_values(const TransferBlock& block) {
 }
 
 HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
-                                       std::uint32_t matrix_count)
-    : places(blocks.size()) {
+                                       std::uint32_t matrix_count, Precision precision)
+    : places(blocks.size()),
+      rank_group(precision == Precision::kQ16 ? HierarchicalOperator::kRankGroup : 1) {
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
     total += block.value_count(matrix_count);
@@ -64,6 +67,22 @@ HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
   find_clusters(blocks);
   place_bases(blocks);
   place_cores(blocks, matrix_count);
+}
+
+std::uint64_t HierarchicalLayout::filled_rank(const Cluster& cluster) const {
+  return (std::uint64_t{cluster.rank} + rank_group - 1) / rank_group * rank_group;
+}
+
+std::uint64_t HierarchicalLayout::basis_index(const End& end, std::uint64_t rank,
+                                              std::uint64_t position) const {
+  const Cluster& cluster = clusters[end.cluster];
+  const std::uint64_t r = end.coefficient - cluster.coefficient + rank;
+  if (rank_group == 1) return cluster.values + r * cluster.size + position;
+  const std::uint64_t begin = position / kStrip * kStrip;
+  const std::uint64_t width = std::min(kStrip, cluster.size - begin);
+  const std::uint64_t pair = (position - begin) / 2;
+  return cluster.values + begin * filled_rank(cluster) +
+         (r / rank_group * width + 2 * pair) * rank_group + r % rank_group * 2 + position % 2;
 }
 
 void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {
@@ -96,22 +115,19 @@ void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks) {
   for (Cluster& cluster : clusters) {
     cluster.coefficient = coefficient_count;
     cluster.values = basis_value_count;
-    coefficient_count = checked_count(std::uint64_t{coefficient_count} + cluster.rank);
-    basis_value_count += std::uint64_t{cluster.rank} * cluster.size;
+    coefficient_count = checked_count(coefficient_count + filled_rank(cluster));
+    basis_value_count += filled_rank(cluster) * cluster.size;
   }
-  visit_ends(blocks, places, [&](End& end, std::uint32_t, std::uint32_t size, std::uint32_t) {
-    const Cluster& cluster = clusters[end.cluster];
-    end.basis = cluster.values + std::uint64_t{end.coefficient} * size;
-    end.coefficient += cluster.coefficient;
+  visit_ends(blocks, places, [&](End& end, std::uint32_t, std::uint32_t, std::uint32_t) {
+    end.coefficient += clusters[end.cluster].coefficient;
   });
 }
 
 void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
                                      std::uint32_t matrix_count) {
-  product_count = coefficient_count;
-  const auto add_products = [&](End& end, std::uint32_t count) {
-    end.coefficient = product_count;
-    product_count = checked_count(std::uint64_t{product_count} + count);
+  const auto add_coefficients = [&](End& end, std::uint32_t count) {
+    end.coefficient = coefficient_count;
+    coefficient_count = checked_count(std::uint64_t{coefficient_count} + count);
   };
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
@@ -119,8 +135,9 @@ void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
     place.values = core_value_count;
     if (block.kind == TransferBlock::Kind::kDense) {
       core_value_count += block.value_count(matrix_count);
-      add_products(place.row, block.row_count);
-      if (!block.on_diagonal()) add_products(place.column, block.column_count);
+      add_coefficients(place.row, block.row_count);
+      place.column = place.row;
+      if (!block.on_diagonal()) add_coefficients(place.column, block.column_count);
     } else {
       core_value_count +=
           std::uint64_t{matrix_count} * block.row_rank * std::uint64_t{block.column_rank};

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "block_kernels.h"
 #include "hierarchical_plan.h"
@@ -23,107 +24,107 @@ std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
 
-/// The vectors of an apply, three to each light.
+/// The vectors of an apply to some lights.
 struct WorkVectors {
-  PlanarVectors<float> x;             ///< by position, times the root of the area
-  PlanarVectors<float> coefficients;  ///< of x in the bases
-  PlanarVectors<float> products;      ///< of cores and dense blocks
-  PlanarVectors<float> y;             ///< by position, what arrives
+  std::size_t light_count;
+  PlanarVectors<float> x;       ///< by position, times the root of the area
+  Coefficients<float> sent;     ///< of x in the bases
+  Coefficients<float> arrived;  ///< products of cores and dense blocks
+  PlanarVectors<float> y;       ///< by position, what arrives
 
-  WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t light_count,
-              float* buffer) {
-    const auto take = [&](std::size_t size) {
-      const PlanarVectors<float> taken{buffer, round_up(size, kLine), kChannelCount * light_count};
-      buffer += taken.stride * taken.count;
-      return taken;
-    };
-    x = take(positions);
-    coefficients = take(layout.coefficient_count);
-    products = take(layout.product_count);
-    y = take(positions);
+  WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
+              float* buffer)
+      : light_count(lights) {
+    const std::size_t vector = vector_size(positions), coefficients = coefficients_size(layout);
+    const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
+    x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
+    sent = {take(light_count * coefficients), coefficients};
+    arrived = {take(light_count * coefficients), coefficients};
+    y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
   }
 
   static std::size_t size(std::size_t positions, const HierarchicalLayout& layout,
                           std::size_t light_count) {
-    return (2 * round_up(positions, kLine) + round_up(layout.coefficient_count, kLine) +
-            round_up(layout.product_count, kLine)) *
-           kChannelCount * light_count;
-  }
-};
-
-template <typename T>
-PlanarVectors<const float> from(const PlanarVectors<T>& vectors, std::size_t begin) {
-  return {vectors.data + begin, vectors.stride, vectors.count};
-}
-
-PlanarVectors<float> to(const PlanarVectors<float>& vectors, std::size_t begin) {
-  return {vectors.data + begin, vectors.stride, vectors.count};
-}
-
-/// The phases of an apply, one entry of the plan at a time.
-template <typename Basis, typename Value>
-class Phases {
- public:
-  Phases(const BasisKernels<Basis>& bases, const CoreKernels<Value>& cores, const Basis* basis,
-         const Value* value, const std::array<std::uint32_t, kChannelCount>& channel_matrix,
-         const WorkVectors& work)
-      : bases_(bases),
-        cores_(cores),
-        basis_(basis),
-        value_(value),
-        channel_matrix_(channel_matrix),
-        work_(work) {}
-
-  void project(const HierarchicalPlan::Projection& p) const {
-    bases_.project(basis_ + p.basis, p.rank, p.size, from(work_.x, p.begin),
-                   to(work_.coefficients, p.coefficient));
-  }
-
-  void multiply(const HierarchicalPlan::Core& core) const {
-    const PlanarVectors<float>& in = core.dense ? work_.x : work_.coefficients;
-    const CoreMatrices<Value> matrices{value_ + core.values, core.rows, core.columns,
-                                       channel_matrix_};
-    kernel(core.direction)(matrices, {.row_in = from(in, core.row_in),
-                                      .column_in = from(in, core.column_in),
-                                      .row_out = to(work_.products, core.row_out),
-                                      .column_out = to(work_.products, core.column_out)});
-  }
-
-  void expand(const HierarchicalPlan::Expansion& e) const {
-    if (e.rank == 0) return add_products(e);
-    bases_.expand(basis_ + e.basis, e.rank, e.size, e.count, from(work_.products, e.coefficient),
-                  to(work_.y, e.begin));
+    return 2 * (kChannelCount * vector_size(positions) + coefficients_size(layout)) * light_count;
   }
 
  private:
-  typename CoreKernels<Value>::Product kernel(HierarchicalPlan::Direction direction) const {
-    switch (direction) {
-      case HierarchicalPlan::Direction::kToRows:
-        return cores_.to_rows;
-      case HierarchicalPlan::Direction::kToColumns:
-        return cores_.to_columns;
-      case HierarchicalPlan::Direction::kBoth:
-        break;
-    }
-    return cores_.both;
+  static std::size_t vector_size(std::size_t positions) { return round_up(positions, kLine); }
+  static std::size_t coefficients_size(const HierarchicalLayout& layout) {
+    return round_up(layout.coefficient_count * kChannelLanes, kLine);
+  }
+};
+
+PlanarVectors<const float> constant(const PlanarVectors<float>& vectors) {
+  return {vectors.data, vectors.stride, vectors.count};
+}
+
+Coefficients<const float> constant(const Coefficients<float>& coefficients) {
+  return {coefficients.data, coefficients.stride};
+}
+
+/// Entries [first, last).
+template <typename T>
+std::span<const T> between(const std::vector<T>& all, std::uint32_t first, std::uint32_t last) {
+  return std::span(all).subspan(first, last - first);
+}
+
+/// The phases of an apply.
+template <typename Basis, typename Value>
+class Phases {
+ public:
+  Phases(const BasisKernels<Basis>& bases, CoreKernel<Value> multiply_cores, const Basis* basis,
+         const Value* value, const ChannelLanes& lanes, float product_scale,
+         const WorkVectors& work)
+      : bases_(bases),
+        multiply_cores_(multiply_cores),
+        basis_(basis),
+        value_(value),
+        lanes_(lanes),
+        product_scale_(product_scale),
+        work_(work) {}
+
+  void project(std::span<const BasisPart> parts) const {
+    bases_.project(basis_, parts, constant(work_.x), work_.sent);
   }
 
-  void add_products(const HierarchicalPlan::Expansion& e) const {
-    // Other light goes through two bases on its way.
-    constexpr float kByteScale = HierarchicalOperator::kByteScale;
-    constexpr float kScale = sizeof(Basis) == 1 ? kByteScale * kByteScale : 1;
-    for (std::size_t v = 0; v < work_.y.count; ++v) {
-      float* y = work_.y.data + v * work_.y.stride + e.begin;
-      const float* product = work_.products.data + v * work_.products.stride + e.coefficient;
-      for (std::size_t k = 0; k < e.count; ++k) y[k] += kScale * product[k];
+  void take_light(const HierarchicalPlan::DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.x.count; ++v) {
+      const float* const x = work_.x.data + v * work_.x.stride + end.position;
+      float* const lane = lane_of(work_.sent, v, end.coefficient);
+      for (std::size_t k = 0; k < end.count; ++k) lane[k * kChannelLanes] = x[k];
     }
+  }
+
+  void multiply(std::span<const CoreBlock> cores) const {
+    multiply_cores_(value_, cores, lanes_, work_.light_count, constant(work_.sent), work_.arrived);
+  }
+
+  void expand(std::span<const BasisPart> parts) const {
+    bases_.expand(basis_, parts, constant(work_.arrived), work_.y);
+  }
+
+  void add_light(const HierarchicalPlan::DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.y.count; ++v) {
+      const float* const lane = lane_of(work_.arrived, v, end.coefficient);
+      float* const y = work_.y.data + v * work_.y.stride + end.position;
+      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale_ * lane[k * kChannelLanes];
+    }
+  }
+
+ private:
+  /// The coefficients of a channel of a light, kChannelLanes floats from one to the next.
+  static float* lane_of(const Coefficients<float>& coefficients, std::size_t v, std::size_t first) {
+    return coefficients.data + v / kChannelCount * coefficients.stride + first * kChannelLanes +
+           v % kChannelCount;
   }
 
   const BasisKernels<Basis>& bases_;
-  const CoreKernels<Value>& cores_;
+  CoreKernel<Value> multiply_cores_;
   const Basis* basis_;
   const Value* value_;
-  const std::array<std::uint32_t, kChannelCount>& channel_matrix_;
+  const ChannelLanes& lanes_;
+  float product_scale_;  ///< of light that goes through no bases, which other light does twice
   const WorkVectors& work_;
 };
 
@@ -179,24 +180,25 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
     for (std::size_t k = 0; k < work.x.stride; k += kGathered) {
       exchange.gather(initial_exitance, k, std::min(k + kGathered, work.x.stride));
     }
+#pragma omp for schedule(dynamic, 1) nowait
+    for (std::size_t k = 0; k < plan.dense_in.size(); ++k) phases.take_light(plan.dense_in[k]);
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.projection_parts.size() - 1; ++part) {
-      for (std::uint32_t k = plan.projection_parts[part]; k < plan.projection_parts[part + 1];
-           ++k) {
-        phases.project(plan.projections[k]);
-      }
+      phases.project(
+          between(plan.projections, plan.projection_parts[part], plan.projection_parts[part + 1]));
     }
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.core_parts.size() - 1; ++part) {
-      for (std::uint32_t k = plan.core_parts[part]; k < plan.core_parts[part + 1]; ++k) {
-        phases.multiply(plan.cores[k]);
-      }
+      phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]));
     }
 #pragma omp for schedule(dynamic, 1)
-    for (const HierarchicalPlan::Arrival& arrival : plan.arrivals) {
+    for (std::size_t k = plan.arrivals.size(); k > 0; --k) {
+      const HierarchicalPlan::Arrival& arrival = plan.arrivals[k - 1];
       clear(work.y, arrival.begin, arrival.end);
-      for (std::uint32_t k = arrival.first_expansion; k < arrival.last_expansion; ++k) {
-        phases.expand(plan.expansions[k]);
+      phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
+      for (const HierarchicalPlan::DenseEnd& end :
+           between(plan.dense_out, arrival.first_dense, arrival.last_dense)) {
+        phases.add_light(end);
       }
       const std::span targets(plan.targets);
       exchange.scatter(targets.subspan(arrival.first_target, arrival.target_count()),
@@ -216,8 +218,7 @@ std::size_t HierarchicalOperator::position_count(std::size_t patch_count) {
 }
 
 HierarchicalOperator::HierarchicalOperator(Storage storage)
-    : storage_(stream(storage)),
-      layout_(std::make_shared<HierarchicalLayout>(storage_.blocks, storage_.matrix_count)) {
+    : storage_(stream(storage)), layout_(std::make_shared<HierarchicalLayout>(storage_)) {
   sqrt_area_.reserve(patch_count());
   inverse_.reserve(patch_count());
   const float scale = product_scale(storage_.precision);
@@ -232,7 +233,8 @@ HierarchicalOperator::HierarchicalOperator(Storage storage)
 
 std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
-         storage_.bases_q8.size_bytes() + storage_.blocks.size() * sizeof(TransferBlock) +
+         storage_.bases_q16.size_bytes() + storage_.bases_q8.size_bytes() +
+         storage_.blocks.size() * sizeof(TransferBlock) +
          storage_.patch.size() * sizeof(std::uint32_t);
 }
 
@@ -253,9 +255,10 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const WorkVectors work(position_count(patch_count()), *layout_, light_count, aligned);
   const BlockKernelSet& kernels = block_kernels();
   const Exchange exchange{storage_.patch, sqrt_area_, inverse_, work};
-  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
-                                const auto* core) {
-    const Phases phases(bases, cores, basis, core, storage_.channel_matrix, work);
+  const ChannelLanes lanes(storage_.channel_matrix, storage_.matrix_count);
+  const auto apply_phases = [&](const auto& bases, auto multiply_cores, const auto* basis,
+                                const auto* core, float basis_scale) {
+    const Phases phases(bases, multiply_cores, basis, core, lanes, basis_scale * basis_scale, work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
   const std::uint16_t* const f16 = storage_.values_f16.data();
@@ -263,11 +266,15 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const std::uint64_t first_core = layout_->basis_value_count;
   switch (storage_.precision) {
     case Precision::kF16:
-      return apply_phases(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core);
+      return apply_phases(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core, 1);
     case Precision::kF32:
-      return apply_phases(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
+      return apply_phases(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core, 1);
+    case Precision::kQ16:
+      return apply_phases(kernels.bases_q16, kernels.cores_f16, storage_.bases_q16.data(), f16,
+                          kShortScale);
     case Precision::kQ8:
-      return apply_phases(kernels.bases_q8, kernels.cores_f16, storage_.bases_q8.data(), f16);
+      return apply_phases(kernels.bases_q8, kernels.cores_f16, storage_.bases_q8.data(), f16,
+                          kByteScale);
   }
 }
 

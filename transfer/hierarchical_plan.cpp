@@ -73,15 +73,15 @@ class Planner {
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       if (has_values(storage_.blocks[b])) add_core(storage_.blocks[b], layout_.places[b]);
     }
+    mark_groups_in();
     for (const Layout::Cluster& cluster : layout_.clusters) add_projections(cluster);
     add_arrivals();
     count_bases();
-    using Projection = Plan::Projection;
-    plan_.projection_parts = share_out(
-        plan_.projections, [](const Projection& p) { return std::uint64_t{p.rank} * p.size; });
-    plan_.core_parts = share_out(plan_.cores, [](const Plan::Core& core) {
-      return std::uint64_t{core.rows} * core.columns;
+    plan_.projection_parts = share_out(plan_.projections, [](const BasisPart& part) {
+      return std::uint64_t{part.last_rank - part.first_rank} * part.size;
     });
+    plan_.core_parts = share_out(
+        plan_.cores, [](const CoreBlock& core) { return std::uint64_t{core.rows} * core.columns; });
   }
 
  private:
@@ -91,59 +91,84 @@ class Planner {
         !block.on_diagonal() && wanted_.any(block.column_begin, block.column_count);
     if (!to_rows && !to_columns) return;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
-    using Direction = Plan::Direction;
-    Plan::Core core{.values = place.values,
-                    .rows = dense ? block.row_count : block.row_rank,
-                    .columns = dense ? block.column_count : block.column_rank,
-                    .row_in = dense ? block.row_begin : place.row.coefficient,
-                    .column_in = dense ? block.column_begin : place.column.coefficient,
-                    .row_out = place.row.coefficient,
-                    .column_out = place.column.coefficient,
-                    .dense = dense,
-                    .direction = !to_columns ? Direction::kToRows
-                                 : !to_rows  ? Direction::kToColumns
-                                             : Direction::kBoth};
+    using Direction = CoreBlock::Direction;
+    const CoreBlock core{.values = place.values,
+                         .rows = dense ? block.row_count : block.row_rank,
+                         .columns = dense ? block.column_count : block.column_rank,
+                         .row = place.row.coefficient,
+                         .column = place.column.coefficient,
+                         .direction = !to_columns ? Direction::kToRows
+                                      : !to_rows  ? Direction::kToColumns
+                                                  : Direction::kBoth};
     plan_.cores.push_back(core);
     plan_.value_count += std::uint64_t{storage_.matrix_count} * core.rows * core.columns;
-    if (dense) {
-      if (to_rows) dense_.push_back({0, 0, 0, block.row_begin, block.row_count, core.row_out});
-      if (to_columns) {
-        dense_.push_back({0, 0, 0, block.column_begin, block.column_count, core.column_out});
-      }
-      return;
+    if (to_rows) {
+      add_way(dense, {block.column_begin, core.columns, core.column},
+              {block.row_begin, core.rows, core.row});
     }
-    if (to_rows) mark(in_, core.column_in, core.columns), mark(out_, core.row_out, core.rows);
-    if (to_columns) mark(in_, core.row_in, core.rows), mark(out_, core.column_out, core.columns);
+    if (to_columns) {
+      add_way(dense, {block.row_begin, core.rows, core.row},
+              {block.column_begin, core.columns, core.column});
+    }
+  }
+
+  /// What goes into a core and comes out of it; of low rank, whatever the positions.
+  void add_way(bool dense, const Plan::DenseEnd& from, const Plan::DenseEnd& to) {
+    if (dense) {
+      plan_.dense_in.push_back(from);
+      dense_out_.push_back(to);
+    } else {
+      mark(in_, from.coefficient, from.count);
+      mark(out_, to.coefficient, to.count);
+    }
   }
 
   static void mark(std::vector<bool>& marks, std::uint32_t begin, std::uint32_t count) {
     std::fill_n(marks.begin() + begin, count, true);
   }
 
-  /// visit(first, last) for the longest runs of marked coefficients of a cluster.
-  template <typename Visit>
-  static void visit_marked(const std::vector<bool>& marks, const Layout::Cluster& cluster,
-                           const Visit& visit) {
-    const std::uint32_t end = cluster.coefficient + cluster.rank;
-    for (std::uint32_t c = cluster.coefficient; c < end;) {
-      if (!marks[c]) {
-        ++c;
-        continue;
-      }
-      const std::uint32_t first = c;
-      while (c < end && marks[c]) ++c;
-      visit(first, c);
+  /// Ranks whose values are interleaved are projected together.
+  void mark_groups_in() {
+    const std::uint32_t group = layout_.rank_group;
+    for (std::uint32_t c = 0; c < layout_.coefficient_count; c += group) {
+      const auto first = in_.begin() + c;
+      const auto last = in_.begin() + std::min(c + group, layout_.coefficient_count);
+      if (std::find(first, last, true) != last) std::fill(first, last, true);
     }
   }
 
-  static std::uint64_t basis_at(const Layout::Cluster& cluster, std::uint32_t coefficient) {
-    return cluster.values + std::uint64_t{coefficient - cluster.coefficient} * cluster.size;
+  /// visit(first, last) for the longest runs of ranks of a cluster with marked coefficients.
+  template <typename Visit>
+  static void visit_marked(const std::vector<bool>& marks, const Layout::Cluster& cluster,
+                           const Visit& visit) {
+    for (std::uint32_t r = 0; r < cluster.rank;) {
+      if (!marks[cluster.coefficient + r]) {
+        ++r;
+        continue;
+      }
+      const std::uint32_t first = r;
+      while (r < cluster.rank && marks[cluster.coefficient + r]) ++r;
+      visit(first, r);
+    }
+  }
+
+  static BasisPart part_of(const Layout::Cluster& cluster, std::uint32_t first_rank,
+                           std::uint32_t last_rank, std::uint32_t first_place,
+                           std::uint32_t last_place) {
+    return {.values = cluster.values,
+            .rank = cluster.rank,
+            .size = cluster.size,
+            .coefficient = cluster.coefficient,
+            .position = cluster.begin,
+            .first_rank = first_rank,
+            .last_rank = last_rank,
+            .first_place = first_place,
+            .last_place = last_place};
   }
 
   void add_projections(const Layout::Cluster& cluster) {
     visit_marked(in_, cluster, [&](std::uint32_t first, std::uint32_t last) {
-      plan_.projections.push_back(
-          {basis_at(cluster, first), last - first, cluster.size, cluster.begin, first});
+      plan_.projections.push_back(part_of(cluster, first, last, 0, cluster.size));
     });
   }
 
@@ -174,6 +199,9 @@ class Planner {
       arrival.first_expansion = static_cast<std::uint32_t>(plan_.expansions.size());
       add_expansions(arrival.begin, arrival.end);
       arrival.last_expansion = static_cast<std::uint32_t>(plan_.expansions.size());
+      arrival.first_dense = static_cast<std::uint32_t>(plan_.dense_out.size());
+      add_dense_ends(arrival.begin, arrival.end);
+      arrival.last_dense = static_cast<std::uint32_t>(plan_.dense_out.size());
       arrival.first_target = target;
       while (target < plan_.targets.size() && plan_.targets[target] < arrival.end) ++target;
       arrival.last_target = target;
@@ -188,17 +216,20 @@ class Planner {
       if (from >= to) continue;
       visit_marked(out_, cluster, [&](std::uint32_t first, std::uint32_t last) {
         wanted_.visit_intervals(from, to, [&](std::uint32_t at, std::uint32_t stop) {
-          plan_.expansions.push_back({basis_at(cluster, first) + at - cluster.begin, last - first,
-                                      cluster.size, at, stop - at, first});
+          plan_.expansions.push_back(
+              part_of(cluster, first, last, at - cluster.begin, stop - cluster.begin));
         });
       });
     }
-    for (const Plan::Expansion& products : dense_) {
-      const std::uint32_t from = std::max(begin, products.begin);
-      const std::uint32_t to = std::min(end, products.begin + products.count);
-      if (from >= to) continue;
-      plan_.expansions.push_back(
-          {0, 0, 0, from, to - from, products.coefficient + from - products.begin});
+  }
+
+  void add_dense_ends(std::uint32_t begin, std::uint32_t end) {
+    for (const Plan::DenseEnd& whole : dense_out_) {
+      const std::uint32_t from = std::max(begin, whole.position);
+      const std::uint32_t to = std::min(end, whole.position + whole.count);
+      if (from < to) {
+        plan_.dense_out.push_back({from, to - from, whole.coefficient + from - whole.position});
+      }
     }
   }
 
@@ -216,8 +247,8 @@ class Planner {
   Plan& plan_;
   std::size_t positions_;
   WantedRuns wanted_;
-  std::vector<bool> in_, out_;          ///< which coefficients are needed, before and after cores
-  std::vector<Plan::Expansion> dense_;  ///< products of dense blocks, whole
+  std::vector<bool> in_, out_;  ///< which coefficients are needed, before and after cores
+  std::vector<Plan::DenseEnd> dense_out_;  ///< whole
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "block_kernels.h"
 #include "hierarchical_layout.h"
 
 namespace rebounce {
@@ -14,35 +15,16 @@ namespace rebounce {
 /// own, whatever thread works on them: no sum depends on the number of threads.
 class HierarchicalPlan {
  public:
-  /// Some bases of a cluster, and the light that goes through them.
-  struct Projection {
-    std::uint64_t basis;
-    std::uint32_t rank, size, begin, coefficient;
-  };
-
-  enum class Direction : std::uint8_t { kBoth, kToRows, kToColumns };
-
-  /// A core or a dense block. What goes in are coefficients, or positions if `dense`; what comes
-  /// out are always coefficients.
-  struct Core {
-    std::uint64_t values;
-    std::uint32_t rows, columns;
-    std::uint32_t row_in, column_in, row_out, column_out;
-    bool dense;
-    Direction direction;
-  };
-
-  /// Positions [begin, begin + count) of bases [rank][size], or if `rank` is 0 of what came out of
-  /// a dense block.
-  struct Expansion {
-    std::uint64_t basis;
-    std::uint32_t rank, size, begin, count, coefficient;
+  /// Positions at an end of a dense block, whose bases are the identity.
+  struct DenseEnd {
+    std::uint32_t position, count, coefficient;
   };
 
   /// Positions that one thread works out from the first addition to the last.
   struct Arrival {
     std::uint32_t begin, end;  ///< positions, multiples of kAlignment
     std::uint32_t first_expansion, last_expansion;
+    std::uint32_t first_dense, last_dense;
     std::uint32_t first_target, last_target;
 
     std::uint32_t target_count() const { return last_target - first_target; }
@@ -52,9 +34,10 @@ class HierarchicalPlan {
   HierarchicalPlan(const HierarchicalOperator::Storage& storage, const HierarchicalLayout& layout,
                    std::vector<std::uint32_t> targets);
 
-  std::vector<Projection> projections;
-  std::vector<Core> cores;
-  std::vector<Expansion> expansions;
+  std::vector<BasisPart> projections;
+  std::vector<CoreBlock> cores;
+  std::vector<BasisPart> expansions;
+  std::vector<DenseEnd> dense_in, dense_out;  ///< those out cut at the arrivals
   std::vector<std::uint32_t> targets;
   std::vector<Arrival> arrivals;
   /// [first, last) of the parts of about equal work that threads take in turn.

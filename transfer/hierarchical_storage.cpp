@@ -81,36 +81,40 @@ std::uint64_t block_order_count(const Storage& storage) {
   return count;
 }
 
-/// Copies runs of values of one block from where it begins to where they belong.
+/// Copies the values of one block from where it begins to where they belong.
 template <typename Value>
-void place_block(const TransferBlock& block, const HierarchicalLayout::Place& place,
-                 std::uint64_t first_core, const Value* from, std::uint64_t count,
-                 std::vector<Value>& values) {
-  const Value* const end = from + count;
-  const auto copy = [&](std::uint64_t size, std::uint64_t to) {
-    std::copy_n(from, size, values.begin() + static_cast<std::ptrdiff_t>(to));
-    from += size;
+void place_block(const HierarchicalLayout& layout, const TransferBlock& block,
+                 const HierarchicalLayout::Place& place, std::uint32_t matrix_count,
+                 const Value* from, Value* to) {
+  const bool dense = block.kind == TransferBlock::Kind::kDense;
+  const auto copy_basis = [&](const HierarchicalLayout::End& end, std::uint64_t count) {
+    std::copy_n(from, count, to + layout.basis_index(end, 0, 0));
+    from += count;
   };
-  if (block.kind == TransferBlock::Kind::kLowRank) {
-    copy(std::uint64_t{block.row_rank} * block.row_count, place.row.basis);
+  if (!dense) {
+    copy_basis(place.row, std::uint64_t{block.row_rank} * block.row_count);
     if (!block.on_diagonal()) {
-      copy(std::uint64_t{block.column_rank} * block.column_count, place.column.basis);
+      copy_basis(place.column, std::uint64_t{block.column_rank} * block.column_count);
     }
   }
-  copy(static_cast<std::uint64_t>(end - from), first_core + place.values);
+  const std::uint64_t entries = dense ? std::uint64_t{block.row_count} * block.column_count
+                                      : std::uint64_t{block.row_rank} * block.column_rank;
+  Value* const core = to + layout.basis_value_count + place.values;
+  for (std::uint32_t matrix = 0; matrix < matrix_count; ++matrix) {
+    for (std::uint64_t k = 0; k < entries; ++k) core[k * matrix_count + matrix] = *from++;
+  }
 }
 
 template <typename Value>
 SharedArray<Value> stream_values(const Storage& storage, const std::vector<TransferBlock>& blocks,
                                  const SharedArray<Value>& values) {
-  const HierarchicalLayout layout(blocks, storage.matrix_count);
+  const HierarchicalLayout layout(blocks, storage.matrix_count, storage.precision);
   std::vector<Value> streamed(
       HierarchicalLayout::padded(layout.basis_value_count + layout.core_value_count));
   const Value* from = values.data();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (has_values(blocks[b])) {
-      place_block(blocks[b], layout.places[b], layout.basis_value_count, from,
-                  blocks[b].value_count(storage.matrix_count), streamed);
+      place_block(layout, blocks[b], layout.places[b], storage.matrix_count, from, streamed.data());
     }
     from += storage.blocks[b].value_count(storage.matrix_count);
   }
@@ -127,6 +131,8 @@ class ValueReader {
     switch (storage_.precision) {
       case Precision::kF16:
         return half_to_float(storage_.values_f16[index]);
+      case Precision::kQ16:
+        return storage_.bases_q16[index] / double{HierarchicalOperator::kShortScale};
       case Precision::kQ8:
         return storage_.bases_q8[index] / double{HierarchicalOperator::kByteScale};
       case Precision::kF32:
@@ -149,19 +155,20 @@ class ValueReader {
 
 /// Numbers of values that the arrays must have.
 struct ArraySizes {
-  std::uint64_t f32 = 0, f16 = 0, q8 = 0;
+  std::uint64_t f32 = 0, f16 = 0, q16 = 0, q8 = 0;
   bool operator==(const ArraySizes&) const = default;
 };
 
 ArraySizes expected_sizes(const Storage& storage) {
-  const HierarchicalLayout layout(storage.blocks, storage.matrix_count);
-  const std::uint64_t bases = layout.basis_value_count, cores = layout.core_value_count;
-  if (storage.precision == Precision::kQ8) {
-    return {.f16 = HierarchicalLayout::padded(cores), .q8 = HierarchicalLayout::padded(bases)};
-  }
-  const std::uint64_t all = storage.order == HierarchicalOperator::Order::kStreamed
-                                ? HierarchicalLayout::padded(bases + cores)
-                                : block_order_count(storage);
+  const HierarchicalLayout layout(storage);
+  const std::uint64_t bases = HierarchicalLayout::padded(layout.basis_value_count);
+  const std::uint64_t cores = HierarchicalLayout::padded(layout.core_value_count);
+  if (storage.precision == Precision::kQ16) return {.f16 = cores, .q16 = bases};
+  if (storage.precision == Precision::kQ8) return {.f16 = cores, .q8 = bases};
+  const std::uint64_t all =
+      storage.order == HierarchicalOperator::Order::kStreamed
+          ? HierarchicalLayout::padded(layout.basis_value_count + layout.core_value_count)
+          : block_order_count(storage);
   if (storage.precision == Precision::kF16) return {.f16 = all};
   return {.f32 = all};
 }
@@ -174,21 +181,93 @@ std::uint16_t encoded(float value) {
   return half;
 }
 
-/// Rounds a basis [rank][size] to bytes; returns what each vector must be multiplied by, over
-/// kByteScale.
-std::vector<float> encode_basis(const float* basis, std::size_t rank, std::size_t size,
-                                std::int8_t* bytes) {
-  std::vector<float> scale(rank);
-  for (std::size_t r = 0; r < rank; ++r, basis += size, bytes += size) {
-    float largest = 0;
-    for (std::size_t k = 0; k < size; ++k) largest = std::max(largest, std::abs(basis[k]));
-    if (largest == 0) continue;
-    for (std::size_t k = 0; k < size; ++k) {
-      bytes[k] = static_cast<std::int8_t>(std::lround(basis[k] / largest * 127));
-    }
-    scale[r] = largest / 127 * HierarchicalOperator::kByteScale;
+/// A kind of integers that bases are rounded to: their largest magnitude, and which of them stands
+/// for 1.
+template <typename Integer>
+struct IntegerRange;
+template <>
+struct IntegerRange<std::int8_t> {
+  static constexpr float kLargest = 127, kScale = HierarchicalOperator::kByteScale;
+};
+template <>
+struct IntegerRange<std::int16_t> {
+  static constexpr float kLargest = HierarchicalOperator::kLargestShort;
+  static constexpr float kScale = HierarchicalOperator::kShortScale;
+};
+
+/// Rounds the bases of operators in f32, and multiplies their cores to make up for the scales.
+template <typename Integer>
+class IntegerEncoder {
+ public:
+  using Layout = HierarchicalLayout;
+
+  IntegerEncoder(const Storage& exact, Storage& rounded)
+      : exact_(exact.values_f32.data()),
+        matrix_count_(exact.matrix_count),
+        from_(exact),
+        to_(rounded),
+        bases_(Layout::padded(to_.basis_value_count)),
+        cores_(Layout::padded(to_.core_value_count)) {
+    for (std::size_t b = 0; b < exact.blocks.size(); ++b) encode(exact.blocks[b], b);
   }
-  return scale;
+
+  SharedArray<Integer> take_bases() { return SharedArray(std::move(bases_)); }
+  SharedArray<std::uint16_t> take_cores() { return SharedArray(std::move(cores_)); }
+
+ private:
+  void encode(const TransferBlock& block, std::size_t index) {
+    const Layout::Place &from = from_.places[index], &to = to_.places[index];
+    const float* core = exact_ + from_.basis_value_count + from.values;
+    std::uint16_t* encoded_core = cores_.data() + to.values;
+    if (block.kind == TransferBlock::Kind::kDense) {
+      std::transform(core, core + block.value_count(matrix_count_), encoded_core, encoded);
+    } else if (has_values(block)) {
+      const std::vector<float> rows =
+          encode_basis(from.row, to.row, block.row_rank, block.row_count);
+      const std::vector<float> columns =
+          encode_basis(from.column, to.column, block.column_rank, block.column_count);
+      for (const float row : rows) {
+        for (const float column : columns) {
+          for (std::uint32_t matrix = 0; matrix < matrix_count_; ++matrix) {
+            *encoded_core++ = encoded(*core++ * row * column);
+          }
+        }
+      }
+    }
+  }
+
+  /// Returns what each vector must be multiplied by, over kScale.
+  std::vector<float> encode_basis(const Layout::End& from, const Layout::End& to, std::size_t rank,
+                                  std::size_t size) {
+    constexpr float kLargest = IntegerRange<Integer>::kLargest;
+    std::vector<float> scale(rank);
+    for (std::size_t r = 0; r < rank; ++r) {
+      const float* const basis = exact_ + from_.basis_index(from, r, 0);
+      float largest = 0;
+      for (std::size_t k = 0; k < size; ++k) largest = std::max(largest, std::abs(basis[k]));
+      if (largest == 0) continue;
+      for (std::size_t k = 0; k < size; ++k) {
+        bases_[to_.basis_index(to, r, k)] =
+            static_cast<Integer>(std::lround(basis[k] / largest * kLargest));
+      }
+      scale[r] = largest / kLargest * IntegerRange<Integer>::kScale;
+    }
+    return scale;
+  }
+
+  const float* exact_;
+  std::uint32_t matrix_count_;
+  Layout from_, to_;
+  std::vector<Integer> bases_;
+  std::vector<std::uint16_t> cores_;
+};
+
+/// An operator in f32 without its values, for those that `precision` has.
+Storage without_values(const Storage& exact, Precision precision) {
+  Storage storage = exact;
+  storage.precision = precision;
+  storage.values_f32 = {};
+  return storage;
 }
 
 }  // namespace
@@ -203,13 +282,19 @@ std::uint64_t TransferBlock::value_count(std::uint32_t matrix_count) const {
 
 void check_hierarchical_storage(const Storage& storage) {
   check_tables(storage);
-  if (storage.precision == Precision::kQ8 &&
-      storage.order != HierarchicalOperator::Order::kStreamed) {
-    refuse("8 bits are for streamed values alone");
+  const bool integers = storage.precision == Precision::kQ16 || storage.precision == Precision::kQ8;
+  if (integers && storage.order != HierarchicalOperator::Order::kStreamed) {
+    refuse("integers are for streamed values alone");
   }
   const ArraySizes sizes{storage.values_f32.size(), storage.values_f16.size(),
-                         storage.bases_q8.size()};
+                         storage.bases_q16.size(), storage.bases_q8.size()};
   if (sizes != expected_sizes(storage)) refuse("the number of values does not fit the blocks");
+  // Sums of their products must not overflow.
+  constexpr std::int16_t kLargest = HierarchicalOperator::kLargestShort;
+  const auto too_large = [](std::int16_t value) { return value > kLargest || value < -kLargest; };
+  if (std::ranges::any_of(storage.bases_q16.span(), too_large)) {
+    refuse("a value of the bases is beyond +-" + std::to_string(kLargest));
+  }
 }
 
 Storage HierarchicalOperator::stream(const Storage& storage) {
@@ -229,53 +314,33 @@ Storage HierarchicalOperator::stream(const Storage& storage) {
 }
 
 Storage HierarchicalOperator::encode_half(const Storage& storage) {
-  Storage half = stream(storage);
-  const SharedArray<float> exact = std::move(half.values_f32);
-  half.precision = Precision::kF16;
-  half.values_f32 = {};
-  const HierarchicalLayout layout(half.blocks, half.matrix_count);
-  std::vector<std::uint16_t> values(exact.size());
+  const Storage exact = stream(storage);
+  Storage half = without_values(exact, Precision::kF16);
+  const HierarchicalLayout layout(half);
+  std::vector<std::uint16_t> values(exact.values_f32.size());
   for (std::uint64_t k = 0; k < values.size(); ++k) {
-    values[k] = k < layout.basis_value_count ? float_to_half(exact[k]) : encoded(exact[k]);
+    const float value = exact.values_f32[k];
+    values[k] = k < layout.basis_value_count ? float_to_half(value) : encoded(value);
   }
   half.values_f16 = SharedArray(std::move(values));
   return half;
 }
 
+Storage HierarchicalOperator::encode_shorts(const Storage& storage) {
+  const Storage exact = stream(storage);
+  Storage shorts = without_values(exact, Precision::kQ16);
+  IntegerEncoder<std::int16_t> encoder(exact, shorts);
+  shorts.bases_q16 = encoder.take_bases();
+  shorts.values_f16 = encoder.take_cores();
+  return shorts;
+}
+
 Storage HierarchicalOperator::encode_bytes(const Storage& storage) {
-  Storage bytes = stream(storage);
-  const SharedArray<float> exact = std::move(bytes.values_f32);
-  bytes.precision = Precision::kQ8;
-  bytes.values_f32 = {};
-  const HierarchicalLayout layout(bytes.blocks, bytes.matrix_count);
-  std::vector<std::int8_t> bases(HierarchicalLayout::padded(layout.basis_value_count));
-  std::vector<std::uint16_t> cores(HierarchicalLayout::padded(layout.core_value_count));
-  const float* const core = exact.data() + layout.basis_value_count;
-  for (std::size_t b = 0; b < bytes.blocks.size(); ++b) {
-    const TransferBlock& block = bytes.blocks[b];
-    const HierarchicalLayout::Place& place = layout.places[b];
-    const auto encode_end = [&](const HierarchicalLayout::End& end, std::size_t rank,
-                                std::size_t size) {
-      return encode_basis(exact.data() + end.basis, rank, size, bases.data() + end.basis);
-    };
-    if (block.kind == TransferBlock::Kind::kDense) {
-      const std::uint64_t count = block.value_count(bytes.matrix_count);
-      std::transform(core + place.values, core + place.values + count, cores.data() + place.values,
-                     encoded);
-    } else if (has_values(block)) {
-      const std::vector<float> rows = encode_end(place.row, block.row_rank, block.row_count);
-      const std::vector<float> columns =
-          encode_end(place.column, block.column_rank, block.column_count);
-      std::uint64_t k = place.values;
-      for (std::uint32_t matrix = 0; matrix < bytes.matrix_count; ++matrix) {
-        for (const float row : rows) {
-          for (const float column : columns) cores[k] = encoded(core[k] * row * column), ++k;
-        }
-      }
-    }
-  }
-  bytes.bases_q8 = SharedArray(std::move(bases));
-  bytes.values_f16 = SharedArray(std::move(cores));
+  const Storage exact = stream(storage);
+  Storage bytes = without_values(exact, Precision::kQ8);
+  IntegerEncoder<std::int8_t> encoder(exact, bytes);
+  bytes.bases_q8 = encoder.take_bases();
+  bytes.values_f16 = encoder.take_cores();
   return bytes;
 }
 
@@ -283,6 +348,8 @@ Storage HierarchicalOperator::encode(const Storage& storage, Precision precision
   switch (precision) {
     case Precision::kF16:
       return encode_half(storage);
+    case Precision::kQ16:
+      return encode_shorts(storage);
     case Precision::kQ8:
       return encode_bytes(storage);
     case Precision::kF32:
@@ -300,22 +367,25 @@ std::vector<double> block_entries(const Storage& storage, const HierarchicalLayo
   std::vector<double> entries(rows * columns, 0.0);
   if (block.kind == TransferBlock::Kind::kDense) {
     for (std::size_t k = 0; k < entries.size(); ++k) {
-      entries[k] = read.core(place.values + matrix * entries.size() + k);
+      entries[k] = read.core(place.values + k * storage.matrix_count + matrix);
     }
     return entries;
   }
   const std::size_t row_rank = block.row_rank, column_rank = block.column_rank;
-  const std::uint64_t u = place.row.basis, v = place.column.basis;
-  const std::uint64_t s = place.values + matrix * row_rank * column_rank;
+  const auto value_of = [&](const HierarchicalLayout::End& end, std::size_t rank,
+                            std::size_t position) {
+    return read.basis(layout.basis_index(end, rank, position));
+  };
   std::vector<double> right(columns);  // a row of S V^T
   for (std::size_t r = 0; r < row_rank; ++r) {
     std::ranges::fill(right, 0.0);
     for (std::size_t k = 0; k < column_rank; ++k) {
-      const double core = read.core(s + r * column_rank + k);
-      for (std::size_t j = 0; j < columns; ++j) right[j] += core * read.basis(v + k * columns + j);
+      const std::uint64_t entry = r * column_rank + k;
+      const double core = read.core(place.values + entry * storage.matrix_count + matrix);
+      for (std::size_t j = 0; j < columns; ++j) right[j] += core * value_of(place.column, k, j);
     }
     for (std::size_t i = 0; i < rows; ++i) {
-      const double left = read.basis(u + r * rows + i);
+      const double left = value_of(place.row, r, i);
       for (std::size_t j = 0; j < columns; ++j) entries[i * columns + j] += left * right[j];
     }
   }
@@ -325,9 +395,12 @@ std::vector<double> block_entries(const Storage& storage, const HierarchicalLayo
 float product_scale(Precision precision) {
   constexpr float kHalfScale = HierarchicalOperator::kHalfScale;
   constexpr float kByteScale = HierarchicalOperator::kByteScale;
+  constexpr float kShortScale = HierarchicalOperator::kShortScale;
   switch (precision) {
     case Precision::kF16:
       return 1 / kHalfScale;
+    case Precision::kQ16:
+      return 1 / (kHalfScale * kShortScale * kShortScale);
     case Precision::kQ8:
       return 1 / (kHalfScale * kByteScale * kByteScale);
     case Precision::kF32:

@@ -8,7 +8,7 @@ namespace rebounce {
 enum class InstructionSet : std::uint8_t {
   kPortable,
   kAvx2,    ///< with FMA and F16C
-  kAvx512,  ///< AVX-512F
+  kAvx512,  ///< AVX-512F, BW, VL and VNNI: since Cascade Lake and Zen 4
 };
 
 /// The widest that this processor has.

@@ -20,6 +20,21 @@ constexpr std::size_t kVector = 16;
   throw Error("low-rank operator: " + reason + "; make the file again");
 }
 
+/// The basis of one tile of patches as the kernels have it.
+BasisPart basis_of_tile(std::size_t tile, std::size_t rank) {
+  constexpr auto kSize = static_cast<std::uint32_t>(LowRankOperator::kTile);
+  const auto ranks = static_cast<std::uint32_t>(rank);
+  return {.values = tile * rank * kSize,
+          .rank = ranks,
+          .size = kSize,
+          .coefficient = 0,
+          .position = static_cast<std::uint32_t>(tile * kSize),
+          .first_rank = 0,
+          .last_rank = ranks,
+          .first_place = 0,
+          .last_place = kSize};
+}
+
 }  // namespace
 
 std::size_t LowRankOperator::tile_count(std::size_t patch_count) {
@@ -76,18 +91,17 @@ std::size_t LowRankOperator::workspace_size() const {
 }
 
 void LowRankOperator::project(const float* x, float* tile_coefficient, float* coefficient) const {
-  const std::size_t tiles = tile_count(patch_count()), rank = storage_.rank;
+  const std::size_t tiles = tile_count(patch_count());
   const BlockKernelSet& kernels = block_kernels();
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < tiles; ++t) {
-    const std::size_t begin = t * rank * kTile;
-    const PlanarVectors<const float> in{x + t * kTile, stride(), kChannelCount};
-    const PlanarVectors<float> out{tile_coefficient + t * coefficient_size(), rank_stride_,
-                                   kChannelCount};
+    const BasisPart part = basis_of_tile(t, storage_.rank);
+    const PlanarVectors<const float> in{x, stride(), kChannelCount};
+    const Coefficients<float> out{tile_coefficient + t * coefficient_size(), coefficient_size()};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.project(storage_.basis_f16.data() + begin, rank, kTile, in, out);
+      kernels.bases_f16.project(storage_.basis_f16.data(), {&part, 1}, in, out);
     } else {
-      kernels.bases_f32.project(storage_.basis_f32.data() + begin, rank, kTile, in, out);
+      kernels.bases_f32.project(storage_.basis_f32.data(), {&part, 1}, in, out);
     }
   }
   std::fill_n(coefficient, coefficient_size(), 0.0F);
@@ -95,7 +109,7 @@ void LowRankOperator::project(const float* x, float* tile_coefficient, float* co
     const float* const part = tile_coefficient + t * coefficient_size();
     for (int c = 0; c < kChannelCount; ++c) {
       for (std::size_t r = 0; r < storage_.rank; ++r) {
-        coefficient[c * rank_stride_ + r] += part[c * rank_stride_ + r];
+        coefficient[c * rank_stride_ + r] += part[r * kChannelLanes + c];
       }
     }
   }
@@ -119,23 +133,23 @@ void LowRankOperator::multiply_cores(const float* in, float* out) const {
     for (std::size_t v = 0; j + v < rank; ++v) sum[v] += core[j + v] * x[j + v];
     float total = 0;
     for (const float s : sum) total += s;
-    out[channel * rank_stride_ + row] = total;
+    out[row * kChannelLanes + channel] = total;
   }
 }
 
 void LowRankOperator::expand_tiles(const float* coefficient, float* y) const {
-  const std::size_t tiles = tile_count(patch_count()), rank = storage_.rank;
+  const std::size_t tiles = tile_count(patch_count());
   const BlockKernelSet& kernels = block_kernels();
-  const PlanarVectors<const float> in{coefficient, rank_stride_, kChannelCount};
+  const Coefficients<const float> in{coefficient, coefficient_size()};
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < tiles; ++t) {
     for (int c = 0; c < kChannelCount; ++c) std::fill_n(y + c * stride() + t * kTile, kTile, 0.0F);
-    const std::size_t begin = t * rank * kTile;
-    const PlanarVectors<float> out{y + t * kTile, stride(), kChannelCount};
+    const BasisPart part = basis_of_tile(t, storage_.rank);
+    const PlanarVectors<float> out{y, stride(), kChannelCount};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.expand(storage_.basis_f16.data() + begin, rank, kTile, kTile, in, out);
+      kernels.bases_f16.expand(storage_.basis_f16.data(), {&part, 1}, in, out);
     } else {
-      kernels.bases_f32.expand(storage_.basis_f32.data() + begin, rank, kTile, kTile, in, out);
+      kernels.bases_f32.expand(storage_.basis_f32.data(), {&part, 1}, in, out);
     }
   }
 }

@@ -256,6 +256,17 @@ std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* 
   return blocks;
 }
 
+void read_integer_bases(const SafetensorsFile& file, const char* name,
+                        HierarchicalOperator::Storage& storage) {
+  if (file.info(name).type == TensorType::kI16) {
+    storage.precision = Precision::kQ16;
+    storage.bases_q16 = file.tensor<std::int16_t>(name, {kAnySize}, TensorType::kI16);
+  } else {
+    storage.precision = Precision::kQ8;
+    storage.bases_q8 = file.tensor<std::int8_t>(name, {kAnySize}, TensorType::kI8);
+  }
+}
+
 std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
     const SafetensorsFile& file, const HierarchicalTensors& names, const std::vector<float>& area) {
   HierarchicalOperator::Storage storage;
@@ -271,10 +282,7 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   } else {
     storage.values_f32 = file.tensor<float>(names.values, {kAnySize});
   }
-  if (file.tensors().contains(names.bases)) {
-    storage.precision = Precision::kQ8;
-    storage.bases_q8 = file.tensor<std::int8_t>(names.bases, {kAnySize}, TensorType::kI8);
-  }
+  if (file.tensors().contains(names.bases)) read_integer_bases(file, names.bases, storage);
   try {
     return std::make_shared<const HierarchicalOperator>(std::move(storage));
   } catch (const Error& error) {
@@ -332,6 +340,9 @@ std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
   auto exchange = read_hierarchical_operator(file, names, area);
   if (exchange->storage().matrix_count != 1) {
     refuse(file, std::string("tensor ") + names.channel_matrix + ": more than one matrix");
+  }
+  if (exchange->storage().precision == Precision::kQ16) {
+    refuse(file, std::string("tensor ") + names.bases + ": not for form factors in 16 bits");
   }
   return exchange;
 }

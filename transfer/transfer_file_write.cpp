@@ -91,6 +91,10 @@ void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
   collector(names.patch, storage.patch);
   collector.add<std::uint32_t>(names.channel_matrix, {storage.channel_matrix.size()},
                                storage.channel_matrix);
+  if (storage.precision == Precision::kQ16) {
+    collector.add(names.bases, {storage.bases_q16.size()}, storage.bases_q16.span(),
+                  TensorType::kI16);
+  }
   if (storage.precision == Precision::kQ8) {
     collector.add(names.bases, {storage.bases_q8.size()}, storage.bases_q8.span(), TensorType::kI8);
   }

@@ -1,12 +1,14 @@
 #pragma once
 
-// The vector type of the AVX-512 kernels; see vector_load.h. Needs AVX-512F.
+// The vector type of the AVX-512 kernels; see vector_load.h. Needs AVX-512F, BW and VL.
 
 #include <immintrin.h>
 
 #include <cstddef>
 #include <cstdint>
 
+#include "block_kernels.h"
+#include "vector_load.h"
 #include "vector_x86.h"
 
 namespace rebounce {
@@ -29,6 +31,7 @@ struct Vector16 {
   static Vector16 load_some(const float* p, std::size_t count) {
     return {_mm512_maskz_loadu_ps(first(count), p)};
   }
+  static Vector16 repeat_four(const float* p) { return {_mm512_broadcast_f32x4(_mm_loadu_ps(p))}; }
   static Vector16 zero() { return {_mm512_setzero_ps()}; }
   static Vector16 broadcast(float x) { return {_mm512_set1_ps(x)}; }
   void store(float* p) const { _mm512_storeu_ps(p, v); }
@@ -45,14 +48,50 @@ struct Vector16 {
                       _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(four), 1)));
     return {_mm_add_ps(_mm256_castps256_ps128(two), _mm256_extractf128_ps(two, 1))};
   }
+  /// Of four vectors the sums over their fours of lanes, one after the other.
+  static Vector16 sums_of_fours(const Vector16 (&a)[4]) {
+    const auto halves = [](__m512 x, __m512 y) REBOUNCE_INLINE {
+      return _mm512_add_ps(_mm512_shuffle_f32x4(x, y, 0x88), _mm512_shuffle_f32x4(x, y, 0xDD));
+    };
+    return {halves(halves(a[0].v, a[1].v), halves(a[2].v, a[3].v))};
+  }
   friend Vector16 add(Vector16 a, Vector16 b) { return {_mm512_add_ps(a.v, b.v)}; }
   friend Vector16 multiply(Vector16 a, Vector16 b) { return {_mm512_mul_ps(a.v, b.v)}; }
   friend Vector16 multiply_add(Vector16 a, Vector16 b, Vector16 c) {
     return {_mm512_fmadd_ps(a.v, b.v, c.v)};
   }
 
+  template <typename Value>
+  class EntryLanes;
+
  private:
   static __mmask16 first(std::size_t count) { return static_cast<__mmask16>((1U << count) - 1); }
+};
+
+template <>
+class Vector16::EntryLanes<float> {
+ public:
+  explicit EntryLanes(const ChannelLanes& lanes)
+      : lane_(_mm512_cvtepu16_epi32(
+            _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())))) {}
+  Vector16 load(const float* p) const { return {_mm512_permutexvar_ps(lane_, _mm512_loadu_ps(p))}; }
+
+ private:
+  __m512i lane_;
+};
+
+template <>
+class Vector16::EntryLanes<std::uint16_t> {
+ public:
+  explicit EntryLanes(const ChannelLanes& lanes)
+      : lane_(_mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data()))) {}
+  Vector16 load(const std::uint16_t* p) const {
+    const __m256i values = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
+    return {_mm512_cvtph_ps(_mm256_permutexvar_epi16(lane_, values))};
+  }
+
+ private:
+  __m256i lane_;
 };
 
 }  // namespace

@@ -3,9 +3,11 @@
 // Kernels are written over a vector type `V` of kWidth floats, one per instruction set: load,
 // load_half, load_bytes, store, zero, broadcast, multiply_add, sum; load_some and store_some touch
 // the first `count` lanes alone, the others are read as zero; sums gives the sums over the lanes of
-// four vectors. kStrip positions and the channels of kLights lights are what its registers
-// have room for. Everything about it is in an unnamed namespace, so that files compiled for
-// different sets never share an instantiation.
+// four vectors. Of vectors whose fours of lanes are the channels of something, repeat_four fills
+// all fours with one, sums_of_fours adds up those of as many vectors as there are, and
+// EntryLanes<Value>::load loads the entries of a core. kStrip positions and the channels of kLights
+// lights are what its registers have room for. Everything about it is in an unnamed namespace, so
+// that files compiled for different sets never share an instantiation.
 
 #include <cstddef>
 #include <cstdint>
@@ -42,6 +44,16 @@ REBOUNCE_INLINE inline void unroll(const Work& work) {
     (work(std::integral_constant<std::size_t, kIndex>{}), ...);
   }
   (std::make_index_sequence<kCount>{});
+}
+
+/// Calls work.template operator()<rows>(first) for groups of kMost rows, and for what is left.
+template <std::size_t kMost, typename Work>
+REBOUNCE_INLINE inline void for_each_rows(std::size_t rows, const Work& work) {
+  std::size_t r = 0;
+  for (; r + kMost <= rows; r += kMost) work.template operator()<kMost>(r);
+  unroll<kMost - 1>([&](auto left) REBOUNCE_INLINE {
+    if (rows - r == left + 1) work.template operator()<left + 1>(r);
+  });
 }
 
 }  // namespace

@@ -8,6 +8,9 @@
 #include <cstdint>
 #include <cstring>
 
+#include "block_kernels.h"
+#include "vector_load.h"
+
 namespace rebounce {
 namespace {
 
@@ -40,6 +43,7 @@ struct Vector4 {
     for (std::size_t k = 0; k < count; ++k) some[k] = p[k];
     return load(some);
   }
+  static Vector4 repeat_four(const float* p) { return load(p); }
   static Vector4 zero() { return broadcast(0); }
   static Vector4 broadcast(float x) { return {Floats{x, x, x, x}}; }
   void store(float* p) const { std::memcpy(p, &v, sizeof v); }
@@ -50,6 +54,7 @@ struct Vector4 {
   static Vector4 sums(const Vector4& a, const Vector4& b, const Vector4& c, const Vector4& d) {
     return {Floats{a.sum(), b.sum(), c.sum(), d.sum()}};
   }
+  static Vector4 sums_of_fours(const Vector4 (&a)[1]) { return a[0]; }
   float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
   float largest() const { return std::max(std::max(v[0], v[1]), std::max(v[2], v[3])); }
 
@@ -63,6 +68,21 @@ struct Vector4 {
   }
   friend Vector4 maximum(const Vector4& a, const Vector4& b) { return {a.v > b.v ? a.v : b.v}; }
 
+  /// Loads entries with their channels side by side.
+  template <typename Value>
+  class EntryLanes {
+   public:
+    explicit EntryLanes(const ChannelLanes& lanes) : lanes_(lanes) {}
+    Vector4 load(const Value* p) const {
+      Value four[kWidth];
+      for (std::size_t k = 0; k < kWidth; ++k) four[k] = p[lanes_.value[k]];
+      return load_values<Vector4>(four);
+    }
+
+   private:
+    const ChannelLanes& lanes_;
+  };
+
  private:
   template <typename Lanes>
   static Lanes read(const void* p) {
@@ -72,16 +92,15 @@ struct Vector4 {
   }
 };
 
-/// Stores the first kCount lanes.
+/// Stores the first kCount lanes of three channels, those of a lane side by side in four floats.
 template <std::size_t kCount>
-inline void store_first(const Vector4& v, float* p) {
-  for (std::size_t k = 0; k < kCount; ++k) p[k] = v.v[k];
-}
-
-/// Adds the first kCount lanes to what is there.
-template <std::size_t kCount>
-inline void add_first(const Vector4& v, float* p) {
-  for (std::size_t k = 0; k < kCount; ++k) p[k] += v.v[k];
+inline void store_side_by_side(const Vector4& red, const Vector4& green, const Vector4& blue,
+                               float* p) {
+  for (std::size_t k = 0; k < kCount; ++k, p += 4) {
+    p[0] = red.v[k];
+    p[1] = green.v[k];
+    p[2] = blue.v[k];
+  }
 }
 
 }  // namespace

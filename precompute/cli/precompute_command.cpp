@@ -111,7 +111,8 @@ void take_probes(const std::vector<float>& numbers, ProbeSettings& settings) {
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
   take_probes(chosen.probes, settings.probes);
-  for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
+  for (const Precision precision :
+       {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
     if (chosen.precision == precision_name(precision)) settings.precision = precision;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
@@ -193,10 +194,11 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
   command
       ->add_option(
           "--precision", chosen->precision,
-          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q8 "
-          "for two thirds of those where the tolerance is 1 % or more; by default f32 for a "
-          "dense operator, f16 for others")
-      ->check(CLI::IsMember({"f16", "f32", "q8"}));
+          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q16 for "
+          "those bytes and the fastest relighting, or q8 for two thirds of them where the "
+          "tolerance is 1 % or more; by default f32 for a dense operator, q16 for a hierarchical "
+          "one, f16 for others")
+      ->check(CLI::IsMember({"f16", "f32", "q16", "q8"}));
   command
       ->add_option(
           "--compress-form-factors", chosen->settings.form_factor_tolerance,

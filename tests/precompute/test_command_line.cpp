@@ -238,14 +238,16 @@ TEST_F(CommandLine, FormFactorsThatMissTheirToleranceFail) {
   EXPECT_GT(report["form_factor_error_mean"].get<double>(), 1e-5);
 }
 
-TEST_F(CommandLine, EightBitsAreRefusedBeforeAnythingIsComputed) {
+TEST_F(CommandLine, IntegersAreRefusedBeforeAnythingIsComputed) {
   for (const std::string kind : {"dense", "low-rank", "first-bounce"}) {
-    const Outcome outcome = run({"precompute", kScene, "--patches", "300", "--operator", kind,
-                                 "--precision", "q8", "-o", path("box.safetensors")});
-    EXPECT_EQ(outcome.exit_code, kBadInput);
-    // The estimate, which comes before the form factors, would be a line of its own.
-    EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
-    EXPECT_NE(outcome.err.find("hierarchical"), std::string::npos) << outcome.err;
+    for (const std::string precision : {"q16", "q8"}) {
+      const Outcome outcome = run({"precompute", kScene, "--patches", "300", "--operator", kind,
+                                   "--precision", precision, "-o", path("box.safetensors")});
+      EXPECT_EQ(outcome.exit_code, kBadInput);
+      // The estimate, which comes before the form factors, would be a line of its own.
+      EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+      EXPECT_NE(outcome.err.find("hierarchical"), std::string::npos) << outcome.err;
+    }
   }
 }
 

@@ -219,7 +219,7 @@ TEST(HierarchicalTransfer, TheBrightestRoomFitsHalfPrecision) {
     test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
     const Room room = make_room(scene, 300);
     const auto lights = lights_in(room.patches, 12, 1);
-    for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
+    for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
       const auto transfer = build_hierarchical_transfer(
           *room.dense, room.patches, {lights, lights}, {.tolerance = 0.03, .precision = precision});
       EXPECT_LT(mean_error(room, *transfer, lights), 0.03);

@@ -25,8 +25,7 @@ constexpr std::size_t kPatchCount = 100;
 TransferData sample_data(Precision precision) {
   TransferData data;
   HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
-  if (precision == Precision::kF16) storage = HierarchicalOperator::encode_half(storage);
-  if (precision == Precision::kQ8) storage = HierarchicalOperator::encode_bytes(storage);
+  if (precision != Precision::kF32) storage = HierarchicalOperator::encode(storage, precision);
   data.patches.area = storage.area;
   data.patches.centroid.assign(kPatchCount, {0, 0, 0});
   data.patches.normal.assign(kPatchCount, {0, 1, 0});
@@ -45,7 +44,8 @@ const HierarchicalOperator::Storage& storage_of(const TransferData& data) {
 }
 
 TEST(HierarchicalFile, RoundTrips) {
-  for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
+  for (const Precision precision :
+       {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
     const test::TemporaryFolder folder;
     const TransferData data = sample_data(precision);
     save_transfer_file(folder / "file", data);
@@ -58,6 +58,7 @@ TEST(HierarchicalFile, RoundTrips) {
     EXPECT_EQ(a.precision, b.precision);
     EXPECT_TRUE(std::ranges::equal(a.values_f32, b.values_f32));
     EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
+    EXPECT_TRUE(std::ranges::equal(a.bases_q16, b.bases_q16));
     EXPECT_TRUE(std::ranges::equal(a.bases_q8, b.bases_q8));
     std::vector<float> expanded_a(kPatchCount * kPatchCount), expanded_b(expanded_a);
     data.transfer->expand(1, expanded_a);
@@ -69,12 +70,15 @@ TEST(HierarchicalFile, RoundTrips) {
 }
 
 TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
-  for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
+  for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
     const test::TemporaryFolder folder;
     save_transfer_file(folder / "file", sample_data(precision));
     const TransferData data = load_transfer_file(folder / "file");
     const auto& owner = data.exchange.row_begin.owner();
     EXPECT_EQ(storage_of(data).values_f16.owner(), owner);
+    if (precision == Precision::kQ16) {
+      EXPECT_EQ(storage_of(data).bases_q16.owner(), owner);
+    }
     if (precision == Precision::kQ8) {
       EXPECT_EQ(storage_of(data).bases_q8.owner(), owner);
     }

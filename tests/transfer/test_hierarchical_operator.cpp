@@ -121,16 +121,46 @@ TEST(HierarchicalOperator, BytesAreAsGoodAsTheirBits) {
   }
 }
 
+TEST(HierarchicalOperator, ShortsAreAsGoodAsTheirBits) {
+  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+    const HierarchicalOperator::Storage storage = random_hierarchical_storage(500, matrices, 5);
+    const HierarchicalOperator exact(storage);
+    const HierarchicalOperator shorts(HierarchicalOperator::encode_shorts(storage));
+    EXPECT_LT(shorts.bytes(), exact.bytes());
+    const std::vector<Float3> m0 = random_light(500, 1);
+    const std::vector<float>& area = storage.area;
+    // Light is rounded to 11 or 12 bits on its way, twice.
+    EXPECT_LT(relative_difference(product(shorts, m0), multiply_expansion(shorts, m0), area), 5e-4);
+    const double error = relative_difference(product(shorts, m0), product(exact, m0), area);
+    EXPECT_LT(error, 1e-3);
+    EXPECT_GT(error, 0);
+  }
+}
+
+TEST(HierarchicalOperator, RefusesShortsWhoseSumsCouldOverflow) {
+  HierarchicalOperator::Storage storage =
+      HierarchicalOperator::encode_shorts(random_hierarchical_storage(100, 1, 1));
+  std::vector<std::int16_t> bases(storage.bases_q16.begin(), storage.bases_q16.end());
+  for (const std::int16_t value : {4096, -4096, -32768}) {
+    bases[7] = value;
+    storage.bases_q16 = SharedArray(std::vector<std::int16_t>(bases));
+    expect_error([&] { HierarchicalOperator op(storage); }, "beyond +-4095");
+  }
+}
+
 TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
-  const HierarchicalOperator op(random_hierarchical_storage(777, 3, 6));
+  const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 6);
   const std::vector<Float3> m0 = random_light(777, 2);
   const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const std::vector<Float3> one = product(op, m0);
-  omp_set_num_threads(5);
-  const std::vector<Float3> five = product(op, m0);
+  for (const Precision precision : {Precision::kF32, Precision::kQ16}) {
+    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    omp_set_num_threads(1);
+    const std::vector<Float3> one = product(op, m0);
+    omp_set_num_threads(5);
+    const std::vector<Float3> five = product(op, m0);
+    EXPECT_EQ(one, five);
+  }
   omp_set_num_threads(before);
-  EXPECT_EQ(one, five);
 }
 
 std::vector<Float3> batch_product(const TransferOperator& op, std::size_t lights,
@@ -148,7 +178,8 @@ TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
         random_hierarchical_storage(n, matrices, 40 + matrices);
     for (const HierarchicalOperator& op :
          {HierarchicalOperator(storage),
-          HierarchicalOperator(HierarchicalOperator::encode_half(storage))}) {
+          HierarchicalOperator(HierarchicalOperator::encode_half(storage)),
+          HierarchicalOperator(HierarchicalOperator::encode_shorts(storage))}) {
       for (const std::size_t lights : {1U, 2U, 3U, 5U}) {
         const std::vector<Float3> m0 = random_light(lights * n, lights);
         const std::vector<Float3> batch = batch_product(op, lights, m0);
@@ -164,10 +195,13 @@ TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
   }
 }
 
-TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
-  const std::size_t n = 777;
-  const HierarchicalOperator op(random_hierarchical_storage(n, 3, 12));
+/// Light at the receivers differs by `allowed` of the largest at most.
+void check_receivers(const HierarchicalOperator& op, float allowed) {
+  const std::size_t n = op.patch_count();
   const std::vector<Float3> m0 = random_light(n, 4), whole = product(op, m0);
+  float most = 0;
+  for (const Float3& h : whole)
+    most = std::max({most, std::abs(h[0]), std::abs(h[1]), std::abs(h[2])});
   std::vector<float> workspace(op.workspace_size(), std::nanf(""));
   constexpr Float3 kUnset = {-1, -2, -3};
   std::uint64_t previous = 0;
@@ -183,7 +217,8 @@ TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouch
     for (const std::uint32_t p : patches) expected[p] = whole[p];
     for (std::size_t i = 0; i < n; ++i) {
       for (int c = 0; c < kChannelCount; ++c) {
-        EXPECT_NEAR(h[i][c], expected[i][c], 2e-6F * std::abs(expected[i][c]));
+        const bool untouched = expected[i] == kUnset;
+        EXPECT_NEAR(h[i][c], expected[i][c], untouched ? 0 : allowed * most);
       }
     }
     EXPECT_TRUE(receivers.value_count() > previous || count == 0);
@@ -191,6 +226,13 @@ TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouch
   }
   EXPECT_EQ(op.receivers(std::vector<std::uint32_t>{}).value_count(), 0U);
   expect_error([&] { (void)op.receivers(std::vector<std::uint32_t>{777}); }, "does not exist");
+}
+
+TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
+  const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 12);
+  check_receivers(HierarchicalOperator(storage), 1e-6F);
+  // Coefficients are rounded by the largest of those that are wanted.
+  check_receivers(HierarchicalOperator(HierarchicalOperator::encode_shorts(storage)), 5e-4F);
 }
 
 TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
@@ -305,77 +347,171 @@ PlanarVectors<float> planar(std::vector<float>& data, std::size_t count) {
   return {data.data(), data.size() / count, count};
 }
 
+template <typename T>
+Coefficients<T> side_by_side(std::vector<std::remove_const_t<T>>& data, std::size_t lights) {
+  return {data.data(), data.size() / lights};
+}
+
+/// A basis of plain numbers [rank][size], and how far products with it may be off.
+struct PlainBasis {
+  std::vector<float> value;
+  std::size_t rank, size;
+  double allowed;
+};
+
+constexpr std::size_t kStride = 330, kRankStride = 150, kFirstPosition = 16, kFirstCoefficient = 4;
+
+/// Where coefficient r of vector v is.
+std::size_t coefficient_at(std::size_t v, std::size_t r) {
+  return (v / 3 * kRankStride + kFirstCoefficient + r) * kChannelLanes + v % 3;
+}
+
+/// Ranks from `first_rank` on and the last `places` positions of a cluster.
+BasisPart part_of(const PlainBasis& plain, std::size_t first_rank, std::size_t places) {
+  const auto rank = static_cast<std::uint32_t>(plain.rank);
+  const auto size = static_cast<std::uint32_t>(plain.size);
+  return {.values = 0,
+          .rank = rank,
+          .size = size,
+          .coefficient = kFirstCoefficient,
+          .position = kFirstPosition,
+          .first_rank = static_cast<std::uint32_t>(first_rank),
+          .last_rank = rank,
+          .first_place = size - static_cast<std::uint32_t>(places),
+          .last_place = size};
+}
+
 template <typename Value>
-void check_bases(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
-                 const std::vector<float>& plain, std::size_t rank, std::size_t size,
-                 std::size_t count) {
-  constexpr std::size_t kStride = 100, kRankStride = 20;
-  const double allowed = kAllowed * (sizeof(Value) == 1 ? 128 : 1);
+void check_project(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
+                   const PlainBasis& plain, std::size_t written, std::size_t lights) {
   Random random;
-  const std::vector<float> x = random.floats(count * kStride), y = random.floats(count * kStride);
-  const std::vector<float> scale = random.floats(count * kRankStride);
-  std::vector<float> coefficient(count * kRankStride, kUntouched), sum = y;
-  kernels.project(basis.data(), rank, size, planar(x, count), planar(coefficient, count));
-  for (std::size_t v = 0; v < count; ++v) {
-    for (std::size_t r = 0; r < kRankStride; ++r) {
-      double expected = r < rank ? 0 : kUntouched;
-      for (std::size_t k = 0; k < size && r < rank; ++k) {
-        expected += plain[r * size + k] * x[v * kStride + k];
+  const std::vector<float> x = random.floats(3 * lights * kStride);
+  std::vector<float> sent(lights * kRankStride * kChannelLanes, kUntouched);
+  const BasisPart part = part_of(plain, 0, plain.size);
+  kernels.project(basis.data(), {&part, 1}, planar(x, 3 * lights),
+                  side_by_side<float>(sent, lights));
+  for (std::size_t v = 0; v < 3 * lights; ++v) {
+    for (std::size_t r = 0; r < kRankStride - kFirstCoefficient; ++r) {
+      double expected = r < written ? 0 : kUntouched;
+      for (std::size_t k = 0; k < plain.size && r < plain.rank; ++k) {
+        expected += plain.value[r * plain.size + k] * x[v * kStride + kFirstPosition + k];
       }
-      EXPECT_NEAR(coefficient[v * kRankStride + r], expected, allowed);
-    }
-  }
-  for (std::size_t part = 16; part <= size; part += 16) {
-    sum = y;
-    kernels.expand(basis.data() + size - part, rank, size, part, planar(scale, count),
-                   planar(sum, count));
-    for (std::size_t v = 0; v < count; ++v) {
-      for (std::size_t k = 0; k < kStride; ++k) {
-        double expected = y[v * kStride + k];
-        for (std::size_t r = 0; r < rank && k < part; ++r) {
-          expected += plain[r * size + size - part + k] * scale[v * kRankStride + r];
-        }
-        EXPECT_NEAR(sum[v * kStride + k], expected, allowed);
-      }
+      EXPECT_NEAR(sent[coefficient_at(v, r)], expected, plain.allowed);
     }
   }
 }
 
 template <typename Value>
-void check_core(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
-                const std::vector<float>& plain, std::size_t rows, std::size_t columns,
-                std::size_t lights) {
-  constexpr std::size_t kStride = 110;
-  const std::size_t count = 3 * lights;
-  const CoreMatrices<Value> matrices{values.data(), rows, columns, {1, 0, 1}};
+void check_expand(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
+                  const PlainBasis& plain, std::size_t first_rank, std::size_t places,
+                  std::size_t lights) {
   Random random;
-  const std::vector<float> row_in = random.floats(count * kStride);
-  const std::vector<float> column_in = random.floats(count * kStride);
-  for (const bool to_rows : {true, false}) {
-    for (const bool to_columns : {true, false}) {
-      if (!to_rows && !to_columns) continue;
-      std::vector<float> row_out(count * kStride, kUntouched), column_out = row_out;
-      const auto product = !to_columns ? kernels.to_rows
-                           : !to_rows  ? kernels.to_columns
-                                       : kernels.both;
-      product(matrices, {planar(row_in, count), planar(column_in, count), planar(row_out, count),
-                         planar(column_out, count)});
-      for (std::size_t v = 0; v < count; ++v) {
-        const float* s = plain.data() + matrices.channel_matrix[v % 3] * rows * columns;
-        for (std::size_t i = 0; i < kStride; ++i) {
-          double expected = to_rows && i < rows ? 0 : kUntouched;
-          for (std::size_t j = 0; j < columns && to_rows && i < rows; ++j) {
-            expected += s[i * columns + j] * column_in[v * kStride + j];
+  const std::vector<float> y = random.floats(3 * lights * kStride);
+  std::vector<float> arrived = random.floats(lights * kRankStride * kChannelLanes), sum = y;
+  const BasisPart part = part_of(plain, first_rank, places);
+  kernels.expand(basis.data(), {&part, 1}, side_by_side<const float>(arrived, lights),
+                 planar(sum, 3 * lights));
+  for (std::size_t v = 0; v < 3 * lights; ++v) {
+    for (std::size_t k = 0; k < kStride; ++k) {
+      double expected = y[v * kStride + k];
+      const bool reached =
+          k >= kFirstPosition + part.first_place && k < kFirstPosition + part.last_place;
+      for (std::size_t r = first_rank; r < plain.rank && reached; ++r) {
+        expected +=
+            plain.value[r * plain.size + k - kFirstPosition] * arrived[coefficient_at(v, r)];
+      }
+      EXPECT_NEAR(sum[v * kStride + k], expected, plain.allowed);
+    }
+  }
+}
+
+template <typename Value>
+void check_bases(const BasisKernels<Value>& kernels, const std::vector<Value>& basis,
+                 const PlainBasis& plain, std::size_t lights) {
+  check_project(kernels, basis, plain, plain.rank, lights);
+  for (std::size_t places = 16; places <= plain.size; places += 16) {
+    check_expand(kernels, basis, plain, 0, places, lights);
+  }
+  if (plain.rank > 1) check_expand(kernels, basis, plain, 1, plain.size, lights);
+}
+
+/// A basis in the order of the file: strips of 64 positions, groups of four ranks, pairs of
+/// positions.
+std::vector<std::int16_t> in_strips(const PlainBasis& plain) {
+  std::vector<std::int16_t> values;
+  for (std::size_t strip = 0; strip < plain.size; strip += 64) {
+    for (std::size_t group = 0; group < plain.rank; group += 4) {
+      for (std::size_t k = strip; k < std::min(strip + 64, plain.size); k += 2) {
+        for (std::size_t r = group; r < group + 4; ++r) {
+          for (std::size_t i = k; i < k + 2; ++i) {
+            const float value = r < plain.rank ? plain.value[r * plain.size + i] : 0;
+            values.push_back(static_cast<std::int16_t>(value));
           }
-          EXPECT_NEAR(row_out[v * kStride + i], expected, kAllowed);
         }
-        for (std::size_t j = 0; j < kStride; ++j) {
-          double expected = to_columns && j < columns ? 0 : kUntouched;
-          for (std::size_t i = 0; i < rows && to_columns && j < columns; ++i) {
-            expected += s[i * columns + j] * row_in[v * kStride + i];
+      }
+    }
+  }
+  return values;
+}
+
+/// Integers up to the largest.
+PlainBasis integer_basis(std::size_t rank, std::size_t size) {
+  constexpr float kLargest = HierarchicalOperator::kLargestShort;
+  Random random;
+  PlainBasis plain{random.floats(rank * size), rank, size, 0};
+  for (float& value : plain.value) value = std::round(kLargest * value);
+  plain.value.front() = -kLargest;
+  // Light up to 1 is a multiple of 2^-11 at most, off by half of that, and times up to 4,095.
+  plain.allowed = static_cast<double>(std::max(rank, size));
+  return plain;
+}
+
+void check_integer_bases(const BasisKernels<std::int16_t>& kernels, std::size_t rank,
+                         std::size_t size, std::size_t lights) {
+  const PlainBasis plain = integer_basis(rank, size);
+  const std::vector<std::int16_t> basis = in_strips(plain);
+  check_project(kernels, basis, plain, (rank + 3) / 4 * 4, lights);
+  for (std::size_t places = 16; places <= size; places += 16) {
+    for (std::size_t first = 0; first < std::min<std::size_t>(6, rank); ++first) {
+      check_expand(kernels, basis, plain, first, places, lights);
+    }
+  }
+}
+
+template <typename Value>
+void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
+                const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
+                std::size_t lights) {
+  using Direction = CoreBlock::Direction;
+  constexpr std::uint32_t kMatrices = 2, kRow = 3, kColumn = 99, kEnd = 200;
+  constexpr std::array<std::uint32_t, 3> kMatrix{1, 0, 1};
+  Random random;
+  const std::vector<float> in = random.floats(lights * kEnd * kChannelLanes);
+  for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
+    const std::vector<CoreBlock> cores{{8, rows, columns, kRow, kColumn, direction}};
+    std::vector<float> out(lights * kEnd * kChannelLanes, kUntouched);
+    multiply_cores(values.data(), cores, ChannelLanes(kMatrix, kMatrices), lights,
+                   {in.data(), kEnd * kChannelLanes}, {out.data(), kEnd * kChannelLanes});
+    for (std::size_t v = 0; v < 3 * lights; ++v) {
+      const auto at = [v](std::size_t k) { return (v / 3 * kEnd + k) * kChannelLanes + v % 3; };
+      const auto entry = [&](std::size_t i, std::size_t j) {
+        return plain[8 + (i * columns + j) * kMatrices + kMatrix[v % 3]];
+      };
+      for (std::uint32_t k = 0; k < kEnd; ++k) {
+        double expected = kUntouched;
+        if (direction != Direction::kToColumns && k >= kRow && k < kRow + rows) {
+          expected = 0;
+          for (std::uint32_t j = 0; j < columns; ++j) {
+            expected += entry(k - kRow, j) * in[at(kColumn + j)];
           }
-          EXPECT_NEAR(column_out[v * kStride + j], expected, kAllowed);
         }
+        if (direction != Direction::kToRows && k >= kColumn && k < kColumn + columns) {
+          expected = 0;
+          for (std::uint32_t i = 0; i < rows; ++i) {
+            expected += entry(i, k - kColumn) * in[at(kRow + i)];
+          }
+        }
+        EXPECT_NEAR(out[at(k)], expected, kAllowed);
       }
     }
   }
@@ -384,7 +520,7 @@ void check_core(const CoreKernels<Value>& kernels, const std::vector<Value>& val
 void check_kernels(const BlockKernelSet& kernels) {
   SCOPED_TRACE(kernels.instruction_set);
   Random random;
-  const std::vector<float> values = random.floats(2 * 96 * 96 + HierarchicalOperator::kPadding);
+  const std::vector<float> values = random.floats(2 * 96 * 96 + 8 + HierarchicalOperator::kPadding);
   const std::vector<std::uint16_t> half = to_half(values);
   std::vector<std::int8_t> bytes(values.size());
   std::ranges::transform(values, bytes.begin(),
@@ -393,27 +529,85 @@ void check_kernels(const BlockKernelSet& kernels) {
   for (const std::size_t lights : {1U, 2U, 3U}) {
     for (const std::size_t rank : {1U, 2U, 3U, 4U, 7U, 17U}) {
       for (const std::size_t size : {16U, 32U, 48U, 96U}) {
-        check_bases(kernels.bases_f32, values, values, rank, size, 3 * lights);
-        check_bases(kernels.bases_f16, half, values, rank, size, 3 * lights);
-        check_bases(kernels.bases_q8, bytes, plain_bytes, rank, size, 3 * lights);
+        check_bases(kernels.bases_f32, values, {values, rank, size, kAllowed}, lights);
+        check_bases(kernels.bases_f16, half, {values, rank, size, kAllowed}, lights);
+        check_bases(kernels.bases_q8, bytes, {plain_bytes, rank, size, 128 * kAllowed}, lights);
+        check_integer_bases(kernels.bases_q16, rank, size, lights);
       }
-      for (const std::size_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
-        check_core(kernels.cores_f32, values, values, rank, columns, lights);
-        check_core(kernels.cores_f16, half, values, rank, columns, lights);
+      const auto rows = static_cast<std::uint32_t>(rank);
+      for (const std::uint32_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
+        check_core(kernels.cores_f32, values, values, rows, columns, lights);
+        check_core(kernels.cores_f16, half, values, rows, columns, lights);
       }
     }
     check_core(kernels.cores_f32, values, values, 48, 96, lights);
     check_core(kernels.cores_f16, half, values, 96, 32, lights);
   }
+  check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
+}
+
+std::vector<const BlockKernelSet*> runnable_kernels() {
+  std::vector<const BlockKernelSet*> sets{&kBlockKernelsPortable};
+#if defined(__x86_64__)
+  const InstructionSet widest = widest_instruction_set();
+  if (widest >= InstructionSet::kAvx2) sets.push_back(&kBlockKernelsAvx2);
+  if (widest >= InstructionSet::kAvx512) sets.push_back(&kBlockKernelsAvx512);
+#endif
+  return sets;
 }
 
 TEST(BlockKernels, EveryInstructionSetAgrees) {
-  check_kernels(kBlockKernelsPortable);
-#if defined(__x86_64__)
-  const InstructionSet widest = widest_instruction_set();
-  if (widest >= InstructionSet::kAvx2) check_kernels(kBlockKernelsAvx2);
-  if (widest >= InstructionSet::kAvx512) check_kernels(kBlockKernelsAvx512);
-#endif
+  for (const BlockKernelSet* set : runnable_kernels()) check_kernels(*set);
+}
+
+/// What comes of x by way of coefficients and back: those, and the light.
+std::vector<float> there_and_back(const BlockKernelSet& set, const PlainBasis& plain,
+                                  const std::vector<float>& x) {
+  const std::vector<std::int16_t> basis = in_strips(plain);
+  const BasisPart part = part_of(plain, 0, plain.size);
+  std::vector<float> sent(kRankStride * kChannelLanes, 0.0F), y(3 * kStride, 0.0F);
+  set.bases_q16.project(basis.data(), {&part, 1}, planar(x, 3), side_by_side<float>(sent, 1));
+  for (std::size_t k = 3; k < sent.size(); k += kChannelLanes) sent[k] = 0;  // no channel's
+  set.bases_q16.expand(basis.data(), {&part, 1}, side_by_side<const float>(sent, 1), planar(y, 3));
+  sent.insert(sent.end(), y.begin(), y.end());
+  return sent;
+}
+
+TEST(BlockKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
+  const PlainBasis plain = integer_basis(134, 304);
+  Random random;
+  const std::vector<float> x = random.floats(3 * kStride);
+  const std::vector<float> expected = there_and_back(kBlockKernelsPortable, plain, x);
+  for (const BlockKernelSet* set : runnable_kernels()) {
+    EXPECT_EQ(there_and_back(*set, plain, x), expected) << set->instruction_set;
+  }
+}
+
+TEST(BlockKernels, SumsOfIntegersHaveRoomForTheLargest) {
+  constexpr std::size_t kRank = 128, kSize = 128;
+  constexpr auto kLargest = static_cast<float>(HierarchicalOperator::kLargestShort);
+  const PlainBasis plain{std::vector<float>(kRank * kSize, kLargest), kRank, kSize, 0};
+  // Just below a power of two: it becomes the largest integer that there is.
+  const float light = std::nextafter(1.0F, 0.0F);
+  for (const BlockKernelSet* set : runnable_kernels()) {
+    SCOPED_TRACE(set->instruction_set);
+    const std::vector<float> result =
+        there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
+    const double sent = kSize * kLargest * light, y = kRank * kLargest * sent;
+    EXPECT_NEAR(result[coefficient_at(0, 0)] / sent, 1, 3e-4);
+    EXPECT_NEAR(result[kRankStride * kChannelLanes + kFirstPosition] / y, 1, 6e-4);
+  }
+}
+
+TEST(BlockKernels, NoLightStaysNone) {
+  const PlainBasis plain = integer_basis(7, 48);
+  for (const float light : {0.0F, 1e-42F}) {
+    for (const BlockKernelSet* set : runnable_kernels()) {
+      const std::vector<float> result =
+          there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
+      for (const float value : result) EXPECT_LE(std::abs(value), 1e-20F);
+    }
+  }
 }
 
 }  // namespace

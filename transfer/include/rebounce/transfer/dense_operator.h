@@ -12,11 +12,11 @@
 
 namespace rebounce {
 
-/// How values are stored; kQ8, the bases of a HierarchicalOperator in 8 bits and the rest as kF16,
-/// is not for a DenseOperator.
-enum class Precision : std::uint8_t { kF16, kF32, kQ8 };
+/// How values are stored. kQ16 and kQ8, the bases of a HierarchicalOperator as integers of 16 or 8
+/// bits and the rest as kF16, are for that alone.
+enum class Precision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
 
-/// As the command line names it: "f16", "f32", "q8".
+/// As the command line names it: "f16", "f32", "q16", "q8".
 std::string precision_name(Precision precision);
 
 /// Y stored whole, in its symmetric form Yhat = A^1/2 Y A^-1/2 = G (I - rho G)^-1 with

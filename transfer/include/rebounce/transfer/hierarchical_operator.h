@@ -63,13 +63,24 @@ class HierarchicalOperator final : public TransferOperator {
   /// entries are +-127; cores are divided by them, with this for 1 at each end.
   static constexpr float kByteScale = 128;
 
+  /// In 16 bits likewise: the largest are +-kLargestShort, and kShortScale stands for 1. So few
+  /// that sums of 128 products with such numbers fit 32 bits.
+  static constexpr std::int16_t kLargestShort = 4095;
+  static constexpr float kShortScale = 4096;
+
+  /// Of bases in 16 bits, so many ranks are kept together, and so many positions.
+  static constexpr std::uint32_t kRankGroup = 4, kStrip = 64;
+
   enum class Order : std::uint8_t {
     /// Block by block, U^T V^T S or the entries, without holes, then kPadding values not used.
     kByBlock,
     /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
-    /// the order of their blocks, U^T before V^T; then cores and dense entries by block; zeros to
-    /// the next multiple of 64 values, at least kPadding of them. Bases in an array of their own
-    /// are followed by zeros likewise.
+    /// the order of their blocks, U^T before V^T; then cores and dense entries by block, the
+    /// matrices of an entry side by side; zeros to the next multiple of 64 values, at least
+    /// kPadding
+    /// of them. Bases in an array of their own are followed by zeros likewise. Those in 16 bits are
+    /// [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster: strips of
+    /// kStrip positions or what is left of it, the last ranks filled up with zeros.
     kStreamed,
   };
 
@@ -83,7 +94,8 @@ class HierarchicalOperator final : public TransferOperator {
     Precision precision = Precision::kF32;
     SharedArray<float> values_f32;          ///< if kF32
     SharedArray<std::uint16_t> values_f16;  ///< IEEE half-precision bits, if kF16
-    SharedArray<std::int8_t> bases_q8;      ///< if kQ8; values_f16 then holds the others alone
+    SharedArray<std::int16_t> bases_q16;    ///< if kQ16; values_f16 then holds the others alone
+    SharedArray<std::int8_t> bases_q8;      ///< if kQ8; likewise
   };
 
   /// Some of the patches, as `receivers` prepares them for `apply_to`.
@@ -108,6 +120,9 @@ class HierarchicalOperator final : public TransferOperator {
   /// The same with half-precision numbers, in the order kStreamed. Throws Error if a value is
   /// beyond their range, and as the constructor does.
   static Storage encode_half(const Storage& storage);
+
+  /// The same with bases of 16 bits. Storage has values in f32. Throws Error as encode_half does.
+  static Storage encode_shorts(const Storage& storage);
 
   /// The same with bases of 8 bits. Storage has values in f32. Throws Error as encode_half does.
   static Storage encode_bytes(const Storage& storage);

@@ -61,7 +61,7 @@ class LowRankOperator final : public TransferOperator {
  private:
   std::size_t stride() const { return tile_count(patch_count()) * kTile; }
   /// Ranks of the three channels, each rounded up to whole vectors.
-  std::size_t coefficient_size() const { return kChannelCount * rank_stride_; }
+  std::size_t coefficient_size() const { return (kChannelCount + 1) * rank_stride_; }
   /// coefficient[c] = core V^T x_c, by way of one set of coefficients for each tile.
   void project(const float* x, float* tile_coefficient, float* coefficient) const;
   void multiply_cores(const float* in, float* out) const;
