@@ -159,7 +159,9 @@ std::string settings_json(const BuildSettings& settings) {
                         {"kernel_tolerance", f.kernel_tolerance},
                         {"probe_grid", settings.probes.grid},
                         {"probe_spacing", settings.probes.spacing},
-                        {"probe_rays_each", settings.probes.ray_count}}
+                        {"probe_rays_each", settings.probes.ray_count},
+                        {"lightmap_size", settings.lightmap.size},
+                        {"lightmap_padding", settings.lightmap.padding}}
       .dump();
 }
 
@@ -256,6 +258,15 @@ FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
   return build_links(model, tracer, settings, {}, progress).links;
 }
 
+Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
+                       BuildReport& report) {
+  PlacedLightmap placed = place_lightmap(model, settings.lightmap);
+  for (const std::string& warning : placed.warnings) {
+    report.warnings.push_back(warning + ": it is left out of the lightmap");
+  }
+  return std::move(placed.lightmap);
+}
+
 // The scene of a file, with what is plainly seen from behind made double-sided.
 Scene import_usable(const std::filesystem::path& path, double scale) {
   Scene scene = import_gltf(path, scale);
@@ -290,6 +301,10 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
     return make_patch_model(std::move(scene), settings.subdivision);
   });
   describe_patches(model, report);
+  if (settings.lightmap.size > 0) {
+    data.lightmap = clock.run(
+        "lightmap", [&](const Progress&) { return make_lightmap(model, settings, report); });
+  }
   const BuildSettings decided = decide(settings, model.patches.size());
   report.estimate = estimate_cost(model.patches, settings.form_factors.probe_rays);
   if (on_estimate) on_estimate(report.estimate);

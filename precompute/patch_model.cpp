@@ -48,7 +48,7 @@ class PatchModelBuilder {
     const RayTracer tracer = make_surface_tracer(model_.mesh);
     make_patches(tracer);
     find_shown_patches(tracer);
-    split_vertices(model_.mesh, tracer);
+    copy_lightmap_texcoords(split_vertices(model_.mesh, tracer));
     if (clamped_count_ > 0) {
       model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
                                 " patches was clamped to 0.99");
@@ -68,12 +68,22 @@ class PatchModelBuilder {
     mesh.base_color_texcoord = scene_.base_color_texcoord;
     mesh.emissive_texcoord = scene_.emissive_texcoord;
     mesh.vertex_color = scene_.vertex_color;
+    model_.lightmap_texcoord = scene_.lightmap_texcoord;
+    model_.lightmap_page = scene_.lightmap_page;
     mesh.triangle = scene_.triangle;
     mesh.triangle_material = scene_.triangle_material;
     mesh.back_triangle.assign(scene_.triangle.size(), kNone);
     for (const TriangleSides& sides : sides_) kind_.push_back(sides.front);
     surface_of_.resize(mesh.triangle.size());
     std::iota(surface_of_.begin(), surface_of_.end(), 0U);
+  }
+
+  /// For vertices that were appended as copies.
+  void copy_lightmap_texcoords(std::span<const std::uint32_t> copied) {
+    if (model_.lightmap_texcoord.empty()) return;
+    for (const std::uint32_t v : copied) {
+      model_.lightmap_texcoord.push_back(model_.lightmap_texcoord[v]);
+    }
   }
 
   /// Appends a copy with reversed winding and normals of every double-sided triangle.
@@ -85,6 +95,9 @@ class PatchModelBuilder {
           back_vertex.try_emplace(v, static_cast<std::uint32_t>(mesh.position.size()));
       if (is_new) {
         for (float& n : mesh.normal[copy_vertex(mesh, v)]) n = -n;
+        if (!model_.lightmap_texcoord.empty()) {
+          model_.lightmap_texcoord.push_back(model_.lightmap_texcoord[v]);
+        }
       }
       return entry->second;
     };

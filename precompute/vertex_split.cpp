@@ -99,21 +99,25 @@ std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v) {
   return static_cast<std::uint32_t>(mesh.position.size() - 1);
 }
 
-std::size_t split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
+std::vector<std::uint32_t> split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
   const VertexTriangles around(mesh);
   const auto vertex_count = static_cast<std::uint32_t>(mesh.position.size());
   std::vector<std::vector<std::uint32_t>> group(vertex_count);
   const VertexSplitter splitter(mesh, tracer);
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::uint32_t v = 0; v < vertex_count; ++v) group[v] = splitter.groups(v, around[v]);
+  std::vector<std::uint32_t> copied;
   for (std::uint32_t v = 0; v < vertex_count; ++v) {
     std::vector<std::uint32_t> vertex_of{v};
     for (std::size_t k = 0; k < group[v].size(); ++k) {
-      while (vertex_of.size() <= group[v][k]) vertex_of.push_back(copy_vertex(mesh, v));
+      while (vertex_of.size() <= group[v][k]) {
+        vertex_of.push_back(copy_vertex(mesh, v));
+        copied.push_back(v);
+      }
       std::ranges::replace(mesh.triangle[around[v][k]], v, vertex_of[group[v][k]]);
     }
   }
-  return mesh.position.size() - vertex_count;
+  return copied;
 }
 
 }  // namespace rebounce

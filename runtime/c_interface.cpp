@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/probe_light.h"
+#include "rebounce/runtime/texel_light.h"
 #include "rebounce/runtime/vertex_light.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
@@ -30,10 +32,14 @@ struct rebounce_transfer {
 
 struct rebounce_engine {
   Engine engine;
-  std::vector<Light> lights;  ///< of the present frame
-  Sky sky;                    ///< likewise
+  std::vector<Light> lights;              ///< of the present frame
+  Sky sky;                                ///< likewise
+  std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap, which needs it
 
-  explicit rebounce_engine(Engine made) : engine(std::move(made)) {}
+  explicit rebounce_engine(Engine made) : engine(std::move(made)) {
+    const TransferData& data = engine.data();
+    if (!data.lightmap.empty()) vertex_irradiance.resize(data.mesh.position.size());
+  }
 };
 
 // NOLINTEND(readability-identifier-naming)
@@ -105,7 +111,7 @@ Struct take(const Struct* given, Struct defaults, std::size_t least_size) {
 // As they were in version 1 of the interface.
 constexpr std::size_t kLightSize1 = sizeof(rebounce_light);
 constexpr std::size_t kSettingsSize1 = sizeof(rebounce_engine_settings);
-constexpr std::size_t kInfoSize1 = sizeof(rebounce_transfer_info);
+constexpr std::size_t kInfoSize1 = offsetof(rebounce_transfer_info, lightmap_width);
 
 #if REBOUNCE_WITH_EMBREE
 /// Light k of an array whose entries are as large as the caller says.
@@ -212,6 +218,8 @@ rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
     filled.probe_count = static_cast<std::uint32_t>(data.probes.size());
     std::ranges::copy(data.probes.grid, filled.probe_grid);
     filled.operator_bytes = data.transfer->bytes();
+    filled.lightmap_width = data.lightmap.width;
+    filled.lightmap_height = data.lightmap.height;
     std::memcpy(info, &filled, std::min<std::size_t>(info->struct_size, sizeof(filled)));
     return REBOUNCE_OK;
   });
@@ -247,6 +255,15 @@ const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer)
 }
 const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer) {
   return transfer == nullptr ? nullptr : transfer->data->probes.valid.data();
+}
+
+const float* rebounce_transfer_lightmap_texcoord(const rebounce_transfer* transfer) {
+  if (transfer == nullptr || transfer->data->lightmap.empty()) return nullptr;
+  return transfer->data->lightmap.texcoord.front().data();
+}
+const uint8_t* rebounce_transfer_lightmap_triangle(const rebounce_transfer* transfer) {
+  if (transfer == nullptr || transfer->data->lightmap.empty()) return nullptr;
+  return transfer->data->lightmap.has_texels.data();
 }
 
 void rebounce_light_init(rebounce_light* light) {
@@ -358,6 +375,24 @@ rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine,
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     reconstruct_at_vertices(engine->engine.data().mesh, engine->engine.indirect_irradiance(),
                             {reinterpret_cast<Float3*>(irradiance), vertex_count});
+    return REBOUNCE_OK;
+  });
+}
+
+rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,
+                                                    size_t texel_count) {
+  if (engine == nullptr || irradiance == nullptr) {
+    return missing("rebounce_engine_lightmap_irradiance");
+  }
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    const TransferData& data = engine->engine.data();
+    if (data.lightmap.empty()) {
+      throw Error("the transfer file has no lightmap; make it with --lightmap");
+    }
+    reconstruct_at_vertices(data.mesh, engine->engine.indirect_irradiance(),
+                            engine->vertex_irradiance);
+    interpolate_at_texels(data.lightmap, data.mesh, engine->vertex_irradiance,
+                          {reinterpret_cast<Float3*>(irradiance), texel_count});
     return REBOUNCE_OK;
   });
 }

@@ -39,6 +39,7 @@ class Checker {
     check_cameras();
     check_lights();
     check_probes();
+    check_lightmap();
     check_exchange();
   }
 
@@ -253,6 +254,27 @@ class Checker {
       rest /= side;
     }
     if (rest != 1) refuse(tensor::kProbeGrid, "not that of the probes");
+  }
+
+  void check_lightmap() const {
+    const Lightmap& map = data_.lightmap;
+    const std::size_t texels = std::size_t{map.width} * map.height;
+    if (texels == 0 && (map.width != 0 || !map.triangle.empty())) {
+      refuse(tensor::kLightmapSize, "of no texels");
+    }
+    if (texels == 0) return;
+    rows("lightmap.texcoord", map.texcoord.size(), data_.mesh.position.size());
+    rows("lightmap.has_texels", map.has_texels.size(), data_.mesh.triangle.size());
+    rows("lightmap.triangle", map.triangle.size(), texels);
+    rows("lightmap.weight", map.weight.size(), texels);
+    numbers("lightmap.texcoord", map.texcoord, kFraction);
+    numbers("lightmap.weight", map.weight, kFraction);
+    for (std::size_t t = 0; t < map.has_texels.size(); ++t) {
+      index("lightmap.has_texels", t, map.has_texels[t], 2);
+    }
+    for (std::size_t k = 0; k < texels; ++k) {
+      index_or_none("lightmap.triangle", k, map.triangle[k], data_.mesh.triangle.size());
+    }
   }
 
   void check_exchange() const {

@@ -35,6 +35,7 @@ inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
 inline constexpr char kLinksPatch[] = "links.patch";
 inline constexpr char kProbePosition[] = "probe.position";
 inline constexpr char kProbeGrid[] = "probe.grid";
+inline constexpr char kLightmapSize[] = "lightmap.size";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
@@ -120,6 +121,14 @@ void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
   visit("probe.entry_begin", probes.entry_begin);
   visit("probe.entry_patch", probes.entry_patch);
   visit("probe.entry_weight", probes.entry_weight);
+}
+
+template <typename Map, typename Visit>
+void visit_tensors_of_lightmap(Map& map, Visit&& visit) {
+  visit("lightmap.texcoord", map.texcoord);
+  visit("lightmap.has_texels", map.has_texels);
+  visit("lightmap.triangle", map.triangle);
+  visit("lightmap.weight", map.weight);
 }
 
 template <typename Maps, typename Visit>

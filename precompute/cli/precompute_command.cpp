@@ -225,6 +225,11 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
                    "Rays by which each light probe looks around")
       ->check(CLI::Range(64, 1000000))
       ->capture_default_str();
+  command
+      ->add_option("--lightmap", chosen->settings.lightmap.size,
+                   "Texels along each side of a lightmap, for scenes with second texture "
+                   "coordinates (TEXCOORD_1)")
+      ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
   command->add_option("--seed", chosen->settings.form_factors.seed, "Seed of the sample points")
       ->capture_default_str();
   command->callback([chosen, &options] { run(*chosen, options); });

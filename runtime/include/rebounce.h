@@ -78,6 +78,8 @@ typedef struct rebounce_transfer_info {
   uint32_t probe_count;    /* 0: there are none */
   uint32_t probe_grid[3];  /* probes along x, y, z, x fastest; zeros: no grid */
   uint64_t operator_bytes; /* that a frame reads, all channels */
+  uint32_t lightmap_width; /* texels; 0: there is no lightmap */
+  uint32_t lightmap_height;
 } rebounce_transfer_info;
 
 rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
@@ -95,6 +97,12 @@ const uint32_t* rebounce_transfer_triangle_patch(
     const rebounce_transfer* transfer); /* [t], or UINT32_MAX */
 const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer); /* [p][3] m */
 const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer);  /* [p] 0, 1 */
+
+/* Where the vertices are in the lightmap, (0, 0) its upper left corner, and whether display
+ * triangles have texels; NULL if there is no lightmap. */
+const float* rebounce_transfer_lightmap_texcoord(const rebounce_transfer* transfer); /* [v][2] */
+const uint8_t* rebounce_transfer_lightmap_triangle(
+    const rebounce_transfer* transfer); /* [t] 0, 1 */
 
 /* ---- Lights ---- */
 
@@ -179,6 +187,11 @@ const float* rebounce_engine_radiosity(const rebounce_engine* engine);
 /* Indirect irradiance of the last frame at the vertices of the display mesh [vertex_count][3]. */
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count);
+
+/* Indirect irradiance of the last frame at the texels of the lightmap, [height][width][3] in lx,
+ * rows from the top; 0 in texels that show nothing. `texel_count` is width x height. */
+rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,
+                                                    size_t texel_count);
 
 /* Radiance in cd/m² that arrives at the light probes from patches and sky in the last frame, lamps
  * apart: [probe_count][9][3], coefficients of real spherical harmonics of degree 0 to 2

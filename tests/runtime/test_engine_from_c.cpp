@@ -28,6 +28,7 @@ class FromC : public testing::Test {
     mesh.vertex_color.resize(mesh.position.size());
     mesh.weight_begin.resize(mesh.position.size() + 1);
     data.materials.resize(1);
+    data.lightmap = one_texel_for_each(mesh);
     const std::string path = (folder_ / "room.safetensors").string();
     save_transfer_file(path, data);
     ASSERT_EQ(rebounce_transfer_load(path.c_str(), &transfer_), REBOUNCE_OK);
@@ -38,6 +39,18 @@ class FromC : public testing::Test {
   void TearDown() override {
     rebounce_engine_destroy(engine_);
     rebounce_transfer_release(transfer_);
+  }
+
+  /// A lightmap of one row, with the middle of each triangle.
+  static Lightmap one_texel_for_each(const DisplayMesh& mesh) {
+    Lightmap map;
+    map.width = static_cast<std::uint32_t>(mesh.triangle.size());
+    map.height = 1;
+    map.texcoord.assign(mesh.position.size(), Float2{0.5F, 0.5F});
+    map.has_texels.assign(map.width, 1);
+    map.weight.assign(map.width, Float2{1 / 3.0F, 1 / 3.0F});
+    for (std::uint32_t t = 0; t < map.width; ++t) map.triangle.push_back(t);
+    return map;
   }
 
   test::TemporaryFolder folder_;
@@ -53,6 +66,43 @@ TEST_F(FromC, AFrameDoesNotAllocate) {
     rebounce_engine_relight(engine_, &lamp_, 1, nullptr);
   });
   EXPECT_EQ(count, 0);
+}
+
+TEST_F(FromC, TheLightmapIsThatOfTheVertices) {
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  ASSERT_EQ(info.lightmap_width, info.triangle_count);
+  ASSERT_EQ(info.lightmap_height, 1U);
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  std::vector<float> vertex(3 * std::size_t{info.vertex_count});
+  std::vector<float> texel(3 * std::size_t{info.triangle_count});
+  ASSERT_EQ(rebounce_engine_vertex_irradiance(engine_, vertex.data(), info.vertex_count),
+            REBOUNCE_OK);
+  EXPECT_EQ(test::count_allocations([&] {
+              rebounce_engine_lightmap_irradiance(engine_, texel.data(), info.triangle_count);
+            }),
+            0);
+  const std::uint32_t* const corner = rebounce_transfer_triangle(transfer_);
+  for (std::size_t t = 0; t < info.triangle_count; ++t) {
+    float mean = 0;
+    for (std::size_t k = 0; k < 3; ++k) mean += vertex[3 * corner[3 * t + k]] / 3;
+    EXPECT_NEAR(texel[3 * t], mean, 1e-5F * mean);
+  }
+  EXPECT_EQ(rebounce_transfer_lightmap_texcoord(transfer_)[0], 0.5F);
+  EXPECT_EQ(rebounce_transfer_lightmap_triangle(transfer_)[0], 1);
+  EXPECT_EQ(rebounce_engine_lightmap_irradiance(engine_, texel.data(), 1),
+            REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_EQ(rebounce_engine_lightmap_irradiance(engine_, nullptr, 1), REBOUNCE_INVALID_ARGUMENT);
+}
+
+TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {
+  rebounce_transfer_info info{};
+  info.struct_size = offsetof(rebounce_transfer_info, lightmap_width);
+  info.lightmap_width = 77;  // memory that is not the structure's
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  EXPECT_GT(info.patch_count, 0U);
+  EXPECT_EQ(info.lightmap_width, 77U);
 }
 
 TEST_F(FromC, StructuresOfALaterVersionAreUnderstood) {

@@ -11,6 +11,7 @@
 
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/light_probes.h"
+#include "rebounce/transfer/lightmap.h"
 #include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/opacity_maps.h"
 #include "rebounce/transfer/scene_description.h"
@@ -81,6 +82,7 @@ struct TransferData {
   std::vector<Camera> cameras;
   std::vector<Light> lights;
   LightProbes probes;  ///< may be none
+  Lightmap lightmap;   ///< may be empty
   ExchangeMatrix exchange;
   /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels, or null if that is not kept:
   /// see CompressedFormFactors.
