@@ -160,6 +160,7 @@ std::string settings_json(const BuildSettings& settings) {
                         {"probe_grid", settings.probes.grid},
                         {"probe_spacing", settings.probes.spacing},
                         {"probe_rays_each", settings.probes.ray_count},
+                        {"surface_harmonic_rays", settings.surface_harmonics.ray_count},
                         {"lightmap_size", settings.lightmap.size},
                         {"lightmap_padding", settings.lightmap.padding}}
       .dump();
@@ -336,6 +337,12 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
       LightProbes probes = place_probes(data.mesh, settings.probes);
       trace_probes(data, tracer, settings.probes, probes, part);
       return probes;
+    });
+  }
+
+  if (settings.surface_harmonics.ray_count > 0) {
+    data.surface_harmonics = clock.run("surface harmonics", [&](const Progress& part) {
+      return trace_surface_harmonics(data, tracer, settings.surface_harmonics, part);
     });
   }
 

@@ -1,6 +1,7 @@
 #include "escape.h"
 
 #include "hemisphere_rays.h"
+#include "seen_patch.h"
 
 namespace rebounce {
 
@@ -22,7 +23,7 @@ Escape measure_escape(const DisplayMesh& mesh, std::span<const std::uint32_t> tr
       continue;
     }
     // A side without a patch counts as seen: what covers it has one.
-    if (!hit.front && mesh.back_triangle[hit.triangle] == kNone) ++absorbed;
+    if (meets_back(mesh, hit)) ++absorbed;
   }
   return {static_cast<double>(sky) / ray_count, static_cast<double>(absorbed) / ray_count};
 }

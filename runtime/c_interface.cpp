@@ -15,6 +15,7 @@
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/probe_light.h"
+#include "rebounce/runtime/surface_light.h"
 #include "rebounce/runtime/texel_light.h"
 #include "rebounce/runtime/vertex_light.h"
 #include "rebounce/transfer/error.h"
@@ -35,10 +36,12 @@ struct rebounce_engine {
   std::vector<Light> lights;              ///< of the present frame
   Sky sky;                                ///< likewise
   std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap, which needs it
+  std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
 
   explicit rebounce_engine(Engine made) : engine(std::move(made)) {
     const TransferData& data = engine.data();
     if (!data.lightmap.empty()) vertex_irradiance.resize(data.mesh.position.size());
+    patch_light.resize(data.surface_harmonics.sky.size());
   }
 };
 
@@ -47,6 +50,7 @@ struct rebounce_engine {
 namespace {
 
 static_assert(sizeof(Float3) == 3 * sizeof(float));
+static_assert(sizeof(SurfaceLight) == 12 * sizeof(float));
 static_assert(sizeof(ProbeLight) == 27 * sizeof(float));
 
 thread_local std::string last_error;
@@ -377,6 +381,34 @@ rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine,
                             {reinterpret_cast<Float3*>(irradiance), vertex_count});
     return REBOUNCE_OK;
   });
+}
+
+rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* harmonics,
+                                             size_t vertex_count) {
+  if (engine == nullptr || harmonics == nullptr) return missing("rebounce_engine_vertex_light");
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    const TransferData& data = engine->engine.data();
+    if (data.surface_harmonics.empty()) {
+      throw Error("the transfer file has no surface harmonics; make it with --surface-harmonics");
+    }
+    apply_surface_harmonics(data.surface_harmonics, engine->engine.radiosity(), engine->sky,
+                            engine->patch_light);
+    reconstruct_at_vertices(data.mesh, engine->patch_light,
+                            {reinterpret_cast<SurfaceLight*>(harmonics), vertex_count});
+    return REBOUNCE_OK;
+  });
+}
+
+void rebounce_bent_irradiance(const float* harmonics, const float* irradiance, const float* normal,
+                              const float* bent, float* result) {
+  if (harmonics == nullptr || irradiance == nullptr || normal == nullptr || bent == nullptr ||
+      result == nullptr) {
+    return;
+  }
+  SurfaceLight light;
+  std::memcpy(light.data(), harmonics, sizeof(light));
+  std::ranges::copy(bent_irradiance(light, triple(irradiance), triple(normal), triple(bent)),
+                    result);
 }
 
 rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,

@@ -40,6 +40,7 @@ class Checker {
     check_lights();
     check_probes();
     check_lightmap();
+    check_surface_harmonics();
     check_exchange();
   }
 
@@ -274,6 +275,21 @@ class Checker {
     }
     for (std::size_t k = 0; k < texels; ++k) {
       index_or_none("lightmap.triangle", k, map.triangle[k], data_.mesh.triangle.size());
+    }
+  }
+
+  void check_surface_harmonics() const {
+    const SurfaceHarmonics& light = data_.surface_harmonics;
+    if (light.empty()) return;
+    const std::size_t n = data_.patches.size(), entries = light.entry_patch.size();
+    rows(tensor::kSurfaceSky, light.sky.size(), n);
+    rows("surface_harmonics.entry_begin", light.entry_begin.size(), n + 1);
+    rows("surface_harmonics.entry_weight", light.entry_weight.size(), entries);
+    begins<std::uint32_t>("surface_harmonics.entry_begin", light.entry_begin, entries);
+    numbers(tensor::kSurfaceSky, light.sky, kFinite);
+    numbers("surface_harmonics.entry_weight", light.entry_weight, kFinite);
+    for (std::size_t i = 0; i < entries; ++i) {
+      index("surface_harmonics.entry_patch", i, light.entry_patch[i], n);
     }
   }
 

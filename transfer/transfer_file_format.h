@@ -36,6 +36,7 @@ inline constexpr char kLinksPatch[] = "links.patch";
 inline constexpr char kProbePosition[] = "probe.position";
 inline constexpr char kProbeGrid[] = "probe.grid";
 inline constexpr char kLightmapSize[] = "lightmap.size";
+inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
@@ -121,6 +122,14 @@ void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
   visit("probe.entry_begin", probes.entry_begin);
   visit("probe.entry_patch", probes.entry_patch);
   visit("probe.entry_weight", probes.entry_weight);
+}
+
+template <typename Light, typename Visit>
+void visit_tensors_of_surface_harmonics(Light& harmonics, Visit&& visit) {
+  visit(tensor::kSurfaceSky, harmonics.sky);
+  visit("surface_harmonics.entry_begin", harmonics.entry_begin);
+  visit("surface_harmonics.entry_patch", harmonics.entry_patch);
+  visit("surface_harmonics.entry_weight", harmonics.entry_weight);
 }
 
 template <typename Map, typename Visit>

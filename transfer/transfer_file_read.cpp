@@ -372,6 +372,9 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   read_scene(file, data);
   read_probes(file, data);
   data.lightmap = read_lightmap(file);
+  if (file.tensors().contains(tensor::kSurfaceSky)) {
+    visit_tensors_of_surface_harmonics(data.surface_harmonics, TensorReader(file));
+  }
   data.exchange = read_exchange(file);
   data.record = read_record(file);
   check_transfer_data(data, file.name());

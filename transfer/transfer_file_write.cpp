@@ -189,6 +189,9 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   collect_textures(data.textures, collector);
   collect_probes(data.probes, collector);
   collect_lightmap(data.lightmap, collector);
+  if (!data.surface_harmonics.empty()) {
+    visit_tensors_of_surface_harmonics(data.surface_harmonics, collector);
+  }
   collect_exchange(data.exchange, collector);
   if (!data.links.empty()) visit_tensors_of_links(data.links, collector);
   collect_operator(data.transfer.get(), collector);

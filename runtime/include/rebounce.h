@@ -188,6 +188,17 @@ const float* rebounce_engine_radiosity(const rebounce_engine* engine);
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count);
 
+/* Radiance in cd/m² that arrives at the vertices from patches and sky in the last frame, lamps apart:
+ * [vertex_count][4][3], coefficients of real spherical harmonics of degree 0 and 1. Needs a file
+ * made with --surface-harmonics. */
+rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* harmonics,
+                                             size_t vertex_count);
+
+/* Irradiance [3] in lx where a normal map bends the unit normal [3] of a surface of this irradiance
+ * [3] to the unit vector bent [3], of coefficients [4][3]; writes [3]. */
+void rebounce_bent_irradiance(const float* harmonics, const float* irradiance, const float* normal,
+                              const float* bent, float* result);
+
 /* Indirect irradiance of the last frame at the texels of the lightmap, [height][width][3] in lx,
  * rows from the top; 0 in texels that show nothing. `texel_count` is width x height. */
 rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,

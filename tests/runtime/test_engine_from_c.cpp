@@ -29,6 +29,8 @@ class FromC : public testing::Test {
     mesh.weight_begin.resize(mesh.position.size() + 1);
     data.materials.resize(1);
     data.lightmap = one_texel_for_each(mesh);
+    data.surface_harmonics.sky.assign(data.patches.size(), LinearHarmonics{1, 1});
+    data.surface_harmonics.entry_begin.assign(data.patches.size() + 1, 0);
     const std::string path = (folder_ / "room.safetensors").string();
     save_transfer_file(path, data);
     ASSERT_EQ(rebounce_transfer_load(path.c_str(), &transfer_), REBOUNCE_OK);
@@ -94,6 +96,29 @@ TEST_F(FromC, TheLightmapIsThatOfTheVertices) {
   EXPECT_EQ(rebounce_engine_lightmap_irradiance(engine_, texel.data(), 1),
             REBOUNCE_INVALID_ARGUMENT);
   EXPECT_EQ(rebounce_engine_lightmap_irradiance(engine_, nullptr, 1), REBOUNCE_INVALID_ARGUMENT);
+}
+
+TEST_F(FromC, BentNormalsFollowTheHarmonicsOfTheVertices) {
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  std::vector<float> light(12 * std::size_t{info.vertex_count});
+  EXPECT_EQ(test::count_allocations(
+                [&] { rebounce_engine_vertex_light(engine_, light.data(), info.vertex_count); }),
+            0);
+  EXPECT_EQ(rebounce_engine_vertex_light(engine_, light.data(), 1), REBOUNCE_INVALID_ARGUMENT);
+  // Light from above alone: a normal that is bent away gets less.
+  const std::array<float, 12> from_above = {1, 1, 1, 1, 1, 1};
+  const std::array<float, 3> irradiance = {1, 2, 3}, up = {0, 1, 0}, bent = {0.6F, 0.8F, 0};
+  std::array<float, 3> result{};
+  rebounce_bent_irradiance(from_above.data(), irradiance.data(), up.data(), up.data(),
+                           result.data());
+  EXPECT_EQ(result, irradiance);
+  rebounce_bent_irradiance(from_above.data(), irradiance.data(), up.data(), bent.data(),
+                           result.data());
+  EXPECT_LT(result[0], 0.95F);
+  EXPECT_GT(result[0], 0.8F);
 }
 
 TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {

@@ -620,6 +620,31 @@ TEST(TransferFile, RefusesImpossibleLightmaps) {
   });
 }
 
+TEST(TransferFile, RefusesImpossibleSurfaceHarmonics) {
+  const auto harmonics = [](auto change) {
+    return [change](TransferData& data) {
+      SurfaceHarmonics& light = data.surface_harmonics;
+      light.sky.assign(data.patches.size(), LinearHarmonics{1, 2, 3, 4});
+      light.entry_begin = {0, 2, 2, 3};
+      light.entry_patch = {1, 2, 0};
+      light.entry_weight.assign(3, LinearHarmonics{1});
+      change(light);
+    };
+  };
+  expect_refused({
+      {"surface_harmonics.sky: 2 rows, not 3", harmonics([](auto& h) { h.sky.pop_back(); })},
+      {"surface_harmonics.sky", harmonics([](auto& h) { h.sky[1][3] = kNan; })},
+      {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin.pop_back(); })},
+      {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin[1] = 4; })},
+      {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_patch.pop_back(); })},
+      {"surface_harmonics.entry_patch: entry 2 is 3",
+       harmonics([](auto& h) { h.entry_patch[2] = 3; })},
+      {"surface_harmonics.entry_weight", harmonics([](auto& h) { h.entry_weight.clear(); })},
+      {"surface_harmonics.entry_weight",
+       harmonics([](auto& h) { h.entry_weight[0][0] = kInfinity; })},
+  });
+}
+
 TEST(TransferFile, RefusesImpossibleFormFactors) {
   const auto begins = [](const std::vector<std::uint64_t>& values) {
     return [values](TransferData& data) { data.exchange.row_begin = SharedArray(values); };
