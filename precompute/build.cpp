@@ -328,6 +328,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.patches = std::move(model.patches);
   data.patches.sky_visibility = std::move(form_factors.sky_visibility);
   data.patches.absorbed = std::move(form_factors.absorbed);
+  data.sky_cells = std::move(form_factors.sky_cells);
   data.mesh = std::move(model.mesh);
   data.exchange = std::move(form_factors.exchange);
   compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh);

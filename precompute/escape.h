@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "rebounce/runtime/patch_points.h"
@@ -13,6 +14,8 @@ namespace rebounce {
 struct Escape {
   double sky = 0;       ///< leaves the scene
   double absorbed = 0;  ///< meets the back of a one-sided surface
+  /// What leaves by cells of the sky, ascending, without those by which nothing does.
+  std::vector<std::pair<std::uint8_t, float>> sky_cells{};
 };
 
 /// Room for the work of measure_escape; afterwards `rays` and `hits` hold what was traced.

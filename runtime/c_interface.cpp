@@ -15,6 +15,8 @@
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/probe_light.h"
+#include "rebounce/runtime/sky_light.h"
+#include "rebounce/runtime/sky_model.h"
 #include "rebounce/runtime/surface_light.h"
 #include "rebounce/runtime/texel_light.h"
 #include "rebounce/runtime/vertex_light.h"
@@ -33,8 +35,9 @@ struct rebounce_transfer {
 
 struct rebounce_engine {
   Engine engine;
-  std::vector<Light> lights;              ///< of the present frame
-  Sky sky;                                ///< likewise
+  std::vector<Light> lights;                                ///< of the present frame
+  Sky sky;                                                  ///< likewise
+  std::shared_ptr<const SkyDistribution> sky_distribution;  ///< may be null
   std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap, which needs it
   std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
 
@@ -50,6 +53,7 @@ struct rebounce_engine {
 namespace {
 
 static_assert(sizeof(Float3) == 3 * sizeof(float));
+static_assert(REBOUNCE_SKY_CELL_COUNT == kSkyCellCount);
 static_assert(sizeof(SurfaceLight) == 12 * sizeof(float));
 static_assert(sizeof(ProbeLight) == 27 * sizeof(float));
 
@@ -130,7 +134,7 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
     throw Error("light " + std::to_string(k) + " has another struct_size than the first");
   }
   const rebounce_light given = take(entry, defaults, kLightSize1);
-  if (given.type > REBOUNCE_LIGHT_RECTANGLE) {
+  if (given.type > REBOUNCE_LIGHT_DISC) {
     throw Error("light " + std::to_string(k) + " is of type " + std::to_string(given.type) +
                 ", which there is not");
   }
@@ -148,14 +152,10 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   check_light(light);
 }
 
-Sky take_sky(const rebounce_sky* sky) {
+/// The engine checks it.
+Sky take_sky(const rebounce_sky* sky, const std::shared_ptr<const SkyDistribution>& distribution) {
   if (sky == nullptr) return {};
-  const Sky taken{triple(sky->color), sky->luminance};
-  const auto good = [](float x) { return x >= 0 && x <= std::numeric_limits<float>::max(); };
-  if (!std::ranges::all_of(taken.color, good) || !good(taken.luminance)) {
-    throw Error("the sky's color and luminance must be finite and at least 0");
-  }
-  return taken;
+  return {triple(sky->color), sky->luminance, distribution};
 }
 #endif
 
@@ -327,8 +327,9 @@ rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     engine->lights.resize(light_count);
     for (std::size_t k = 0; k < light_count; ++k) take_light(lights, k, engine->lights[k]);
-    engine->sky = take_sky(sky);
-    engine->engine.relight(engine->lights, engine->sky);
+    const Sky taken = take_sky(sky, engine->sky_distribution);
+    engine->engine.relight(engine->lights, taken);
+    engine->sky = taken;
     return REBOUNCE_OK;
   });
 #else
@@ -348,6 +349,32 @@ rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const fl
     const auto* const triples = reinterpret_cast<const Float3*>(irradiance);
     engine->engine.relight(std::span(triples, patch_count));
     engine->sky = {};
+    return REBOUNCE_OK;
+  });
+}
+
+rebounce_status rebounce_engine_set_sky_distribution(rebounce_engine* engine,
+                                                     const float* distribution) {
+  if (engine == nullptr) return missing("rebounce_engine_set_sky_distribution");
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    if (distribution == nullptr) {
+      engine->sky_distribution = nullptr;
+      return REBOUNCE_OK;
+    }
+    SkyDistribution taken;
+    std::copy_n(distribution, taken.size(), taken.begin());
+    auto shared = std::make_shared<const SkyDistribution>(taken);
+    check_sky({.distribution = shared}, engine->engine.data());
+    engine->sky_distribution = std::move(shared);
+    return REBOUNCE_OK;
+  });
+}
+
+rebounce_status rebounce_cie_sky(int type, const float* sun_direction, float ground_reflectance,
+                                 float* distribution) {
+  if (sun_direction == nullptr || distribution == nullptr) return missing("rebounce_cie_sky");
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    std::ranges::copy(cie_sky(type, triple(sun_direction), ground_reflectance), distribution);
     return REBOUNCE_OK;
   });
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/error.h"
 
@@ -32,8 +33,7 @@ void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const 
   const std::size_t n = harmonics.sky.size();
   check_size(light.size(), n, "the result");
   check_size(radiosity.size(), n, "the radiosity");
-  const Float3 open_sky = {sky.luminance * sky.color[0], sky.luminance * sky.color[1],
-                           sky.luminance * sky.color[2]};
+  const Float3 open_sky = mean_sky_luminance(sky);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     SurfaceLight sum{};

@@ -38,6 +38,7 @@ class Checker {
     check_materials();
     check_cameras();
     check_lights();
+    check_sky_cells();
     check_probes();
     check_lightmap();
     check_surface_harmonics();
@@ -255,6 +256,18 @@ class Checker {
       rest /= side;
     }
     if (rest != 1) refuse(tensor::kProbeGrid, "not that of the probes");
+  }
+
+  void check_sky_cells() const {
+    const SkyCells& cells = data_.sky_cells;
+    if (cells.empty()) return;
+    rows(tensor::kSkyBegin, cells.entry_begin.size(), data_.patches.size() + 1);
+    rows("sky.entry_part", cells.entry_part.size(), cells.entry_cell.size());
+    begins<std::uint32_t>(tensor::kSkyBegin, cells.entry_begin, cells.entry_cell.size());
+    numbers("sky.entry_part", cells.entry_part, kFraction);
+    for (std::size_t i = 0; i < cells.entry_cell.size(); ++i) {
+      index("sky.entry_cell", i, cells.entry_cell[i], kSkyCellCount);
+    }
   }
 
   void check_lightmap() const {

@@ -36,6 +36,7 @@ inline constexpr char kLinksPatch[] = "links.patch";
 inline constexpr char kProbePosition[] = "probe.position";
 inline constexpr char kProbeGrid[] = "probe.grid";
 inline constexpr char kLightmapSize[] = "lightmap.size";
+inline constexpr char kSkyBegin[] = "sky.entry_begin";
 inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
@@ -122,6 +123,13 @@ void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
   visit("probe.entry_begin", probes.entry_begin);
   visit("probe.entry_patch", probes.entry_patch);
   visit("probe.entry_weight", probes.entry_weight);
+}
+
+template <typename Cells, typename Visit>
+void visit_tensors_of_sky(Cells& cells, Visit&& visit) {
+  visit(tensor::kSkyBegin, cells.entry_begin);
+  visit("sky.entry_cell", cells.entry_cell);
+  visit("sky.entry_part", cells.entry_part);
 }
 
 template <typename Light, typename Visit>

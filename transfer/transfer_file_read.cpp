@@ -370,6 +370,9 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
     visit_tensors_of_opacity(data.mesh.opacity, TensorReader(file));
   }
   read_scene(file, data);
+  if (file.tensors().contains(tensor::kSkyBegin)) {
+    visit_tensors_of_sky(data.sky_cells, TensorReader(file));
+  }
   read_probes(file, data);
   data.lightmap = read_lightmap(file);
   if (file.tensors().contains(tensor::kSurfaceSky)) {

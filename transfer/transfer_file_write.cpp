@@ -187,6 +187,7 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   if (!data.mesh.opacity.empty()) visit_tensors_of_opacity(data.mesh.opacity, collector);
   visit_tensors_of_scene(data, collector);
   collect_textures(data.textures, collector);
+  if (!data.sky_cells.empty()) visit_tensors_of_sky(data.sky_cells, collector);
   collect_probes(data.probes, collector);
   collect_lightmap(data.lightmap, collector);
   if (!data.surface_harmonics.empty()) {

@@ -111,7 +111,8 @@ typedef enum rebounce_light_type {
   REBOUNCE_LIGHT_SPOT = 1,
   REBOUNCE_LIGHT_DIRECTIONAL = 2,
   REBOUNCE_LIGHT_SPHERE = 3,
-  REBOUNCE_LIGHT_RECTANGLE = 4
+  REBOUNCE_LIGHT_RECTANGLE = 4,
+  REBOUNCE_LIGHT_DISC = 5
 } rebounce_light_type;
 
 /* A lamp, with the fields, units and fall-off of KHR_lights_punctual where it is one of those. */
@@ -125,7 +126,7 @@ typedef struct rebounce_light {
   float range;          /* m; no light arrives from further away; 0, the default: unlimited */
   float inner_cone_angle; /* rad from the axis, spot; default 0 */
   float outer_cone_angle; /* rad from the axis, spot, at most pi/2; default pi/4 */
-  float radius;           /* m, > 0, sphere */
+  float radius;           /* m, > 0, sphere and disc */
   float size[2];          /* m, > 0, rectangle: along the tangent and across it */
   float tangent[3];       /* rectangle: first side, not along its direction; default x */
 } rebounce_light;
@@ -133,11 +134,23 @@ typedef struct rebounce_light {
 /* Writes the defaults. */
 void rebounce_light_init(rebounce_light* light);
 
-/* The same luminance in cd/m² from every direction in which the scene is open. */
+/* The luminance in cd/m² in every direction in which the scene is open; times the distribution of
+ * the engine's sky, where it has one. */
 typedef struct rebounce_sky {
   float color[3];
   float luminance;
 } rebounce_sky;
+
+/* Cells of the sky: 0 is all that is below the horizon, 1 to 145 are Tregenza's, in rows of 12 degrees
+ * of altitude from the horizon up, each from north (-z) clockwise as seen from above, its first
+ * cell around north; the last is the zenith (+y). */
+#define REBOUNCE_SKY_CELL_COUNT 146
+
+/* Writes the relative luminance [REBOUNCE_SKY_CELL_COUNT] of a sky of the CIE standard general sky,
+ * `type` 1 (overcast) to 15, 12 being clear: 1 at the zenith. `sun_direction` [3] is the way that
+ * sunlight travels, downwards; the ground reflects `ground_reflectance`, 0 to 1. */
+rebounce_status rebounce_cie_sky(int type, const float* sun_direction, float ground_reflectance,
+                                 float* distribution);
 
 /* ---- Engines: one light state each ---- */
 
@@ -174,6 +187,11 @@ rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_
 /* One frame with a direct irradiance [patch_count][3] in lx of the caller's own. */
 rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const float* irradiance,
                                                size_t patch_count);
+
+/* From the next frame on, the sky's luminance in each cell is that of the frame's sky times
+ * distribution [REBOUNCE_SKY_CELL_COUNT] >= 0; NULL: it is uniform, as at first. */
+rebounce_status rebounce_engine_set_sky_distribution(rebounce_engine* engine,
+                                                     const float* distribution);
 
 /* From the next frame on, surfaces of this material emit that of the scene times scale [3] >= 0. */
 rebounce_status rebounce_engine_set_emission_scale(rebounce_engine* engine, uint32_t material,

@@ -31,6 +31,7 @@ class FromC : public testing::Test {
     data.lightmap = one_texel_for_each(mesh);
     data.surface_harmonics.sky.assign(data.patches.size(), LinearHarmonics{1, 1});
     data.surface_harmonics.entry_begin.assign(data.patches.size() + 1, 0);
+    add_zenith(data);
     const std::string path = (folder_ / "room.safetensors").string();
     save_transfer_file(path, data);
     ASSERT_EQ(rebounce_transfer_load(path.c_str(), &transfer_), REBOUNCE_OK);
@@ -41,6 +42,16 @@ class FromC : public testing::Test {
   void TearDown() override {
     rebounce_engine_destroy(engine_);
     rebounce_transfer_release(transfer_);
+  }
+
+  /// Every patch sees half of its sky in the zenith.
+  static void add_zenith(TransferData& data) {
+    data.sky_cells.entry_begin = {0};
+    for (std::uint32_t i = 0; i < data.patches.size(); ++i) {
+      data.sky_cells.entry_begin.push_back(i + 1);
+      data.sky_cells.entry_cell.push_back(145);
+      data.sky_cells.entry_part.push_back(0.5F);
+    }
   }
 
   /// A lightmap of one row, with the middle of each triangle.
@@ -121,6 +132,22 @@ TEST_F(FromC, BentNormalsFollowTheHarmonicsOfTheVertices) {
   EXPECT_GT(result[0], 0.8F);
 }
 
+TEST_F(FromC, ASkyHasADistributionWhereTheFileKnowsItsCells) {
+  std::array<float, REBOUNCE_SKY_CELL_COUNT> sky{};
+  const std::array<float, 3> down = {0, -1, 0};
+  EXPECT_EQ(rebounce_cie_sky(1, down.data(), 0.2F, sky.data()), REBOUNCE_OK);
+  EXPECT_NEAR(sky[145], 1, 0.01);
+  EXPECT_EQ(rebounce_cie_sky(77, down.data(), 0.2F, sky.data()), REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, sky.data()), REBOUNCE_OK);
+  const rebounce_sky bright = {{1, 1, 1}, 1000};
+  EXPECT_EQ(rebounce_engine_relight(engine_, nullptr, 0, &bright), REBOUNCE_OK);
+  const float* const direct = rebounce_engine_direct_irradiance(engine_);
+  EXPECT_NEAR(direct[0], 3.14159F * 1000 * 0.5F * sky[145], 0.1F);
+  sky[3] = -1;
+  EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, sky.data()), REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, nullptr), REBOUNCE_OK);
+}
+
 TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {
   rebounce_transfer_info info{};
   info.struct_size = offsetof(rebounce_transfer_info, lightmap_width);
@@ -169,7 +196,7 @@ TEST_F(FromC, LightsOutOfRangeAreRefused) {
     return rebounce_engine_relight(engine_, &light, 1, nullptr) == REBOUNCE_INVALID_ARGUMENT;
   };
   EXPECT_FALSE(refused([](auto&) {}));
-  EXPECT_TRUE(refused([](auto& l) { l.type = 5; }));
+  EXPECT_TRUE(refused([](auto& l) { l.type = 6; }));
   EXPECT_TRUE(refused([](auto& l) { l.position[2] = NAN; }));
   EXPECT_TRUE(refused([](auto& l) { l.color[0] = -1; }));
   EXPECT_TRUE(refused([](auto& l) { l.intensity = INFINITY; }));

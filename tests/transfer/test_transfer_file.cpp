@@ -620,6 +620,31 @@ TEST(TransferFile, RefusesImpossibleLightmaps) {
   });
 }
 
+TEST(TransferFile, KeepsAndChecksTheCellsOfTheSky) {
+  const auto cells = [](auto change) {
+    return [change](TransferData& data) {
+      data.sky_cells = {{0, 1, 1, 3}, {145, 0, 7}, {0.5F, 0.25F, 1}};
+      change(data.sky_cells);
+    };
+  };
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data();
+  cells([](auto&) {})(data);
+  save_transfer_file(folder / "file", data);
+  const SkyCells read = load_transfer_file(folder / "file").sky_cells;
+  EXPECT_EQ(read.entry_begin, data.sky_cells.entry_begin);
+  EXPECT_EQ(read.entry_cell, data.sky_cells.entry_cell);
+  EXPECT_EQ(read.entry_part, data.sky_cells.entry_part);
+  expect_refused({
+      {"sky.entry_begin: 3 rows, not 4", cells([](auto& c) { c.entry_begin.pop_back(); })},
+      {"sky.entry_begin: descends", cells([](auto& c) { c.entry_begin[1] = 4; })},
+      {"sky.entry_part", cells([](auto& c) { c.entry_part.pop_back(); })},
+      {"sky.entry_part", cells([](auto& c) { c.entry_part[0] = 1.5F; })},
+      {"sky.entry_part", cells([](auto& c) { c.entry_part[0] = kNan; })},
+      {"sky.entry_cell: entry 0 is 146", cells([](auto& c) { c.entry_cell[0] = 146; })},
+  });
+}
+
 TEST(TransferFile, RefusesImpossibleSurfaceHarmonics) {
   const auto harmonics = [](auto change) {
     return [change](TransferData& data) {
@@ -636,7 +661,8 @@ TEST(TransferFile, RefusesImpossibleSurfaceHarmonics) {
       {"surface_harmonics.sky", harmonics([](auto& h) { h.sky[1][3] = kNan; })},
       {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin.pop_back(); })},
       {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin[1] = 4; })},
-      {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_patch.pop_back(); })},
+      {"surface_harmonics.entry_weight: 3 rows",
+       harmonics([](auto& h) { h.entry_patch.pop_back(); })},
       {"surface_harmonics.entry_patch: entry 2 is 3",
        harmonics([](auto& h) { h.entry_patch[2] = 3; })},
       {"surface_harmonics.entry_weight", harmonics([](auto& h) { h.entry_weight.clear(); })},

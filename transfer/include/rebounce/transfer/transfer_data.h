@@ -82,6 +82,7 @@ struct TransferData {
   std::vector<Texture> textures;
   std::vector<Camera> cameras;
   std::vector<Light> lights;
+  SkyCells sky_cells;                  ///< may be empty: then the sky is uniform
   LightProbes probes;                  ///< may be none
   Lightmap lightmap;                   ///< may be empty
   SurfaceHarmonics surface_harmonics;  ///< may be empty
