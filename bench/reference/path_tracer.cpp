@@ -17,6 +17,7 @@
 #include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 #include "reference/emitter_sampler.h"
 #include "reference/path_sampling.h"

@@ -231,9 +231,10 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
                    "coordinates (TEXCOORD_1)")
       ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
   command
-      ->add_option("--surface-harmonics", chosen->settings.surface_harmonics.ray_count,
-                   "Keep from where light comes to the patches, for normal maps, found by this many "
-                   "rays of each")
+      ->add_option(
+          "--surface-harmonics", chosen->settings.surface_harmonics.ray_count,
+          "Keep from where light comes to the patches, for normal maps, found by this many "
+          "rays of each")
       ->check(CLI::Range(16, 1000000));
   command->add_option("--seed", chosen->settings.form_factors.seed, "Seed of the sample points")
       ->capture_default_str();

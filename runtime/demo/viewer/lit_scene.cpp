@@ -17,9 +17,8 @@ namespace rebounce {
 LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference)
     : data_(std::move(data)),
       engine_(data_),
-      form_factors_(data_->exchange, data_->patches.area),
       emitted_(irradiance_from_emitters(*data_)),
-      solver_{IndirectSolver(*data_, form_factors_), IndirectSolver(*data_, form_factors_)},
+      solver_{IndirectSolver(*data_), IndirectSolver(*data_)},
       pictures_(*data_, engine_.tracer()),
       reference_(std::move(reference)) {
   for (auto& values : indirect_) values.resize(data_->patches.size());
