@@ -166,7 +166,10 @@ std::string settings_json(const BuildSettings& settings) {
                         {"kernel_tolerance", f.kernel_tolerance},
                         {"probe_grid", settings.probes.grid},
                         {"probe_spacing", settings.probes.spacing},
-                        {"probe_rays_each", settings.probes.ray_count}}
+                        {"probe_rays_each", settings.probes.ray_count},
+                        {"surface_harmonic_rays", settings.surface_harmonics.ray_count},
+                        {"lightmap_size", settings.lightmap.size},
+                        {"lightmap_padding", settings.lightmap.padding}}
       .dump();
 }
 
@@ -263,6 +266,15 @@ FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
   return build_links(model, tracer, settings, {}, progress).links;
 }
 
+Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
+                       BuildReport& report) {
+  PlacedLightmap placed = place_lightmap(model, settings.lightmap);
+  for (const std::string& warning : placed.warnings) {
+    report.warnings.push_back(warning + ": it is left out of the lightmap");
+  }
+  return std::move(placed.lightmap);
+}
+
 // The scene of a file, with what is plainly seen from behind made double-sided.
 Scene import_usable(const std::filesystem::path& path, double scale) {
   Scene scene = import_gltf(path, scale);
@@ -297,6 +309,10 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
     return make_patch_model(std::move(scene), settings.subdivision, part);
   });
   describe_patches(model, report);
+  if (settings.lightmap.size > 0) {
+    data.lightmap = clock.run(
+        "lightmap", [&](const Progress&) { return make_lightmap(model, settings, report); });
+  }
   const BuildSettings decided = decide(settings, model.patches.size());
   report.estimate = estimate_cost(model, settings.form_factors.probe_rays);
   if (on_estimate) on_estimate(report.estimate);
@@ -319,6 +335,7 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   data.patches = std::move(model.patches);
   data.patches.sky_visibility = std::move(form_factors.sky_visibility);
   data.patches.absorbed = std::move(form_factors.absorbed);
+  data.sky_cells = std::move(form_factors.sky_cells);
   data.mesh = std::move(model.mesh);
   data.exchange = std::move(form_factors.exchange);
   clock.run("weights", [&](const Progress& part) {
@@ -332,6 +349,12 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
       LightProbes probes = place_probes(data.mesh, settings.probes);
       trace_probes(data, tracer, settings.probes, probes, part);
       return probes;
+    });
+  }
+
+  if (settings.surface_harmonics.ray_count > 0) {
+    data.surface_harmonics = clock.run("surface harmonics", [&](const Progress& part) {
+      return trace_surface_harmonics(data, tracer, settings.surface_harmonics, part);
     });
   }
 

@@ -22,6 +22,11 @@ std::array<float, N> mix(const std::array<float, N>& a, const std::array<float, 
   return mixed;
 }
 
+// Both are of one triangle, hence of one page.
+LightmapTexcoord mix(const LightmapTexcoord& a, const LightmapTexcoord& b, double part) {
+  return {mix(a.texcoord, b.texcoord, part), a.page};
+}
+
 Float3 mix_normals(const Float3& a, const Float3& b, double part) {
   const glm::vec3 normal = to_glm(mix(a, b, part));
   const float length = glm::length(normal);
@@ -131,6 +136,10 @@ std::uint32_t ConformingMesh::add_vertex(std::uint32_t a, std::uint32_t b, doubl
   interpolate(scene_.emissive_texcoord);
   interpolate(scene_.vertex_color);
   scene_.normal.push_back(mix_normals(scene_.normal[a], scene_.normal[b], part));
+  if (!scene_.lightmap_texcoord.empty()) {
+    scene_.lightmap_texcoord.push_back(
+        mix(scene_.lightmap_texcoord[a], scene_.lightmap_texcoord[b], part));
+  }
   position_id_.push_back(id);
   return static_cast<std::uint32_t>(scene_.position.size() - 1);
 }
@@ -142,6 +151,7 @@ void ConformingMesh::move_vertex(std::uint32_t v, std::uint32_t to, double part)
   move(scene_.emissive_texcoord);
   move(scene_.vertex_color);
   scene_.normal[v] = mix_normals(scene_.normal[v], scene_.normal[to], part);
+  if (!scene_.lightmap_texcoord.empty()) move(scene_.lightmap_texcoord);
 }
 
 std::vector<std::uint32_t> ConformingMesh::finish() {

@@ -1,6 +1,9 @@
 #include "escape.h"
 
+#include <array>
+
 #include "hemisphere_rays.h"
+#include "rebounce/transfer/sky_cells.h"
 
 namespace rebounce {
 
@@ -16,14 +19,23 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
   tracer.intersect(scratch.rays, scratch.hits);
 
   int sky = 0, absorbed = 0;
-  for (const Hit& hit : scratch.hits) {
+  std::array<int, kSkyCellCount> count{};
+  for (std::size_t k = 0; k < scratch.hits.size(); ++k) {
+    const Hit& hit = scratch.hits[k];
     if (hit.triangle == kNone) {
       ++sky;
+      ++count[sky_cell(scratch.rays[k].direction)];
     } else if (patch_at(model, hit) == kNone) {
       ++absorbed;
     }
   }
-  return {static_cast<double>(sky) / ray_count, static_cast<double>(absorbed) / ray_count};
+  Escape escape{static_cast<double>(sky) / ray_count, static_cast<double>(absorbed) / ray_count};
+  for (std::uint32_t cell = 0; sky > 0 && cell < kSkyCellCount; ++cell) {
+    if (count[cell] == 0) continue;
+    escape.sky_cells.emplace_back(static_cast<std::uint8_t>(cell),
+                                  static_cast<float>(count[cell]) / static_cast<float>(ray_count));
+  }
+  return escape;
 }
 
 std::uint32_t patch_at(const PatchModel& model, const Hit& hit) {

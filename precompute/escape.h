@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "rebounce/precompute/patch_model.h"
@@ -14,6 +15,8 @@ namespace rebounce {
 struct Escape {
   double sky = 0;       ///< leaves the scene
   double absorbed = 0;  ///< meets the back of a one-sided surface, or a side without a patch
+  /// What leaves by cells of the sky, ascending, without those by which nothing does.
+  std::vector<std::pair<std::uint8_t, float>> sky_cells{};
 };
 
 /// Room for the work of measure_escape; afterwards `rays` and `hits` hold what was traced.

@@ -64,7 +64,19 @@ class FormFactorAssembly {
       const double sky = lost > 0 ? rest * escape[i].sky / lost : 0;
       result.sky_visibility.push_back(static_cast<float>(sky));
       result.absorbed.push_back(static_cast<float>(std::max(0.0, rest - sky)));
+      append_sky_cells(escape[i], sky, result.sky_cells);
     }
+  }
+
+  /// Adds the cells by which one more patch sees the sky, `sky` in all.
+  static void append_sky_cells(const Escape& escape, double sky, SkyCells& cells) {
+    if (cells.empty()) cells.entry_begin.push_back(0);
+    for (const auto& [cell, part] : escape.sky_cells) {
+      if (!(sky > 0)) break;
+      cells.entry_cell.push_back(cell);
+      cells.entry_part.push_back(static_cast<float>(part * sky / escape.sky));
+    }
+    cells.entry_begin.push_back(static_cast<std::uint32_t>(cells.entry_cell.size()));
   }
 
   static ExchangeMatrix compress_rows(const ExchangeRows& rows) {

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <map>
 #include <optional>
 
 #include "gltf_instances.h"
@@ -33,8 +34,10 @@ glm::dmat3 cofactors(const glm::dmat3& m) {
 // Puts one primitive into the world and appends what is left of it to the scene.
 class Placement {
  public:
-  Placement(const Primitive& primitive, const glm::dmat4& world, Scene& scene)
+  Placement(const Primitive& primitive, const glm::dmat4& world, std::uint32_t lightmap_page,
+            Scene& scene)
       : primitive_(primitive),
+        lightmap_page_(lightmap_page),
         mirrored_(glm::determinant(glm::dmat3(world)) < 0),
         normal_transform_(cofactors(glm::dmat3(world)) * (mirrored_ ? -1.0 : 1.0)),
         scene_(scene),
@@ -111,10 +114,15 @@ class Placement {
     scene_.base_color_texcoord.push_back(primitive_.base_color_texcoord[local]);
     scene_.emissive_texcoord.push_back(primitive_.emissive_texcoord[local]);
     scene_.vertex_color.push_back(primitive_.vertex_color[local]);
+    scene_.lightmap_texcoord.push_back(
+        primitive_.lightmap_texcoord.empty()
+            ? LightmapTexcoord{}
+            : LightmapTexcoord{primitive_.lightmap_texcoord[local], lightmap_page_});
     return static_cast<std::uint32_t>(scene_.position.size() - 1);
   }
 
   const Primitive& primitive_;
+  std::uint32_t lightmap_page_;
   bool mirrored_;
   glm::dmat3 normal_transform_;
   Scene& scene_;
@@ -145,8 +153,28 @@ class Meshes {
   std::vector<std::optional<std::vector<Primitive>>> primitives_;
 };
 
-// Runs visit(primitive, world, instances) for each use of a primitive that has triangles. Instances
-// are read again on every call: kept for all nodes they could fill the memory.
+// Gives every mesh a page of the lightmap wherever it is placed, as its primitives are unwrapped
+// together.
+class LightmapPages {
+ public:
+  explicit LightmapPages(std::vector<std::string>& names) : names_(names) {}
+
+  // kNone where the primitive has no place in a lightmap. `use` is the number of the node.
+  std::uint32_t page(const Primitive& primitive, std::size_t use, std::size_t instance) {
+    if (primitive.lightmap_texcoord.empty()) return kNone;
+    const auto [entry, is_new] =
+        pages_.try_emplace({use, instance}, static_cast<std::uint32_t>(names_.size()));
+    if (is_new) names_.push_back(primitive.mesh_name);
+    return entry->second;
+  }
+
+ private:
+  std::vector<std::string>& names_;
+  std::map<std::pair<std::size_t, std::size_t>, std::uint32_t> pages_;
+};
+
+// Runs visit(primitive, placed, instances) for each use of a primitive that has triangles.
+// Instances are read again on every call: kept for all nodes they could fill the memory.
 template <typename Visit>
 void for_each_use(const Document& document, std::span<const PlacedNode> nodes, Meshes& meshes,
                   const Visit& visit) {
@@ -157,7 +185,7 @@ void for_each_use(const Document& document, std::span<const PlacedNode> nodes, M
     for (const Primitive& primitive : meshes[mesh]) {
       if (primitive.triangle.empty()) continue;
       if (!instances) instances = read_instances(document, placed.node);
-      visit(primitive, placed.world, *instances);
+      visit(primitive, placed, *instances);
     }
   }
 }
@@ -168,7 +196,7 @@ void reserve(const Document& document, std::span<const PlacedNode> nodes, Meshes
   std::size_t triangles = 0;
   std::size_t vertices = 0;
   for_each_use(document, nodes, meshes,
-               [&](const Primitive& primitive, const glm::dmat4&, const Instances& instances) {
+               [&](const Primitive& primitive, const PlacedNode&, const Instances& instances) {
                  const std::size_t corners = 3 * primitive.triangle.size();
                  const std::size_t used = primitive.normal.empty()
                                               ? corners
@@ -183,6 +211,7 @@ void reserve(const Document& document, std::span<const PlacedNode> nodes, Meshes
   scene.base_color_texcoord.reserve(vertices);
   scene.emissive_texcoord.reserve(vertices);
   scene.vertex_color.reserve(vertices);
+  scene.lightmap_texcoord.reserve(vertices);
 }
 
 }  // namespace
@@ -197,13 +226,17 @@ void import_meshes(const Document& document, std::span<const PlacedNode> nodes,
   }
   Meshes meshes(document, texcoords, warnings);
   reserve(document, nodes, meshes, scene);
+  LightmapPages pages(scene.lightmap_page);
   for_each_use(
       document, nodes, meshes,
-      [&](const Primitive& primitive, const glm::dmat4& world, const Instances& instances) {
+      [&](const Primitive& primitive, const PlacedNode& placed, const Instances& instances) {
         for (std::size_t i = 0; i < instances.count; ++i) {
-          Placement(primitive, world * instances.transform(i), scene).append();
+          Placement(primitive, placed.world * instances.transform(i),
+                    pages.page(primitive, placed.node, i), scene)
+              .append();
         }
       });
+  if (scene.lightmap_page.empty()) scene.lightmap_texcoord = {};
 }
 
 }  // namespace rebounce::gltf

@@ -90,6 +90,7 @@ class PrimitiveReader {
     }
     primitive.base_color_texcoord = read_texcoords(texcoords.base_color);
     primitive.emissive_texcoord = read_texcoords(texcoords.emissive);
+    read_lightmap_texcoords(primitive);
     read_colors(texcoords.uses_alpha, primitive);
   }
 
@@ -195,6 +196,16 @@ class PrimitiveReader {
     return texcoords;
   }
 
+  // TEXCOORD_1 as it is: what unwraps for lightmaps writes it there.
+  void read_lightmap_texcoords(Primitive& primitive) {
+    const int accessor = attribute("TEXCOORD_1");
+    if (accessor < 0) return;
+    primitive.lightmap_texcoord = vectors<2>(read(accessor, "TEXCOORD_1", {2}));
+    if (std::ranges::all_of(primitive.lightmap_texcoord, is_finite<2>)) return;
+    primitive.lightmap_texcoord.clear();
+    warnings_.count("the second texture coordinates of {} primitives are not finite: ignored");
+  }
+
   void read_colors(bool uses_alpha, Primitive& primitive) {
     const int accessor = attribute("COLOR_0");
     if (accessor < 0) {
@@ -274,6 +285,7 @@ void drop_unused_vertices(Primitive& primitive) {
   compact(primitive.normal);
   compact(primitive.base_color_texcoord);
   compact(primitive.emissive_texcoord);
+  compact(primitive.lightmap_texcoord);
   compact(primitive.vertex_color);
   for (Uint3& triangle : primitive.triangle) {
     for (std::uint32_t& vertex : triangle) vertex = kept[vertex];
@@ -301,7 +313,8 @@ std::vector<Primitive> read_primitives(const Document& document, std::size_t mes
   std::size_t triangle_count = 0;
   for (std::size_t i = 0; i < source.primitives.size(); ++i) {
     Primitive primitive;
-    primitive.place = fmt::format("meshes[{}] \"{}\", primitives[{}]", mesh, source.name, i);
+    primitive.mesh_name = fmt::format("meshes[{}] \"{}\"", mesh, source.name);
+    primitive.place = fmt::format("{}, primitives[{}]", primitive.mesh_name, i);
     try {
       if (!is_wanted(source.primitives[i], warnings)) continue;
       const int material = source.primitives[i].material;

@@ -20,11 +20,13 @@ void add_triangles(std::size_t& total, std::size_t more);
 /// A primitive's triangles in its mesh's own space, checked.
 struct Primitive {
   std::string place;                        ///< for messages: meshes[2] "Chair", primitives[0]
+  std::string mesh_name;                    ///< likewise: meshes[2] "Chair"
   std::uint32_t material = 0;               ///< in Scene::materials
   std::vector<Float3> position;             ///< [v] finite
   std::vector<Float3> normal;               ///< [v] as stored; empty where the asset has none
   std::vector<Float2> base_color_texcoord;  ///< [v] finite
   std::vector<Float2> emissive_texcoord;    ///< [v] finite
+  std::vector<Float2> lightmap_texcoord;    ///< [v] finite; empty where the asset has none
   std::vector<Float3> vertex_color;         ///< [v] finite, >= 0
   std::vector<Uint3> triangle;              ///< indices in range
 };

@@ -10,6 +10,7 @@
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/error.h"
+#include "seen_patch.h"
 
 namespace rebounce {
 namespace {
@@ -42,13 +43,6 @@ Float3 fibonacci_direction(int k, int count, double turn) {
 
 void add(Harmonics& sum, const Harmonics& y, float factor) {
   for (std::size_t k = 0; k < kHarmonicCount; ++k) sum[k] += factor * y[k];
-}
-
-/// The patch whose light a ray meets; kNone for one that goes into a back or a side without one.
-std::uint32_t seen_patch(const DisplayMesh& mesh, const Hit& hit) {
-  if (hit.front) return mesh.triangle_patch[hit.triangle];
-  const std::uint32_t back = mesh.back_triangle[hit.triangle];
-  return back == kNone ? kNone : mesh.triangle_patch[back];
 }
 
 class Viewer {
@@ -85,7 +79,7 @@ class Viewer {
         add(view.sky, spherical_harmonics(rays_[k].direction), solid_angle);
         continue;
       }
-      if (!hit.front && mesh_.back_triangle[hit.triangle] == kNone) ++backs;
+      if (meets_back(mesh_, hit)) ++backs;
       const std::uint32_t patch = seen_patch(mesh_, hit);
       if (patch != kNone) by_patch_.emplace_back(patch, k);
     }

@@ -56,7 +56,7 @@ class PatchModelBuilder {
     make_patches(tracer);
     find_shown_patches(tracer);
     report_progress(progress_, kAfterClusters);
-    split_vertices(model_.mesh, tracer);
+    copy_lightmap_texcoords(split_vertices(model_.mesh, tracer));
     if (clamped_count_ > 0) {
       model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
                                 " patches was clamped to 0.99");
@@ -77,12 +77,22 @@ class PatchModelBuilder {
     mesh.base_color_texcoord = std::move(scene_.base_color_texcoord);
     mesh.emissive_texcoord = std::move(scene_.emissive_texcoord);
     mesh.vertex_color = std::move(scene_.vertex_color);
+    model_.lightmap_texcoord = std::move(scene_.lightmap_texcoord);
+    model_.lightmap_page = scene_.lightmap_page;
     mesh.triangle = std::move(scene_.triangle);
     mesh.triangle_material = std::move(scene_.triangle_material);
     mesh.back_triangle.assign(mesh.triangle.size(), kNone);
     for (const TriangleSides& sides : sides_) kind_.push_back(sides.front);
     surface_of_.resize(mesh.triangle.size());
     std::iota(surface_of_.begin(), surface_of_.end(), 0U);
+  }
+
+  /// For vertices that were appended as copies.
+  void copy_lightmap_texcoords(std::span<const std::uint32_t> copied) {
+    if (model_.lightmap_texcoord.empty()) return;
+    for (const std::uint32_t v : copied) {
+      model_.lightmap_texcoord.push_back(model_.lightmap_texcoord[v]);
+    }
   }
 
   /// Appends a copy with reversed winding and normals of every double-sided triangle.
@@ -93,6 +103,9 @@ class PatchModelBuilder {
       if (back_vertex[v] == kNone) {
         back_vertex[v] = copy_vertex(mesh, v);
         for (float& n : mesh.normal[back_vertex[v]]) n = -n;
+        if (!model_.lightmap_texcoord.empty()) {
+          model_.lightmap_texcoord.push_back(model_.lightmap_texcoord[v]);
+        }
       }
       return back_vertex[v];
     };

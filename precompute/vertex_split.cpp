@@ -104,7 +104,7 @@ std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v) {
   return static_cast<std::uint32_t>(mesh.position.size() - 1);
 }
 
-std::size_t split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
+std::vector<std::uint32_t> split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
   const VertexTriangles around(mesh);
   const auto vertex_count = static_cast<std::uint32_t>(mesh.position.size());
   std::vector<std::uint32_t> groups(around.corner_count());
@@ -113,16 +113,19 @@ std::size_t split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
   for (std::uint32_t v = 0; v < vertex_count; ++v) {
     splitter.find_groups(v, around[v], around.of(groups, v));
   }
-  std::vector<std::uint32_t> vertex_of;
+  std::vector<std::uint32_t> vertex_of, copied;
   for (std::uint32_t v = 0; v < vertex_count; ++v) {
     const std::span<const std::uint32_t> group = around.of(groups, v);
     vertex_of.assign(1, v);
     for (std::size_t k = 0; k < group.size(); ++k) {
-      while (vertex_of.size() <= group[k]) vertex_of.push_back(copy_vertex(mesh, v));
+      while (vertex_of.size() <= group[k]) {
+        vertex_of.push_back(copy_vertex(mesh, v));
+        copied.push_back(v);
+      }
       std::ranges::replace(mesh.triangle[around[v][k]], v, vertex_of[group[k]]);
     }
   }
-  return mesh.position.size() - vertex_count;
+  return copied;
 }
 
 }  // namespace rebounce

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstring>
 #include <exception>
 #include <memory>
@@ -14,6 +15,10 @@
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/probe_light.h"
+#include "rebounce/runtime/sky_light.h"
+#include "rebounce/runtime/sky_model.h"
+#include "rebounce/runtime/surface_light.h"
+#include "rebounce/runtime/texel_light.h"
 #include "rebounce/runtime/vertex_light.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
@@ -30,10 +35,17 @@ struct rebounce_transfer {
 
 struct rebounce_engine {
   Engine engine;
-  std::vector<Light> lights;  ///< of the present frame
-  Sky sky;                    ///< likewise
+  std::vector<Light> lights;                                ///< of the present frame
+  Sky sky;                                                  ///< likewise
+  std::shared_ptr<const SkyDistribution> sky_distribution;  ///< may be null
+  std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap, which needs it
+  std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
 
-  explicit rebounce_engine(Engine made) : engine(std::move(made)) {}
+  explicit rebounce_engine(Engine made) : engine(std::move(made)) {
+    const TransferData& data = engine.data();
+    if (!data.lightmap.empty()) vertex_irradiance.resize(data.mesh.position.size());
+    patch_light.resize(data.surface_harmonics.sky.size());
+  }
 };
 
 // NOLINTEND(readability-identifier-naming)
@@ -41,6 +53,8 @@ struct rebounce_engine {
 namespace {
 
 static_assert(sizeof(Float3) == 3 * sizeof(float));
+static_assert(REBOUNCE_SKY_CELL_COUNT == kSkyCellCount);
+static_assert(sizeof(SurfaceLight) == 12 * sizeof(float));
 static_assert(sizeof(ProbeLight) == 27 * sizeof(float));
 
 thread_local std::string last_error;
@@ -105,7 +119,7 @@ Struct take(const Struct* given, Struct defaults, std::size_t least_size) {
 // As they were in version 1 of the interface.
 constexpr std::size_t kLightSize1 = sizeof(rebounce_light);
 constexpr std::size_t kSettingsSize1 = sizeof(rebounce_engine_settings);
-constexpr std::size_t kInfoSize1 = sizeof(rebounce_transfer_info);
+constexpr std::size_t kInfoSize1 = offsetof(rebounce_transfer_info, lightmap_width);
 
 #if REBOUNCE_WITH_EMBREE
 /// Light k of an array whose entries are as large as the caller says.
@@ -120,7 +134,7 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
     throw Error("light " + std::to_string(k) + " has another struct_size than the first");
   }
   const rebounce_light given = take(entry, defaults, kLightSize1);
-  if (given.type > REBOUNCE_LIGHT_RECTANGLE) {
+  if (given.type > REBOUNCE_LIGHT_DISC) {
     throw Error("light " + std::to_string(k) + " is of type " + std::to_string(given.type) +
                 ", which there is not");
   }
@@ -138,14 +152,10 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   check_light(light);
 }
 
-Sky take_sky(const rebounce_sky* sky) {
+/// The engine checks it.
+Sky take_sky(const rebounce_sky* sky, const std::shared_ptr<const SkyDistribution>& distribution) {
   if (sky == nullptr) return {};
-  const Sky taken{triple(sky->color), sky->luminance};
-  const auto good = [](float x) { return x >= 0 && x <= std::numeric_limits<float>::max(); };
-  if (!std::ranges::all_of(taken.color, good) || !good(taken.luminance)) {
-    throw Error("the sky's color and luminance must be finite and at least 0");
-  }
-  return taken;
+  return {triple(sky->color), sky->luminance, distribution};
 }
 #endif
 
@@ -212,6 +222,8 @@ rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
     filled.probe_count = static_cast<std::uint32_t>(data.probes.size());
     std::ranges::copy(data.probes.grid, filled.probe_grid);
     filled.operator_bytes = data.transfer->bytes();
+    filled.lightmap_width = data.lightmap.width;
+    filled.lightmap_height = data.lightmap.height;
     std::memcpy(info, &filled, std::min<std::size_t>(info->struct_size, sizeof(filled)));
     return REBOUNCE_OK;
   });
@@ -247,6 +259,15 @@ const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer)
 }
 const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer) {
   return transfer == nullptr ? nullptr : transfer->data->probes.valid.data();
+}
+
+const float* rebounce_transfer_lightmap_texcoord(const rebounce_transfer* transfer) {
+  if (transfer == nullptr || transfer->data->lightmap.empty()) return nullptr;
+  return transfer->data->lightmap.texcoord.front().data();
+}
+const uint8_t* rebounce_transfer_lightmap_triangle(const rebounce_transfer* transfer) {
+  if (transfer == nullptr || transfer->data->lightmap.empty()) return nullptr;
+  return transfer->data->lightmap.has_texels.data();
 }
 
 void rebounce_light_init(rebounce_light* light) {
@@ -306,8 +327,9 @@ rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     engine->lights.resize(light_count);
     for (std::size_t k = 0; k < light_count; ++k) take_light(lights, k, engine->lights[k]);
-    engine->sky = take_sky(sky);
-    engine->engine.relight(engine->lights, engine->sky);
+    const Sky taken = take_sky(sky, engine->sky_distribution);
+    engine->engine.relight(engine->lights, taken);
+    engine->sky = taken;
     return REBOUNCE_OK;
   });
 #else
@@ -327,6 +349,32 @@ rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const fl
     const auto* const triples = reinterpret_cast<const Float3*>(irradiance);
     engine->engine.relight(std::span(triples, patch_count));
     engine->sky = {};
+    return REBOUNCE_OK;
+  });
+}
+
+rebounce_status rebounce_engine_set_sky_distribution(rebounce_engine* engine,
+                                                     const float* distribution) {
+  if (engine == nullptr) return missing("rebounce_engine_set_sky_distribution");
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    if (distribution == nullptr) {
+      engine->sky_distribution = nullptr;
+      return REBOUNCE_OK;
+    }
+    SkyDistribution taken;
+    std::copy_n(distribution, taken.size(), taken.begin());
+    auto shared = std::make_shared<const SkyDistribution>(taken);
+    check_sky({.distribution = shared}, engine->engine.data());
+    engine->sky_distribution = std::move(shared);
+    return REBOUNCE_OK;
+  });
+}
+
+rebounce_status rebounce_cie_sky(int type, const float* sun_direction, float ground_reflectance,
+                                 float* distribution) {
+  if (sun_direction == nullptr || distribution == nullptr) return missing("rebounce_cie_sky");
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    std::ranges::copy(cie_sky(type, triple(sun_direction), ground_reflectance), distribution);
     return REBOUNCE_OK;
   });
 }
@@ -358,6 +406,52 @@ rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine,
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     reconstruct_at_vertices(engine->engine.data().mesh, engine->engine.indirect_irradiance(),
                             {reinterpret_cast<Float3*>(irradiance), vertex_count});
+    return REBOUNCE_OK;
+  });
+}
+
+rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* harmonics,
+                                             size_t vertex_count) {
+  if (engine == nullptr || harmonics == nullptr) return missing("rebounce_engine_vertex_light");
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    const TransferData& data = engine->engine.data();
+    if (data.surface_harmonics.empty()) {
+      throw Error("the transfer file has no surface harmonics; make it with --surface-harmonics");
+    }
+    apply_surface_harmonics(data.surface_harmonics, engine->engine.radiosity(), engine->sky,
+                            engine->patch_light);
+    reconstruct_at_vertices(data.mesh, engine->patch_light,
+                            {reinterpret_cast<SurfaceLight*>(harmonics), vertex_count});
+    return REBOUNCE_OK;
+  });
+}
+
+void rebounce_bent_irradiance(const float* harmonics, const float* irradiance, const float* normal,
+                              const float* bent, float* result) {
+  if (harmonics == nullptr || irradiance == nullptr || normal == nullptr || bent == nullptr ||
+      result == nullptr) {
+    return;
+  }
+  SurfaceLight light;
+  std::memcpy(light.data(), harmonics, sizeof(light));
+  std::ranges::copy(bent_irradiance(light, triple(irradiance), triple(normal), triple(bent)),
+                    result);
+}
+
+rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,
+                                                    size_t texel_count) {
+  if (engine == nullptr || irradiance == nullptr) {
+    return missing("rebounce_engine_lightmap_irradiance");
+  }
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    const TransferData& data = engine->engine.data();
+    if (data.lightmap.empty()) {
+      throw Error("the transfer file has no lightmap; make it with --lightmap");
+    }
+    reconstruct_at_vertices(data.mesh, engine->engine.indirect_irradiance(),
+                            engine->vertex_irradiance);
+    interpolate_at_texels(data.lightmap, data.mesh, engine->vertex_irradiance,
+                          {reinterpret_cast<Float3*>(irradiance), texel_count});
     return REBOUNCE_OK;
   });
 }

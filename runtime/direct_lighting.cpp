@@ -5,12 +5,12 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "prepared_light.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -200,6 +200,7 @@ void DirectLighting::make_room(std::size_t light_count) {
 void DirectLighting::compute(std::span<const Light> lights, const Sky& sky,
                              std::span<Float3> direct_irradiance) {
   assert(direct_irradiance.size() == data_.patches.size());
+  check_sky(sky, data_);
   prepare(lights);
   const std::size_t block_count = receivers_->block_box.size();
 #pragma omp parallel for schedule(dynamic, 1)
@@ -266,11 +267,7 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
 void DirectLighting::add_up(const Sky& sky, std::size_t block,
                             std::span<Float3> direct_irradiance) const {
   const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, data_.patches.size());
-  // A uniform sky of luminance L gives pi L to a patch that sees nothing else.
-  const glm::vec3 open_sky = std::numbers::pi_v<float> * sky.luminance * to_glm(sky.color);
-  for (std::size_t i = begin; i < end; ++i) {
-    direct_irradiance[i] = to_float3(data_.patches.sky_visibility[i] * open_sky);
-  }
+  for (std::size_t i = begin; i < end; ++i) direct_irradiance[i] = sky_irradiance(data_, sky, i);
   for (std::size_t k = 0; k < light_count_; ++k) {
     const LightResponse& response = responses_[k];
     const glm::vec3 intensity = response.intensity;

@@ -60,7 +60,8 @@ void check_light(const Light& light) {
     require(light.inner_cone_angle >= 0 && light.inner_cone_angle <= light.outer_cone_angle,
             "inner cone angle", "from 0 to the outer one");
   }
-  require(light.type != LightType::kSphere || is_length(light.radius), "radius", "above 0");
+  const bool round = light.type == LightType::kSphere || light.type == LightType::kDisc;
+  require(!round || is_length(light.radius), "radius", "above 0");
   require(light.type != LightType::kRectangle || std::ranges::all_of(light.size, is_length), "size",
           "above 0");
 }

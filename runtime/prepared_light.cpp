@@ -9,14 +9,27 @@
 #include <limits>
 #include <numbers>
 
+#include "disc_form_factor.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/polygon_form_factor.h"
+#include "rebounce/runtime/sampling.h"
 #include "sphere_form_factor.h"
 
 namespace rebounce {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
+
+// An axis of the world that does not lie along the unit vector.
+glm::vec3 least_axis(const glm::vec3& v) {
+  return std::abs(v.x) < 0.5F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+}
+
+// From the unit square to the unit disc (Shirley and Chiu 1997).
+glm::vec2 disc_place(const glm::vec2& place) {
+  const glm::dvec3 lifted = square_to_cosine_hemisphere(place);
+  return {lifted.x, lifted.y};
+}
 
 }  // namespace
 
@@ -32,14 +45,19 @@ PreparedLight::PreparedLight(const Light& light)
     range_ = light.range;
     if (range_ > 0) reach_squared_ = range_ * range_;
   }
-  if (type_ == LightType::kSphere) {
-    radius_ = light.radius;
-    return;
-  }
+  if (type_ == LightType::kSphere || type_ == LightType::kDisc) radius_ = light.radius;
+  if (type_ == LightType::kSphere) return;
   if (type_ != LightType::kPoint || light.profile) direction_ = to_glm(light.direction);
   if (type_ == LightType::kSpot) {
     cone_cosine_ = std::cos(light.outer_cone_angle);
     cone_scale_ = 1 / std::max(0.001F, std::cos(light.inner_cone_angle) - cone_cosine_);
+  }
+  if (type_ == LightType::kDisc) {
+    const auto [side, other_side] = sides_around(direction_, least_axis(direction_));
+    side_ = radius_ * side;
+    other_side_ = radius_ * other_side;
+    area_ = kPi * radius_ * radius_;
+    return;
   }
   const bool rectangle = type_ == LightType::kRectangle;
   if (!rectangle && type_ != LightType::kDirectional) profile_ = light.profile;
@@ -62,7 +80,7 @@ void PreparedLight::evaluate_places(const glm::vec3& point, std::span<const glm:
   if (type_ == LightType::kSphere) {
     from_sphere(position_ - point, places, light);
   } else {
-    from_rectangle(position_ - point, places, light);
+    from_flat(position_ - point, places, light);
   }
 }
 
@@ -92,8 +110,7 @@ void PreparedLight::from_sphere(const glm::vec3& to_center, std::span<const glm:
   const float height = sine_squared / (1 + std::sqrt(1 - sine_squared));
   const float illuminance = 2 * kPi * height * range_window(distance_squared);
   const glm::vec3 axis = to_center / distance;
-  const glm::vec3 least = std::abs(axis.x) < 0.5F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-  const auto [x, y] = sides_around(axis, least);
+  const auto [x, y] = sides_around(axis, least_axis(axis));
   for (std::size_t k = 0; k < places.size(); ++k) {
     const float down = places[k].x * height;  // 1 - cosine of the direction to the axis
     const float cosine = 1 - down, sine_squared_here = down * (1 + cosine);
@@ -107,12 +124,13 @@ void PreparedLight::from_sphere(const glm::vec3& to_center, std::span<const glm:
 }
 
 // Uniformly over the area.
-void PreparedLight::from_rectangle(const glm::vec3& to_center, std::span<const glm::vec2> places,
-                                   std::span<UnitLight> light) const {
+void PreparedLight::from_flat(const glm::vec3& to_center, std::span<const glm::vec2> places,
+                              std::span<UnitLight> light) const {
   const float full = area_ * range_window(glm::dot(to_center, to_center));
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const glm::vec3 path =
-        to_center + (2 * places[k].x - 1) * side_ + (2 * places[k].y - 1) * other_side_;
+    const glm::vec2 at =
+        type_ == LightType::kDisc ? disc_place(places[k]) : 2.0F * places[k] - glm::vec2(1);
+    const glm::vec3 path = to_center + at.x * side_ + at.y * other_side_;
     const float distance_squared = glm::dot(path, path);
     light[k] = {};
     if (!(distance_squared > 0)) continue;
@@ -131,6 +149,9 @@ float PreparedLight::unoccluded_irradiance(const glm::vec3& point, const glm::ve
     return window * kPi * point_to_sphere_form_factor(to_center, normal, radius_);
   }
   if (glm::dot(to_center, direction_) >= 0) return 0;  // behind it
+  if (type_ == LightType::kDisc) {
+    return window * kPi * point_to_disc_form_factor(to_center, normal, direction_, radius_);
+  }
   const std::array<glm::vec3, 4> corner = {
       position_ - side_ - other_side_, position_ + side_ - other_side_,
       position_ + side_ + other_side_, position_ - side_ + other_side_};
@@ -139,6 +160,11 @@ float PreparedLight::unoccluded_irradiance(const glm::vec3& point, const glm::ve
 
 glm::vec3 PreparedLight::highest_point(const glm::vec3& normal) const {
   if (type_ == LightType::kSphere) return position_ + radius_ * normal;
+  if (type_ == LightType::kDisc) {
+    const glm::vec3 up = normal - glm::dot(normal, direction_) * direction_;
+    const float length = glm::length(up);
+    return length > 0 ? position_ + radius_ / length * up : position_;
+  }
   const float up = std::copysign(1.0F, glm::dot(side_, normal));
   const float other_up = std::copysign(1.0F, glm::dot(other_side_, normal));
   return position_ + up * side_ + other_up * other_side_;

@@ -50,19 +50,19 @@ class PreparedLight {
   UnitLight from_lamp(const glm::vec3& to_lamp) const;
   void from_sphere(const glm::vec3& to_center, std::span<const glm::vec2> places,
                    std::span<UnitLight> light) const;
-  void from_rectangle(const glm::vec3& to_center, std::span<const glm::vec2> places,
-                      std::span<UnitLight> light) const;
+  void from_flat(const glm::vec3& to_center, std::span<const glm::vec2> places,
+                 std::span<UnitLight> light) const;
   float range_window(float distance_squared) const;
   float cone_attenuation(float cosine) const;
   float profile_candela(const glm::vec3& from_lamp) const;
 
   LightType type_ = LightType::kPoint;
   glm::vec3 position_{0}, direction_{0};
-  glm::vec3 side_{0}, other_side_{0};  ///< unit; half as long as the rectangle's sides
+  glm::vec3 side_{0}, other_side_{0};  ///< unit; to the rim of a rectangle or disc
   float range_ = 0, reach_squared_ = 0;
   float cone_cosine_ = 0, cone_scale_ = 0;
   float radius_ = 0;
-  float area_ = 0;  ///< m², of a rectangle
+  float area_ = 0;  ///< m², of a rectangle or disc
   std::shared_ptr<const IntensityProfile> profile_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/error.h"
 
@@ -56,8 +57,7 @@ void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, 
   check_size(light.size(), probes.size(), "the result");
   if (probes.size() == 0) return;
   check_size(radiosity.size(), probes.patch_count, "the radiosity");
-  const Float3 open_sky = {sky.luminance * sky.color[0], sky.luminance * sky.color[1],
-                           sky.luminance * sky.color[2]};
+  const Float3 open_sky = mean_sky_luminance(sky);
 #pragma omp parallel for schedule(static)
   for (std::size_t p = 0; p < probes.size(); ++p) {
     PlanarLight sum;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -17,9 +18,10 @@ class TemporaryFolder {
  public:
   explicit TemporaryFolder(const std::string& purpose = "") {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    path_ = std::filesystem::temp_directory_path() /
-            (std::string("rebounce-") + info->test_suite_name() + "-" + info->name() + "-" +
-             std::to_string(::getpid()) + purpose);
+    std::string name = std::string("rebounce-") + info->test_suite_name() + "-" + info->name() +
+                       "-" + std::to_string(::getpid()) + purpose;
+    std::ranges::replace(name, '/', '_');  // of parameterised tests
+    path_ = std::filesystem::temp_directory_path() / name;
     std::filesystem::create_directories(path_);
   }
   ~TemporaryFolder() {
@@ -29,6 +31,7 @@ class TemporaryFolder {
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
+  const std::filesystem::path& path() const { return path_; }
   std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
 
   /// Names of everything in it, hidden files included.

@@ -38,7 +38,10 @@ class Checker {
     check_materials();
     check_cameras();
     check_lights();
+    check_sky_cells();
     check_probes();
+    check_lightmap();
+    check_surface_harmonics();
     check_exchange();
   }
 
@@ -253,6 +256,54 @@ class Checker {
       rest /= side;
     }
     if (rest != 1) refuse(tensor::kProbeGrid, "not that of the probes");
+  }
+
+  void check_sky_cells() const {
+    const SkyCells& cells = data_.sky_cells;
+    if (cells.empty()) return;
+    rows(tensor::kSkyBegin, cells.entry_begin.size(), data_.patches.size() + 1);
+    rows("sky.entry_part", cells.entry_part.size(), cells.entry_cell.size());
+    begins<std::uint32_t>(tensor::kSkyBegin, cells.entry_begin, cells.entry_cell.size());
+    numbers("sky.entry_part", cells.entry_part, kFraction);
+    for (std::size_t i = 0; i < cells.entry_cell.size(); ++i) {
+      index("sky.entry_cell", i, cells.entry_cell[i], kSkyCellCount);
+    }
+  }
+
+  void check_lightmap() const {
+    const Lightmap& map = data_.lightmap;
+    const std::size_t texels = std::size_t{map.width} * map.height;
+    if (texels == 0 && (map.width != 0 || !map.triangle.empty())) {
+      refuse(tensor::kLightmapSize, "of no texels");
+    }
+    if (texels == 0) return;
+    rows("lightmap.texcoord", map.texcoord.size(), data_.mesh.position.size());
+    rows("lightmap.has_texels", map.has_texels.size(), data_.mesh.triangle.size());
+    rows("lightmap.triangle", map.triangle.size(), texels);
+    rows("lightmap.weight", map.weight.size(), texels);
+    numbers("lightmap.texcoord", map.texcoord, kFraction);
+    numbers("lightmap.weight", map.weight, kFraction);
+    for (std::size_t t = 0; t < map.has_texels.size(); ++t) {
+      index("lightmap.has_texels", t, map.has_texels[t], 2);
+    }
+    for (std::size_t k = 0; k < texels; ++k) {
+      index_or_none("lightmap.triangle", k, map.triangle[k], data_.mesh.triangle.size());
+    }
+  }
+
+  void check_surface_harmonics() const {
+    const SurfaceHarmonics& light = data_.surface_harmonics;
+    if (light.empty()) return;
+    const std::size_t n = data_.patches.size(), entries = light.entry_patch.size();
+    rows(tensor::kSurfaceSky, light.sky.size(), n);
+    rows("surface_harmonics.entry_begin", light.entry_begin.size(), n + 1);
+    rows("surface_harmonics.entry_weight", light.entry_weight.size(), entries);
+    begins<std::uint32_t>("surface_harmonics.entry_begin", light.entry_begin, entries);
+    numbers(tensor::kSurfaceSky, light.sky, kFinite);
+    numbers("surface_harmonics.entry_weight", light.entry_weight, kFinite);
+    for (std::size_t i = 0; i < entries; ++i) {
+      index("surface_harmonics.entry_patch", i, light.entry_patch[i], n);
+    }
   }
 
   void check_exchange() const {

@@ -35,6 +35,9 @@ inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
 inline constexpr char kLinksPatch[] = "links.patch";
 inline constexpr char kProbePosition[] = "probe.position";
 inline constexpr char kProbeGrid[] = "probe.grid";
+inline constexpr char kLightmapSize[] = "lightmap.size";
+inline constexpr char kSkyBegin[] = "sky.entry_begin";
+inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
@@ -120,6 +123,29 @@ void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
   visit("probe.entry_begin", probes.entry_begin);
   visit("probe.entry_patch", probes.entry_patch);
   visit("probe.entry_weight", probes.entry_weight);
+}
+
+template <typename Cells, typename Visit>
+void visit_tensors_of_sky(Cells& cells, Visit&& visit) {
+  visit(tensor::kSkyBegin, cells.entry_begin);
+  visit("sky.entry_cell", cells.entry_cell);
+  visit("sky.entry_part", cells.entry_part);
+}
+
+template <typename Light, typename Visit>
+void visit_tensors_of_surface_harmonics(Light& harmonics, Visit&& visit) {
+  visit(tensor::kSurfaceSky, harmonics.sky);
+  visit("surface_harmonics.entry_begin", harmonics.entry_begin);
+  visit("surface_harmonics.entry_patch", harmonics.entry_patch);
+  visit("surface_harmonics.entry_weight", harmonics.entry_weight);
+}
+
+template <typename Map, typename Visit>
+void visit_tensors_of_lightmap(Map& map, Visit&& visit) {
+  visit("lightmap.texcoord", map.texcoord);
+  visit("lightmap.has_texels", map.has_texels);
+  visit("lightmap.triangle", map.triangle);
+  visit("lightmap.weight", map.weight);
 }
 
 template <typename Maps, typename Visit>

@@ -356,6 +356,17 @@ void read_probes(const SafetensorsFile& file, TransferData& data) {
   data.probes.patch_count = data.patches.size();
 }
 
+/// A file without a lightmap has no tensors of one.
+Lightmap read_lightmap(const SafetensorsFile& file) {
+  Lightmap map;
+  if (!file.tensors().contains(tensor::kLightmapSize)) return map;
+  visit_tensors_of_lightmap(map, TensorReader(file));
+  const auto size = file.tensor<std::uint32_t>(tensor::kLightmapSize, {2});
+  map.width = size[0];
+  map.height = size[1];
+  return map;
+}
+
 }  // namespace
 
 TransferData load_transfer_file(const std::filesystem::path& path) {
@@ -370,7 +381,14 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
     visit_tensors_of_opacity(data.mesh.opacity, TensorReader(file));
   }
   read_scene(file, data);
+  if (file.tensors().contains(tensor::kSkyBegin)) {
+    visit_tensors_of_sky(data.sky_cells, TensorReader(file));
+  }
   read_probes(file, data);
+  data.lightmap = read_lightmap(file);
+  if (file.tensors().contains(tensor::kSurfaceSky)) {
+    visit_tensors_of_surface_harmonics(data.surface_harmonics, TensorReader(file));
+  }
   data.exchange = read_exchange(file);
   data.record = read_record(file);
   check_transfer_data(data, file.name());

@@ -141,6 +141,14 @@ void collect_probes(const LightProbes& probes, TensorCollector& collector) {
   collector.add<std::uint32_t>(tensor::kProbeGrid, {probes.grid.size()}, probes.grid);
 }
 
+/// Files without a lightmap have no tensors of one.
+void collect_lightmap(const Lightmap& map, TensorCollector& collector) {
+  if (map.empty()) return;
+  visit_tensors_of_lightmap(map, collector);
+  const std::array<std::uint32_t, 2> size = {map.width, map.height};
+  collector.add_made<std::uint32_t>(tensor::kLightmapSize, size);
+}
+
 std::string names_text(const TransferData& data) {
   nlohmann::json names;
   visit_named_items(data, [&](const char* kind, const auto& items) {
@@ -183,7 +191,12 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   if (!data.mesh.opacity.empty()) visit_tensors_of_opacity(data.mesh.opacity, collector);
   visit_tensors_of_scene(data, collector);
   collect_textures(data.textures, collector);
+  if (!data.sky_cells.empty()) visit_tensors_of_sky(data.sky_cells, collector);
   collect_probes(data.probes, collector);
+  collect_lightmap(data.lightmap, collector);
+  if (!data.surface_harmonics.empty()) {
+    visit_tensors_of_surface_harmonics(data.surface_harmonics, collector);
+  }
   collect_exchange(data.exchange, collector);
   if (!data.links.empty()) visit_tensors_of_links(data.links, collector);
   collect_operator(data.transfer.get(), collector);

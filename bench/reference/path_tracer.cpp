@@ -17,6 +17,7 @@
 #include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 #include "reference/emitter_sampler.h"
 #include "reference/path_sampling.h"
@@ -66,7 +67,7 @@ class PathTracer {
   explicit PathTracer(const LitScene& lit_scene)
       : tracer_(lit_scene.tracer),
         lights_(lit_scene.lights),
-        sky_exitance_(std::numbers::pi * lit_scene.sky.luminance * to_dvec3(lit_scene.sky.color)),
+        sky_(lit_scene.sky),
         surface_(lit_scene.scene),
         emitters_(surface_) {}
   PathTracer(const PathTracer&) = delete;  // emitters_ refers to surface_
@@ -201,11 +202,16 @@ class PathTracer {
     scratch.active.resize(left);
   }
 
+  /// What a surface receives that sees nothing but sky of the luminance in this direction, lx.
+  glm::dvec3 sky_exitance(const Float3& direction) const {
+    return std::numbers::pi * to_dvec3(sky_luminance(sky_, direction));
+  }
+
   /// Takes up what the ray met after vertex number `vertex`; false if the path ends there.
   bool arrive(int vertex, const Ray& ray, const Hit& hit, Path& path) const {
     if (hit.triangle == kNone) {
       // The sky that the first vertex sees is its direct light.
-      if (vertex > 0) path.gathered += path.throughput * sky_exitance_;
+      if (vertex > 0) path.gathered += path.throughput * sky_exitance(ray.direction);
       return false;
     }
     if (!hit.front && !surface_.material(hit.triangle).double_sided) {
@@ -245,7 +251,7 @@ class PathTracer {
 
   const RayTracer& tracer_;
   std::span<const Light> lights_;
-  glm::dvec3 sky_exitance_;  // what a surface that sees nothing but sky receives, lx
+  Sky sky_;
   SceneSurface surface_;
   EmitterSampler emitters_;
 };

@@ -37,12 +37,17 @@ void run(const BakeOptions& chosen, const CommonOptions& options) {
   if (options.json) {
     const nlohmann::json summary = {{"vertices", mesh.position.size()},
                                     {"triangles", mesh.index.size() / 3},
+                                    {"texture", {mesh.texture.width, mesh.texture.height}},
                                     {"exposure", mesh.exposure},
                                     {"bytes", bytes}};
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
-    fmt::print("{}: {} triangles, {} vertices, exposure {:+.2f} EV, {} bytes\n", chosen.output,
-               mesh.index.size() / 3, mesh.position.size(), mesh.exposure, bytes);
+    const std::string texture =
+        mesh.texture.rgb.empty()
+            ? std::string()
+            : fmt::format("lightmap {} x {}, ", mesh.texture.width, mesh.texture.height);
+    fmt::print("{}: {} triangles, {} vertices, {}exposure {:+.2f} EV, {} bytes\n", chosen.output,
+               mesh.index.size() / 3, mesh.position.size(), texture, mesh.exposure, bytes);
   }
 }
 
@@ -60,8 +65,10 @@ void add_bake_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--camera", chosen->camera,
                       "Where the exposure is found from: as for render");
   command
-      ->add_option("--triangles", chosen->settings.triangle_target,
-                   "Cut triangles, all alike, as finely as stays below this number")
+      ->add_option(
+          "--triangles", chosen->settings.triangle_target,
+          "Cut triangles without texels in a lightmap, all alike, as finely as stays below "
+          "this number")
       ->check(CLI::Range(std::size_t{1}, std::size_t{20000000}))
       ->capture_default_str();
   command->add_option("-o,--output", chosen->output, "Scene to write (.glb)")

@@ -12,6 +12,7 @@
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/runtime/emitting_material.h"
 #include "rebounce/runtime/ies_profile.h"
+#include "rebounce/runtime/sky_model.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 
@@ -33,7 +34,8 @@ LightType light_type(const Field& field) {
   if (type == "directional") return LightType::kDirectional;
   if (type == "sphere") return LightType::kSphere;
   if (type == "rectangle") return LightType::kRectangle;
-  field.fail("type", "\"point\", \"spot\", \"directional\", \"sphere\" or \"rectangle\"");
+  if (type == "disc") return LightType::kDisc;
+  field.fail("type", "\"point\", \"spot\", \"directional\", \"sphere\", \"rectangle\" or \"disc\"");
 }
 
 void read_cone(const Field& light_field, Light& light) {
@@ -92,7 +94,8 @@ void check_fields_of_type(const Field& field, LightType type) {
       throw Error(fmt::format("{}: \"{}\" is for {} only", field.where, name, where));
     }
   };
-  only("radius", type == LightType::kSphere, "spheres");
+  const bool round = type == LightType::kSphere || type == LightType::kDisc;
+  only("radius", round, "spheres and discs");
   only("width", type == LightType::kRectangle, "rectangles");
   only("height", type == LightType::kRectangle, "rectangles");
   only("tangent", type == LightType::kRectangle || profiled, "rectangles and lights with \"ies\"");
@@ -101,7 +104,8 @@ void check_fields_of_type(const Field& field, LightType type) {
 
 void read_shape(const Field& field, const std::filesystem::path& folder, Light& light) {
   check_fields_of_type(field, light.type);
-  if (light.type == LightType::kSphere) light.radius = field.required_length("radius");
+  if (light.type == LightType::kSphere || light.type == LightType::kDisc)
+    light.radius = field.required_length("radius");
   if (light.type == LightType::kRectangle) {
     light.size = {field.required_length("width"), field.required_length("height")};
   }
@@ -169,6 +173,46 @@ void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> p
   }
 }
 
+SkyDistribution read_cie_sky(const Field& field) {
+  const float type = field.number("cie", 1, 1);
+  if (type != std::floor(type) || type > kCieSkyCount) field.fail("cie", "a whole number, 1 to 15");
+  const float ground = field.number("groundReflectance", 0, 0.2F);
+  const Float3 sun = field.vector("sunDirection", {0, -1, 0});
+  try {
+    return cie_sky(static_cast<int>(type), sun, ground);
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", field.where, error.what()));
+  }
+}
+
+SkyDistribution read_sky_cells(const Field& field) {
+  const json& cells = field.object.at("cells");
+  SkyDistribution distribution{};
+  bool good = cells.is_array() && cells.size() == distribution.size();
+  for (std::size_t k = 0; good && k < distribution.size(); ++k) {
+    good = cells[k].is_number();
+    if (good) distribution[k] = cells[k].get<float>();
+    good = good && std::isfinite(distribution[k]) && distribution[k] >= 0;
+  }
+  if (!good) field.fail("cells", fmt::format("{} numbers, at least 0", kSkyCellCount));
+  return distribution;
+}
+
+Sky read_sky(const Field& field) {
+  field.check_names({"color", "luminance", "cie", "sunDirection", "groundReflectance", "cells"});
+  Sky sky;
+  sky.color = field.triple("color", 0, sky.color);
+  sky.luminance = field.number("luminance", 0, sky.luminance);
+  const bool cie = field.object.contains("cie"), cells = field.object.contains("cells");
+  if (cie && cells) field.fail("cells", "left out where there is \"cie\"");
+  for (const char* name : {"sunDirection", "groundReflectance"}) {
+    if (field.object.contains(name) && !cie) field.fail(name, "given with \"cie\" only");
+  }
+  if (cie) sky.distribution = std::make_shared<const SkyDistribution>(read_cie_sky(field));
+  if (cells) sky.distribution = std::make_shared<const SkyDistribution>(read_sky_cells(field));
+  return sky;
+}
+
 LightSetup read_json(const std::filesystem::path& path) {
   const json document = read_json_object(path, "lights");
   const Field root{document, path.string()};
@@ -185,10 +229,7 @@ LightSetup read_json(const std::filesystem::path& path) {
   setup.emitters = read_emitters(root);
   if (document.contains("sky")) {
     if (!document.at("sky").is_object()) root.fail("sky", "an object");
-    const Field field{document.at("sky"), path.string() + ": sky"};
-    field.check_names({"color", "luminance"});
-    setup.sky.color = field.triple("color", 0, setup.sky.color);
-    setup.sky.luminance = field.number("luminance", 0, setup.sky.luminance);
+    setup.sky = read_sky({document.at("sky"), path.string() + ": sky"});
   }
   return setup;
 }

@@ -227,6 +227,17 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
                    "Rays by which each light probe looks around")
       ->check(CLI::Range(64, 1000000))
       ->capture_default_str();
+  command
+      ->add_option("--lightmap", chosen->settings.lightmap.size,
+                   "Texels along each side of a lightmap, for scenes with second texture "
+                   "coordinates (TEXCOORD_1)")
+      ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
+  command
+      ->add_option(
+          "--surface-harmonics", chosen->settings.surface_harmonics.ray_count,
+          "Keep from where light comes to the patches, for normal maps, found by this many "
+          "rays of each")
+      ->check(CLI::Range(16, 1000000));
   command->add_option("--seed", chosen->settings.form_factors.seed, "Seed of the sample points")
       ->capture_default_str();
   command->callback([chosen, &options] { run(*chosen, options); });

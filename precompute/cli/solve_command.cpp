@@ -24,7 +24,6 @@ namespace {
 constexpr const char *kExact = "exact", *kCompressed = "compressed";  // F as methods see it
 
 // Gathering along links; they are another F than the solvers in solve_radiosity.h are given.
-constexpr const char* kHierarchical = "hierarchical";
 
 struct SolveOptions {
   std::string file, lights, method = kTransferMethod, form_factors = kExact, output;
@@ -145,7 +144,7 @@ Solution solve_on_links(const SolveOptions& chosen, Engine& engine) {
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorOperator& form_factors) {
   if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
-  if (chosen.method == kHierarchical) return solve_on_links(chosen, engine);
+  if (chosen.method == kHierarchicalMethod) return solve_on_links(chosen, engine);
   const TransferData& data = engine.data();
   const auto solver = make_solver(method_of(chosen), form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
@@ -196,14 +195,12 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
 
 void add_solve_command(CLI::App& app, const CommonOptions& options) {
   auto chosen = std::make_shared<SolveOptions>();
-  std::vector<std::string> methods = method_names();
-  methods.emplace_back(kHierarchical);
   CLI::App* command = app.add_subcommand("solve", "Relight a transfer file once");
   command->add_option("file", chosen->file, "Transfer file")->required();
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
   command->add_option("--method", chosen->method, "How to find the indirect light")
-      ->check(CLI::IsMember(methods))
+      ->check(CLI::IsMember(method_names()))
       ->capture_default_str();
   command
       ->add_option("--form-factors", chosen->form_factors,

@@ -34,7 +34,8 @@ struct ViewOptions {
 
 IndirectMethod method_of(const std::string& name, const ViewOptions& chosen) {
   IndirectMethod method{.sweeps = chosen.sweeps, .warm = !chosen.cold};
-  if (name != kTransferMethod) {
+  method.on_links = name == kHierarchicalMethod;
+  if (name != kTransferMethod && !method.on_links) {
     method.iteration = std::ranges::find(kSolveMethods, name, &NamedSolveMethod::name)->method;
   }
   return method;

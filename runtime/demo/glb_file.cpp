@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "rebounce/demo/punctual_light.h"
@@ -205,7 +206,6 @@ class GlbBuilder {
   }
 
   json primitive(const LitMesh::Part& part) {
-    const Material& material = data_.materials[part.material];
     json attributes = {
         {"POSITION", vertex_accessor(part, position_view_, sizeof(Float3), kFloat, "VEC3")},
         {"COLOR_0", vertex_accessor(part, color_view_, sizeof(Color16), kUnsignedShort, "VEC4")}};
@@ -215,7 +215,7 @@ class GlbBuilder {
     position["min"] = low;
     position["max"] = high;
     document_["accessors"][attributes["COLOR_0"].get<std::size_t>()]["normalized"] = true;
-    if (material.base_color_texture != kNone) {
+    if (is_textured(part)) {
       if (texcoord_view_ < 0) {
         texcoord_view_ =
             binary_.add_view(std::span<const Float2>(mesh_.texcoord), sizeof(Float2), kArrayBuffer);
@@ -228,7 +228,7 @@ class GlbBuilder {
                                       {"componentType", kUnsignedInt},
                                       {"count", part.index_end - part.index_begin},
                                       {"type", "SCALAR"}});
-    document_["materials"].push_back(material_entry(material));
+    document_["materials"].push_back(material_entry(part));
     return {{"attributes", std::move(attributes)},
             {"indices", indices},
             {"material", document_["materials"].size() - 1}};
@@ -248,11 +248,18 @@ class GlbBuilder {
     return static_cast<int>(document_["accessors"].size()) - 1;
   }
 
-  json material_entry(const Material& material) {
+  bool is_textured(const LitMesh::Part& part) const {
+    return part.is_in_texture || data_.materials[part.material].base_color_texture != kNone;
+  }
+
+  json material_entry(const LitMesh::Part& part) {
+    const Material& material = data_.materials[part.material];
     // For viewers without KHR_materials_unlit: as dull as can be.
     json surface = {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}};
-    if (material.base_color_texture != kNone) {
-      surface["baseColorTexture"] = {{"index", texture_index(material.base_color_texture)}};
+    if (is_textured(part)) {
+      surface["baseColorTexture"] = {{"index", part.is_in_texture
+                                                   ? lit_texture_index()
+                                                   : texture_index(material.base_color_texture)}};
     }
     json entry = {{"extensions", {{"KHR_materials_unlit", json::object()}}}};
     const float alpha = material.base_alpha * (1 - material.transmission);
@@ -271,18 +278,34 @@ class GlbBuilder {
 
   // Textures go into the file when they are first needed.
   std::size_t texture_index(std::uint32_t texture) {
-    const auto [at, is_new] = textures_.try_emplace(texture, textures_.size());
-    if (is_new) {
-      const Texture& source = data_.textures[texture];
-      const int view = binary_.add_view(std::span<const std::uint8_t>(source.encoded), 0, 0);
-      document_["images"].push_back({{"bufferView", view}, {"mimeType", mime_type(source)}});
-      document_["samplers"].push_back({{"magFilter", kLinear},
-                                       {"minFilter", kLinearMipmapLinear},
-                                       {"wrapS", wrap_code(source.wrap_s)},
-                                       {"wrapT", wrap_code(source.wrap_t)}});
-      document_["textures"].push_back({{"source", at->second}, {"sampler", at->second}});
+    const auto found = textures_.find(texture);
+    if (found != textures_.end()) return found->second;
+    const Texture& source = data_.textures[texture];
+    const std::size_t index =
+        add_texture(source.encoded, mime_type(source), source.wrap_s, source.wrap_t);
+    textures_.emplace(texture, index);
+    return index;
+  }
+
+  std::size_t lit_texture_index() {
+    if (!lit_texture_) {
+      lit_texture_ = add_texture(encode_png(mesh_.texture), "image/png", TextureWrap::kClampToEdge,
+                                 TextureWrap::kClampToEdge);
     }
-    return at->second;
+    return *lit_texture_;
+  }
+
+  std::size_t add_texture(std::span<const std::uint8_t> encoded, const char* mime,
+                          TextureWrap wrap_s, TextureWrap wrap_t) {
+    const std::size_t index = document_["textures"].size();
+    const int view = binary_.add_view(encoded, 0, 0);
+    document_["images"].push_back({{"bufferView", view}, {"mimeType", mime}});
+    document_["samplers"].push_back({{"magFilter", kLinear},
+                                     {"minFilter", kLinearMipmapLinear},
+                                     {"wrapS", wrap_code(wrap_s)},
+                                     {"wrapT", wrap_code(wrap_t)}});
+    document_["textures"].push_back({{"source", index}, {"sampler", index}});
+    return index;
   }
 
   static void append(std::vector<std::byte>& file, std::span<const std::byte> bytes) {
@@ -321,6 +344,7 @@ class GlbBuilder {
   Binary binary_;
   int index_view_ = -1, position_view_ = -1, color_view_ = -1, texcoord_view_ = -1;
   std::map<std::uint32_t, std::size_t> textures_;
+  std::optional<std::size_t> lit_texture_;
 };
 
 }  // namespace

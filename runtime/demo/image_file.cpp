@@ -16,23 +16,6 @@
 namespace rebounce {
 namespace {
 
-std::vector<std::uint8_t> encode_png(const ScreenImage& image) {
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
-  header.width = static_cast<png_uint_32>(image.width);
-  header.height = static_cast<png_uint_32>(image.height);
-  header.format = PNG_FORMAT_RGB;
-  png_alloc_size_t byte_count = PNG_IMAGE_PNG_SIZE_MAX(header);
-  std::vector<std::uint8_t> bytes(byte_count);
-  if (!png_image_write_to_memory(&header, bytes.data(), &byte_count, 0, image.rgb.data(), 0,
-                                 nullptr)) {
-    throw Error("picture: libpng could not encode it: " + std::string(header.message) +
-                "; check its size");
-  }
-  bytes.resize(byte_count);
-  return bytes;
-}
-
 /// A pattern of thresholds without structure that the eye finds, so that slow gradients do not show
 /// the steps of eight bits: interleaved gradient noise (J. Jimenez, "Next generation post
 /// processing in Call of Duty: Advanced Warfare", 2014), kept off 0 and 1 so that exact bytes stay.
@@ -58,6 +41,23 @@ ScreenImage tone_map(const Picture& picture) {
     for (int c = 0; c < kChannelCount; ++c) image.rgb.push_back(to_srgb_byte(color[c], threshold));
   }
   return image;
+}
+
+std::vector<std::uint8_t> encode_png(const ScreenImage& image) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(image.width);
+  header.height = static_cast<png_uint_32>(image.height);
+  header.format = PNG_FORMAT_RGB;
+  png_alloc_size_t byte_count = PNG_IMAGE_PNG_SIZE_MAX(header);
+  std::vector<std::uint8_t> bytes(byte_count);
+  if (!png_image_write_to_memory(&header, bytes.data(), &byte_count, 0, image.rgb.data(), 0,
+                                 nullptr)) {
+    throw Error("picture: libpng could not encode it: " + std::string(header.message) +
+                "; check its size");
+  }
+  bytes.resize(byte_count);
+  return bytes;
 }
 
 void write_png(const std::filesystem::path& path, const ScreenImage& image) {

@@ -3,22 +3,43 @@
 #include <algorithm>
 #include <chrono>
 
+#include "rebounce/runtime/hierarchical_solver.h"
+#include "rebounce/transfer/error.h"
+
 namespace rebounce {
 
-IndirectSolver::IndirectSolver(const TransferData& data, const FormFactorBlocks& form_factors)
+IndirectSolver::IndirectSolver(const TransferData& data)
     : data_(data),
-      form_factors_(form_factors),
       indirect_irradiance_(data.patches.size()),
-      workspace_(std::max(data.transfer->workspace_size(), form_factors.workspace_size())) {}
+      workspace_(data.transfer->workspace_size()) {}
 
 void IndirectSolver::choose(const IndirectMethod& method) {
-  if (!method.iteration) {
+  if (!method.iterates()) {
     solver_.reset();
-  } else if (!solver_ || method.iteration != method_.iteration) {
-    solver_ = make_solver(*method.iteration, form_factors_,
-                          {data_.patches.area, data_.patches.reflectance}, data_.transfer);
+    form_factors_.reset();
+  } else if (!solver_ || method.iteration != method_.iteration ||
+             method.on_links != method_.on_links) {
+    make_iteration(method);
   }
   method_ = method;
+}
+
+void IndirectSolver::make_iteration(const IndirectMethod& method) {
+  const RadiosityProblem problem{data_.patches.area, data_.patches.reflectance};
+  if (method.on_links) {
+    if (data_.links.empty()) {
+      throw Error("the transfer file has no links; make it again with precompute --store-links");
+    }
+    auto links = std::make_unique<const LinkedFormFactors>(data_.links, data_.patches.area,
+                                                           data_.patches.centroid);
+    solver_ = std::make_unique<HierarchicalSolver>(*links, problem);
+    form_factors_ = std::move(links);
+  } else {
+    auto form = make_form_factors(*method.iteration, data_.exchange, data_.patches.area);
+    solver_ = make_solver(*method.iteration, *form, problem, data_.transfer);
+    form_factors_ = std::move(form);
+  }
+  workspace_.resize(std::max(data_.transfer->workspace_size(), form_factors_->workspace_size()));
 }
 
 std::span<const Float3> IndirectSolver::solve(std::span<const Float3> initial_exitance) {
@@ -44,7 +65,7 @@ void IndirectSolver::iterate(std::span<const Float3> initial_exitance) {
   settings.measure_residual = false;
   if (!method_.warm) solver_->forget();
   microseconds_ = solver_->solve(initial_exitance, settings).microseconds;
-  form_factors_.gather(solver_->radiosity(), indirect_irradiance_, workspace_);
+  form_factors_->gather(solver_->radiosity(), indirect_irradiance_, workspace_);
 }
 
 }  // namespace rebounce

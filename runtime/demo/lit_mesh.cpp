@@ -2,19 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <string>
 
-#include "direct_light.h"
-#include "display_surface.h"
-#include "emitters.h"
+#include "lit_surface.h"
+#include "lit_texture.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 #include "sample_sequence.h"
 #include "subdivided_mesh.h"
 #include "tone_curve.h"
-#include "vertex_light.h"
 
 namespace rebounce {
 namespace {
@@ -76,36 +72,24 @@ glm::vec3 near_corner(std::uint32_t corner, const glm::vec2& place) {
   return turned;
 }
 
+// Lights the vertices of a mesh: each stands for the surface around it.
 class VertexLighter {
  public:
-  VertexLighter(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
-                const LitMeshSettings& settings, const SubdividedMesh& mesh,
+  VertexLighter(const SurfaceLighter& lighter, const SubdividedMesh& mesh,
                 std::span<const Float3> position)
-      : data_(data),
-        tracer_(tracer),
-        light_(light),
-        settings_(settings),
-        mesh_(mesh),
-        surface_(data),
-        emitters_(data, surface_, settings.emitter_samples),
-        vertex_light_(light_at_vertices(data, light)),
-        around_(mesh, position) {}
+      : lighter_(lighter), mesh_(mesh), around_(mesh, position) {}
 
   // What vertices [begin, end) show if their textures are white, in parts of the screen's white.
-  void light(std::uint32_t begin, std::uint32_t end, float exposure_scale,
-             std::span<glm::vec3> shown) const {
-    const std::vector<glm::vec3> direct = direct_irradiance(begin, end);
+  std::vector<glm::vec3> shown(std::uint32_t begin, std::uint32_t end, float exposure_scale) const {
+    std::vector<LitPiece> pieces;
+    std::vector<CameraSample> samples;
+    const auto count = static_cast<std::uint32_t>(lighter_.samples_per_piece());
     for (std::uint32_t v = begin; v < end; ++v) {
-      const SurfacePoint point =
-          surface_.point_on(mesh_.vertex[v].triangle, mesh_.vertex[v].weight);
-      const glm::vec3 irradiance = direct[v - begin] +
-                                   interpolate(data_.mesh, vertex_light_.sky, point) +
-                                   interpolate(data_.mesh, vertex_light_.bounced, point);
-      const glm::vec3 reflected =
-          surface_.untextured_albedo(point) * irradiance * std::numbers::inv_pi_v<float>;
-      const glm::vec3 emitted = surface_.emitted_luminance(point, size_around(v));
-      shown[v] = exposure_scale * reflected + dimmed(exposure_scale * emitted, kBrightestEmitter);
+      const auto& [triangle, weight] = mesh_.vertex[v];
+      pieces.push_back({lighter_.surface().point_on(triangle, weight), size_around(v)});
+      for (std::uint32_t k = 0; k < count; ++k) samples.push_back(sample(v, k));
     }
+    return lighter_.shown(begin, pieces, samples, exposure_scale, false);
   }
 
  private:
@@ -117,7 +101,7 @@ class VertexLighter {
   CameraSample sample(std::uint32_t v, std::uint32_t k) const {
     const std::span<const Surroundings::Corner> corners = around_.of(v);
     const float choice =
-        (static_cast<float>(k) + 0.5F) / static_cast<float>(settings_.samples_per_vertex);
+        (static_cast<float>(k) + 0.5F) / static_cast<float>(lighter_.samples_per_piece());
     const auto chosen = std::min(std::ranges::lower_bound(corners, choice * corners.back().area_end,
                                                           {}, &Surroundings::Corner::area_end),
                                  corners.end() - 1);
@@ -125,64 +109,31 @@ class VertexLighter {
         near_corner(chosen->index, r2_point(k, {hash_to_unit(v, 0), hash_to_unit(v, 1)}));
     const std::array<glm::vec3, 3>& corner = mesh_.corner[chosen->triangle];
     CameraSample sample{.pixel = v, .index = k};
-    sample.point =
-        surface_.point_on(mesh_.display[chosen->triangle],
-                          inside.x * corner[0] + inside.y * corner[1] + inside.z * corner[2]);
+    sample.point = lighter_.surface().point_on(
+        mesh_.display[chosen->triangle],
+        inside.x * corner[0] + inside.y * corner[1] + inside.z * corner[2]);
     return sample;
   }
 
-  // Those samples that do not lie inside a solid body, where the first thing above is a back.
-  std::vector<CameraSample> uncovered(std::span<const CameraSample> samples) const {
-    std::vector<Ray> rays;
-    for (const CameraSample& s : samples) {
-      const Float3 normal = to_float3(s.point.geometric_normal);
-      rays.push_back({.origin = tracer_.offset_point(to_float3(s.point.position), normal),
-                      .t_near = 0,
-                      .direction = normal,
-                      .t_far = std::numeric_limits<float>::infinity()});
-    }
-    std::vector<Hit> hits(rays.size());
-    tracer_.intersect(rays, hits);
-    std::vector<CameraSample> kept;
-    for (std::size_t k = 0; k < samples.size(); ++k) {
-      if (!is_culled(data_.mesh, hits[k])) kept.push_back(samples[k]);
-    }
-    return kept;
-  }
-
-  std::vector<glm::vec3> direct_irradiance(std::uint32_t begin, std::uint32_t end) const {
-    std::vector<CameraSample> samples;
-    const auto count = static_cast<std::uint32_t>(settings_.samples_per_vertex);
-    for (std::uint32_t v = begin; v < end; ++v) {
-      for (std::uint32_t k = 0; k < count; ++k) samples.push_back(sample(v, k));
-    }
-    samples = uncovered(samples);
-    add_punctual_light(samples, light_.lights, tracer_);
-    add_emitter_light(samples, emitters_, tracer_, settings_.samples_per_vertex);
-    std::vector<glm::vec3> mean(end - begin, glm::vec3(0));
-    std::vector<int> open(end - begin, 0);
-    for (const CameraSample& s : samples) {
-      mean[s.pixel - begin] += s.irradiance;
-      ++open[s.pixel - begin];
-    }
-    for (std::size_t k = 0; k < mean.size(); ++k) {
-      mean[k] /= static_cast<float>(std::max(1, open[k]));
-    }
-    return mean;
-  }
-
-  const TransferData& data_;
-  const RayTracer& tracer_;
-  const PictureLight& light_;
-  const LitMeshSettings& settings_;
+  const SurfaceLighter& lighter_;
   const SubdividedMesh& mesh_;
-  DisplaySurface surface_;
-  Emitters emitters_;
-  VertexLight vertex_light_;
   Surroundings around_;
 };
 
+// The display triangles whose light goes into a texture. Those that let light through keep theirs
+// at the vertices, as their texture has the opacity.
+std::vector<std::uint8_t> triangles_with_texels(const TransferData& data) {
+  std::vector<std::uint8_t> chosen = data.lightmap.has_texels;
+  chosen.resize(data.mesh.triangle.size(), 0);
+  for (std::size_t t = 0; t < chosen.size(); ++t) {
+    const Material& material = data.materials[data.mesh.triangle_material[t]];
+    if (material.alpha_mode != AlphaMode::kOpaque || material.transmission > 0) chosen[t] = 0;
+  }
+  return chosen;
+}
+
 int divisions_for(std::size_t triangle_count, std::size_t target) {
+  if (triangle_count == 0) return 1;
   const double ratio = static_cast<double>(target) / static_cast<double>(triangle_count);
   return std::clamp(static_cast<int>(std::sqrt(ratio)), 1, kMaxDivisions);
 }
@@ -198,23 +149,25 @@ Float3 position_of(const DisplayMesh& mesh, const MeshPlace& place) {
   return to_float3(sum);
 }
 
-Float2 texcoord_of(const DisplayMesh& mesh, const MeshPlace& place) {
+Float2 texcoord_of(const DisplayMesh& mesh, std::span<const Float2> at, const MeshPlace& place) {
   const Uint3& corner = mesh.triangle[place.triangle];
-  const auto& at = mesh.base_color_texcoord;
   const glm::vec2 value = place.weight.x * to_glm(at[corner[0]]) +
                           place.weight.y * to_glm(at[corner[1]]) +
                           place.weight.z * to_glm(at[corner[2]]);
   return {value.x, value.y};
 }
 
-LitMesh without_light(const DisplayMesh& display, const SubdividedMesh& mesh) {
+LitMesh without_light(const TransferData& data, const SubdividedMesh& mesh) {
   LitMesh lit;
-  for (const MeshPlace& place : mesh.vertex) {
-    lit.position.push_back(position_of(display, place));
-    lit.texcoord.push_back(texcoord_of(display, place));
-  }
   for (const SubdividedMesh::Part& part : mesh.part) {
+    const std::span<const Float2> texcoord =
+        part.is_whole ? data.lightmap.texcoord : data.mesh.base_color_texcoord;
+    for (std::uint32_t v = part.vertex_begin; v < part.vertex_end; ++v) {
+      lit.position.push_back(position_of(data.mesh, mesh.vertex[v]));
+      lit.texcoord.push_back(texcoord_of(data.mesh, texcoord, mesh.vertex[v]));
+    }
     lit.part.push_back({.material = part.material,
+                        .is_in_texture = part.is_whole,
                         .index_begin = 3 * part.triangle_begin,
                         .index_end = 3 * part.triangle_end,
                         .vertex_begin = part.vertex_begin,
@@ -226,29 +179,42 @@ LitMesh without_light(const DisplayMesh& display, const SubdividedMesh& mesh) {
   return lit;
 }
 
+// Vertices whose light is in the texture stay white.
+void light_vertices(const VertexLighter& lighter, LitMesh& lit) {
+  lit.color.assign(lit.position.size(), Float3{1, 1, 1});
+  for (const LitMesh::Part& part : lit.part) {
+    if (part.is_in_texture) continue;
+#pragma omp parallel for schedule(dynamic)
+    for (std::uint32_t begin = part.vertex_begin; begin < part.vertex_end; begin += kBlock) {
+      const std::vector<glm::vec3> shown =
+          lighter.shown(begin, std::min(begin + kBlock, part.vertex_end), std::exp2(lit.exposure));
+      for (std::size_t k = 0; k < shown.size(); ++k) {
+        // Light without bound, as right beside a lamp, has no place on the curve.
+        const glm::vec3 bounded = glm::min(shown[k], glm::vec3(kBrightest));
+        lit.color[begin + k] = to_float3(glm::clamp(tone_curve(bounded), 0.0F, 1.0F));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                    const Camera& camera, const LitMeshSettings& settings) {
   if (settings.samples_per_vertex < 1) throw Error("a lit mesh needs at least one sample a vertex");
+  const std::vector<std::uint8_t> in_texture = triangles_with_texels(data);
+  const auto count_in_texture =
+      static_cast<std::size_t>(std::ranges::count(in_texture, std::uint8_t{1}));
+  const std::size_t rest = data.mesh.triangle.size() - count_in_texture;
   const SubdividedMesh mesh =
-      subdivide(data.mesh, divisions_for(data.mesh.triangle.size(), settings.triangle_target));
-  LitMesh lit = without_light(data.mesh, mesh);
+      subdivide(data.mesh, divisions_for(rest, settings.triangle_target), in_texture);
+  LitMesh lit = without_light(data, mesh);
   lit.exposure = settings.exposure ? *settings.exposure
                                    : exposure_for(PictureRenderer(data, tracer), light, camera);
-
-  const VertexLighter lighter(data, tracer, light, settings, mesh, lit.position);
-  const auto vertex_count = static_cast<std::uint32_t>(mesh.vertex.size());
-  std::vector<glm::vec3> shown(vertex_count);
-#pragma omp parallel for schedule(dynamic)
-  for (std::uint32_t begin = 0; begin < vertex_count; begin += kBlock) {
-    lighter.light(begin, std::min(begin + kBlock, vertex_count), std::exp2(lit.exposure), shown);
-  }
-  for (const glm::vec3& value : shown) {
-    // Light without bound, as right beside a lamp, has no place on the curve.
-    const glm::vec3 bounded = glm::min(value, glm::vec3(kBrightest));
-    lit.color.push_back(to_float3(glm::clamp(tone_curve(bounded), 0.0F, 1.0F)));
-  }
+  const SurfaceLighter lighter(data, tracer, light, settings.samples_per_vertex,
+                               settings.emitter_samples);
+  light_vertices(VertexLighter(lighter, mesh, lit.position), lit);
+  if (count_in_texture > 0) lit.texture = light_texture(data, lighter, in_texture, lit.exposure);
   return lit;
 }
 

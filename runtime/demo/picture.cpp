@@ -12,6 +12,7 @@
 #include "emitters.h"
 #include "exposure.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 #include "sample_sequence.h"
 #include "srgb.h"
@@ -143,7 +144,8 @@ class Painter {
   virtual ~Painter() = default;
 
   // Adds to `pixel` what a camera ray of this `weight` sees where there is no surface.
-  virtual void paint_background(std::uint32_t index, float weight, std::span<glm::vec3> pixel) = 0;
+  virtual void paint_background(std::uint32_t index, float weight, const glm::vec3& direction,
+                                std::span<glm::vec3> pixel) = 0;
 
   // Adds the colours of `samples` to their pixels, each times its weight.
   virtual void paint(std::span<CameraSample> samples, std::span<glm::vec3> pixel) = 0;
@@ -184,9 +186,10 @@ class LightPainter final : public Painter {
         coverage_(reflected_.size(), 0.0F),
         shining_(reflected_.size()) {}
 
-  void paint_background(std::uint32_t index, float weight, std::span<glm::vec3>) override {
+  void paint_background(std::uint32_t index, float weight, const glm::vec3& direction,
+                        std::span<glm::vec3>) override {
     if (settings_.show == Show::kIndirect) return;
-    shining_.add(index, to_glm(light_.sky.color) * light_.sky.luminance, weight);
+    shining_.add(index, to_glm(sky_luminance(light_.sky, to_float3(direction))), weight);
   }
 
   void paint(std::span<CameraSample> samples, std::span<glm::vec3> pixel) override {
@@ -262,7 +265,8 @@ class PatchPainter final : public Painter {
     if (!(top_ > 0) && !error_.empty()) top_ = *std::max_element(error_.begin(), error_.end());
   }
 
-  void paint_background(std::uint32_t index, float weight, std::span<glm::vec3> pixel) override {
+  void paint_background(std::uint32_t index, float weight, const glm::vec3& /*direction*/,
+                        std::span<glm::vec3> pixel) override {
     pixel[index] += weight * kNothing;
   }
 
@@ -304,7 +308,8 @@ std::vector<glm::vec3> paint_tiles(const RayTracer& tracer, const DisplaySurface
       intersect_visible(tracer, surface, camera.rays, hits);
       for (std::size_t k = 0; k < hits.size(); ++k) {
         if (hits[k].triangle != kNone) continue;
-        painter.paint_background(camera.pixel[k], camera.weight[k], pixel);
+        painter.paint_background(camera.pixel[k], camera.weight[k],
+                                 glm::normalize(to_glm(camera.rays[k].direction)), pixel);
       }
       std::vector<CameraSample> samples =
           seen_surface(camera, hits, layer == kMaxLayers, surface, view);

@@ -38,6 +38,12 @@ Light punctual_equivalent(const Light& light) {
     result.inner_cone_angle = 0;
     result.outer_cone_angle = kPi / 2;
   }
+  if (light.type == LightType::kDisc) {
+    result.type = LightType::kSpot;
+    result.intensity *= kPi * light.radius * light.radius;
+    result.inner_cone_angle = 0;
+    result.outer_cone_angle = kPi / 2;
+  }
   if (light.profile) {
     result.intensity *= mean_intensity(*light.profile);
     result.profile = nullptr;

@@ -11,12 +11,14 @@ namespace {
 // Cuts the triangles of one material after another.
 class Subdivider {
  public:
-  Subdivider(const DisplayMesh& mesh, int divisions, SubdividedMesh& out)
-      : mesh_(mesh), divisions_(divisions), out_(out) {}
+  Subdivider(const DisplayMesh& mesh, SubdividedMesh& out) : mesh_(mesh), out_(out) {}
 
-  void begin_part(std::uint32_t material) {
+  // Triangles that are added from here on are cut into `divisions`² each.
+  void begin_part(std::uint32_t material, bool is_whole, int divisions) {
     shared_.clear();
+    divisions_ = divisions;
     out_.part.push_back({.material = material,
+                         .is_whole = is_whole,
                          .triangle_begin = triangle_count(),
                          .triangle_end = triangle_count(),
                          .vertex_begin = vertex_count(),
@@ -76,23 +78,30 @@ class Subdivider {
   }
 
   const DisplayMesh& mesh_;
-  int divisions_;
+  int divisions_ = 1;
   SubdividedMesh& out_;
   std::map<Key, std::uint32_t> shared_;
 };
 
 }  // namespace
 
-SubdividedMesh subdivide(const DisplayMesh& mesh, int divisions) {
+SubdividedMesh subdivide(const DisplayMesh& mesh, int divisions,
+                         std::span<const std::uint8_t> whole) {
+  // What a part is of, in the order of the parts.
+  const auto part_of = [&](std::uint32_t t) {
+    return std::pair(mesh.triangle_material[t], !whole.empty() && whole[t] != 0);
+  };
   std::vector<std::uint32_t> order(mesh.triangle.size());
   std::iota(order.begin(), order.end(), 0U);
-  std::ranges::stable_sort(order, {}, [&](std::uint32_t t) { return mesh.triangle_material[t]; });
+  std::ranges::stable_sort(order, {}, part_of);
   SubdividedMesh out;
-  Subdivider subdivider(mesh, divisions, out);
-  for (const std::uint32_t t : order) {
-    const std::uint32_t material = mesh.triangle_material[t];
-    if (out.part.empty() || out.part.back().material != material) subdivider.begin_part(material);
-    subdivider.add(t);
+  Subdivider subdivider(mesh, out);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const auto [material, is_whole] = part_of(order[k]);
+    if (k == 0 || part_of(order[k]) != part_of(order[k - 1])) {
+      subdivider.begin_part(material, is_whole, is_whole ? 1 : divisions);
+    }
+    subdivider.add(order[k]);
   }
   return out;
 }

@@ -1,10 +1,10 @@
 #include "vertex_light.h"
 
-#include <numbers>
 #include <string>
 
 #include "display_surface.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -19,11 +19,10 @@ VertexLight light_at_vertices(const TransferData& data, const PictureLight& ligh
   const std::size_t n = data.patches.size();
   check_length(light.indirect_irradiance.size(), n, "indirect_irradiance");
   check_length(light.emitted_irradiance.size(), n, "emitted_irradiance");
-  const glm::vec3 sky_irradiance =
-      to_glm(light.sky.color) * light.sky.luminance * std::numbers::pi_v<float>;
+  check_sky(light.sky, data);
   std::vector<glm::vec3> sky(n), bounced(n, glm::vec3(0));
   for (std::size_t i = 0; i < n; ++i) {
-    sky[i] = sky_irradiance * data.patches.sky_visibility[i];
+    sky[i] = to_glm(sky_irradiance(data, light.sky, i));
     if (!light.indirect_irradiance.empty()) bounced[i] = to_glm(light.indirect_irradiance[i]);
     if (!light.emitted_irradiance.empty()) bounced[i] -= to_glm(light.emitted_irradiance[i]);
     // The operator's error may leave a little less than the first flight.

@@ -78,6 +78,8 @@ typedef struct rebounce_transfer_info {
   uint32_t probe_count;    /* 0: there are none */
   uint32_t probe_grid[3];  /* probes along x, y, z, x fastest; zeros: no grid */
   uint64_t operator_bytes; /* that a frame reads, all channels */
+  uint32_t lightmap_width; /* texels; 0: there is no lightmap */
+  uint32_t lightmap_height;
 } rebounce_transfer_info;
 
 rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
@@ -96,6 +98,12 @@ const uint32_t* rebounce_transfer_triangle_patch(
 const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer); /* [p][3] m */
 const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer);  /* [p] 0, 1 */
 
+/* Where the vertices are in the lightmap, (0, 0) its upper left corner, and whether display
+ * triangles have texels; NULL if there is no lightmap. */
+const float* rebounce_transfer_lightmap_texcoord(const rebounce_transfer* transfer); /* [v][2] */
+const uint8_t* rebounce_transfer_lightmap_triangle(
+    const rebounce_transfer* transfer); /* [t] 0, 1 */
+
 /* ---- Lights ---- */
 
 typedef enum rebounce_light_type {
@@ -103,7 +111,8 @@ typedef enum rebounce_light_type {
   REBOUNCE_LIGHT_SPOT = 1,
   REBOUNCE_LIGHT_DIRECTIONAL = 2,
   REBOUNCE_LIGHT_SPHERE = 3,
-  REBOUNCE_LIGHT_RECTANGLE = 4
+  REBOUNCE_LIGHT_RECTANGLE = 4,
+  REBOUNCE_LIGHT_DISC = 5
 } rebounce_light_type;
 
 /* A lamp, with the fields, units and fall-off of KHR_lights_punctual where it is one of those. */
@@ -117,7 +126,7 @@ typedef struct rebounce_light {
   float range;          /* m; no light arrives from further away; 0, the default: unlimited */
   float inner_cone_angle; /* rad from the axis, spot; default 0 */
   float outer_cone_angle; /* rad from the axis, spot, at most pi/2; default pi/4 */
-  float radius;           /* m, > 0, sphere */
+  float radius;           /* m, > 0, sphere and disc */
   float size[2];          /* m, > 0, rectangle: along the tangent and across it */
   float tangent[3];       /* rectangle: first side, not along its direction; default x */
 } rebounce_light;
@@ -125,11 +134,23 @@ typedef struct rebounce_light {
 /* Writes the defaults. */
 void rebounce_light_init(rebounce_light* light);
 
-/* The same luminance in cd/m² from every direction in which the scene is open. */
+/* The luminance in cd/m² in every direction in which the scene is open; times the distribution of
+ * the engine's sky, where it has one. */
 typedef struct rebounce_sky {
   float color[3];
   float luminance;
 } rebounce_sky;
+
+/* Cells of the sky: 0 is all that is below the horizon, 1 to 145 are Tregenza's, in rows of 12 degrees
+ * of altitude from the horizon up, each from north (-z) clockwise as seen from above, its first
+ * cell around north; the last is the zenith (+y). */
+#define REBOUNCE_SKY_CELL_COUNT 146
+
+/* Writes the relative luminance [REBOUNCE_SKY_CELL_COUNT] of a sky of the CIE standard general sky,
+ * `type` 1 (overcast) to 15, 12 being clear: 1 at the zenith. `sun_direction` [3] is the way that
+ * sunlight travels, downwards; the ground reflects `ground_reflectance`, 0 to 1. */
+rebounce_status rebounce_cie_sky(int type, const float* sun_direction, float ground_reflectance,
+                                 float* distribution);
 
 /* ---- Engines: one light state each ---- */
 
@@ -167,6 +188,11 @@ rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_
 rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const float* irradiance,
                                                size_t patch_count);
 
+/* From the next frame on, the sky's luminance in each cell is that of the frame's sky times
+ * distribution [REBOUNCE_SKY_CELL_COUNT] >= 0; NULL: it is uniform, as at first. */
+rebounce_status rebounce_engine_set_sky_distribution(rebounce_engine* engine,
+                                                     const float* distribution);
+
 /* From the next frame on, surfaces of this material emit that of the scene times scale [3] >= 0. */
 rebounce_status rebounce_engine_set_emission_scale(rebounce_engine* engine, uint32_t material,
                                                    const float* scale);
@@ -179,6 +205,22 @@ const float* rebounce_engine_radiosity(const rebounce_engine* engine);
 /* Indirect irradiance of the last frame at the vertices of the display mesh [vertex_count][3]. */
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count);
+
+/* Radiance in cd/m² that arrives at the vertices from patches and sky in the last frame, lamps apart:
+ * [vertex_count][4][3], coefficients of real spherical harmonics of degree 0 and 1. Needs a file
+ * made with --surface-harmonics. */
+rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* harmonics,
+                                             size_t vertex_count);
+
+/* Irradiance [3] in lx where a normal map bends the unit normal [3] of a surface of this irradiance
+ * [3] to the unit vector bent [3], of coefficients [4][3]; writes [3]. */
+void rebounce_bent_irradiance(const float* harmonics, const float* irradiance, const float* normal,
+                              const float* bent, float* result);
+
+/* Indirect irradiance of the last frame at the texels of the lightmap, [height][width][3] in lx,
+ * rows from the top; 0 in texels that show nothing. `texel_count` is width x height. */
+rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,
+                                                    size_t texel_count);
 
 /* Radiance in cd/m² that arrives at the light probes from patches and sky in the last frame, lamps
  * apart: [probe_count][9][3], coefficients of real spherical harmonics of degree 0 to 2

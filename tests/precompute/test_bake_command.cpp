@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "precompute/command_line.h"
+#include "precompute/unwrapped_room.h"
 #include "rebounce/precompute/import_gltf.h"
 
 namespace rebounce {
@@ -11,6 +12,7 @@ namespace {
 using nlohmann::json;
 using test::CommandLine;
 using test::kLights;
+using test::kScene;
 using test::kUsage;
 
 using BakeCommand = CommandLine;
@@ -39,6 +41,33 @@ TEST_F(BakeCommand, WritesASceneThatCanBeImported) {
   EXPECT_LT(mean, 0.7);
   EXPECT_GT(red, 20);
   EXPECT_GT(green, 20);
+}
+
+TEST_F(BakeCommand, WritesTheLightOfAnUnwrappedSceneIntoATexture) {
+  const std::string scene = write("room.glb", test::unwrapped_scene(test::unwrapped_room()).glb());
+  const std::string file = path("room.safetensors");
+  ASSERT_EQ(
+      run({"precompute", scene, "--patches", "300", "--lightmap", "128", "-o", file}).exit_code,
+      test::kDone);
+  const json summary =
+      summary_of({"bake", file, "--lights", kLights, "--triangles", "1", "-o", path("lit.glb")});
+  EXPECT_EQ(summary["texture"], json({128, 128}));
+  const Scene lit = import_gltf(path("lit.glb"));
+  ASSERT_EQ(lit.images.size(), 1U);
+  ASSERT_EQ(lit.materials.size(), 1U);
+  EXPECT_EQ(lit.materials[0].base_color_texture, 0U);
+  EXPECT_EQ(lit.materials[0].base_color, (Float3{1, 1, 1}));
+  for (const Float3& c : lit.vertex_color) EXPECT_EQ(c, (Float3{1, 1, 1}));
+  // About half of it is charts: lit, not blown out.
+  int dark = 0, white = 0;
+  for (std::size_t k = 0; k < 128 * 128; ++k) {
+    dark += lit.images[0].rgba[4 * k] < 8 ? 1 : 0;
+    white += lit.images[0].rgba[4 * k] == 255 ? 1 : 0;
+  }
+  EXPECT_LT(dark, 128 * 128 * 6 / 10);
+  EXPECT_LT(white, 128 * 128 / 10);
+  expect_refused({"precompute", kScene, "--lightmap", "128", "-o", path("no.safetensors")},
+                 "TEXCOORD_1");
 }
 
 TEST_F(BakeCommand, TakesTheExposureThatIsAskedFor) {

@@ -496,6 +496,11 @@ TEST_F(CommandLine, RefusesAMalformedLightFileWithTheField) {
       {R"({"sky": 1})", "\"sky\""},
       {R"({"sky": {"luminance": -1}})", "\"luminance\""},
       {R"({"sky": {"color": [1]}})", "\"color\""},
+      {R"({"sky": {"cie": 16}})", "\"cie\""},
+      {R"({"sky": {"cie": 12, "sunDirection": [0, 1, 0]}})", "above the horizon"},
+      {R"({"sky": {"cells": [1, 2]}})", "146 numbers"},
+      {R"({"sky": {"sunDirection": [0, -1, 0]}})", "with \"cie\" only"},
+      {R"({"lights": [{"type": "disc"}]})", "\"radius\""},
       {R"({"sky": {"intensity": 1}})", "\"intensity\""},
   };
   for (const auto& [text, field] : cases) {

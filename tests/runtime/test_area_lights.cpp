@@ -50,6 +50,14 @@ Light rectangle_at(const Float3& position, const Float2& size) {
   return light;
 }
 
+Light disc_at(const Float3& position, float radius) {
+  Light light;
+  light.type = LightType::kDisc;
+  light.position = position;
+  light.radius = radius;
+  return light;
+}
+
 /// The mean of illuminance times cosine over many places of the lamp: what evaluate_light promises.
 double sampled_irradiance(const Light& light, const glm::vec3& normal, int count) {
   double sum = 0;
@@ -161,6 +169,59 @@ TEST(AreaLights, AreKeptAndRepeatTheirBits) {
   there[1].size = {0.5F, 1};
   EXPECT_NE(direct(data, here), direct(data, there));
   EXPECT_EQ(direct(data, here), direct(data, here));
+}
+
+TEST(DiscLight, FacingElementsAreThatOfTheCatalogue) {
+  // Howell, B-13: from an element parallel to the disc, at height h and off its axis by d.
+  for (const float d : {0.0F, 0.3F, 1.0F, 4.0F}) {
+    const double h = 1.5, r = 0.8;
+    const double z = h * h + d * d + r * r;
+    const double factor =
+        0.5 * (1 - (h * h + d * d - r * r) / std::sqrt(z * z - 4 * r * r * d * d));
+    const std::vector<Float3> e =
+        direct(tiny_patch({0, 1, 0}), {disc_at({d, static_cast<float>(h), 0}, 0.8F)});
+    EXPECT_NEAR(e[0][0], kPi * factor, 1e-5 * kPi) << d;
+  }
+}
+
+TEST(DiscLight, ElementsAtRightAnglesAreThatOfTheCatalogue) {
+  // Howell, B-11: the disc stands on the bright side of the element,
+  // whose plane is parallel to its axis.
+  for (const float d : {1.0F, 2.0F}) {
+    const double h = 1.2, r = 0.6, big_h = h / d, big_r = r / d;
+    const double z = 1 + big_h * big_h + big_r * big_r;
+    const double factor = 0.5 * big_h * (z / std::sqrt(z * z - 4 * big_r * big_r) - 1);
+    const std::vector<Float3> e =
+        direct(tiny_patch({1, 0, 0}), {disc_at({d, static_cast<float>(h), 0}, 0.6F)});
+    EXPECT_NEAR(e[0][0], kPi * factor, 1e-5 * kPi) << d;
+  }
+}
+
+TEST(DiscLight, IsTheMeanOfItsPlacesWhereverTheHorizonCuts) {
+  int cut = 0;
+  for (std::uint32_t k = 0; k < 40; ++k) {
+    const glm::dvec2 s = r2_point(k, {0.4, 0.9}), t = r2_point(k, {0.7, 0.1});
+    const glm::vec3 normal = glm::normalize(glm::vec3(2 * s.x - 1, 0.3 + s.y, 2 * t.x - 1));
+    Light disc = disc_at({static_cast<float>(2 * t.y - 1), 1.0F, 0.4F}, 0.9F);
+    const glm::vec3 direction = glm::normalize(glm::vec3(s.y - 0.5, -1, t.x - 0.5));
+    disc.direction = {direction.x, direction.y, direction.z};
+    const glm::vec3 center(disc.position[0], disc.position[1], disc.position[2]);
+    const glm::vec3 across = normal - glm::dot(normal, direction) * direction;
+    if (std::abs(glm::dot(center, normal)) < 0.9F * glm::length(across)) ++cut;
+    const double sampled = sampled_irradiance(disc, normal, 1 << 14);
+    const std::vector<Float3> e = direct(tiny_patch(normal), {disc});
+    EXPECT_NEAR(e[0][0], sampled, 0.005 * sampled + 1e-4) << k;
+  }
+  EXPECT_GE(cut, 8);
+  EXPECT_LE(cut, 32);
+}
+
+TEST(DiscLight, ShinesOnOneSideAndFromAfarLikeASpot) {
+  Light disc = disc_at({0, 1, 0}, 0.5F);
+  disc.direction = {0, 1, 0};
+  EXPECT_EQ(direct(tiny_patch({0, 1, 0}), {disc})[0][0], 0);
+  const Light far = disc_at({0, 100, 0}, 0.5F);
+  EXPECT_NEAR(direct(tiny_patch({0, 1, 0}), {far})[0][0], kPi * 0.25 / 1e4, 1e-8);
 }
 
 }  // namespace

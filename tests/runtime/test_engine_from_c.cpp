@@ -28,6 +28,10 @@ class FromC : public testing::Test {
     mesh.vertex_color.resize(mesh.position.size());
     mesh.weight_begin.resize(mesh.position.size() + 1);
     data.materials.resize(1);
+    data.lightmap = one_texel_for_each(mesh);
+    data.surface_harmonics.sky.assign(data.patches.size(), LinearHarmonics{1, 1});
+    data.surface_harmonics.entry_begin.assign(data.patches.size() + 1, 0);
+    add_zenith(data);
     const std::string path = (folder_ / "room.safetensors").string();
     save_transfer_file(path, data);
     ASSERT_EQ(rebounce_transfer_load(path.c_str(), &transfer_), REBOUNCE_OK);
@@ -38,6 +42,28 @@ class FromC : public testing::Test {
   void TearDown() override {
     rebounce_engine_destroy(engine_);
     rebounce_transfer_release(transfer_);
+  }
+
+  /// Every patch sees half of its sky in the zenith.
+  static void add_zenith(TransferData& data) {
+    data.sky_cells.entry_begin = {0};
+    for (std::uint32_t i = 0; i < data.patches.size(); ++i) {
+      data.sky_cells.entry_begin.push_back(i + 1);
+      data.sky_cells.entry_cell.push_back(145);
+      data.sky_cells.entry_part.push_back(0.5F);
+    }
+  }
+
+  /// A lightmap of one row, with the middle of each triangle.
+  static Lightmap one_texel_for_each(const DisplayMesh& mesh) {
+    Lightmap map;
+    map.width = static_cast<std::uint32_t>(mesh.triangle.size());
+    map.height = 1;
+    map.texcoord.assign(mesh.position.size(), Float2{0.5F, 0.5F});
+    map.has_texels.assign(map.width, 1);
+    map.weight.assign(map.width, Float2{1 / 3.0F, 1 / 3.0F});
+    for (std::uint32_t t = 0; t < map.width; ++t) map.triangle.push_back(t);
+    return map;
   }
 
   test::TemporaryFolder folder_;
@@ -53,6 +79,82 @@ TEST_F(FromC, AFrameDoesNotAllocate) {
     rebounce_engine_relight(engine_, &lamp_, 1, nullptr);
   });
   EXPECT_EQ(count, 0);
+}
+
+TEST_F(FromC, TheLightmapIsThatOfTheVertices) {
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  ASSERT_EQ(info.lightmap_width, info.triangle_count);
+  ASSERT_EQ(info.lightmap_height, 1U);
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  std::vector<float> vertex(3 * std::size_t{info.vertex_count});
+  std::vector<float> texel(3 * std::size_t{info.triangle_count});
+  ASSERT_EQ(rebounce_engine_vertex_irradiance(engine_, vertex.data(), info.vertex_count),
+            REBOUNCE_OK);
+  EXPECT_EQ(test::count_allocations([&] {
+              rebounce_engine_lightmap_irradiance(engine_, texel.data(), info.triangle_count);
+            }),
+            0);
+  const std::uint32_t* const corner = rebounce_transfer_triangle(transfer_);
+  for (std::size_t t = 0; t < info.triangle_count; ++t) {
+    float mean = 0;
+    for (std::size_t k = 0; k < 3; ++k) mean += vertex[3 * corner[3 * t + k]] / 3;
+    EXPECT_NEAR(texel[3 * t], mean, 1e-5F * mean);
+  }
+  EXPECT_EQ(rebounce_transfer_lightmap_texcoord(transfer_)[0], 0.5F);
+  EXPECT_EQ(rebounce_transfer_lightmap_triangle(transfer_)[0], 1);
+  EXPECT_EQ(rebounce_engine_lightmap_irradiance(engine_, texel.data(), 1),
+            REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_EQ(rebounce_engine_lightmap_irradiance(engine_, nullptr, 1), REBOUNCE_INVALID_ARGUMENT);
+}
+
+TEST_F(FromC, BentNormalsFollowTheHarmonicsOfTheVertices) {
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  std::vector<float> light(12 * std::size_t{info.vertex_count});
+  EXPECT_EQ(test::count_allocations(
+                [&] { rebounce_engine_vertex_light(engine_, light.data(), info.vertex_count); }),
+            0);
+  EXPECT_EQ(rebounce_engine_vertex_light(engine_, light.data(), 1), REBOUNCE_INVALID_ARGUMENT);
+  // Light from above alone: a normal that is bent away gets less.
+  const std::array<float, 12> from_above = {1, 1, 1, 1, 1, 1};
+  const std::array<float, 3> irradiance = {1, 2, 3}, up = {0, 1, 0}, bent = {0.6F, 0.8F, 0};
+  std::array<float, 3> result{};
+  rebounce_bent_irradiance(from_above.data(), irradiance.data(), up.data(), up.data(),
+                           result.data());
+  EXPECT_EQ(result, irradiance);
+  rebounce_bent_irradiance(from_above.data(), irradiance.data(), up.data(), bent.data(),
+                           result.data());
+  EXPECT_LT(result[0], 0.95F);
+  EXPECT_GT(result[0], 0.8F);
+}
+
+TEST_F(FromC, ASkyHasADistributionWhereTheFileKnowsItsCells) {
+  std::array<float, REBOUNCE_SKY_CELL_COUNT> sky{};
+  const std::array<float, 3> down = {0, -1, 0};
+  EXPECT_EQ(rebounce_cie_sky(1, down.data(), 0.2F, sky.data()), REBOUNCE_OK);
+  EXPECT_NEAR(sky[145], 1, 0.01);
+  EXPECT_EQ(rebounce_cie_sky(77, down.data(), 0.2F, sky.data()), REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, sky.data()), REBOUNCE_OK);
+  const rebounce_sky bright = {{1, 1, 1}, 1000};
+  EXPECT_EQ(rebounce_engine_relight(engine_, nullptr, 0, &bright), REBOUNCE_OK);
+  const float* const direct = rebounce_engine_direct_irradiance(engine_);
+  EXPECT_NEAR(direct[0], 3.14159F * 1000 * 0.5F * sky[145], 0.1F);
+  sky[3] = -1;
+  EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, sky.data()), REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, nullptr), REBOUNCE_OK);
+}
+
+TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {
+  rebounce_transfer_info info{};
+  info.struct_size = offsetof(rebounce_transfer_info, lightmap_width);
+  info.lightmap_width = 77;  // memory that is not the structure's
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  EXPECT_GT(info.patch_count, 0U);
+  EXPECT_EQ(info.lightmap_width, 77U);
 }
 
 TEST_F(FromC, StructuresOfALaterVersionAreUnderstood) {
@@ -94,7 +196,7 @@ TEST_F(FromC, LightsOutOfRangeAreRefused) {
     return rebounce_engine_relight(engine_, &light, 1, nullptr) == REBOUNCE_INVALID_ARGUMENT;
   };
   EXPECT_FALSE(refused([](auto&) {}));
-  EXPECT_TRUE(refused([](auto& l) { l.type = 5; }));
+  EXPECT_TRUE(refused([](auto& l) { l.type = 6; }));
   EXPECT_TRUE(refused([](auto& l) { l.position[2] = NAN; }));
   EXPECT_TRUE(refused([](auto& l) { l.color[0] = -1; }));
   EXPECT_TRUE(refused([](auto& l) { l.intensity = INFINITY; }));

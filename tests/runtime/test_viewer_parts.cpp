@@ -16,6 +16,7 @@
 #include "rebounce/demo/picture.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
 #include "runtime/test_scene_data.h"
 
 namespace rebounce {
@@ -138,8 +139,7 @@ std::vector<Float3> patterned(std::size_t n, float shift) {
 
 TEST(IndirectSolver, GivesTheProductByDefault) {
   const auto data = two_planes();
-  const FormFactorBlocks form_factors(data->exchange, data->patches.area);
-  IndirectSolver solver(*data, form_factors);
+  IndirectSolver solver(*data);
   const std::vector<Float3> exitance = patterned(data->patches.size(), 0);
   std::vector<Float3> expected(exitance.size());
   std::vector<float> workspace(data->transfer->workspace_size());
@@ -149,9 +149,8 @@ TEST(IndirectSolver, GivesTheProductByDefault) {
 
 TEST(IndirectSolver, ConvergesFromFrameToFrameOnlyIfWarm) {
   const auto data = two_planes();
-  const FormFactorBlocks form_factors(data->exchange, data->patches.area);
   const std::vector<Float3> exitance = patterned(data->patches.size(), 0);
-  IndirectSolver exact(*data, form_factors), warm(*data, form_factors), cold(*data, form_factors);
+  IndirectSolver exact(*data), warm(*data), cold(*data);
   exact.choose({.iteration = SolveMethod::kGaussSeidel, .sweeps = 100, .warm = false});
   warm.choose({.iteration = SolveMethod::kGathering, .sweeps = 1, .warm = true});
   cold.choose({.iteration = SolveMethod::kGathering, .sweeps = 1, .warm = false});
@@ -165,10 +164,24 @@ TEST(IndirectSolver, ConvergesFromFrameToFrameOnlyIfWarm) {
   EXPECT_GT(relative_difference(cold.solve(exitance), truth, area), 1e-2);
 }
 
+TEST(IndirectSolver, EveryIterationFindsTheSameLight) {
+  const auto data = two_planes();
+  const std::vector<Float3> exitance = patterned(data->patches.size(), 0);
+  IndirectSolver exact(*data), other(*data);
+  exact.choose({.iteration = SolveMethod::kGaussSeidel, .sweeps = 100, .warm = false});
+  const auto truth = exact.solve(exitance);
+  for (const NamedSolveMethod& named : kSolveMethods) {
+    if (named.method == SolveMethod::kSouthwell) continue;  // its sweeps are single shots
+    other.choose({.iteration = named.method, .sweeps = 100});
+    EXPECT_LT(relative_difference(other.solve(exitance), truth, data->patches.area), 1e-4)
+        << named.name;
+  }
+  EXPECT_THROW(other.choose({.on_links = true}), Error);  // there are none
+}
+
 TEST(IndirectSolver, ChangesNoMoreThanTheLightDid) {
   const auto data = two_planes();
-  const FormFactorBlocks form_factors(data->exchange, data->patches.area);
-  IndirectSolver solver(*data, form_factors);
+  IndirectSolver solver(*data);
   solver.choose({.iteration = SolveMethod::kGaussSeidel, .sweeps = 100, .warm = true});
   const std::vector<Float3> before = patterned(data->patches.size(), 0);
   const std::vector<Float3> after = patterned(data->patches.size(), 0.01F);

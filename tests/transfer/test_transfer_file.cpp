@@ -572,6 +572,105 @@ TEST(TransferFile, RefusesImpossibleProbes) {
   });
 }
 
+/// Of 2 x 1 texels, for the four vertices and two triangles of sample_data.
+Lightmap sample_lightmap(const TransferData& data) {
+  Lightmap map;
+  map.width = 2;
+  map.height = 1;
+  map.texcoord.assign(data.mesh.position.size(), Float2{0.5F, 1});
+  map.has_texels.assign(data.mesh.triangle.size(), 1);
+  map.triangle = {0, kNone};
+  map.weight = {{0.25F, 0.5F}, {0, 0}};
+  return map;
+}
+
+TEST(TransferFile, KeepsALightmap) {
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data();
+  data.lightmap = sample_lightmap(data);
+  save_transfer_file(folder / "file", data);
+  const Lightmap read = load_transfer_file(folder / "file").lightmap;
+  EXPECT_EQ(read.width, 2U);
+  EXPECT_EQ(read.height, 1U);
+  EXPECT_EQ(read.texcoord, data.lightmap.texcoord);
+  EXPECT_EQ(read.has_texels, data.lightmap.has_texels);
+  EXPECT_EQ(read.triangle, data.lightmap.triangle);
+  EXPECT_EQ(read.weight, data.lightmap.weight);
+}
+
+TEST(TransferFile, RefusesImpossibleLightmaps) {
+  const auto lightmap = [](auto change) {
+    return [change](TransferData& data) {
+      data.lightmap = sample_lightmap(data);
+      change(data.lightmap);
+    };
+  };
+  expect_refused({
+      {"lightmap.triangle: 2 rows, not 6", lightmap([](auto& m) { m.height = 3; })},
+      {"lightmap.triangle: 2 rows", lightmap([](auto& m) { m.width = m.height = 0xFFFFFFFF; })},
+      {"lightmap.size: of no texels", lightmap([](auto& m) { m.height = 0; })},
+      {"lightmap.triangle: entry 1 is", lightmap([](auto& m) { m.triangle[1] = 1000; })},
+      {"lightmap.weight", lightmap([](auto& m) { m.weight.pop_back(); })},
+      {"lightmap.weight", lightmap([](auto& m) { m.weight[0][1] = kNan; })},
+      {"lightmap.weight", lightmap([](auto& m) { m.weight[0][1] = 1.5F; })},
+      {"lightmap.texcoord", lightmap([](auto& m) { m.texcoord.pop_back(); })},
+      {"lightmap.texcoord", lightmap([](auto& m) { m.texcoord[1][0] = -0.1F; })},
+      {"lightmap.has_texels", lightmap([](auto& m) { m.has_texels[0] = 2; })},
+      {"lightmap.has_texels", lightmap([](auto& m) { m.has_texels.clear(); })},
+  });
+}
+
+TEST(TransferFile, KeepsAndChecksTheCellsOfTheSky) {
+  const auto cells = [](auto change) {
+    return [change](TransferData& data) {
+      data.sky_cells = {{0, 1, 1, 3}, {145, 0, 7}, {0.5F, 0.25F, 1}};
+      change(data.sky_cells);
+    };
+  };
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data();
+  cells([](auto&) {})(data);
+  save_transfer_file(folder / "file", data);
+  const SkyCells read = load_transfer_file(folder / "file").sky_cells;
+  EXPECT_EQ(read.entry_begin, data.sky_cells.entry_begin);
+  EXPECT_EQ(read.entry_cell, data.sky_cells.entry_cell);
+  EXPECT_EQ(read.entry_part, data.sky_cells.entry_part);
+  expect_refused({
+      {"sky.entry_begin: 3 rows, not 4", cells([](auto& c) { c.entry_begin.pop_back(); })},
+      {"sky.entry_begin: descends", cells([](auto& c) { c.entry_begin[1] = 4; })},
+      {"sky.entry_part", cells([](auto& c) { c.entry_part.pop_back(); })},
+      {"sky.entry_part", cells([](auto& c) { c.entry_part[0] = 1.5F; })},
+      {"sky.entry_part", cells([](auto& c) { c.entry_part[0] = kNan; })},
+      {"sky.entry_cell: entry 0 is 146", cells([](auto& c) { c.entry_cell[0] = 146; })},
+  });
+}
+
+TEST(TransferFile, RefusesImpossibleSurfaceHarmonics) {
+  const auto harmonics = [](auto change) {
+    return [change](TransferData& data) {
+      SurfaceHarmonics& light = data.surface_harmonics;
+      light.sky.assign(data.patches.size(), LinearHarmonics{1, 2, 3, 4});
+      light.entry_begin = {0, 2, 2, 3};
+      light.entry_patch = {1, 2, 0};
+      light.entry_weight.assign(3, LinearHarmonics{1});
+      change(light);
+    };
+  };
+  expect_refused({
+      {"surface_harmonics.sky: 2 rows, not 3", harmonics([](auto& h) { h.sky.pop_back(); })},
+      {"surface_harmonics.sky", harmonics([](auto& h) { h.sky[1][3] = kNan; })},
+      {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin.pop_back(); })},
+      {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin[1] = 4; })},
+      {"surface_harmonics.entry_weight: 3 rows",
+       harmonics([](auto& h) { h.entry_patch.pop_back(); })},
+      {"surface_harmonics.entry_patch: entry 2 is 3",
+       harmonics([](auto& h) { h.entry_patch[2] = 3; })},
+      {"surface_harmonics.entry_weight", harmonics([](auto& h) { h.entry_weight.clear(); })},
+      {"surface_harmonics.entry_weight",
+       harmonics([](auto& h) { h.entry_weight[0][0] = kInfinity; })},
+  });
+}
+
 TEST(TransferFile, RefusesImpossibleFormFactors) {
   const auto begins = [](const std::vector<std::uint64_t>& values) {
     return [values](TransferData& data) { data.exchange.row_begin = SharedArray(values); };

@@ -8,6 +8,7 @@
 #include "display_surface.h"
 #include "rebounce/demo/patch_errors.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/area_norm.h"
 #include "vertex_light.h"
 
@@ -16,9 +17,8 @@ namespace rebounce {
 LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference)
     : data_(std::move(data)),
       engine_(data_),
-      form_factors_(data_->exchange, data_->patches.area),
       emitted_(irradiance_from_emitters(*data_)),
-      solver_{IndirectSolver(*data_, form_factors_), IndirectSolver(*data_, form_factors_)},
+      solver_{IndirectSolver(*data_), IndirectSolver(*data_)},
       pictures_(*data_, engine_.tracer()),
       reference_(std::move(reference)) {
   for (auto& values : indirect_) values.resize(data_->patches.size());
@@ -41,10 +41,9 @@ void LitScene::relight(std::span<const Light> lights, const Sky& sky,
 }
 
 std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const {
-  const glm::vec3 open = to_glm(sky.color) * sky.luminance * std::numbers::pi_v<float>;
   std::vector<glm::vec3> value(emitted_.size());
   for (std::size_t i = 0; i < value.size(); ++i) {
-    value[i] = open * data_->patches.sky_visibility[i] + to_glm(emitted_[i]);
+    value[i] = to_glm(sky_irradiance(*data_, sky, i)) + to_glm(emitted_[i]);
   }
   return reconstruct_at_vertices(data_->mesh, value);
 }

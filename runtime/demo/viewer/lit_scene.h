@@ -54,7 +54,6 @@ class LitScene {
 
   std::shared_ptr<const TransferData> data_;
   Engine engine_;
-  FormFactorBlocks form_factors_;
   std::vector<Float3> emitted_;  // F M_e, lx
   std::array<IndirectSolver, kSideCount> solver_;
   std::array<std::vector<Float3>, kSideCount> indirect_;

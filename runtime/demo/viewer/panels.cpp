@@ -17,6 +17,7 @@ namespace {
 
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
 constexpr const char* kTransferName = "transfer (one product)";
+constexpr const char* kHierarchicalName = "hierarchical (links)";
 
 struct NamedShow {
   const char* name;
@@ -29,26 +30,32 @@ constexpr std::array<NamedShow, 5> kShows = {{{"all light", Show::kRadiosity},
                                               {"error", Show::kError}}};
 
 std::string name_of(const IndirectMethod& method) {
+  if (method.on_links) return kHierarchicalName;
   if (!method.iteration) return kTransferName;
   const auto* named =
       std::ranges::find(kSolveMethods, *method.iteration, &NamedSolveMethod::method);
   return std::string(named->name);
 }
 
-void choose_method(const char* label, IndirectMethod& method) {
+void choose_method(const char* label, bool has_links, IndirectMethod& method) {
+  const auto choice = [&](const std::string& name, std::optional<SolveMethod> iteration,
+                          bool on_links) {
+    const bool is_chosen = method.iteration == iteration && method.on_links == on_links;
+    if (!ImGui::Selectable(name.c_str(), is_chosen)) return;
+    method.iteration = iteration;
+    method.on_links = on_links;
+  };
   ImGui::PushID(label);
   ImGui::SetNextItemWidth(-70);
   if (ImGui::BeginCombo(label, name_of(method).c_str())) {
-    if (ImGui::Selectable(kTransferName, !method.iteration)) method.iteration.reset();
+    choice(kTransferName, std::nullopt, false);
     for (const NamedSolveMethod& named : kSolveMethods) {
-      const std::string name(named.name);
-      if (ImGui::Selectable(name.c_str(), method.iteration == named.method)) {
-        method.iteration = named.method;
-      }
+      choice(std::string(named.name), named.method, false);
     }
+    if (has_links) choice(kHierarchicalName, std::nullopt, true);
     ImGui::EndCombo();
   }
-  if (method.iteration) {
+  if (method.iterates()) {
     ImGui::SetNextItemWidth(110);
     ImGui::SliderInt("sweeps", &method.sweeps, 1, 30, "%d", ImGuiSliderFlags_AlwaysClamp);
     ImGui::SameLine();
@@ -178,7 +185,7 @@ void Panels::draw(ViewerState& state, const FrameDrawer& frame) {
   if (ImGui::Begin("Rebounce")) {
     ImGui::PushItemWidth(-80);
     draw_view(state, frame);
-    draw_methods(state);
+    draw_methods(state, frame);
     draw_times(state);
     draw_lights(state, frame);
     ImGui::PopItemWidth();
@@ -208,13 +215,14 @@ void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
   ImGui::Text("yellow is             %.2e", static_cast<double>(frame.error_top()));
 }
 
-void Panels::draw_methods(ViewerState& state) const {
+void Panels::draw_methods(ViewerState& state, const FrameDrawer& frame) const {
   if (!ImGui::CollapsingHeader("Indirect light", ImGuiTreeNodeFlags_DefaultOpen)) return;
-  choose_method(state.is_split ? "left" : "method", state.methods[0]);
+  const bool has_links = !frame.scene().data().links.empty();
+  choose_method(state.is_split ? "left" : "method", has_links, state.methods[0]);
   ImGui::Checkbox("split the screen", &state.is_split);
   if (!state.is_split) return;
   ImGui::SliderFloat("at", &state.split, 0, 1, "%.2f");
-  choose_method("right", state.methods[1]);
+  choose_method("right", has_links, state.methods[1]);
 }
 
 void Panels::draw_times(const ViewerState& state) const {

@@ -13,7 +13,7 @@ class Panels {
  private:
   void smooth(const StageTimes& times);
   void draw_view(ViewerState& state, const FrameDrawer& frame) const;
-  void draw_methods(ViewerState& state) const;
+  void draw_methods(ViewerState& state, const FrameDrawer& frame) const;
   void draw_times(const ViewerState& state) const;
   void draw_lights(ViewerState& state, const FrameDrawer& frame) const;
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 #include "shaders.h"
 #include "tone_curve.h"
@@ -29,8 +30,8 @@ void check_complete() {
 glm::vec3 background(const FrameSettings& frame) {
   if (frame.show == Show::kPatches || frame.show == Show::kError) return glm::vec3(0.02F);
   if (frame.show == Show::kIndirect) return glm::vec3(0);
-  const glm::vec3 sky = to_glm(frame.sky.color) * (frame.sky.luminance * std::exp2(frame.exposure));
-  return dimmed(sky, kBrightestEmitter);
+  return dimmed(to_glm(mean_sky_luminance(frame.sky)) * std::exp2(frame.exposure),
+                kBrightestEmitter);
 }
 
 SceneBounds bounds_of(const DisplayMesh& mesh) {

@@ -14,7 +14,9 @@
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/light_probes.h"
+#include "rebounce/precompute/lightmap.h"
 #include "rebounce/precompute/subdivision.h"
+#include "rebounce/precompute/surface_harmonics.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -39,7 +41,9 @@ struct BuildSettings {
   /// Store links too, for hierarchical radiosity: to form_factors.link_epsilon, or kLinkEpsilon if
   /// that is 0.
   bool store_links = false;
-  ProbeSettings probes;  ///< by default none
+  ProbeSettings probes;                       ///< by default none
+  LightmapSettings lightmap;                  ///< by default none
+  SurfaceHarmonicSettings surface_harmonics;  ///< by default none
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
   std::size_t rank = 256;    ///< of kLowRank and kFirstBounce: see LowRankSettings

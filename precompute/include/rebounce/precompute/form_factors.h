@@ -8,6 +8,7 @@
 #include "rebounce/precompute/progress.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/sky_cells.h"
 
 namespace rebounce {
 
@@ -43,6 +44,7 @@ struct FormFactors {
   std::vector<float> sky_visibility;  ///< [n] fraction of a patch's light that leaves the scene
   std::vector<float> absorbed;        ///< [n] fraction that meets back faces; with the row sum of F
                                       ///< the three add up to 1
+  SkyCells sky_cells;                 ///< by which of its cells patches see the sky
   ClosureReport closure;
   std::uint64_t ray_count = 0;
   std::uint64_t pair_count = 0;  ///< pairs of patches that face each other

@@ -22,6 +22,10 @@ struct PatchModel {
   /// [t] the patch whose light a display triangle shows: its own, or that of the surface that
   /// covers it; kNone for a side that sees nothing.
   std::vector<std::uint32_t> shown_patch;
+  /// [v] of the mesh, or empty: see Scene. Second sides have no place in the lightmap unless the
+  /// [v] of the mesh, or empty: see Scene. Both sides of a double-sided triangle have the same.
+  std::vector<LightmapTexcoord> lightmap_texcoord;
+  std::vector<std::string> lightmap_page;
   std::size_t element_count = 0;         ///< lit sides, of which patches are made
   std::size_t scene_triangle_count = 0;  ///< before subdivision, slivers not counted
   std::size_t sliver_count = 0;          ///< triangles thinner than rays are precise: dropped

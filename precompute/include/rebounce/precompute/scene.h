@@ -17,6 +17,12 @@ struct Image {
   std::vector<std::uint8_t> rgba;  ///< [height][width][4]
 };
 
+/// A vertex's place in the lightmap that its asset was unwrapped for.
+struct LightmapTexcoord {
+  Float2 texcoord{0, 0};       ///< TEXCOORD_1: (0, 0) is the upper left corner of the page
+  std::uint32_t page = kNone;  ///< the placed mesh whose page that is; kNone: none
+};
+
 /// A static triangle scene in world space: metres, right-handed, +Y up.
 struct Scene {
   std::vector<Float3> position;             ///< [v]
@@ -24,6 +30,10 @@ struct Scene {
   std::vector<Float2> base_color_texcoord;  ///< [v] set and KHR_texture_transform applied
   std::vector<Float2> emissive_texcoord;    ///< [v] likewise
   std::vector<Float3> vertex_color;         ///< [v] linear, 1 where the asset has none
+  /// [v] finite, or empty where no mesh has a second set of texture coordinates. Every mesh has a
+  /// page of its own wherever it is placed.
+  std::vector<LightmapTexcoord> lightmap_texcoord;
+  std::vector<std::string> lightmap_page;  ///< name of each page's mesh, for messages
 
   std::vector<Uint3> triangle;  ///< [t] counter-clockwise seen from the front (mirrors undone)
   std::vector<std::uint32_t> triangle_material;  ///< [t]

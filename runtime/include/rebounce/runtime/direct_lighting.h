@@ -42,7 +42,8 @@ class DirectLighting {
   DirectLighting& operator=(const DirectLighting&) = delete;
 
   /// Writes the irradiance [n] in lx that arrives straight from `lights` and `sky`. Does not
-  /// allocate, but see light_capacity. The same bits for any number of OpenMP threads.
+  /// allocate, but see light_capacity. The same bits for any number of OpenMP threads. Throws Error
+  /// as check_sky does.
   void compute(std::span<const Light> lights, const Sky& sky, std::span<Float3> direct_irradiance);
 
   /// Lights that the last compute() traced: those that were new or had changed.

@@ -13,7 +13,7 @@ struct IncidentLight {
 
 /// True for lamps that have a surface, whose light comes from many directions.
 inline bool is_area_light(LightType type) {
-  return type == LightType::kSphere || type == LightType::kRectangle;
+  return type == LightType::kSphere || type == LightType::kRectangle || type == LightType::kDisc;
 }
 
 /// Evaluates `light` at `point`: inverse-square fall-off, range window and spot cone as
@@ -22,7 +22,7 @@ inline bool is_area_light(LightType type) {
 /// Of a lamp with a surface, `place` in [0, 1)² is where the light comes from; the mean over all
 /// places of illuminance times cosine is its irradiance. Spheres are sampled by the cone in which
 /// they are seen (C. Wang, "Direct lighting models for ray tracing with cylindrical lamps", 1992),
-/// rectangles by their area. The range window is then that of the lamp's middle.
+/// rectangles and discs by their area. The range window is then that of the lamp's middle.
 IncidentLight evaluate_light(const Light& light, const Float3& point,
                              const Float2& place = {0.5F, 0.5F});
 

@@ -13,8 +13,9 @@ namespace rebounce {
 using ProbeLight = std::array<Float3, kHarmonicCount>;
 
 /// Writes the light that arrives at each probe [p] from patches of `radiosity` [n] in lx and from
-/// `sky`; that of lamps is not in it. Probes that are not valid get none. Neither allocates nor
-/// locks; the same bits for any number of OpenMP threads. Throws Error if a size is wrong.
+/// `sky`, which is taken for uniform (mean_sky_luminance); that of lamps is not in it. Probes that
+/// are not valid get none. Neither allocates nor locks; the same bits for any number of OpenMP
+/// threads. Throws Error if a size is wrong.
 void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
                   std::span<ProbeLight> light);
 

@@ -9,28 +9,30 @@
 #include <vector>
 
 #include "rebounce/transfer/intensity_profile.h"
+#include "rebounce/transfer/sky_cells.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
 
-enum class LightType : std::uint8_t { kPoint, kSpot, kDirectional, kSphere, kRectangle };
+enum class LightType : std::uint8_t { kPoint, kSpot, kDirectional, kSphere, kRectangle, kDisc };
 
 /// A lamp in the world. Points, spots and directional lights have the fields and units of
-/// KHR_lights_punctual; spheres and rectangles shine with the same luminance from all of their
-/// surface.
+/// KHR_lights_punctual; spheres, rectangles and discs shine with the same luminance from all of
+/// their surface.
 struct Light {
   LightType type = LightType::kPoint;
   std::string name;
-  Float3 position{0, 0, 0};    ///< metres, the middle; not used by directional lights
-  Float3 direction{0, -1, 0};  ///< unit; the way the light travels; the side of a rectangle that
-                               ///< shines; not used by spheres, and by points without a profile
-  Float3 color{1, 1, 1};       ///< linear Rec.709, each >= 0
-  float intensity = 1;         ///< >= 0; candela (point, spot), lux (directional), candela per m²
-                               ///< (sphere, rectangle); with a profile a factor of its candelas
-  float range = 0;             ///< metres; beyond it no light arrives; 0 means unlimited
-  float inner_cone_angle = 0;  ///< radians from the axis: full intensity inside (spot)
+  Float3 position{0, 0, 0};  ///< metres, the middle; not used by directional lights
+  Float3 direction{0, -1,
+                   0};  ///< unit; the way the light travels; the side of a rectangle or
+                        ///< disc that shines; not used by spheres, and by points without a profile
+  Float3 color{1, 1, 1};  ///< linear Rec.709, each >= 0
+  float intensity = 1;    ///< >= 0; candela (point, spot), lux (directional), candela per m²
+                          ///< (sphere, rectangle, disc); with a profile a factor of its candelas
+  float range = 0;        ///< metres; beyond it no light arrives; 0 means unlimited
+  float inner_cone_angle = 0;             ///< radians from the axis: full intensity inside (spot)
   float outer_cone_angle = 0.785398163F;  ///< radians from the axis: none outside (spot)
-  float radius = 0;                       ///< metres, > 0 (sphere)
+  float radius = 0;                       ///< metres, > 0 (sphere, disc)
   Float2 size{0, 0};                      ///< metres, > 0: along `tangent`, across it (rectangle)
   /// Not along `direction`, of which it is made perpendicular: the first side of a rectangle, and
   /// where the horizontal angles of a profile begin.
@@ -38,10 +40,13 @@ struct Light {
   std::shared_ptr<const IntensityProfile> profile;  ///< of a luminaire (point, spot); may be null
 };
 
-/// A uniform sky: the same luminance from every direction in which nothing is hit.
+/// What is seen in every direction in which nothing is hit.
 struct Sky {
   Float3 color{1, 1, 1};
   float luminance = 0;  ///< cd/m², >= 0
+  /// Each >= 0: the luminance of each cell in parts of `luminance`; null: the same in all
+  /// directions.
+  std::shared_ptr<const SkyDistribution> distribution{};
 };
 
 /// A perspective camera placed in the world. `right`, `up` and `backward` are orthonormal.

@@ -11,9 +11,11 @@
 
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/light_probes.h"
+#include "rebounce/transfer/lightmap.h"
 #include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/opacity_maps.h"
 #include "rebounce/transfer/scene_description.h"
+#include "rebounce/transfer/surface_harmonics.h"
 #include "rebounce/transfer/transfer_operator.h"
 #include "rebounce/transfer/types.h"
 
@@ -80,7 +82,10 @@ struct TransferData {
   std::vector<Texture> textures;
   std::vector<Camera> cameras;
   std::vector<Light> lights;
-  LightProbes probes;  ///< may be none
+  SkyCells sky_cells;                  ///< may be empty: then the sky is uniform
+  LightProbes probes;                  ///< may be none
+  Lightmap lightmap;                   ///< may be empty
+  SurfaceHarmonics surface_harmonics;  ///< may be empty
   ExchangeMatrix exchange;
   /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels, or null if that is not kept:
   /// see CompressedFormFactors.

@@ -11,10 +11,10 @@
 namespace rebounce {
 
 /// Encodes a lit mesh as binary glTF 2.0: one primitive for each material, with COLOR_0 as
-/// normalised 16-bit numbers, KHR_materials_unlit, and the base colour textures of `data`; its
-/// cameras, and `lights` as KHR_lights_punctual (unlit materials do not take light from them). The
-/// exposure is in asset.extras. Throws Error if it would be 4 GiB or more, or a texture is neither
-/// PNG nor JPEG.
+/// normalised 16-bit numbers, KHR_materials_unlit, and the base colour textures of `data` or the
+/// mesh's own; its cameras, and `lights` as KHR_lights_punctual (unlit materials do not take light
+/// from them). The exposure is in asset.extras. Throws Error if it would be 4 GiB or more, or a
+/// texture is neither PNG nor JPEG.
 std::vector<std::byte> encode_glb(const LitMesh& mesh, const TransferData& data,
                                   std::span<const Light> lights);
 

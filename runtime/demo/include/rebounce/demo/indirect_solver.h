@@ -7,27 +7,30 @@
 
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/solve_radiosity.h"
-#include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/form_factor_operator.h"
 
 namespace rebounce {
 
 /// How a frame finds its indirect light.
 struct IndirectMethod {
   std::optional<SolveMethod> iteration{};  ///< unset: one product with the stored operator
-  int sweeps = 1;                          ///< of an iteration, at least 1
-  bool warm = true;                        ///< an iteration starts from the frame before
+  bool on_links = false;  ///< instead of either: hierarchical radiosity over the file's links
+  int sweeps = 1;         ///< of an iteration, at least 1
+  bool warm = true;       ///< an iteration starts from the frame before
 
+  bool iterates() const { return iteration || on_links; }
   bool operator==(const IndirectMethod&) const = default;
 };
 
 /// Finds the indirect light of a frame by any method; an iteration keeps its solution from frame to
-/// frame.
+/// frame, and form factors in the form that it is fastest on (make_form_factors).
 class IndirectSolver {
  public:
-  /// `data` must have an operator; it and `form_factors` must outlive the object.
-  IndirectSolver(const TransferData& data, const FormFactorBlocks& form_factors);
+  /// `data` must have an operator and outlive the object.
+  explicit IndirectSolver(const TransferData& data);
 
-  /// Takes another method; an iteration begins without a solution.
+  /// Takes another method; another iteration begins without a solution. Throws Error if it needs
+  /// links and there are none.
   void choose(const IndirectMethod& method);
   const IndirectMethod& method() const { return method_; }
 
@@ -40,12 +43,13 @@ class IndirectSolver {
   double microseconds() const { return microseconds_; }
 
  private:
+  void make_iteration(const IndirectMethod& method);
   void apply(std::span<const Float3> initial_exitance);
   void iterate(std::span<const Float3> initial_exitance);
 
   const TransferData& data_;
-  const FormFactorBlocks& form_factors_;
   IndirectMethod method_;
+  std::unique_ptr<const FormFactorOperator> form_factors_;  ///< of an iteration
   std::unique_ptr<RadiositySolver> solver_;
   std::vector<Float3> indirect_irradiance_;
   std::vector<float> workspace_;

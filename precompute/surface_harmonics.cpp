@@ -1,0 +1,143 @@
+#include "rebounce/precompute/surface_harmonics.h"
+
+#include <algorithm>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/patch_points.h"
+#include "rebounce/runtime/sampling.h"
+#include "rebounce/runtime/spherical_harmonics.h"
+#include "rebounce/transfer/error.h"
+#include "seen_patch.h"
+
+namespace rebounce {
+namespace {
+
+constexpr int kFewestRays = 16;
+constexpr std::size_t kBatch = 256;  // patches between two looks at the progress
+
+/// What one patch sees.
+struct View {
+  std::vector<std::pair<std::uint32_t, LinearHarmonics>> entries;  ///< ascending patches
+  LinearHarmonics sky{};
+};
+
+void add(LinearHarmonics& sum, const Harmonics& y, float factor) {
+  for (std::size_t k = 0; k < kLinearHarmonicCount; ++k) sum[k] += factor * y[k];
+}
+
+/// A direction around `normal`, uniform over the hemisphere.
+glm::dvec3 hemisphere_direction(const glm::dvec3& normal, const glm::dvec2& s) {
+  const double r = std::sqrt(1 - s.x * s.x), phi = 2 * std::numbers::pi * s.y;
+  return frame_around(normal) * glm::dvec3(r * std::cos(phi), r * std::sin(phi), s.x);
+}
+
+class Viewer {
+ public:
+  Viewer(const DisplayMesh& mesh, const RayTracer& tracer, const SurfaceHarmonicSettings& settings)
+      : mesh_(mesh),
+        tracer_(tracer),
+        settings_(settings),
+        points_(static_cast<std::size_t>(settings.ray_count)),
+        rays_(points_.size()),
+        hits_(points_.size()) {}
+
+  View look_up(std::span<const std::uint32_t> triangles, std::uint32_t patch) {
+    const std::uint64_t bits = mix_bits(settings_.seed ^ mix_bits(patch));
+    spread_points(mesh_, triangles, unit_square(bits), points_);
+    const glm::dvec2 shift = unit_square(mix_bits(bits));
+    for (std::uint32_t k = 0; k < rays_.size(); ++k) {
+      const auto& [position, normal] = points_[k];
+      // Other irrational steps than those of the points, so that they do not march together.
+      const glm::dvec2 s = glm::fract(shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
+      Ray& ray = rays_[k] = Ray{};
+      ray.origin = tracer_.offset_point(position, normal);
+      ray.direction = to_float3(hemisphere_direction(to_dvec3(normal), s));
+      ray.t_near = 0;
+      ray.t_far = std::numeric_limits<float>::infinity();
+    }
+    tracer_.intersect(rays_, hits_);
+    return sum_up();
+  }
+
+ private:
+  View sum_up() {
+    View view;
+    by_patch_.clear();
+    const float solid_angle = 2 * std::numbers::pi_v<float> / static_cast<float>(rays_.size());
+    for (std::uint32_t k = 0; k < hits_.size(); ++k) {
+      if (hits_[k].triangle == kNone) {
+        add(view.sky, spherical_harmonics(rays_[k].direction), solid_angle);
+        continue;
+      }
+      const std::uint32_t patch = seen_patch(mesh_, hits_[k]);
+      if (patch != kNone) by_patch_.emplace_back(patch, k);
+    }
+    std::ranges::sort(by_patch_);
+    for (const auto& [patch, k] : by_patch_) {
+      if (view.entries.empty() || view.entries.back().first != patch) {
+        view.entries.emplace_back(patch, LinearHarmonics{});
+      }
+      // A diffuse patch of radiosity B has the luminance B / pi.
+      add(view.entries.back().second, spherical_harmonics(rays_[k].direction),
+          solid_angle / std::numbers::pi_v<float>);
+    }
+    return view;
+  }
+
+  const DisplayMesh& mesh_;
+  const RayTracer& tracer_;
+  const SurfaceHarmonicSettings& settings_;
+  std::vector<PatchPoint> points_;
+  std::vector<Ray> rays_;
+  std::vector<Hit> hits_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_patch_;  ///< and number of the ray
+};
+
+void append(const View& view, SurfaceHarmonics& harmonics) {
+  harmonics.sky.push_back(view.sky);
+  for (const auto& [patch, weight] : view.entries) {
+    harmonics.entry_patch.push_back(patch);
+    harmonics.entry_weight.push_back(weight);
+  }
+  if (harmonics.entry_patch.size() >= kNone) {
+    throw Error("the patches see too much for one file; ask for fewer rays of each");
+  }
+  harmonics.entry_begin.push_back(static_cast<std::uint32_t>(harmonics.entry_patch.size()));
+}
+
+}  // namespace
+
+SurfaceHarmonics trace_surface_harmonics(const TransferData& data, const RayTracer& tracer,
+                                         const SurfaceHarmonicSettings& settings,
+                                         const Progress& progress) {
+  if (settings.ray_count < kFewestRays)
+    throw Error("a patch needs at least 16 rays to look around");
+  const std::size_t n = data.patches.size();
+  const PatchTriangles triangles(data.mesh.triangle_patch, n);
+  SurfaceHarmonics harmonics;
+  harmonics.entry_begin = {0};
+  std::vector<View> views;
+  for (std::size_t first = 0; first < n; first += kBatch) {
+    if (progress && !progress(static_cast<double>(first) / static_cast<double>(n))) {
+      throw Cancelled();
+    }
+    const std::size_t count = std::min(kBatch, n - first);
+    views.resize(count);
+#pragma omp parallel
+    {
+      Viewer viewer(data.mesh, tracer, settings);
+#pragma omp for schedule(dynamic, 4)
+      for (std::size_t k = 0; k < count; ++k) {
+        views[k] = viewer.look_up(triangles[first + k], static_cast<std::uint32_t>(first + k));
+      }
+    }
+    for (const View& view : views) append(view, harmonics);
+  }
+  return harmonics;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,100 @@
+// The form factor as an integral around the rim (Stokes: E. Sparrow, "A new and simpler formulation
+// for radiative angle factors", 1963), which is elementary for an arc of a circle; the chord where
+// a horizon cuts the disc is Lambert's term for an edge.
+
+#include "disc_form_factor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace rebounce {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// Below this the distance to the rim is as good as constant: the formula for that is exact to its
+// square, the other loses its reciprocal in roundings.
+constexpr double kSmallEccentricity = 1e-7;
+
+/// The rim center + radius (cos(t) u + sin(t) v), as seen from the origin.
+class Rim {
+ public:
+  Rim(const glm::dvec3& center, const glm::dvec3& normal, const glm::dvec3& axis, double radius)
+      : center_(center), radius_(radius) {
+    const glm::dvec3 off_axis = center - glm::dot(center, axis) * axis;
+    const double distance = glm::length(off_axis);
+    const glm::dvec3 least = std::abs(axis.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+    u_ = distance > 0 ? off_axis / distance : glm::normalize(glm::cross(axis, least));
+    v_ = glm::cross(axis, u_);
+    // normal . (r x dr/dt) = a + b cos t + c sin t,  |r|² = d + e cos t
+    a_ = radius * radius * glm::dot(normal, axis);
+    b_ = radius * glm::dot(normal, glm::cross(center, v_));
+    c_ = -radius * glm::dot(normal, glm::cross(center, u_));
+    d_ = glm::dot(center, center) + radius * radius;
+    e_ = 2 * radius * glm::dot(center, u_);
+  }
+
+  glm::dvec3 at(double t) const {
+    return center_ + radius_ * (std::cos(t) * u_ + std::sin(t) * v_);
+  }
+
+  /// Height above a horizon through the origin is height(t) = h + amplitude cos(t - turn).
+  double amplitude(const glm::dvec3& normal) const {
+    return radius_ * std::hypot(glm::dot(normal, u_), glm::dot(normal, v_));
+  }
+  double turn(const glm::dvec3& normal) const {
+    return std::atan2(glm::dot(normal, v_), glm::dot(normal, u_));
+  }
+
+  /// The integral of normal . (r x dr) / |r|² from `begin` to `end`, by at most a whole turn.
+  double integral(double begin, double end) const {
+    const double shift = 2 * kPi * std::floor((begin + kPi) / (2 * kPi));
+    begin -= shift;
+    end -= shift;
+    if (end <= kPi) return primitive(end) - primitive(begin);
+    return primitive(kPi) - primitive(begin) + primitive(end - 2 * kPi) - primitive(-kPi);
+  }
+
+ private:
+  /// For t in [-pi, pi].
+  double primitive(double t) const {
+    if (e_ < kSmallEccentricity * d_) return (a_ * t + b_ * std::sin(t) - c_ * std::cos(t)) / d_;
+    const double angle =
+        std::atan2(std::sqrt(d_ - e_) * std::sin(t / 2), std::sqrt(d_ + e_) * std::cos(t / 2));
+    return b_ / e_ * t + (a_ - b_ * d_ / e_) * 2 * angle / std::sqrt(d_ * d_ - e_ * e_) -
+           c_ / e_ * std::log(d_ + e_ * std::cos(t));
+  }
+
+  glm::dvec3 center_, u_, v_;
+  double radius_, a_, b_, c_, d_, e_;
+};
+
+/// Lambert's term for the edge from `a` to `b`.
+double edge_integral(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& normal) {
+  const glm::dvec3 axis = glm::cross(a, b);
+  const double sine = glm::length(axis);
+  return sine > 0 ? std::atan2(sine, glm::dot(a, b)) * glm::dot(axis, normal) / sine : 0.0;
+}
+
+}  // namespace
+
+float point_to_disc_form_factor(const glm::vec3& to_center, const glm::vec3& normal,
+                                const glm::vec3& axis, float radius) {
+  const glm::dvec3 center(to_center), up(normal);
+  if (glm::dot(to_center, axis) == 0) return 0;
+  const Rim rim(center, up, glm::dvec3(axis), radius);
+  const double height = glm::dot(center, up), amplitude = rim.amplitude(up);
+  if (height <= -amplitude) return 0;
+  double sum = 0;
+  if (height >= amplitude) {
+    sum = rim.integral(-kPi, kPi);
+  } else {
+    const double turn = rim.turn(up), half = std::acos(-height / amplitude);
+    sum = rim.integral(turn - half, turn + half) +
+          edge_integral(rim.at(turn + half), rim.at(turn - half), up);
+  }
+  return static_cast<float>(std::clamp(std::abs(sum) / (2 * kPi), 0.0, 1.0));
+}
+
+}  // namespace rebounce

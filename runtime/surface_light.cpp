@@ -1,0 +1,89 @@
+#include "rebounce/runtime/surface_light.h"
+
+#include <algorithm>
+#include <string>
+
+#include "rebounce/runtime/sky_light.h"
+#include "rebounce/runtime/spherical_harmonics.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+// Beyond this a bent normal would see more light than the series, which may undershoot at the
+// surface's own normal, can answer for.
+constexpr float kLargestGain = 4;
+
+void check_size(std::size_t size, std::size_t wanted, const char* name) {
+  if (size == wanted) return;
+  throw Error(std::string("surface harmonics: ") + name + " has " + std::to_string(size) +
+              " entries; it must have " + std::to_string(wanted));
+}
+
+void add(SurfaceLight& sum, const LinearHarmonics& weight, const Float3& color) {
+  for (std::size_t k = 0; k < kLinearHarmonicCount; ++k) {
+    for (std::size_t c = 0; c < kChannelCount; ++c) sum[k][c] += weight[k] * color[c];
+  }
+}
+
+}  // namespace
+
+void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const Float3> radiosity,
+                             const Sky& sky, std::span<SurfaceLight> light) {
+  const std::size_t n = harmonics.sky.size();
+  check_size(light.size(), n, "the result");
+  check_size(radiosity.size(), n, "the radiosity");
+  const Float3 open_sky = mean_sky_luminance(sky);
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < n; ++i) {
+    SurfaceLight sum{};
+    add(sum, harmonics.sky[i], open_sky);
+    for (std::uint32_t e = harmonics.entry_begin[i]; e < harmonics.entry_begin[i + 1]; ++e) {
+      add(sum, harmonics.entry_weight[e], radiosity[harmonics.entry_patch[e]]);
+    }
+    light[i] = sum;
+  }
+}
+
+void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const SurfaceLight> patch_light,
+                             std::span<SurfaceLight> vertex_light) {
+  check_size(vertex_light.size(), mesh.position.size(), "the light at vertices");
+#pragma omp parallel for schedule(static)
+  for (std::size_t v = 0; v < vertex_light.size(); ++v) {
+    SurfaceLight sum{};
+    if (!mesh.weight_begin.empty()) {
+      for (std::uint32_t w = mesh.weight_begin[v]; w < mesh.weight_begin[v + 1]; ++w) {
+        const SurfaceLight& of_patch = patch_light[mesh.weight_patch[w]];
+        for (std::size_t k = 0; k < kLinearHarmonicCount; ++k) {
+          for (std::size_t c = 0; c < kChannelCount; ++c) {
+            sum[k][c] += mesh.weight[w] * of_patch[k][c];
+          }
+        }
+      }
+    }
+    vertex_light[v] = sum;
+  }
+}
+
+Float3 surface_irradiance(const SurfaceLight& light, const Float3& normal) {
+  const Harmonics y = spherical_harmonics(normal);
+  Float3 sum{0, 0, 0};
+  for (std::size_t k = 0; k < kLinearHarmonicCount; ++k) {
+    for (std::size_t c = 0; c < kChannelCount; ++c) sum[c] += kCosineLobe[k] * y[k] * light[k][c];
+  }
+  for (float& x : sum) x = std::max(x, 0.0F);  // the series may undershoot
+  return sum;
+}
+
+Float3 bent_irradiance(const SurfaceLight& light, const Float3& irradiance, const Float3& normal,
+                       const Float3& bent) {
+  const Float3 before = surface_irradiance(light, normal);
+  const Float3 after = surface_irradiance(light, bent);
+  Float3 result = irradiance;
+  for (std::size_t c = 0; c < kChannelCount; ++c) {
+    if (before[c] > 0) result[c] *= std::min(after[c] / before[c], kLargestGain);
+  }
+  return result;
+}
+
+}  // namespace rebounce

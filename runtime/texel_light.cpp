@@ -1,0 +1,40 @@
+#include "rebounce/runtime/texel_light.h"
+
+#include <algorithm>
+#include <string>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+void check_size(std::size_t size, std::size_t wanted, const char* name) {
+  if (size == wanted) return;
+  throw Error(std::string("lightmap: ") + name + " have " + std::to_string(size) +
+              " entries; there must be " + std::to_string(wanted));
+}
+
+}  // namespace
+
+void interpolate_at_texels(const Lightmap& lightmap, const DisplayMesh& mesh,
+                           std::span<const Float3> vertex_value, std::span<Float3> texel_value) {
+  check_size(vertex_value.size(), mesh.position.size(), "the values at vertices");
+  check_size(texel_value.size(), lightmap.triangle.size(), "the values at texels");
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = 0; k < texel_value.size(); ++k) {
+    const std::uint32_t t = lightmap.triangle[k];
+    if (t == kNone) {
+      texel_value[k] = {0, 0, 0};
+      continue;
+    }
+    const auto [second, third] = lightmap.weight[k];
+    const float first = 1 - second - third;
+    const auto [a, b, c] = mesh.triangle[t];
+    for (int i = 0; i < kChannelCount; ++i) {
+      texel_value[k][i] = std::max(0.0F, first * vertex_value[a][i] + second * vertex_value[b][i] +
+                                             third * vertex_value[c][i]);
+    }
+  }
+}
+
+}  // namespace rebounce
