@@ -81,15 +81,20 @@ ShadowRays::Agreement ShadowRays::agreement(std::span<const Ray> rays,
 ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
                                               std::span<const Ray> rays,
                                               std::span<const float> transmitted) const {
-  const std::uint64_t hash = pair_hash(i, j);
   VisibilityEstimate estimate;
+  add(i, j, rays, transmitted, estimate);
+  if (estimate.is_empty()) return {0, 1};
+  return {estimate.part(), estimate.variance()};
+}
+
+void ShadowRays::add(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
+                     std::span<const float> transmitted, VisibilityEstimate& estimate) const {
+  const std::uint64_t hash = pair_hash(i, j);
   for (std::size_t k = 0; k < rays.size(); ++k) {
     if (is_void(rays[k])) continue;
     const auto [x, y] = ray_ends(i, j, rays[k].id, hash);
     estimate.add(kernel(*x, *y), transmitted[k]);
   }
-  if (estimate.is_empty()) return {0, 1};
-  return {estimate.part(), estimate.variance()};
 }
 
 }  // namespace rebounce

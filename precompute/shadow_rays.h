@@ -45,9 +45,11 @@ class VisibilityEstimate {
 /// pair's exchange gets through. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
-  /// The most rays that a pair can have. Rays between points that do not face each other are not
-  /// made: they carry no light.
   static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
+
+  /// The most rays that a pair can have; beyond kPointCount the points meet again in other pairs.
+  /// Rays between points that do not face each other are not made: they carry no light.
+  static constexpr std::uint32_t kMostRays = 4 * kPointCount;
 
   /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
   /// `kernel_tolerance` is that of unoccluded_exchange_area().
@@ -68,7 +70,7 @@ class ShadowRays {
   template <typename Wanted>
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
-  /// Writes to `rays` `count` <= kPointCount untraced rays for each pair of patch i, one pair after
+  /// Writes to `rays` `count` <= kMostRays untraced rays for each pair of patch i, one pair after
   /// the other; where a pair has fewer the rest are never occluded and void (is_void).
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
@@ -90,6 +92,10 @@ class ShadowRays {
   Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
                         std::span<const float> transmitted) const;
 
+  /// Adds the same rays to what is known of the pair.
+  void add(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
+           std::span<const float> transmitted, VisibilityEstimate& estimate) const;
+
   /// A ray from `x` to `y`.
   static Ray ray_between(const PatchPoint& x, const PatchPoint& y);
 
@@ -100,7 +106,7 @@ class ShadowRays {
 
  private:
   // Pairs of points that are looked at for rays, at most.
-  static constexpr std::uint32_t kCandidateCount = 4 * kPointCount;
+  static constexpr std::uint32_t kCandidateCount = 4 * kMostRays;
 
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
   void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
