@@ -225,6 +225,33 @@ double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t 
   return sum;
 }
 
+/// The number of the point for which `measure`(position) is largest.
+template <typename Measure>
+std::uint8_t find_farthest(std::span<const PatchPoint> points, const Measure& measure) {
+  std::size_t farthest = 0;
+  double most = -1;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double distance = measure(to_dvec3(points[k].position));
+    if (distance <= most) continue;
+    most = distance;
+    farthest = k;
+  }
+  return static_cast<std::uint8_t>(farthest);
+}
+
+std::array<std::uint8_t, 3> find_outermost(std::span<const PatchPoint> points,
+                                           const glm::dvec3& centre) {
+  const auto at = [&](std::uint8_t k) { return to_dvec3(points[k].position); };
+  const std::uint8_t a =
+      find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, centre); });
+  const std::uint8_t b =
+      find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, at(a)); });
+  const std::uint8_t c = find_farthest(points, [&](const glm::dvec3& p) {
+    return glm::length(glm::cross(p - at(a), p - at(b)));
+  });
+  return {a, b, c};
+}
+
 /// The sum of the radii by the distance: the larger, the nearer.
 double relative_reach(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
   const PatchBounds &a = geometry.bounds(i), &b = geometry.bounds(j);
@@ -264,6 +291,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
   area_.resize(n);
   bounds_.resize(n);
   points_.resize(n * kPointCount);
+  outermost_.resize(n);
   parts_.resize(n * kPartStride);
   fragments_.resize(n);
   flat_level_.resize(n);
@@ -274,6 +302,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
     const std::span<PatchPoint> points(&points_[i * kPointCount], kPointCount);
     spread_points(model.mesh, patches[i], unit_square(mix_bits(seed ^ mix_bits(i))), points);
     for (PatchPoint& p : points) p.position = tracer.offset_point(p.position, p.normal);
+    outermost_[i] = find_outermost(points, bounds_[i].centre);
     add_parts(i);
   }
 }

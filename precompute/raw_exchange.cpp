@@ -97,7 +97,8 @@ class RawExchangeBuilder {
   void compute_row(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
     const auto is_fine = [&](std::uint32_t j) { return !is_coarse_pair(geometry_, i, j); };
     shadow_rays_.find_facing(i, scratch.facing, is_fine);
-    trace(i, scratch.facing, settings_.probe_rays, scratch);
+    shadow_rays_.make_probe_rays(i, scratch.facing, settings_.probe_rays, scratch.rays);
+    trace(scratch);
     scratch.mixed.clear();
     const auto probe = static_cast<std::size_t>(settings_.probe_rays);
     for (std::size_t p = 0; p < scratch.facing.size(); ++p) {
@@ -146,7 +147,8 @@ class RawExchangeBuilder {
     const int full = settings_.full_rays;
     // No part is known better than that many rays tell (rule of succession).
     const double least_variance = 1.0 / ((full + 2.0) * (full + 2.0));
-    trace(i, scratch.mixed, full, scratch);
+    shadow_rays_.make_rays(i, scratch.mixed, full, scratch.rays);
+    trace(scratch);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
       const FacingPatch& pair = scratch.mixed[p];
       const ShadowRays::Visibility visible =
@@ -173,12 +175,10 @@ class RawExchangeBuilder {
     }
   }
 
-  /// Traces `count` rays for each pair of patch i, one pair after the other.
+  /// Traces the rays of the pairs of a patch.
   /// Where there are holes, a triangle's mean is all that patches resolve: taking it keeps the
   /// noise of single holes out of F.
-  void trace(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
-             Scratch& scratch) const {
-    shadow_rays_.make_rays(i, facing, count, scratch.rays);
+  void trace(Scratch& scratch) const {
     scratch.transmitted.resize(scratch.rays.size());
     tracer_.transmittance(scratch.rays, PassageDetail::kTriangle, scratch.transmitted);
   }

@@ -35,6 +35,27 @@ void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& faci
   }
 }
 
+void ShadowRays::make_probe_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
+                                 std::vector<Ray>& rays) const {
+  rays.resize(facing.size() * count);
+  for (std::size_t p = 0; p < facing.size(); ++p) {
+    const std::span<Ray> pair = std::span(rays).subspan(p * count, count);
+    make_pair_rays(i, facing[p].patch, pair.subspan(make_corner_rays(i, facing[p].patch, pair)));
+  }
+}
+
+/// Writes those between the outermost points that face each other, and returns how many.
+std::size_t ShadowRays::make_corner_rays(std::uint32_t i, std::uint32_t j,
+                                         std::span<Ray> rays) const {
+  std::size_t made = 0;
+  for (std::uint32_t k = 0; k < kCornerRays && made < rays.size(); ++k) {
+    const PatchPoint &x = geometry_.points(i)[geometry_.outermost_points(i)[k % 3]],
+                     &y = geometry_.points(j)[geometry_.outermost_points(j)[(k + k / 3) % 3]];
+    if (kernel(x, y) > 0) rays[made++] = ray_between(x, y);
+  }
+  return made;
+}
+
 void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const {
   const std::uint64_t hash = pair_hash(i, j);
   std::size_t made = 0;

@@ -75,6 +75,12 @@ class ShadowRays {
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
 
+  /// The same for rays that are to tell whether a pair is partly hidden: the first kCornerRays join
+  /// the outermost points of the two, which what has a straight edge hides or shows first.
+  void make_probe_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
+                       std::vector<Ray>& rays) const;
+  static constexpr std::uint32_t kCornerRays = 9;
+
   /// What the `rays` of a pair agree on, whose transmittances are `transmitted`.
   enum class Agreement : std::uint8_t { kClear, kHidden, kMixed };
   static Agreement agreement(std::span<const Ray> rays, std::span<const float> transmitted);
@@ -110,6 +116,7 @@ class ShadowRays {
 
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
   void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
+  std::size_t make_corner_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
   std::pair<const PatchPoint*, const PatchPoint*> ray_ends(std::uint32_t i, std::uint32_t j,
                                                            std::uint32_t k,
                                                            std::uint64_t hash) const;

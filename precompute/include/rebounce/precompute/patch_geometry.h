@@ -2,6 +2,7 @@
 
 // What form factors ask of the shape of patches: their triangles, bounds, and points on them.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -65,6 +66,11 @@ class PatchGeometry {
     return {points_.data() + patch * kPointCount, kPointCount};
   }
 
+  /// Three of the points, by their numbers, that span about the largest triangle.
+  std::span<const std::uint8_t, 3> outermost_points(std::size_t patch) const {
+    return outermost_[patch];
+  }
+
   /// The 2^`level` parts that make up the patch, `level` at most kPartLevels and at least
   /// flat_level(patch) if they are to stand for it.
   std::span<const PatchPart> parts(std::size_t patch, int level) const;
@@ -93,6 +99,7 @@ class PatchGeometry {
   std::vector<double> area_;              ///< [n] m²
   std::vector<PatchBounds> bounds_;       ///< [n]
   std::vector<PatchPoint> points_;        ///< [n][kPointCount]
+  std::vector<std::array<std::uint8_t, 3>> outermost_;  ///< [n]
   std::vector<Fragments> fragments_;      ///< [n]
   std::vector<std::uint8_t> flat_level_;  ///< [n]
   std::vector<PatchPart> parts_;          ///< [n][all levels, the coarsest first]
