@@ -26,7 +26,7 @@ struct Options {
   std::size_t patch_count = 1000;
   int reference_factor = 100;
   double ray_limit = 2e6;
-  bool speed_only = false;
+  std::string part = "all";
   CommonOptions common{.repeats = 5};
 };
 
@@ -70,10 +70,10 @@ FormFactors form_factors_of(const PatchModel& model, FormFactorQuality quality) 
   return compute_form_factors(model, make_surface_tracer(model.mesh), with_quality(quality));
 }
 
-void measure_known(const std::vector<KnownFormFactor>& cases, Report& report) {
-  constexpr std::size_t kPatches = 300;
+void measure_known(const std::vector<KnownFormFactor>& cases, std::size_t patch_count,
+                   Report& report) {
   for (const KnownFormFactor& known : cases) {
-    const PatchModel model = make_patch_model(known.scene, {.patch_count = kPatches});
+    const PatchModel model = make_patch_model(known.scene, {.patch_count = patch_count});
     for (const NamedQuality& q : kQualities) {
       if (q.asked_part == 0) continue;
       const FormFactors f = form_factors_of(model, q.quality);
@@ -235,16 +235,17 @@ class SceneBench {
 
 void run(const Options& options) {
   Report report;
-  if (!options.speed_only) {
-    measure_known(tabled_form_factors(options.table), report);
-    measure_known(hidden_form_factors(), report);
+  const bool all = options.part == "all";
+  if (all || options.part == "closed-forms") {
+    measure_known(tabled_form_factors(options.table), 200, report);
+    measure_known(hidden_form_factors(), 600, report);
     measure_rooms(report);
     for (const int longitudes : {16, 32}) measure_sphere(longitudes, report);
   }
   for (const std::string& scene : options.scenes) {
     SceneBench bench(scene, options, report);
-    if (!options.speed_only) bench.measure_convergence();
-    bench.measure_speed();
+    if (all || options.part == "convergence") bench.measure_convergence();
+    if (all || options.part == "speed") bench.measure_speed();
   }
   publish("form_factors", report.table(), options.common);
 }
@@ -269,7 +270,9 @@ int main(int argc, char** argv) {
   app.add_option("--ray-limit", options.ray_limit, "Rays that lie ready for bare Embree at most")
       ->check(CLI::Range(1e3, 1e9))
       ->capture_default_str();
-  app.add_flag("--speed-only", options.speed_only, "Only time the scenes");
+  app.add_option("--part", options.part, "What to measure; the last two for each scene")
+      ->check(CLI::IsMember({"all", "closed-forms", "convergence", "speed"}))
+      ->capture_default_str();
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] { run(options); });
 }

@@ -12,7 +12,9 @@ struct KnownFormFactor {
   std::string name;
   Scene scene;
   double factor = 0;       ///< from material 0 to material 1
-  double model_error = 0;  ///< what the scene itself differs by, as a part of the factor
+  /// What the scene itself differs by (discs with corners), as a part of the factor: by the contour
+  /// integral, which tests of the kernel compare with the table.
+  double model_error = 0;
 };
 
 /// Every row of a table of view factors (tests/reference/view_factors.tsv) but the infinitely long

@@ -145,8 +145,6 @@ class RawExchangeBuilder {
   /// shadow rays and hemisphere rays say, weighted by the inverse of their variances.
   void append_mixed(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
     const int full = settings_.full_rays;
-    // No part is known better than that many rays tell (rule of succession).
-    const double least_variance = 1.0 / ((full + 2.0) * (full + 2.0));
     shadow_rays_.make_rays(i, scratch.mixed, full, scratch.rays);
     trace(scratch);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
@@ -154,16 +152,25 @@ class RawExchangeBuilder {
       const ShadowRays::Visibility visible =
           shadow_rays_.visibility(i, pair.patch, std::span(scratch.rays).subspan(p * full, full),
                                   std::span(scratch.transmitted).subspan(p * full, full));
-      const double shadow = pair.unoccluded * visible.part;
-      const double shadow_variance =
-          pair.unoccluded * pair.unoccluded * std::max(visible.variance, least_variance);
-      const double met = hemisphere_->find(i, pair.patch).exchange;
-      const double met_variance = hemisphere_->variance(i, pair.patch, shadow);
-      const double both = shadow_variance + met_variance;
-      append(row, pair, (shadow * met_variance + met * shadow_variance) / both,
-             shadow_variance * met_variance / both);
+      append_mean(i, pair, visible, row);
     }
     ray_count_ += scratch.mixed.size() * full;
+  }
+
+  /// Adds the mean of `visible` and of the hemisphere rays. The variances are those of one and the
+  /// same guess: by estimates of its own, each side would count the more the less it found.
+  void append_mean(std::uint32_t i, const FacingPatch& pair, const ShadowRays::Visibility& visible,
+                   std::vector<ExchangeEntry>& row) const {
+    const double most = pair.unoccluded, shadow = most * visible.part;
+    const double met = hemisphere_->find(i, pair.patch).exchange;
+    const double guess = std::min(most, 0.5 * (shadow + met));
+    // No part is known better than that many rays tell (rule of succession).
+    const double rays = visible.ray_count, part = (guess / most * rays + 1) / (rays + 2);
+    const double shadow_variance = most * most * part * (1 - part) / (rays + 1);
+    const double met_variance = hemisphere_->variance(i, pair.patch, guess);
+    const double both = shadow_variance + met_variance;
+    append(row, pair, (shadow * met_variance + met * shadow_variance) / both,
+           shadow_variance * met_variance / both);
   }
 
   /// Adds the near pairs of many triangles to row i, as hemisphere rays have them.

@@ -9,16 +9,18 @@ std::uint64_t ShadowRays::pair_hash(std::uint32_t i, std::uint32_t j) const {
   return mix_bits(seed_ * 0x9E3779B9ULL + ((static_cast<std::uint64_t>(i) << 32) | j));
 }
 
-/// The points that ray k of the pair (i, j) joins. Both walk the patches' point sets, the second
-/// by steps of 19 from a start of the pair's own, so that every prefix covers all four dimensions.
+/// The points that ray k of the pair (i, j) joins. Both walk the patches' point sets from starts of
+/// the pair's own; the second, in each block of 64, by steps of 19, so that every prefix covers all
+/// four dimensions.
 std::pair<const PatchPoint*, const PatchPoint*> ShadowRays::ray_ends(std::uint32_t i,
                                                                      std::uint32_t j,
                                                                      std::uint32_t k,
                                                                      std::uint64_t hash) const {
-  const std::uint32_t round = k / kPointCount;
+  constexpr std::uint32_t kBlock = 64;
+  const std::uint32_t first = k / kBlock * kBlock, round = k / kPointCount;
   const std::uint32_t a = (k + static_cast<std::uint32_t>(hash)) % kPointCount;
   const std::uint32_t b =
-      (19 * k + 7 * round + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
+      (first + 19 * k % kBlock + 7 * round + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
   return {&geometry_.points(i)[a], &geometry_.points(j)[b]};
 }
 
@@ -104,8 +106,8 @@ ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
                                               std::span<const float> transmitted) const {
   VisibilityEstimate estimate;
   add(i, j, rays, transmitted, estimate);
-  if (estimate.is_empty()) return {0, 1};
-  return {estimate.part(), estimate.variance()};
+  if (estimate.is_empty()) return {0, 1, 0};
+  return {estimate.part(), estimate.variance(), estimate.effective_count()};
 }
 
 void ShadowRays::add(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,

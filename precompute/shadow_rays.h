@@ -34,8 +34,9 @@ class VisibilityEstimate {
   /// Variance of what single rays find.
   double spread() const { return std::max(0.0, visible_squared_ / sum_ - part() * part()); }
 
-  /// Variance of part(): as sure as that many rays of equal weight (Kish's effective sample size).
-  double variance() const { return spread() / (sum_ * sum_ / sum_of_squares_); }
+  /// As sure as that many rays of equal weight (Kish's effective sample size).
+  double effective_count() const { return sum_ * sum_ / sum_of_squares_; }
+  double variance() const { return spread() / effective_count(); }  ///< of part()
 
  private:
   double sum_ = 0, sum_of_squares_ = 0, visible_ = 0, visible_squared_ = 0;
@@ -47,9 +48,9 @@ class ShadowRays {
  public:
   static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
 
-  /// The most rays that a pair can have; beyond kPointCount the points meet again in other pairs.
-  /// Rays between points that do not face each other are not made: they carry no light.
-  static constexpr std::uint32_t kMostRays = 4 * kPointCount;
+  /// The most rays that a pair can have. Rays between points that do not face each other are not
+  /// made: they carry no light.
+  static constexpr std::uint32_t kMostRays = kPointCount;
 
   /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
   /// `kernel_tolerance` is that of unoccluded_exchange_area().
@@ -89,8 +90,9 @@ class ShadowRays {
   static bool is_void(const Ray& ray) { return ray.id == kNone; }
 
   struct Visibility {
-    double part;      ///< of the pair's light that gets through, [0, 1]
-    double variance;  ///< of `part`
+    double part;       ///< of the pair's light that gets through, [0, 1]
+    double variance;   ///< of `part`
+    double ray_count;  ///< rays of equal weight that would tell as much
   };
 
   /// What the `rays` of the pair (i, j) and their transmittances `transmitted` say of it: each is
@@ -112,7 +114,7 @@ class ShadowRays {
 
  private:
   // Pairs of points that are looked at for rays, at most.
-  static constexpr std::uint32_t kCandidateCount = 4 * kMostRays;
+  static constexpr std::uint32_t kCandidateCount = 4 * kPointCount;
 
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
   void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;

@@ -42,8 +42,9 @@ struct PatchPart {
 /// The shapes of all patches. Immutable, usable from any number of threads.
 class PatchGeometry {
  public:
-  /// Sample points per patch; a power of two.
-  static constexpr std::uint32_t kPointCount = 64;
+  /// Sample points per patch; a power of two. More than a pair has rays, so that the pairs of a
+  /// patch have different ones and their errors do not add up in its row.
+  static constexpr std::uint32_t kPointCount = 256;
 
   /// Parts that a patch is cut into at most: two to the power of levels.
   static constexpr int kPartLevels = 5;
@@ -61,7 +62,7 @@ class PatchGeometry {
     return {triangle_.data() + begin_[patch], triangle_.data() + begin_[patch + 1]};
   }
 
-  /// kPointCount points spread over it evenly, every prefix too, moved off the surface.
+  /// kPointCount points spread over it evenly, any that follow each other too, moved off the surface.
   std::span<const PatchPoint> points(std::size_t patch) const {
     return {points_.data() + patch * kPointCount, kPointCount};
   }
