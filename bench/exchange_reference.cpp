@@ -43,7 +43,8 @@ class ReferenceBuilder {
   ExchangeReference run() {
     trace_hemispheres();
     trace_pairs();
-    return {std::move(exchange_area_), std::move(gathered_), gather_noise()};
+    const double noise = gather_noise();
+    return {std::move(exchange_area_), std::move(gathered_), noise};
   }
 
  private:

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/ray_tracer.h"
@@ -21,10 +22,14 @@ struct EscapeScratch {
   std::vector<PatchPoint> points;
   std::vector<Ray> rays;
   std::vector<Hit> hits;
+  std::vector<Hit> near_hits;
+  std::vector<CoincidentSide> sides;
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over its `triangles`. A side that another covers stands for that one.
+/// over its `triangles`. A side that another covers stands for that one, and so does the back of a
+/// one-sided triangle for a front in the same place: of two that make up a sheet, a ray may meet
+/// either.
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch);

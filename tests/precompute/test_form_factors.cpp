@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <numeric>
 
 #include "form_factor_sums.h"
@@ -149,6 +150,47 @@ TEST(FormFactors, CopiesThatLieInOneAnotherCountOnce) {
   for (const std::uint32_t patch : model.shown_patch) EXPECT_NE(patch, kNone);
   const FormFactors f = form_factors_of(model);
   EXPECT_LT(f.closure.row_sum_error_before, 1e-3);
+}
+
+TEST(FormFactors, BothSidesOfASheetOfTwoSurfacesExchangeLight) {
+  // A room cut in two by two one-sided walls back to back in one plane: each half is closed.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 2, 3}, true);
+  std::vector<glm::dvec3> wall = {{1.3, 0, 0}, {1.3, 2, 0}, {1.3, 2, 3}, {1.3, 0, 3}};
+  test::add_polygon(scene, wall);
+  std::ranges::reverse(wall);
+  test::add_polygon(scene, wall);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 400});
+  std::size_t in_wall = 0;
+  for (const Float3& c : model.patches.centroid) in_wall += std::abs(c[0] - 1.3F) < 1e-4F ? 1 : 0;
+  EXPECT_GT(in_wall, 20U);
+  EXPECT_EQ(model.unlit_side_count, 0U);
+  const FormFactors f = form_factors_of(model);
+  for (const float absorbed : f.absorbed) EXPECT_NEAR(absorbed, 0, 1e-6);
+  EXPECT_LT(f.closure.row_sum_error_before, 1e-3);
+  for (const double sum : test::row_sums_of(model, f)) EXPECT_NEAR(sum, 1, 1e-6);
+}
+
+TEST(FormFactors, SideThatABoxStandsOnIsSealed) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 4}, true);
+  test::add_box(scene, {1, 0, 1}, {2, 1, 2}, false);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 300});
+  EXPECT_GT(model.unlit_side_count + model.buried_side_count, 0U);
+  for (std::size_t i = 0; i < model.patches.size(); ++i) {
+    const Float3 &c = model.patches.centroid[i], &n = model.patches.normal[i];
+    EXPECT_FALSE(c[1] < 1e-3F && n[1] < 0) << "the bottom of the box has a patch";
+  }
+}
+
+TEST(FormFactors, QualityDecidesRaysAndLeavesTheRest) {
+  for (const FormFactorQuality quality : {FormFactorQuality::kLow, FormFactorQuality::kHigh}) {
+    const FormFactorSettings settings = with_quality(quality, {.seed = 5, .link_epsilon = 0.5});
+    EXPECT_EQ(settings.seed, 5U);
+    EXPECT_EQ(settings.link_epsilon, 0.5);
+  }
+  EXPECT_LT(with_quality(FormFactorQuality::kLow).full_rays, FormFactorSettings().full_rays);
+  EXPECT_GT(with_quality(FormFactorQuality::kHigh).full_rays, FormFactorSettings().full_rays);
 }
 
 TEST(FormFactors, SameBitsForAnyNumberOfThreads) {
