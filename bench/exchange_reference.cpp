@@ -140,6 +140,10 @@ class ReferenceBuilder {
       }
       for (const PooledPair& pair : rows[i]) {
         const double part = pair.estimate.is_empty() ? 0 : pair.estimate.part();
+        if (is_near_pair(geometry, i, pair.patch) && !pair.is_settled()) {
+          set(i, pair.patch, hemisphere_exchange(i, pair.patch));
+          continue;
+        }
         set(i, pair.patch, pair.unoccluded * part);
       }
     }

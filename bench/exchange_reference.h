@@ -11,7 +11,8 @@ namespace rebounce::bench {
 /// neither rays nor formulas.
 struct ExchangeReference {
   /// [n][n] m²: the kernel of each pair times the pooled visibility of shadow rays between ever new
-  /// points; near pairs of many triangles by pooled hemisphere rays. No closure.
+  /// points; near pairs that are partly hidden or of many triangles by pooled hemisphere rays. No
+  /// closure.
   std::vector<double> exchange_area;
   /// [n] the gather F B of `radiosity` by hemisphere rays alone.
   std::vector<double> gathered;

@@ -27,9 +27,8 @@ struct EscapeScratch {
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over its `triangles`. A side that another covers stands for that one, and so does the back of a
-/// one-sided triangle for a front in the same place: of two that make up a sheet, a ray may meet
-/// either.
+/// over its `triangles`. Where a ray meets a side without a patch in the place of one that has one (of copies
+/// that lie in one another, or of two that make up a sheet, it may meet either), that one was met.
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch);

@@ -322,10 +322,13 @@ std::span<const PatchPart> PatchGeometry::parts(std::size_t patch, int level) co
   return {&parts_[patch * kPartStride + part_offset(level)], std::size_t{1} << level};
 }
 
-bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
-  if (geometry.triangles(i).size() * geometry.triangles(j).size() <= kFewTrianglePairs)
-    return false;
+bool is_near_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
   return i == j || !(relative_reach(geometry, i, j) < kPartReach.back());
+}
+
+bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
+  return geometry.triangles(i).size() * geometry.triangles(j).size() > kFewTrianglePairs &&
+         is_near_pair(geometry, i, j);
 }
 
 double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, std::size_t j,

@@ -107,10 +107,9 @@ class RawExchangeBuilder {
           ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe),
                                 std::span(scratch.transmitted).subspan(p * probe, probe));
       if (agreement == ShadowRays::Agreement::kMixed || is_contradicted(i, pair, agreement)) {
-        scratch.mixed.push_back(pair);
+        add_mixed(i, pair, scratch, row);
       } else if (agreement == ShadowRays::Agreement::kClear) {
-        append(row, pair, pair.unoccluded,
-               kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
+        append_clear(pair, row);
       }
     }
     append_mixed(i, scratch, row);
@@ -126,14 +125,17 @@ class RawExchangeBuilder {
     const double count = hemisphere_->find(i, pair.patch).count;
     if (agreement == ShadowRays::Agreement::kHidden) return count > 0;
     const double expected = hemisphere_->expected_count(i, pair.patch, pair.unoccluded);
-    return std::abs(count - expected) > kContradiction * std::sqrt(expected + 1);
+    const double variance = hemisphere_->variance(i, pair.patch, pair.unoccluded);
+    const double deviation = hemisphere_->expected_count(i, pair.patch, std::sqrt(variance));
+    return std::abs(count - expected) > kContradiction * deviation;
   }
 
-  /// Traces all rays of the pairs of row i that have a doubtful patch, and replaces their entries.
+  /// Traces all rays of the pairs of row i that have a doubtful patch and are not near, and replaces
+  /// their entries.
   void refine_row(std::uint32_t i, const std::vector<bool>& doubtful, Scratch& scratch,
                   std::vector<ExchangeEntry>& row) {
     const auto is_doubtful = [&](std::uint32_t j) {
-      return (doubtful[i] || doubtful[j]) && !is_coarse_pair(geometry_, i, j);
+      return (doubtful[i] || doubtful[j]) && !is_near_pair(geometry_, i, j);
     };
     std::erase_if(row, [&](const ExchangeEntry& entry) { return is_doubtful(entry.column); });
     shadow_rays_.find_facing(i, scratch.mixed, is_doubtful);
@@ -152,7 +154,11 @@ class RawExchangeBuilder {
       const ShadowRays::Visibility visible =
           shadow_rays_.visibility(i, pair.patch, std::span(scratch.rays).subspan(p * full, full),
                                   std::span(scratch.transmitted).subspan(p * full, full));
-      append_mean(i, pair, visible, row);
+      if (visible.part == 1 && !is_contradicted(i, pair, ShadowRays::Agreement::kClear)) {
+        append_clear(pair, row);
+      } else {
+        append_mean(i, pair, visible, row);
+      }
     }
     ray_count_ += scratch.mixed.size() * full;
   }
@@ -173,12 +179,33 @@ class RawExchangeBuilder {
            shadow_variance * met_variance / both);
   }
 
-  /// Adds the near pairs of many triangles to row i, as hemisphere rays have them.
+  /// A pair that is partly hidden: a near one is taken from the hemisphere rays at once, another is
+  /// put down for all of its rays.
+  void add_mixed(std::uint32_t i, const FacingPatch& pair, Scratch& scratch,
+                 std::vector<ExchangeEntry>& row) const {
+    if (is_near_pair(geometry_, i, pair.patch)) {
+      append_counted(i, hemisphere_->find(i, pair.patch), pair.unoccluded, row);
+    } else {
+      scratch.mixed.push_back(pair);
+    }
+  }
+
+  static void append_clear(const FacingPatch& pair, std::vector<ExchangeEntry>& row) {
+    append(row, pair, pair.unoccluded,
+           kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
+  }
+
+  /// Adds a pair as hemisphere rays have it.
+  void append_counted(std::uint32_t i, const HemisphereExchange::Pair& pair, double unoccluded,
+                      std::vector<ExchangeEntry>& row) const {
+    append(row, {pair.patch, std::max(unoccluded, pair.exchange)}, pair.exchange,
+           hemisphere_->variance(i, pair.patch, pair.exchange));
+  }
+
+  /// Adds the near pairs of many triangles to row i.
   void append_coarse(std::uint32_t i, std::vector<ExchangeEntry>& row) const {
     for (const HemisphereExchange::Pair& pair : hemisphere_->pairs(i)) {
-      if (!is_coarse_pair(geometry_, i, pair.patch)) continue;
-      append(row, {pair.patch, pair.exchange}, pair.exchange,
-             hemisphere_->variance(i, pair.patch, pair.exchange));
+      if (is_coarse_pair(geometry_, i, pair.patch)) append_counted(i, pair, 0, row);
     }
   }
 

@@ -106,8 +106,13 @@ class PatchGeometry {
   std::vector<PatchPart> parts_;          ///< [n][all levels, the coarsest first]
 };
 
-/// True for a pair (i, j) of many triangles so near to each other that their kernel is slow to find
-/// and coarse: hemisphere rays tell better what they exchange. A patch is near itself.
+/// True for a pair (i, j) so near to each other that the few points of shadow rays cannot stand for
+/// all that varies between them: the sum of the radii is above 0.6 of the distance. A patch is near
+/// itself.
+bool is_near_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j);
+
+/// True for a near pair (i, j) of many triangles: their kernel is slow to find and coarse, and
+/// hemisphere rays tell better what they exchange.
 bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j);
 
 /// Exchange area A_i F_ij in m² of patches i and j with nothing between them: symmetric up to
