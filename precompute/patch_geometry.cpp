@@ -20,6 +20,11 @@ constexpr double kFlatCosine = 0.999, kFlatThickness = 0.02;
 // sums over parts are coarser, with as many as that.
 constexpr std::size_t kFewTrianglePairs = 4, kFewNearTrianglePairs = 64;
 
+// Below this tolerance sums over parts are too coarse, and pairs of as many triangles as there are
+// pairs of parts are summed triangle by triangle.
+constexpr double kPartTolerance = 1e-4;
+constexpr std::size_t kPartPairs = std::size_t{1} << (2 * PatchGeometry::kPartLevels);
+
 // Sums over 2^level parts each are taken while (sum of radii) / distance is below these: their
 // error goes with (that / sqrt(2)^level)^2. Measured: tests/precompute/test_patch_geometry.cpp.
 constexpr std::array<double, 4> kPartReach = {0.02, 0.1, 0.4, 0.6};
@@ -334,7 +339,8 @@ bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j)
 double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, std::size_t j,
                                 double tolerance) {
   const std::span<const FlatTriangle> a = geometry.triangles(i), b = geometry.triangles(j);
-  if (a.size() * b.size() <= kFewTrianglePairs) return between_triangles(a, b, tolerance);
+  const std::size_t few = tolerance < kPartTolerance ? kPartPairs : kFewTrianglePairs;
+  if (a.size() * b.size() <= few) return between_triangles(a, b, tolerance);
   const double reach = relative_reach(geometry, i, j);
   for (std::size_t k = 0; i != j && k < kPartReach.size(); ++k) {
     if (!(reach < kPartReach[k])) continue;
