@@ -52,15 +52,14 @@ class FarBlocks {
     for (const std::uint32_t p : patches(cluster)) {
       const double size = std::sqrt(model_.patches.area[p]);
       bounds.radius = std::max(
-          bounds.radius,
-          glm::distance(bounds.centre, to_dvec3(model_.patches.centroid[p])) + size);
+          bounds.radius, glm::distance(bounds.centre, to_dvec3(model_.patches.centroid[p])) + size);
     }
     return bounds;
   }
 
   bool is_far(std::uint32_t a, std::uint32_t b) const {
-    const double gap = glm::distance(bounds_[a].centre, bounds_[b].centre) - bounds_[a].radius -
-                       bounds_[b].radius;
+    const double gap =
+        glm::distance(bounds_[a].centre, bounds_[b].centre) - bounds_[a].radius - bounds_[b].radius;
     return gap >= 2 * std::min(bounds_[a].radius, bounds_[b].radius);
   }
 

@@ -108,9 +108,8 @@ class ReferenceBuilder {
 
   std::vector<PooledPair> facing_pairs(const ShadowRays& shadow_rays, std::uint32_t i) const {
     std::vector<FacingPatch> facing;
-    shadow_rays.find_facing(i, facing, [&](std::uint32_t j) {
-      return !is_coarse_pair(shadow_rays.geometry(), i, j);
-    });
+    shadow_rays.find_facing(
+        i, facing, [&](std::uint32_t j) { return !is_coarse_pair(shadow_rays.geometry(), i, j); });
     std::vector<PooledPair> row;
     row.reserve(facing.size());
     for (const FacingPatch& pair : facing) {

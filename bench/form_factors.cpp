@@ -78,9 +78,9 @@ void measure_known(const std::vector<KnownFormFactor>& cases, std::size_t patch_
       if (q.asked_part == 0) continue;
       const FormFactors f = form_factors_of(model, q.quality);
       const double error = std::abs(test::factor_between(model, f, 0, 1) - known.factor);
-      report.at_most(known.name, model.patches.size(), q.name, "error of F", error,
-                     std::max(q.asked_part * known.factor, q.asked_least) +
-                         known.model_error * known.factor);
+      report.at_most(
+          known.name, model.patches.size(), q.name, "error of F", error,
+          std::max(q.asked_part * known.factor, q.asked_least) + known.model_error * known.factor);
     }
   }
 }
@@ -159,8 +159,8 @@ class SceneBench {
       add(q.name, "gather F B, L2",
           light_error(gather(matrices.back(), area(), light), truth.gathered, area()),
           asked ? 3e-3 : 0);
-      add(q.name, "F, Frobenius",
-          form_factor_error(matrices.back(), truth.exchange_area, area()), asked ? 0.03 : 0);
+      add(q.name, "F, Frobenius", form_factor_error(matrices.back(), truth.exchange_area, area()),
+          asked ? 0.03 : 0);
       add(q.name, "row sums before closure", f.closure.row_sum_error_before);
       add(q.name, "F changed by closure", f.closure.relative_change);
     }
@@ -181,8 +181,7 @@ class SceneBench {
     const double escape = static_cast<double>(area().size()) * settings.hemisphere_rays;
     const double shadow = static_cast<double>(f.ray_count) - escape;
     const double traced = speed.tracer_seconds(shadow, escape, &Timing::minimum);
-    const double kernel =
-        speed.kernel_seconds(static_cast<double>(f.pair_count), &Timing::minimum);
+    const double kernel = speed.kernel_seconds(static_cast<double>(f.pair_count), &Timing::minimum);
     report_.at_least(name_, area().size(), "default", "bare Embree / traced, same rays",
                      speed.bare_seconds(shadow, escape, &Timing::minimum) / traced, 0.7);
     add("default", "kernel / phase", kernel / phase);

@@ -58,10 +58,10 @@ void add_halves(std::vector<KnownFormFactor>& cases) {
   const Polygon below = flat(unit, 0, true), above = flat(unit, 1, false);
   cases.push_back(between("half screen", below, above, {flat({-0.1, 0.5, -0.1, 1.1}, 0.5, true)},
                           0.5 * kOppositeSquares));
-  cases.push_back(between(
-      "two quarter screens", below, above,
-      {flat({-0.1, 0.5, -0.1, 0.5}, 0.5, true), flat({0.5, 1.1, 0.5, 1.1}, 0.5, true)},
-      0.5 * kOppositeSquares));
+  cases.push_back(
+      between("two quarter screens", below, above,
+              {flat({-0.1, 0.5, -0.1, 0.5}, 0.5, true), flat({0.5, 1.1, 0.5, 1.1}, 0.5, true)},
+              0.5 * kOppositeSquares));
 }
 
 /// A wall across both surfaces: each half sees only its own.
@@ -73,29 +73,27 @@ void add_partitions(std::vector<KnownFormFactor>& cases) {
   const Rectangle unit = {0, 1, 0, 1};
   cases.push_back(
       between("opposite, partition", flat(unit, 0, true), flat(unit, 1, false), {wall}, opposite));
-  const double adjacent = at * perpendicular_rectangles(1, 1, at) +
-                          (1 - at) * perpendicular_rectangles(1, 1, 1 - at);
+  const double adjacent =
+      at * perpendicular_rectangles(1, 1, at) + (1 - at) * perpendicular_rectangles(1, 1, 1 - at);
   const Polygon side = {{0, 0, 0}, {0, 0, 1}, {1, 0, 1}, {1, 0, 0}};
   cases.push_back(between("adjacent, partition", flat(unit, 0, true), side, {wall}, adjacent));
 }
 
-/// All light that enters the opening halfway meets the upper square, which is just wide enough: what
-/// is exchanged is what the opening gets. What meets a plate there would have met the square.
+/// All light that enters the opening halfway meets the upper square, which is just wide enough:
+/// what is exchanged is what the opening gets. What meets a plate there would have met the square.
 void add_openings(std::vector<KnownFormFactor>& cases) {
   const Rectangle unit = {0, 1, 0, 1}, wide = {-0.9, 1.9, -0.9, 1.9},
                   halfway = {-0.46, 1.46, -0.46, 1.46};
   const Polygon below = flat(unit, 0, true), above = flat(wide, 1, false);
   const Rectangle square = {0.31, 0.69, 0.31, 0.69}, slot = {0.1, 0.9, 0.47, 0.53};
   const auto to_opening = [&](const Rectangle& r) { return parallel_rectangles(unit, r, 0.5); };
-  cases.push_back(between("square hole", below, above, frame(halfway, square, 0.5),
-                          to_opening(square)));
   cases.push_back(
-      between("slot", below, above, frame(halfway, slot, 0.5), to_opening(slot)));
+      between("square hole", below, above, frame(halfway, square, 0.5), to_opening(square)));
+  cases.push_back(between("slot", below, above, frame(halfway, slot, 0.5), to_opening(slot)));
   const double open = parallel_rectangles(unit, wide, 1);
-  cases.push_back(between("square plate", below, above, {flat(square, 0.5, true)},
-                          open - to_opening(square)));
   cases.push_back(
-      between("strip", below, above, {flat(slot, 0.5, true)}, open - to_opening(slot)));
+      between("square plate", below, above, {flat(square, 0.5, true)}, open - to_opening(square)));
+  cases.push_back(between("strip", below, above, {flat(slot, 0.5, true)}, open - to_opening(slot)));
 }
 
 /// By the contour integral of the triangles themselves.

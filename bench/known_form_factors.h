@@ -11,7 +11,7 @@ namespace rebounce::bench {
 struct KnownFormFactor {
   std::string name;
   Scene scene;
-  double factor = 0;       ///< from material 0 to material 1
+  double factor = 0;  ///< from material 0 to material 1
   /// What the scene itself differs by (discs with corners), as a part of the factor: by the contour
   /// integral, which tests of the kernel compare with the table.
   double model_error = 0;

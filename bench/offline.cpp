@@ -87,9 +87,7 @@ class OfflineStage {
     for (const auto& [phase, seconds] : report_.seconds) samples_[phase].push_back(seconds);
   }
 
-  Timing timing(const std::string& what) const {
-    return summarise(samples_.at(what));
-  }
+  Timing timing(const std::string& what) const { return summarise(samples_.at(what)); }
 
   void row(Table& table, const std::string& what, const Timing& time, const Table::Cell& rate = {},
            const Table::Cell& unit = {}, const Table::Cell& ratio = {},
@@ -101,7 +99,8 @@ class OfflineStage {
   void report_form_factors(Table& table) const {
     const Timing phase = timing("form factors");
     const auto rays = static_cast<double>(report_.ray_count);
-    const double escape = static_cast<double>(model_.patches.size()) * ff_settings().hemisphere_rays;
+    const double escape =
+        static_cast<double>(model_.patches.size()) * ff_settings().hemisphere_rays;
     const double bare = speed_->bare_seconds(rays - escape, escape, &Timing::median);
     row(table, "form factors", phase, rays / phase.median / 1e6, "Mray/s", bare / phase.median,
         "bare Embree, same rays");

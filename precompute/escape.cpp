@@ -25,7 +25,8 @@ void prefer_lit_side(const PatchModel& model, const RayTracer& tracer, const Ray
   const auto corner = [&](int k) {
     return to_dvec3(mesh.position[mesh.triangle[hit.triangle][k]]);
   };
-  const glm::dvec3 normal = glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+  const glm::dvec3 normal =
+      glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
   const glm::dvec3 point =
       to_dvec3(ray.origin) + static_cast<double>(hit.t) * to_dvec3(ray.direction);
   find_coincident_sides(

@@ -27,8 +27,9 @@ struct EscapeScratch {
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over its `triangles`. Where a ray meets a side without a patch in the place of one that has one (of copies
-/// that lie in one another, or of two that make up a sheet, it may meet either), that one was met.
+/// over its `triangles`. Where a ray meets a side without a patch in the place of one that has one
+/// (of copies that lie in one another, or of two that make up a sheet, it may meet either), that
+/// one was met.
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch);

@@ -128,8 +128,9 @@ class LitSides {
   }
 
   /// Looks at points all over a side for other surfaces in the same place. Returns kUnlit if it
-  /// lies on fronts everywhere, with something solid behind one of the two; else lists in `cover` sides that together cover it, none if some
-  /// point is bare. One that covers a point is enough for it: that of the earliest triangle.
+  /// lies on fronts everywhere, with something solid behind one of the two; else lists in `cover`
+  /// sides that together cover it, none if some point is bare. One that covers a point is enough
+  /// for it: that of the earliest triangle.
   SideKind look_for_contact(std::uint32_t t, bool front, Scratch& scratch,
                             std::vector<CoincidentSide>& cover) const {
     const Side side = side_of(t, front);

@@ -251,9 +251,8 @@ std::array<std::uint8_t, 3> find_outermost(std::span<const PatchPoint> points,
       find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, centre); });
   const std::uint8_t b =
       find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, at(a)); });
-  const std::uint8_t c = find_farthest(points, [&](const glm::dvec3& p) {
-    return glm::length(glm::cross(p - at(a), p - at(b)));
-  });
+  const std::uint8_t c = find_farthest(
+      points, [&](const glm::dvec3& p) { return glm::length(glm::cross(p - at(a), p - at(b))); });
   return {a, b, c};
 }
 

@@ -130,8 +130,8 @@ class RawExchangeBuilder {
     return std::abs(count - expected) > kContradiction * std::sqrt(expected + 1);
   }
 
-  /// Traces all rays of the pairs of row i that have a doubtful patch and are not near, and replaces
-  /// their entries.
+  /// Traces all rays of the pairs of row i that have a doubtful patch and are not near, and
+  /// replaces their entries.
   void refine_row(std::uint32_t i, const std::vector<bool>& doubtful, Scratch& scratch,
                   std::vector<ExchangeEntry>& row) {
     const auto is_doubtful = [&](std::uint32_t j) {

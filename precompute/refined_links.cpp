@@ -53,7 +53,8 @@ void check_form_factor_settings(const FormFactorSettings& settings) {
   };
   if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) ||
       settings.hemisphere_rays < 1) {
-    throw Error("form factors: rays per pair must be between 1 and 256, hemisphere rays at least 1");
+    throw Error(
+        "form factors: rays per pair must be between 1 and 256, hemisphere rays at least 1");
   }
   if (!(settings.link_epsilon >= 0)) {
     throw Error("form factors: the error of a link must not be negative");

@@ -210,9 +210,10 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
           "light that is gathered in the mean")
       ->check(CLI::Range(1e-5, 0.5));
   command
-      ->add_option("--quality", chosen->quality,
-                   "Rays and kernels of the form factors: view factors to some 0.5 % by default, to "
-                   "0.1 % in ten times as long with high")
+      ->add_option(
+          "--quality", chosen->quality,
+          "Rays and kernels of the form factors: view factors to some 0.5 % by default, to "
+          "0.1 % in ten times as long with high")
       ->check(CLI::IsMember({"low", "default", "high"}))
       ->capture_default_str();
   command

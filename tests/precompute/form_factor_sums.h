@@ -34,8 +34,8 @@ inline double factor_between(const PatchModel& model, const FormFactors& f, std:
     if (material[i] == from) area += model.patches.area[i];
     for (std::uint64_t k = f.exchange.row_begin[i]; k < f.exchange.row_begin[i + 1]; ++k) {
       const std::uint32_t j = f.exchange.column[k];
-      const bool wanted = (material[i] == from && material[j] == to) ||
-                          (material[j] == from && material[i] == to);
+      const bool wanted =
+          (material[i] == from && material[j] == to) || (material[j] == from && material[i] == to);
       if (wanted) exchange += f.exchange.exchange_area[k];
     }
   }

@@ -62,7 +62,8 @@ class PatchGeometry {
     return {triangle_.data() + begin_[patch], triangle_.data() + begin_[patch + 1]};
   }
 
-  /// kPointCount points spread over it evenly, any that follow each other too, moved off the surface.
+  /// kPointCount points spread over it evenly, any that follow each other too, moved off the
+  /// surface.
   std::span<const PatchPoint> points(std::size_t patch) const {
     return {points_.data() + patch * kPointCount, kPointCount};
   }
@@ -95,15 +96,15 @@ class PatchGeometry {
 
   void add_parts(std::size_t patch);
 
-  std::vector<std::uint32_t> begin_;      ///< [n + 1]
-  std::vector<FlatTriangle> triangle_;    ///< those of patch i at [begin_[i], begin_[i + 1])
-  std::vector<double> area_;              ///< [n] m²
-  std::vector<PatchBounds> bounds_;       ///< [n]
-  std::vector<PatchPoint> points_;        ///< [n][kPointCount]
+  std::vector<std::uint32_t> begin_;    ///< [n + 1]
+  std::vector<FlatTriangle> triangle_;  ///< those of patch i at [begin_[i], begin_[i + 1])
+  std::vector<double> area_;            ///< [n] m²
+  std::vector<PatchBounds> bounds_;     ///< [n]
+  std::vector<PatchPoint> points_;      ///< [n][kPointCount]
   std::vector<std::array<std::uint8_t, 3>> outermost_;  ///< [n]
-  std::vector<Fragments> fragments_;      ///< [n]
-  std::vector<std::uint8_t> flat_level_;  ///< [n]
-  std::vector<PatchPart> parts_;          ///< [n][all levels, the coarsest first]
+  std::vector<Fragments> fragments_;                    ///< [n]
+  std::vector<std::uint8_t> flat_level_;                ///< [n]
+  std::vector<PatchPart> parts_;                        ///< [n][all levels, the coarsest first]
 };
 
 /// True for a pair (i, j) so near to each other that the few points of shadow rays cannot stand for
