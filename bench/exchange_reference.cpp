@@ -35,7 +35,7 @@ class ReferenceBuilder {
       : model_(model),
         tracer_(tracer),
         radiosity_(radiosity),
-        factor_(factor),
+        factor_(factor + factor % 2),  // two halves of as many rounds
         n_(model.patches.size()),
         patch_triangles_(model.mesh.triangle_patch, n_),
         rays_each_(FormFactorSettings().hemisphere_rays) {}

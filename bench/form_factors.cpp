@@ -86,11 +86,14 @@ void measure_known(const std::vector<KnownFormFactor>& cases, std::size_t patch_
 }
 
 void measure_closed(const std::string& name, const PatchModel& model, Report& report) {
-  const FormFactors f = form_factors_of(model, FormFactorQuality::kDefault);
-  const std::size_t n = model.patches.size();
-  report.at_most(name, n, "default", "row sums before closure", f.closure.row_sum_error_before,
-                 1e-3);
-  report.at_most(name, n, "default", "row sums after closure", f.closure.row_sum_error_after, 1e-6);
+  for (const NamedQuality& q : kQualities) {
+    if (q.asked_part == 0) continue;
+    const FormFactors f = form_factors_of(model, q.quality);
+    const std::size_t n = model.patches.size();
+    report.at_most(name, n, q.name, "row sums before closure", f.closure.row_sum_error_before,
+                   1e-3);
+    report.at_most(name, n, q.name, "row sums after closure", f.closure.row_sum_error_after, 1e-6);
+  }
 }
 
 void measure_rooms(Report& report) {
