@@ -107,7 +107,7 @@ class RawExchangeBuilder {
           ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe),
                                 std::span(scratch.transmitted).subspan(p * probe, probe));
       if (agreement == ShadowRays::Agreement::kMixed || is_contradicted(i, pair, agreement)) {
-        add_mixed(i, pair, scratch, row);
+        scratch.mixed.push_back(pair);
       } else if (agreement == ShadowRays::Agreement::kClear) {
         append_clear(pair, row);
       }
@@ -135,7 +135,7 @@ class RawExchangeBuilder {
   void refine_row(std::uint32_t i, const std::vector<bool>& doubtful, Scratch& scratch,
                   std::vector<ExchangeEntry>& row) {
     const auto is_doubtful = [&](std::uint32_t j) {
-      return (doubtful[i] || doubtful[j]) && !is_near_pair(geometry_, i, j);
+      return (doubtful[i] || doubtful[j]) && !is_coarse_pair(geometry_, i, j);
     };
     std::erase_if(row, [&](const ExchangeEntry& entry) { return is_doubtful(entry.column); });
     shadow_rays_.find_facing(i, scratch.mixed, is_doubtful);
@@ -179,33 +179,17 @@ class RawExchangeBuilder {
            shadow_variance * met_variance / both);
   }
 
-  /// A pair that is partly hidden: a near one is taken from the hemisphere rays at once, another is
-  /// put down for all of its rays.
-  void add_mixed(std::uint32_t i, const FacingPatch& pair, Scratch& scratch,
-                 std::vector<ExchangeEntry>& row) const {
-    if (is_near_pair(geometry_, i, pair.patch)) {
-      append_counted(i, hemisphere_->find(i, pair.patch), pair.unoccluded, row);
-    } else {
-      scratch.mixed.push_back(pair);
-    }
-  }
-
   static void append_clear(const FacingPatch& pair, std::vector<ExchangeEntry>& row) {
     append(row, pair, pair.unoccluded,
            kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
   }
 
-  /// Adds a pair as hemisphere rays have it.
-  void append_counted(std::uint32_t i, const HemisphereExchange::Pair& pair, double unoccluded,
-                      std::vector<ExchangeEntry>& row) const {
-    append(row, {pair.patch, std::max(unoccluded, pair.exchange)}, pair.exchange,
-           hemisphere_->variance(i, pair.patch, pair.exchange));
-  }
-
-  /// Adds the near pairs of many triangles to row i.
+  /// Adds the near pairs of many triangles to row i, as hemisphere rays have them.
   void append_coarse(std::uint32_t i, std::vector<ExchangeEntry>& row) const {
     for (const HemisphereExchange::Pair& pair : hemisphere_->pairs(i)) {
-      if (is_coarse_pair(geometry_, i, pair.patch)) append_counted(i, pair, 0, row);
+      if (!is_coarse_pair(geometry_, i, pair.patch)) continue;
+      append(row, {pair.patch, pair.exchange}, pair.exchange,
+             hemisphere_->variance(i, pair.patch, pair.exchange));
     }
   }
 

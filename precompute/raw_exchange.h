@@ -31,8 +31,7 @@ struct RawExchange {
 ///   hemisphere rays, that is the answer; else it gets all of its rays, and if those do not agree
 ///   either the mean of what they and the hemisphere rays say, weighted by the inverse of their
 ///   variances.
-/// - 3. A near pair that is partly hidden or of many triangles is taken from the hemisphere rays
-///   alone.
+/// - 3. A near pair of many triangles is taken from the hemisphere rays alone.
 /// - 4. Rows whose sum is off its target get all rays for every pair.
 ///
 /// Rows are shared out among OpenMP threads; the bits do not depend on how many. Throws Cancelled
