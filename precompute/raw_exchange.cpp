@@ -170,9 +170,7 @@ class RawExchangeBuilder {
     const double most = pair.unoccluded, shadow = most * visible.part;
     const double met = hemisphere_->find(i, pair.patch).exchange;
     const double guess = std::min(most, 0.5 * (shadow + met));
-    // No part is known better than that many rays tell (rule of succession).
-    const double rays = visible.ray_count, part = (guess / most * rays + 1) / (rays + 2);
-    const double shadow_variance = most * most * part * (1 - part) / (rays + 1);
+    const double shadow_variance = most * most * variance_of_part(guess / most, visible);
     const double met_variance = hemisphere_->variance(i, pair.patch, guess);
     const double both = shadow_variance + met_variance;
     append(row, pair, (shadow * met_variance + met * shadow_variance) / both,
@@ -182,6 +180,16 @@ class RawExchangeBuilder {
   static void append_clear(const FacingPatch& pair, std::vector<ExchangeEntry>& row) {
     append(row, pair, pair.unoccluded,
            kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
+  }
+
+  /// Variance of what the rays of `visible` say if `part` of the light gets through. Rays that are
+  /// dimmed, as by glass, spread less than those that are stopped or not.
+  static double variance_of_part(double part, const ShadowRays::Visibility& visible) {
+    const double binary = visible.part * (1 - visible.part), rays = visible.ray_count;
+    const double spread = binary > 0 ? visible.variance * rays / binary : 1;
+    // No part is known better than that many rays tell (rule of succession).
+    const double expected = (part * rays + 1) / (rays + 2), least = 1 / (rays + 2);
+    return std::max(spread * expected * (1 - expected) / (rays + 1), least * least);
   }
 
   /// Adds the near pairs of many triangles to row i, as hemisphere rays have them.
