@@ -331,7 +331,7 @@ bool is_near_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
 }
 
 bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
-  return geometry.triangles(i).size() * geometry.triangles(j).size() > kFewTrianglePairs &&
+  return geometry.triangles(i).size() * geometry.triangles(j).size() > kFewNearTrianglePairs &&
          is_near_pair(geometry, i, j);
 }
 
