@@ -1,19 +1,16 @@
 // The offline stage by phase, beside what bare Embree and BLAS reach in the same run.
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <limits>
 #include <map>
+#include <optional>
 
-#include "bare_embree.h"
 #include "blas_peak.h"
 #include "program.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/transfer/error.h"
-#include "shadow_rays.h"
-#include "stage_rays.h"
+#include "stage_speed.h"
 #include "tiled_cholesky.h"
 #include "timing.h"
 
@@ -50,23 +47,16 @@ class OfflineStage {
         model_(make_patch_model(import_gltf(scene), options.settings.subdivision)),
         tracer_(model_.mesh.position,
                 std::span(model_.mesh.triangle).first(model_.mesh.surface_count())),
-        geometry_(model_, tracer_, ff_settings().seed),
-        shadow_rays_(geometry_, ff_settings().seed, ff_settings().kernel_tolerance),
         matrix_(test_matrix(model_.patches.size())) {}
 
   void measure() {
     build_transfer_data(scene_, options_.settings, report_);
-    choose_rows();
-    const StageRays rays = make_stage_rays(model_, tracer_, ff_settings(), row_step_);
-    sampled_shadow_count_ = rays.shadow_count;
-    sampled_escape_count_ = rays.escape_count;
-    BareEmbree embree(model_.mesh, rays);
+    speed_.emplace(model_, tracer_, ff_settings(), options_.ray_limit, report_.ray_count);
     BlasPeak blas;
     blas_flops_ = blas.flops();
     for (int repeat = 0; repeat < options_.common.repeats; ++repeat) {
       measure_stage();
-      measure_embree(embree, rays.hidden_count);
-      add("pairs", [&] { find_pairs(); });
+      speed_->measure_once();
       TiledMatrix matrix = matrix_;
       add("inverse", [&] { invert_positive_definite(matrix); });
       add("dgemm", [&] { blas.run(); });
@@ -87,12 +77,6 @@ class OfflineStage {
  private:
   const FormFactorSettings& ff_settings() const { return options_.settings.form_factors; }
 
-  /// Takes as many rows, evenly spread, as keep the rays that lie ready below the limit.
-  void choose_rows() {
-    const double parts = static_cast<double>(report_.ray_count) / options_.ray_limit;
-    row_step_ = static_cast<std::uint32_t>(std::max(1.0, std::ceil(parts)));
-  }
-
   void add(const std::string& what, const std::function<void()>& work) {
     samples_[what].push_back(seconds_of(work));
   }
@@ -103,44 +87,7 @@ class OfflineStage {
     for (const auto& [phase, seconds] : report_.seconds) samples_[phase].push_back(seconds);
   }
 
-  void measure_embree(BareEmbree& embree, std::uint64_t hidden_count) {
-    for (const TraceMode mode : kTraceModes) {
-      embree.reset();
-      add(std::string("shadow ") + name(mode), [&] { embree.trace_shadow(mode); });
-      add(std::string("escape ") + name(mode), [&] { embree.trace_escape(mode); });
-      check_agreement(embree.hidden_count(), hidden_count);
-    }
-  }
-
-  /// Embree's packets and single rays round differently, so that a ray in a million that grazes an
-  /// edge may go either way; a mode that traced something else would be off by far more.
-  void check_agreement(std::uint64_t hidden_count, std::uint64_t expected) const {
-    constexpr double kTolerance = 1e-4;
-    const double difference =
-        std::abs(static_cast<double>(hidden_count) - static_cast<double>(expected));
-    if (difference <= kTolerance * static_cast<double>(sampled_shadow_count_)) return;
-    throw Error("bare Embree and the ray tracer disagree on " + scene_ + ": " +
-                std::to_string(hidden_count) + " hidden rays, not " + std::to_string(expected));
-  }
-
-  void find_pairs() {
-    std::uint64_t pairs = 0;
-#pragma omp parallel reduction(+ : pairs)
-    {
-      std::vector<FacingPatch> facing;
-#pragma omp for schedule(dynamic, 4)
-      for (std::size_t i = 0; i < geometry_.patch_count(); i += row_step_) {
-        shadow_rays_.find_facing(static_cast<std::uint32_t>(i), facing,
-                                 [](std::uint32_t) { return true; });
-        pairs += facing.size();
-      }
-    }
-    sampled_pair_count_ = pairs;
-  }
-
-  Timing timing(const std::string& what) const {
-    return summarise(samples_.at(what));
-  }
+  Timing timing(const std::string& what) const { return summarise(samples_.at(what)); }
 
   void row(Table& table, const std::string& what, const Timing& time, const Table::Cell& rate = {},
            const Table::Cell& unit = {}, const Table::Cell& ratio = {},
@@ -149,38 +96,27 @@ class OfflineStage {
                time.median, time.spread, rate, unit, ratio, baseline});
   }
 
-  /// The fastest mode's median seconds for the sampled rays of `kind`.
-  double fastest(const std::string& kind) const {
-    double seconds = std::numeric_limits<double>::infinity();
-    for (const TraceMode mode : kTraceModes) {
-      seconds = std::min(seconds, timing(kind + " " + name(mode)).median);
-    }
-    return seconds;
-  }
-
   void report_form_factors(Table& table) const {
     const Timing phase = timing("form factors");
     const auto rays = static_cast<double>(report_.ray_count);
-    const double escape = static_cast<double>(model_.patches.size()) * ff_settings().hemisphere_rays;
-    // Seconds of bare Embree for all rays of the phase, in the proportion of their kinds.
-    const double bare =
-        (rays - escape) * fastest("shadow") / static_cast<double>(sampled_shadow_count_) +
-        escape * fastest("escape") / static_cast<double>(sampled_escape_count_);
+    const double escape =
+        static_cast<double>(model_.patches.size()) * ff_settings().hemisphere_rays;
+    const double bare = speed_->bare_seconds(rays - escape, escape, &Timing::median);
     row(table, "form factors", phase, rays / phase.median / 1e6, "Mray/s", bare / phase.median,
         "bare Embree, same rays");
-    const Timing pairs = timing("pairs");
-    const double scale =
-        static_cast<double>(report_.pair_count) / static_cast<double>(sampled_pair_count_);
-    row(table, "pairs and kernel alone", {pairs.median * scale, pairs.spread},
-        static_cast<double>(sampled_pair_count_) / pairs.median / 1e6, "Mpair/s",
-        pairs.median * scale / phase.median, "form factors");
-    report_embree(table, "shadow", static_cast<double>(sampled_shadow_count_));
-    report_embree(table, "escape", static_cast<double>(sampled_escape_count_));
+    const Timing pairs = speed_->pairs();
+    const double all_pairs =
+        speed_->kernel_seconds(static_cast<double>(report_.pair_count), &Timing::median);
+    row(table, "pairs and kernel alone", {all_pairs, pairs.spread, 0},
+        static_cast<double>(speed_->pair_count()) / pairs.median / 1e6, "Mpair/s",
+        all_pairs / phase.median, "form factors");
+    report_embree(table, "shadow", static_cast<double>(speed_->shadow_count()));
+    report_embree(table, "escape", static_cast<double>(speed_->escape_count()));
   }
 
   void report_embree(Table& table, const std::string& kind, double ray_count) const {
     for (const TraceMode mode : kTraceModes) {
-      const Timing time = timing(kind + " " + name(mode));
+      const Timing time = speed_->bare(kind, mode);
       row(table, "bare Embree, " + kind + " rays, " + name(mode), time,
           ray_count / time.median / 1e6, "Mray/s");
     }
@@ -199,12 +135,9 @@ class OfflineStage {
   const OfflineOptions& options_;
   PatchModel model_;
   RayTracer tracer_;
-  PatchGeometry geometry_;
-  ShadowRays shadow_rays_;
   TiledMatrix matrix_;
   BuildReport report_;
-  std::uint32_t row_step_ = 1;
-  std::uint64_t sampled_shadow_count_ = 0, sampled_escape_count_ = 0, sampled_pair_count_ = 0;
+  std::optional<StageSpeed> speed_;
   double blas_flops_ = 0;
   std::map<std::string, std::vector<double>> samples_;  ///< seconds
 };

@@ -25,8 +25,12 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
   std::vector<float> transmitted;
   EscapeScratch escape;
   const auto add_shadow_stream = [&](std::uint32_t row, const std::vector<FacingPatch>& pairs,
-                                     int count) {
-    shadow_rays.make_rays(row, pairs, count, rays);
+                                     int count, bool probe) {
+    if (probe) {
+      shadow_rays.make_probe_rays(row, pairs, count, rays);
+    } else {
+      shadow_rays.make_rays(row, pairs, count, rays);
+    }
     result.shadow.push_back(rays);
     result.shadow_count += rays.size();
     transmitted.resize(rays.size());
@@ -36,7 +40,7 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
   for (std::uint32_t row = 0; row < geometry.patch_count(); row += row_step) {
     shadow_rays.find_facing(
         row, facing, [&](std::uint32_t column) { return !is_coarse_pair(geometry, row, column); });
-    add_shadow_stream(row, facing, settings.probe_rays);
+    add_shadow_stream(row, facing, settings.probe_rays, true);
     mixed.clear();
     const auto probe_rays = static_cast<std::size_t>(settings.probe_rays);
     for (std::size_t p = 0; p < facing.size(); ++p) {
@@ -45,7 +49,7 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
                                 std::span(transmitted).subspan(p * probe_rays, probe_rays));
       if (agreement == ShadowRays::Agreement::kMixed) mixed.push_back(facing[p]);
     }
-    add_shadow_stream(row, mixed, settings.full_rays);
+    add_shadow_stream(row, mixed, settings.full_rays, false);
     measure_escape(model, patch_triangles[row], row, tracer, settings.hemisphere_rays,
                    settings.seed, escape);
     result.escape.push_back(escape.rays);

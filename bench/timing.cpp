@@ -42,7 +42,7 @@ double seconds_of(const std::function<void()>& work) {
 Timing summarise(std::vector<double> samples) {
   std::ranges::sort(samples);
   const double median = quantile(samples, 0.5);
-  return {median, (quantile(samples, 0.75) - quantile(samples, 0.25)) / median};
+  return {median, (quantile(samples, 0.75) - quantile(samples, 0.25)) / median, samples.front()};
 }
 
 std::vector<Timing> time_interleaved(std::span<const TimedCase> cases,

@@ -11,8 +11,9 @@ double seconds_of(const std::function<void()>& work);
 
 /// What repeated measurements of one thing amount to.
 struct Timing {
-  double median = 0;  ///< seconds
-  double spread = 0;  ///< interquartile range as a part of the median
+  double median = 0;   ///< seconds
+  double spread = 0;   ///< interquartile range as a part of the median
+  double minimum = 0;  ///< seconds; what a machine that others use disturbs least
 };
 
 /// Summarises at least one sample, in seconds.

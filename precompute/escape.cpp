@@ -3,9 +3,49 @@
 #include <array>
 
 #include "hemisphere_rays.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/sky_cells.h"
 
 namespace rebounce {
+namespace {
+
+/// The display triangle of the side that was hit, kNone for the back of a one-sided one.
+std::uint32_t side_at(const DisplayMesh& mesh, const Hit& hit) {
+  return hit.front ? hit.triangle : mesh.back_triangle[hit.triangle];
+}
+
+bool has_own_patch(const DisplayMesh& mesh, const Hit& hit) {
+  const std::uint32_t side = side_at(mesh, hit);
+  return side != kNone && mesh.triangle_patch[side] != kNone;
+}
+
+/// If `hit` of `ray` is a side without a patch of its own, in whose place another one has one and
+/// faces the same way, makes that one the side that was hit. The weights of the vertices are left.
+void prefer_lit_side(const PatchModel& model, const RayTracer& tracer, const Ray& ray, Hit& hit,
+                     EscapeScratch& scratch) {
+  const DisplayMesh& mesh = model.mesh;
+  const auto corner = [&](int k) {
+    return to_dvec3(mesh.position[mesh.triangle[hit.triangle][k]]);
+  };
+  const glm::dvec3 normal =
+      glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+  const glm::dvec3 point =
+      to_dvec3(ray.origin) + static_cast<double>(hit.t) * to_dvec3(ray.direction);
+  find_coincident_sides(
+      tracer, to_float3(point), to_float3(hit.front ? normal : -normal), hit.triangle,
+      [&](std::uint32_t t) { return mesh.back_triangle[t] != kNone; }, scratch.near_hits,
+      scratch.sides);
+  std::uint32_t least = kNone;
+  for (const CoincidentSide& side : scratch.sides) {
+    const std::uint32_t shown = side.front ? side.triangle : mesh.back_triangle[side.triangle];
+    if (!side.same_way || mesh.triangle_patch[shown] >= least) continue;
+    least = mesh.triangle_patch[shown];
+    hit.triangle = side.triangle;
+    hit.front = side.front;
+  }
+}
+
+}  // namespace
 
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
@@ -21,7 +61,10 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
   int sky = 0, absorbed = 0;
   std::array<int, kSkyCellCount> count{};
   for (std::size_t k = 0; k < scratch.hits.size(); ++k) {
-    const Hit& hit = scratch.hits[k];
+    Hit& hit = scratch.hits[k];
+    if (hit.triangle != kNone && !has_own_patch(model.mesh, hit)) {
+      prefer_lit_side(model, tracer, scratch.rays[k], hit, scratch);
+    }
     if (hit.triangle == kNone) {
       ++sky;
       ++count[sky_cell(scratch.rays[k].direction)];
@@ -39,7 +82,7 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
 }
 
 std::uint32_t patch_at(const PatchModel& model, const Hit& hit) {
-  const std::uint32_t side = hit.front ? hit.triangle : model.mesh.back_triangle[hit.triangle];
+  const std::uint32_t side = side_at(model.mesh, hit);
   return side == kNone ? kNone : model.shown_patch[side];
 }
 

@@ -14,7 +14,7 @@ namespace rebounce {
 /// scratch of its own.
 class LinkRays {
  public:
-  static constexpr int kMostRays = static_cast<int>(ShadowRays::kPointCount);
+  static constexpr int kMostRays = static_cast<int>(ShadowRays::kMostRays);
 
   struct Scratch {
     std::vector<Ray> rays;

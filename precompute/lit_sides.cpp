@@ -25,6 +25,9 @@ constexpr std::size_t kBatch = 1 << 15;
 // Points at which a side is looked at for copies of itself.
 constexpr std::uint32_t kPointsPerSide = 32;
 
+// Rays by which a side that touches another looks for something solid, on either face.
+constexpr std::uint32_t kRaysPerContact = 64;
+
 class LitSides {
  public:
   LitSides(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer) {
@@ -137,9 +140,27 @@ class LitSides {
     return buried ? SideKind::kBuried : SideKind::kUnlit;
   }
 
+  /// True if at least half of the rays from one of the faces of a side's plane meet backs of
+  /// one-sided surfaces: there is something solid, such as the box that stands on a floor. Two
+  /// surfaces back to back that make up a sheet have none on either face.
+  bool is_beside_solid(const Side& side, std::uint32_t t, Scratch& scratch) const {
+    const std::span rays = std::span(scratch.rays).first(kRaysPerContact);
+    scratch.hits.resize(rays.size());
+    for (const double face : {1.0, -1.0}) {
+      make_hemisphere_rays(side.corner, face * side.normal, tracer_, mix_bits(t), rays);
+      tracer_.intersect(rays, scratch.hits);
+      const auto backs = std::ranges::count_if(scratch.hits, [&](const Hit& hit) {
+        return hit.triangle != kNone && !hit.front && !is_double_sided(hit.triangle);
+      });
+      if (2 * static_cast<std::size_t>(backs) >= rays.size()) return true;
+    }
+    return false;
+  }
+
   /// Looks at points all over a side for other surfaces in the same place. Returns kUnlit if it
-  /// lies on fronts everywhere; else adds to `covers` the sides that together cover it, unless some
-  /// point is bare. One that covers a point is enough for it: that of the earliest triangle.
+  /// lies on fronts everywhere, with something solid behind one of the two; else adds to `covers`
+  /// the sides that together cover it, unless some point is bare. One that covers a point is enough
+  /// for it: that of the earliest triangle.
   SideKind look_for_contact(std::uint32_t t, bool front, Scratch& scratch,
                             std::vector<Cover>& covers) const {
     std::vector<CoincidentSide> cover;
@@ -163,7 +184,8 @@ class LitSides {
       if (sealed_count <= k && cover.size() <= k) break;
     }
     if (cover.size() == kPointsPerSide) covers.push_back({t, front, std::move(cover)});
-    return sealed_count == kPointsPerSide ? SideKind::kUnlit : SideKind::kLit;
+    const bool sealed = sealed_count == kPointsPerSide && is_beside_solid(side, t, scratch);
+    return sealed ? SideKind::kUnlit : SideKind::kLit;
   }
 
   bool is_covered(const Cover& cover) const {

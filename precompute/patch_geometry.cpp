@@ -20,6 +20,11 @@ constexpr double kFlatCosine = 0.999, kFlatThickness = 0.02;
 // sums over parts are coarser, with as many as that.
 constexpr std::size_t kFewTrianglePairs = 4, kFewNearTrianglePairs = 64;
 
+// Below this tolerance sums over parts are too coarse, and pairs of as many triangles as there are
+// pairs of parts are summed triangle by triangle.
+constexpr double kPartTolerance = 1e-4;
+constexpr std::size_t kPartPairs = std::size_t{1} << (2 * PatchGeometry::kPartLevels);
+
 // Sums over 2^level parts each are taken while (sum of radii) / distance is below these: their
 // error goes with (that / sqrt(2)^level)^2. Measured: tests/precompute/test_patch_geometry.cpp.
 constexpr std::array<double, 4> kPartReach = {0.02, 0.1, 0.4, 0.6};
@@ -225,6 +230,32 @@ double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t 
   return sum;
 }
 
+/// The number of the point for which `measure`(position) is largest.
+template <typename Measure>
+std::uint8_t find_farthest(std::span<const PatchPoint> points, const Measure& measure) {
+  std::size_t farthest = 0;
+  double most = -1;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const double distance = measure(to_dvec3(points[k].position));
+    if (distance <= most) continue;
+    most = distance;
+    farthest = k;
+  }
+  return static_cast<std::uint8_t>(farthest);
+}
+
+std::array<std::uint8_t, 3> find_outermost(std::span<const PatchPoint> points,
+                                           const glm::dvec3& centre) {
+  const auto at = [&](std::uint8_t k) { return to_dvec3(points[k].position); };
+  const std::uint8_t a =
+      find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, centre); });
+  const std::uint8_t b =
+      find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, at(a)); });
+  const std::uint8_t c = find_farthest(
+      points, [&](const glm::dvec3& p) { return glm::length(glm::cross(p - at(a), p - at(b))); });
+  return {a, b, c};
+}
+
 /// The sum of the radii by the distance: the larger, the nearer.
 double relative_reach(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
   const PatchBounds &a = geometry.bounds(i), &b = geometry.bounds(j);
@@ -264,6 +295,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
   area_.resize(n);
   bounds_.resize(n);
   points_.resize(n * kPointCount);
+  outermost_.resize(n);
   parts_.resize(n * kPartStride);
   fragments_.resize(n);
   flat_level_.resize(n);
@@ -274,6 +306,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
     const std::span<PatchPoint> points(&points_[i * kPointCount], kPointCount);
     spread_points(model.mesh, patches[i], unit_square(mix_bits(seed ^ mix_bits(i))), points);
     for (PatchPoint& p : points) p.position = tracer.offset_point(p.position, p.normal);
+    outermost_[i] = find_outermost(points, bounds_[i].centre);
     add_parts(i);
   }
 }
@@ -293,16 +326,20 @@ std::span<const PatchPart> PatchGeometry::parts(std::size_t patch, int level) co
   return {&parts_[patch * kPartStride + part_offset(level)], std::size_t{1} << level};
 }
 
-bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
-  if (geometry.triangles(i).size() * geometry.triangles(j).size() <= kFewTrianglePairs)
-    return false;
+bool is_near_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
   return i == j || !(relative_reach(geometry, i, j) < kPartReach.back());
+}
+
+bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
+  return geometry.triangles(i).size() * geometry.triangles(j).size() > kFewNearTrianglePairs &&
+         is_near_pair(geometry, i, j);
 }
 
 double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, std::size_t j,
                                 double tolerance) {
   const std::span<const FlatTriangle> a = geometry.triangles(i), b = geometry.triangles(j);
-  if (a.size() * b.size() <= kFewTrianglePairs) return between_triangles(a, b, tolerance);
+  const std::size_t few = tolerance < kPartTolerance ? kPartPairs : kFewTrianglePairs;
+  if (a.size() * b.size() <= few) return between_triangles(a, b, tolerance);
   const double reach = relative_reach(geometry, i, j);
   for (std::size_t k = 0; i != j && k < kPartReach.size(); ++k) {
     if (!(reach < kPartReach[k])) continue;

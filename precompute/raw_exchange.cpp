@@ -97,7 +97,8 @@ class RawExchangeBuilder {
   void compute_row(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
     const auto is_fine = [&](std::uint32_t j) { return !is_coarse_pair(geometry_, i, j); };
     shadow_rays_.find_facing(i, scratch.facing, is_fine);
-    trace(i, scratch.facing, settings_.probe_rays, scratch);
+    shadow_rays_.make_probe_rays(i, scratch.facing, settings_.probe_rays, scratch.rays);
+    trace(scratch);
     scratch.mixed.clear();
     const auto probe = static_cast<std::size_t>(settings_.probe_rays);
     for (std::size_t p = 0; p < scratch.facing.size(); ++p) {
@@ -108,8 +109,7 @@ class RawExchangeBuilder {
       if (agreement == ShadowRays::Agreement::kMixed || is_contradicted(i, pair, agreement)) {
         scratch.mixed.push_back(pair);
       } else if (agreement == ShadowRays::Agreement::kClear) {
-        append(row, pair, pair.unoccluded,
-               kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
+        append_clear(pair, row);
       }
     }
     append_mixed(i, scratch, row);
@@ -125,10 +125,13 @@ class RawExchangeBuilder {
     const double count = hemisphere_->find(i, pair.patch).count;
     if (agreement == ShadowRays::Agreement::kHidden) return count > 0;
     const double expected = hemisphere_->expected_count(i, pair.patch, pair.unoccluded);
+    // As random rays would deviate: more than they do, but of many thousand pairs none may be lost
+    // to chance whose kernel is exact.
     return std::abs(count - expected) > kContradiction * std::sqrt(expected + 1);
   }
 
-  /// Traces all rays of the pairs of row i that have a doubtful patch, and replaces their entries.
+  /// Traces all rays of the pairs of row i that have a doubtful patch and are not near, and
+  /// replaces their entries.
   void refine_row(std::uint32_t i, const std::vector<bool>& doubtful, Scratch& scratch,
                   std::vector<ExchangeEntry>& row) {
     const auto is_doubtful = [&](std::uint32_t j) {
@@ -144,24 +147,49 @@ class RawExchangeBuilder {
   /// shadow rays and hemisphere rays say, weighted by the inverse of their variances.
   void append_mixed(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
     const int full = settings_.full_rays;
-    // No part is known better than that many rays tell (rule of succession).
-    const double least_variance = 1.0 / ((full + 2.0) * (full + 2.0));
-    trace(i, scratch.mixed, full, scratch);
+    shadow_rays_.make_rays(i, scratch.mixed, full, scratch.rays);
+    trace(scratch);
     for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
       const FacingPatch& pair = scratch.mixed[p];
       const ShadowRays::Visibility visible =
           shadow_rays_.visibility(i, pair.patch, std::span(scratch.rays).subspan(p * full, full),
                                   std::span(scratch.transmitted).subspan(p * full, full));
-      const double shadow = pair.unoccluded * visible.part;
-      const double shadow_variance =
-          pair.unoccluded * pair.unoccluded * std::max(visible.variance, least_variance);
-      const double met = hemisphere_->find(i, pair.patch).exchange;
-      const double met_variance = hemisphere_->variance(i, pair.patch, shadow);
-      const double both = shadow_variance + met_variance;
-      append(row, pair, (shadow * met_variance + met * shadow_variance) / both,
-             shadow_variance * met_variance / both);
+      if (visible.part == 1 && !is_contradicted(i, pair, ShadowRays::Agreement::kClear)) {
+        append_clear(pair, row);
+      } else {
+        append_mean(i, pair, visible, row);
+      }
     }
     ray_count_ += scratch.mixed.size() * full;
+  }
+
+  /// Adds the mean of `visible` and of the hemisphere rays. The variances are those of one and the
+  /// same guess: by estimates of its own, each side would count the more the less it found.
+  void append_mean(std::uint32_t i, const FacingPatch& pair, const ShadowRays::Visibility& visible,
+                   std::vector<ExchangeEntry>& row) const {
+    const double most = pair.unoccluded, shadow = most * visible.part;
+    const double met = hemisphere_->find(i, pair.patch).exchange;
+    const double guess = std::min(most, 0.5 * (shadow + met));
+    const double shadow_variance = most * most * variance_of_part(guess / most, visible);
+    const double met_variance = hemisphere_->variance(i, pair.patch, guess);
+    const double both = shadow_variance + met_variance;
+    append(row, pair, (shadow * met_variance + met * shadow_variance) / both,
+           shadow_variance * met_variance / both);
+  }
+
+  static void append_clear(const FacingPatch& pair, std::vector<ExchangeEntry>& row) {
+    append(row, pair, pair.unoccluded,
+           kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
+  }
+
+  /// Variance of what the rays of `visible` say if `part` of the light gets through. Rays that are
+  /// dimmed, as by glass, spread less than those that are stopped or not.
+  static double variance_of_part(double part, const ShadowRays::Visibility& visible) {
+    const double binary = visible.part * (1 - visible.part), rays = visible.ray_count;
+    const double spread = binary > 0 ? visible.variance * rays / binary : 1;
+    // No part is known better than that many rays tell (rule of succession).
+    const double expected = (part * rays + 1) / (rays + 2), least = 1 / (rays + 2);
+    return std::max(spread * expected * (1 - expected) / (rays + 1), least * least);
   }
 
   /// Adds the near pairs of many triangles to row i, as hemisphere rays have them.
@@ -173,12 +201,10 @@ class RawExchangeBuilder {
     }
   }
 
-  /// Traces `count` rays for each pair of patch i, one pair after the other.
+  /// Traces the rays of the pairs of a patch.
   /// Where there are holes, a triangle's mean is all that patches resolve: taking it keeps the
   /// noise of single holes out of F.
-  void trace(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
-             Scratch& scratch) const {
-    shadow_rays_.make_rays(i, facing, count, scratch.rays);
+  void trace(Scratch& scratch) const {
     scratch.transmitted.resize(scratch.rays.size());
     tracer_.transmittance(scratch.rays, PassageDetail::kTriangle, scratch.transmitted);
   }

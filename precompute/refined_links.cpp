@@ -49,11 +49,12 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
 
 void check_form_factor_settings(const FormFactorSettings& settings) {
   const auto in_range = [](int rays) {
-    return rays >= 1 && rays <= static_cast<int>(ShadowRays::kPointCount);
+    return rays >= 1 && rays <= static_cast<int>(ShadowRays::kMostRays);
   };
   if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) ||
       settings.hemisphere_rays < 1) {
-    throw Error("form factors: rays per pair must be between 1 and 64, hemisphere rays at least 1");
+    throw Error(
+        "form factors: rays per pair must be between 1 and 256, hemisphere rays at least 1");
   }
   if (!(settings.link_epsilon >= 0)) {
     throw Error("form factors: the error of a link must not be negative");

@@ -17,10 +17,13 @@ std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count
   target.reserve(escape.size());
   for (const Escape& e : escape) {
     const double lost = e.sky + e.absorbed, count = ray_count;
-    // Where no ray at all is lost, the row is taken as closed. Else the measurement is as sure as
-    // the rule of succession says; low-discrepancy rays err about half as much as random ones.
+    // Where no ray at all is lost, the row is taken as closed; nor does a single one open it, as it
+    // may have begun beyond the wall of an edge, a ray's offset away. Else the measurement is as
+    // sure as the rule of succession says; low-discrepancy rays err about half as much as random
+    // ones.
+    const bool closed = lost * count < 1.5;
     const double p = (lost * count + 1) / (count + 2);
-    target.push_back({1 - lost, lost > 0 ? 0.5 * std::sqrt(p * (1 - p) / count) : 0.0});
+    target.push_back({closed ? 1 : 1 - lost, closed ? 0 : 0.5 * std::sqrt(p * (1 - p) / count)});
   }
   return target;
 }

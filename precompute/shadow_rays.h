@@ -34,8 +34,9 @@ class VisibilityEstimate {
   /// Variance of what single rays find.
   double spread() const { return std::max(0.0, visible_squared_ / sum_ - part() * part()); }
 
-  /// Variance of part(): as sure as that many rays of equal weight (Kish's effective sample size).
-  double variance() const { return spread() / (sum_ * sum_ / sum_of_squares_); }
+  /// As sure as that many rays of equal weight (Kish's effective sample size).
+  double effective_count() const { return sum_ * sum_ / sum_of_squares_; }
+  double variance() const { return spread() / effective_count(); }  ///< of part()
 
  private:
   double sum_ = 0, sum_of_squares_ = 0, visible_ = 0, visible_squared_ = 0;
@@ -45,9 +46,11 @@ class VisibilityEstimate {
 /// pair's exchange gets through. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
+  static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
+
   /// The most rays that a pair can have. Rays between points that do not face each other are not
   /// made: they carry no light.
-  static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
+  static constexpr std::uint32_t kMostRays = kPointCount;
 
   /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
   /// `kernel_tolerance` is that of unoccluded_exchange_area().
@@ -68,10 +71,16 @@ class ShadowRays {
   template <typename Wanted>
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
-  /// Writes to `rays` `count` <= kPointCount untraced rays for each pair of patch i, one pair after
+  /// Writes to `rays` `count` <= kMostRays untraced rays for each pair of patch i, one pair after
   /// the other; where a pair has fewer the rest are never occluded and void (is_void).
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
+
+  /// The same for rays that are to tell whether a pair is partly hidden: the first kCornerRays join
+  /// the outermost points of the two, which what has a straight edge hides or shows first.
+  void make_probe_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
+                       std::vector<Ray>& rays) const;
+  static constexpr std::uint32_t kCornerRays = 9;
 
   /// What the `rays` of a pair agree on, whose transmittances are `transmitted`.
   enum class Agreement : std::uint8_t { kClear, kHidden, kMixed };
@@ -81,14 +90,19 @@ class ShadowRays {
   static bool is_void(const Ray& ray) { return ray.id == kNone; }
 
   struct Visibility {
-    double part;      ///< of the pair's light that gets through, [0, 1]
-    double variance;  ///< of `part`
+    double part;       ///< of the pair's light that gets through, [0, 1]
+    double variance;   ///< of `part`
+    double ray_count;  ///< rays of equal weight that would tell as much
   };
 
   /// What the `rays` of the pair (i, j) and their transmittances `transmitted` say of it: each is
   /// weighted by the kernel between its ends.
   Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
                         std::span<const float> transmitted) const;
+
+  /// Adds the same rays to what is known of the pair.
+  void add(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
+           std::span<const float> transmitted, VisibilityEstimate& estimate) const;
 
   /// A ray from `x` to `y`.
   static Ray ray_between(const PatchPoint& x, const PatchPoint& y);
@@ -104,6 +118,7 @@ class ShadowRays {
 
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
   void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
+  std::size_t make_corner_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
   std::pair<const PatchPoint*, const PatchPoint*> ray_ends(std::uint32_t i, std::uint32_t j,
                                                            std::uint32_t k,
                                                            std::uint64_t hash) const;

@@ -315,6 +315,14 @@ TEST_F(CommandLine, EveryMethodReachesTheResidualItWasAsked) {
   }
 }
 
+TEST_F(CommandLine, QualitySetsTheRaysOfFormFactors) {
+  const json low = summary_of({"info", precompute("low.safetensors", {"--quality", "low"})});
+  const json usual = summary_of({"info", precompute("usual.safetensors")});
+  EXPECT_EQ(low["settings"]["hemisphere_rays"], 1024);
+  EXPECT_EQ(low["settings"]["full_rays"], 16);
+  EXPECT_EQ(usual["settings"]["hemisphere_rays"], 4096);
+}
+
 TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
   const std::string file =
       precompute("box.safetensors", {"--store-links", "--link-epsilon", "0.0005"});

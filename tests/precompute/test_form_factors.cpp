@@ -5,10 +5,11 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <numeric>
 
+#include "form_factor_sums.h"
 #include "rebounce/transfer/error.h"
-#include "test_scenes.h"
 #include "view_factor_table.h"
 
 namespace rebounce {
@@ -16,43 +17,6 @@ namespace {
 
 FormFactors form_factors_of(const PatchModel& model, const FormFactorSettings& settings = {}) {
   return compute_form_factors(model, test::make_tracer(model), settings);
-}
-
-std::vector<double> row_sums_of(const PatchModel& model, const FormFactors& f) {
-  std::vector<double> sum(model.patches.size(), 0.0);
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    for (std::uint64_t k = f.exchange.row_begin[i]; k < f.exchange.row_begin[i + 1]; ++k) {
-      const double s = f.exchange.exchange_area[k];
-      sum[i] += s / model.patches.area[i];
-      sum[f.exchange.column[k]] += s / model.patches.area[f.exchange.column[k]];
-    }
-  }
-  return sum;
-}
-
-/// F from all patches of one material to all of another.
-double factor_between(const PatchModel& model, const FormFactors& f, std::uint32_t from,
-                      std::uint32_t to) {
-  const auto material = [&](std::size_t patch) { return test::material_of(model, patch); };
-  double exchange = 0, area = 0;
-  for (std::size_t i = 0; i < model.patches.size(); ++i) {
-    if (material(i) == from) area += model.patches.area[i];
-    for (std::uint64_t k = f.exchange.row_begin[i]; k < f.exchange.row_begin[i + 1]; ++k) {
-      const std::size_t j = f.exchange.column[k];
-      const bool wanted =
-          (material(i) == from && material(j) == to) || (material(j) == from && material(i) == to);
-      if (wanted) exchange += f.exchange.exchange_area[k];
-    }
-  }
-  return exchange / area;
-}
-
-Scene scene_of_two(const std::vector<glm::dvec3>& a, const std::vector<glm::dvec3>& b) {
-  Scene scene = test::empty_scene();
-  scene.materials.resize(2, scene.materials[0]);
-  test::add_polygon(scene, a, 0);
-  test::add_polygon(scene, b, 1);
-  return scene;
 }
 
 /// A room with a block that stands on its floor and one that hangs in the air.
@@ -69,8 +33,8 @@ TEST(FormFactors, AgreeWithEveryRowOfTheTable) {
       test::read_view_factors(REBOUNCE_SOURCE_DIR "/tests/reference/view_factors.tsv");
   for (const test::ViewFactorCase& c : cases) {
     if (c.a.size() > 4 || c.id.starts_with("INF")) continue;  // the kernel's test has them
-    PatchModel model = make_patch_model(scene_of_two(c.a, c.b), {.patch_count = 200});
-    const double factor = factor_between(model, form_factors_of(model), 0, 1);
+    PatchModel model = make_patch_model(test::scene_of_two(c.a, c.b), {.patch_count = 200});
+    const double factor = test::factor_between(model, form_factors_of(model), 0, 1);
     EXPECT_NEAR(factor, c.factor, std::max(5e-3 * c.factor, 5e-5)) << c.id;
   }
 }
@@ -81,14 +45,14 @@ TEST(FormFactors, EmptyRoomIsClosedBeforeAnyCorrection) {
   const PatchModel model = make_patch_model(scene, {.patch_count = 600});
   const FormFactors f = form_factors_of(model);
   EXPECT_LT(f.closure.row_sum_error_before, 1e-3);
-  for (const double sum : row_sums_of(model, f)) EXPECT_NEAR(sum, 1, 1e-6);
+  for (const double sum : test::row_sums_of(model, f)) EXPECT_NEAR(sum, 1, 1e-6);
   for (const float sky : f.sky_visibility) EXPECT_NEAR(sky, 0, 1e-6);
 }
 
 TEST(FormFactors, FurnishedRoomIsClosed) {
   const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 1200});
   const FormFactors f = form_factors_of(model);
-  const std::vector<double> sum = row_sums_of(model, f);
+  const std::vector<double> sum = test::row_sums_of(model, f);
   for (std::size_t i = 0; i < sum.size(); ++i) {
     EXPECT_NEAR(sum[i] + f.sky_visibility[i] + f.absorbed[i], 1, 1e-3);
     EXPECT_EQ(f.sky_visibility[i], 0);  // the room has no opening
@@ -154,21 +118,21 @@ TEST(FormFactors, OpeningsAndBackFacesAreAccountedFor) {
 TEST(FormFactors, HalfHiddenSquaresExchangeHalf) {
   // Between opposite unit squares, a screen halfway that covers x < 1/2: by mirror symmetry just
   // half of the exchange crosses the open half.
-  Scene scene = scene_of_two({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
-                             {{0, 1, 1}, {1, 1, 1}, {1, 0, 1}, {0, 0, 1}});
+  Scene scene = test::scene_of_two({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
+                                   {{0, 1, 1}, {1, 1, 1}, {1, 0, 1}, {0, 0, 1}});
   scene.materials.resize(3, scene.materials[0]);
   const std::vector<glm::dvec3> screen = {
       {-0.1, -0.1, 0.5}, {0.5, -0.1, 0.5}, {0.5, 1.1, 0.5}, {-0.1, 1.1, 0.5}};
   test::add_polygon(scene, screen, 2);
   const PatchModel model = make_patch_model(scene, {.patch_count = 0, .patch_size = 0.15F});
   const FormFactors f = form_factors_of(model);
-  EXPECT_NEAR(factor_between(model, f, 0, 1), 0.5 * 0.19982489569839, 5e-4);
+  EXPECT_NEAR(test::factor_between(model, f, 0, 1), 0.5 * 0.19982489569839, 2e-4);
 }
 
 TEST(FormFactors, CoplanarAndBackFacingPatchesExchangeNothing) {
   const PatchModel model =
-      make_patch_model(scene_of_two({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
-                                    {{1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}}),
+      make_patch_model(test::scene_of_two({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
+                                          {{1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}}),
                        {.patch_count = 100});
   EXPECT_EQ(form_factors_of(model).exchange.column.size(), 0U);
 }
@@ -186,6 +150,47 @@ TEST(FormFactors, CopiesThatLieInOneAnotherCountOnce) {
   for (const std::uint32_t patch : model.shown_patch) EXPECT_NE(patch, kNone);
   const FormFactors f = form_factors_of(model);
   EXPECT_LT(f.closure.row_sum_error_before, 1e-3);
+}
+
+TEST(FormFactors, BothSidesOfASheetOfTwoSurfacesExchangeLight) {
+  // A room cut in two by two one-sided walls back to back in one plane: each half is closed.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 2, 3}, true);
+  std::vector<glm::dvec3> wall = {{1.3, 0, 0}, {1.3, 2, 0}, {1.3, 2, 3}, {1.3, 0, 3}};
+  test::add_polygon(scene, wall);
+  std::ranges::reverse(wall);
+  test::add_polygon(scene, wall);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 400});
+  std::size_t in_wall = 0;
+  for (const Float3& c : model.patches.centroid) in_wall += std::abs(c[0] - 1.3F) < 1e-4F ? 1 : 0;
+  EXPECT_GT(in_wall, 20U);
+  EXPECT_EQ(model.unlit_side_count, 0U);
+  const FormFactors f = form_factors_of(model);
+  for (const float absorbed : f.absorbed) EXPECT_NEAR(absorbed, 0, 1e-6);
+  EXPECT_LT(f.closure.row_sum_error_before, 1e-3);
+  for (const double sum : test::row_sums_of(model, f)) EXPECT_NEAR(sum, 1, 1e-6);
+}
+
+TEST(FormFactors, SideThatABoxStandsOnIsSealed) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 4}, true);
+  test::add_box(scene, {1, 0, 1}, {2, 1, 2}, false);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 300});
+  EXPECT_GT(model.unlit_side_count + model.buried_side_count, 0U);
+  for (std::size_t i = 0; i < model.patches.size(); ++i) {
+    const Float3 &c = model.patches.centroid[i], &n = model.patches.normal[i];
+    EXPECT_FALSE(c[1] < 1e-3F && n[1] < 0) << "the bottom of the box has a patch";
+  }
+}
+
+TEST(FormFactors, QualityDecidesRaysAndLeavesTheRest) {
+  for (const FormFactorQuality quality : {FormFactorQuality::kLow, FormFactorQuality::kHigh}) {
+    const FormFactorSettings settings = with_quality(quality, {.seed = 5, .link_epsilon = 0.5});
+    EXPECT_EQ(settings.seed, 5U);
+    EXPECT_EQ(settings.link_epsilon, 0.5);
+  }
+  EXPECT_LT(with_quality(FormFactorQuality::kLow).full_rays, FormFactorSettings().full_rays);
+  EXPECT_GT(with_quality(FormFactorQuality::kHigh).full_rays, FormFactorSettings().full_rays);
 }
 
 TEST(FormFactors, SameBitsForAnyNumberOfThreads) {
@@ -222,7 +227,7 @@ TEST(FormFactors, RefuseSettingsOutOfRange) {
   const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 50});
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(compute_form_factors(model, tracer, {.probe_rays = 0}), Error);
-  EXPECT_THROW(compute_form_factors(model, tracer, {.full_rays = 65}), Error);
+  EXPECT_THROW(compute_form_factors(model, tracer, {.full_rays = 257}), Error);
   EXPECT_THROW(compute_form_factors(model, tracer, {.hemisphere_rays = 0}), Error);
 }
 

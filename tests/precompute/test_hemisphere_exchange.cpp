@@ -13,7 +13,8 @@ namespace {
 
 constexpr int kRays = 4096;
 
-HemisphereExchange exchange_of(const PatchModel& model) {
+/// What the hemisphere rays of each patch meet.
+std::vector<std::vector<MetPatch>> met_by_all(const PatchModel& model) {
   const RayTracer tracer = test::make_tracer(model);
   const PatchTriangles triangles(model.mesh.triangle_patch, model.patches.size());
   std::vector<std::vector<MetPatch>> met;
@@ -22,8 +23,12 @@ HemisphereExchange exchange_of(const PatchModel& model) {
     measure_escape(model, triangles[i], i, tracer, kRays, 1, scratch);
     met.push_back(count_met_patches(model, scratch.hits));
   }
+  return met;
+}
+
+HemisphereExchange exchange_of(const PatchModel& model) {
   const std::vector<double> area(model.patches.area.begin(), model.patches.area.end());
-  return {met, area, kRays};
+  return {met_by_all(model), area, kRays};
 }
 
 /// A room with `count` balls of many triangles, some of which touch the floor or each other.
@@ -71,6 +76,31 @@ TEST(HemisphereExchange, ListsPairsInOrderAndFindsThem) {
       EXPECT_GT(pair.count, 0U);
     }
     EXPECT_EQ(exchange.find(i, static_cast<std::uint32_t>(model.patches.size())).count, 0U);
+  }
+}
+
+TEST(HemisphereExchange, OfWhatLiesUnderACopyCutOtherwiseIsTheSameFromEitherEnd) {
+  // A ceiling there twice, cut along either diagonal: rays that meet the one without patches count
+  // for the patch that is in that place, however the copy is cut.
+  Scene scene = test::empty_scene();
+  test::add_polygon(scene, std::vector<glm::dvec3>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}});
+  test::add_polygon(scene, std::vector<glm::dvec3>{{0, 0, 1}, {0, 1, 1}, {1, 1, 1}, {1, 0, 1}});
+  test::add_polygon(scene, std::vector<glm::dvec3>{{0, 1, 1}, {1, 1, 1}, {1, 0, 1}, {0, 0, 1}});
+  const PatchModel model = make_patch_model(scene, {.patch_count = 24});
+  ASSERT_GT(model.covered_side_count, 0U);
+  const std::size_t n = model.patches.size();
+  const auto rays = met_by_all(model);
+  std::vector<double> count(n * n);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (const MetPatch& met : rays[i]) count[i * n + met.patch] = met.count;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      const double there = model.patches.area[i] * count[i * n + j],
+                   back = model.patches.area[j] * count[j * n + i];
+      const double area = std::max(model.patches.area[i], model.patches.area[j]);
+      EXPECT_NEAR(there, back, 6 * area * std::sqrt(count[i * n + j] + 1)) << i << ' ' << j;
+    }
   }
 }
 

@@ -317,7 +317,7 @@ TEST(Links, RefuseSettingsOutOfRange) {
   const std::vector<float> few(3, 1.0F);
   EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 0}), Error);
   EXPECT_THROW(build_links(model, tracer, {.link_epsilon = -1}), Error);
-  EXPECT_THROW(build_links(model, tracer, {.probe_rays = 65, .link_epsilon = 1e-3}), Error);
+  EXPECT_THROW(build_links(model, tracer, {.probe_rays = 257, .link_epsilon = 1e-3}), Error);
   EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 1e-3}, few), Error);
 }
 

@@ -33,7 +33,9 @@ struct TriangleSides {
 ///   neither gives light to anything nor gets any back, so leaving it out of the system changes
 ///   nothing. One side is kept for that matter.
 /// - A side that lies flat on the front of another surface (the bottom of a box on a floor) sees
-///   nothing either, and rays from it would begin beyond that surface.
+///   nothing either, and rays from it would begin beyond that surface. Not so two one-sided
+///   surfaces back to back that make up a sheet: on neither face of it is something solid, and
+///   each is lit.
 /// - A side that sees nothing but backs of one-sided surfaces, all of them near (a sixteenth of the
 ///   scene's diagonal), is inside of something: a leg of a table in the wall. Backs absorb what
 ///   meets them, so leaving it out changes nothing but for lamps that hang in there. Surfaces that

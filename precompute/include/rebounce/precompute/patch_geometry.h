@@ -2,6 +2,7 @@
 
 // What form factors ask of the shape of patches: their triangles, bounds, and points on them.
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -41,8 +42,9 @@ struct PatchPart {
 /// The shapes of all patches. Immutable, usable from any number of threads.
 class PatchGeometry {
  public:
-  /// Sample points per patch; a power of two.
-  static constexpr std::uint32_t kPointCount = 64;
+  /// Sample points per patch; a power of two. More than a pair has rays, so that the pairs of a
+  /// patch have different ones and their errors do not add up in its row.
+  static constexpr std::uint32_t kPointCount = 256;
 
   /// Parts that a patch is cut into at most: two to the power of levels.
   static constexpr int kPartLevels = 5;
@@ -60,9 +62,15 @@ class PatchGeometry {
     return {triangle_.data() + begin_[patch], triangle_.data() + begin_[patch + 1]};
   }
 
-  /// kPointCount points spread over it evenly, every prefix too, moved off the surface.
+  /// kPointCount points spread over it evenly, any that follow each other too, moved off the
+  /// surface.
   std::span<const PatchPoint> points(std::size_t patch) const {
     return {points_.data() + patch * kPointCount, kPointCount};
+  }
+
+  /// Three of the points, by their numbers, that span about the largest triangle.
+  std::span<const std::uint8_t, 3> outermost_points(std::size_t patch) const {
+    return outermost_[patch];
   }
 
   /// The 2^`level` parts that make up the patch, `level` at most kPartLevels and at least
@@ -88,18 +96,24 @@ class PatchGeometry {
 
   void add_parts(std::size_t patch);
 
-  std::vector<std::uint32_t> begin_;      ///< [n + 1]
-  std::vector<FlatTriangle> triangle_;    ///< those of patch i at [begin_[i], begin_[i + 1])
-  std::vector<double> area_;              ///< [n] m²
-  std::vector<PatchBounds> bounds_;       ///< [n]
-  std::vector<PatchPoint> points_;        ///< [n][kPointCount]
-  std::vector<Fragments> fragments_;      ///< [n]
-  std::vector<std::uint8_t> flat_level_;  ///< [n]
-  std::vector<PatchPart> parts_;          ///< [n][all levels, the coarsest first]
+  std::vector<std::uint32_t> begin_;    ///< [n + 1]
+  std::vector<FlatTriangle> triangle_;  ///< those of patch i at [begin_[i], begin_[i + 1])
+  std::vector<double> area_;            ///< [n] m²
+  std::vector<PatchBounds> bounds_;     ///< [n]
+  std::vector<PatchPoint> points_;      ///< [n][kPointCount]
+  std::vector<std::array<std::uint8_t, 3>> outermost_;  ///< [n]
+  std::vector<Fragments> fragments_;                    ///< [n]
+  std::vector<std::uint8_t> flat_level_;                ///< [n]
+  std::vector<PatchPart> parts_;                        ///< [n][all levels, the coarsest first]
 };
 
-/// True for a pair (i, j) of many triangles so near to each other that their kernel is slow to find
-/// and coarse: hemisphere rays tell better what they exchange. A patch is near itself.
+/// True for a pair (i, j) so near to each other that the few points of shadow rays cannot stand for
+/// all that varies between them: the sum of the radii is above 0.6 of the distance. A patch is near
+/// itself.
+bool is_near_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j);
+
+/// True for a near pair (i, j) of many triangles: their kernel is slow to find and coarse, and
+/// hemisphere rays tell better what they exchange.
 bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j);
 
 /// Exchange area A_i F_ij in m² of patches i and j with nothing between them: symmetric up to
