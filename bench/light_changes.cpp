@@ -1,6 +1,10 @@
 #include "light_changes.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <glm/glm.hpp>
+#include <limits>
 
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/direct_lighting.h"
@@ -11,20 +15,11 @@
 namespace rebounce::bench {
 namespace {
 
-double diagonal(const TransferData& data) {
-  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
-  for (const Float3& p : data.mesh.position) {
-    low = glm::min(low, to_dvec3(p));
-    high = glm::max(high, to_dvec3(p));
-  }
-  return glm::length(high - low);
-}
-
 /// Two places for a lamp, far enough from each other that it can move between them.
 std::pair<Light, Light> find_places(const TransferData& data, const RayTracer& tracer,
-                                    double distance) {
+                                    double distance, std::uint64_t seed) {
   constexpr int kTries = 64;
-  const std::vector<Light> lamps = random_point_lights(data, tracer, kTries, 1);
+  const std::vector<Light> lamps = random_point_lights(data, tracer, kTries, seed);
   for (const Light& other : lamps) {
     if (glm::distance(to_dvec3(lamps[0].position), to_dvec3(other.position)) > distance) {
       return {lamps[0], other};
@@ -42,7 +37,17 @@ Light moved(Light lamp, const Light& towards, double distance) {
 
 }  // namespace
 
-std::vector<LightChange> light_changes(const TransferData& data) {
+double scene_diagonal(const TransferData& data) {
+  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const Float3& p : data.mesh.position) {
+    low = glm::min(low, to_dvec3(p));
+    high = glm::max(high, to_dvec3(p));
+  }
+  return glm::length(high - low);
+}
+
+std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
+                                       std::uint64_t seed) {
   const RayTracer tracer(data.mesh.position,
                          std::span(data.mesh.triangle).first(data.mesh.surface_count()));
   DirectLighting direct(data, tracer);
@@ -57,13 +62,13 @@ std::vector<LightChange> light_changes(const TransferData& data) {
     }
     return exitance;
   };
-  const double size = diagonal(data);
-  const auto [lamp, other] = find_places(data, tracer, 0.2 * size);
+  const double size = scene_diagonal(data);
+  const auto [lamp, other] = find_places(data, tracer, 0.2 * size, seed);
   const std::vector<Float3> before = light(lamp);
   std::vector<LightChange> changes = {{"from zero", {}, before}};
-  for (const auto& [name, part] :
-       {std::pair{"moved 1 %", 0.01}, {"moved 5 %", 0.05}, {"moved 20 %", 0.2}}) {
-    changes.push_back({name, before, light(moved(lamp, other, part * size))});
+  for (const double part : motions) {
+    changes.push_back(
+        {fmt::format("moved {:g} %", 100 * part), before, light(moved(lamp, other, part * size))});
   }
   changes.push_back({"switched", before, light(other)});
   return changes;

@@ -608,12 +608,17 @@ TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
   }
 }
 
-TEST_F(CommandLine, TheShippedSceneIsWhatItsScriptMakes) {
+TEST_F(CommandLine, TheShippedScenesAreWhatTheirScriptsMake) {
   if (std::system("python3 --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "needs python3";
   const std::string command =
       "python3 '" + kScenes + "make_cornell_box.py' '" + path("box.gltf") + "'";
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(test::read_bytes(path("box.gltf")), test::read_bytes(kScene));
+  ASSERT_EQ(std::system(("python3 '" + kScenes + "make_rooms.py' '" + path(".") + "'").c_str()), 0);
+  for (const std::string name : {"two_rooms", "furnished_room", "white_room", "pavilion"}) {
+    const std::string file = name + ".gltf";
+    EXPECT_EQ(test::read_bytes(path(file)), test::read_bytes(kScenes + file)) << name;
+  }
 }
 
 }  // namespace
