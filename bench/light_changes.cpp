@@ -19,7 +19,7 @@ namespace {
 std::pair<Light, Light> find_places(const TransferData& data, const RayTracer& tracer,
                                     double distance, std::uint64_t seed) {
   constexpr int kTries = 64;
-  const std::vector<Light> lamps = random_point_lights(data, tracer, kTries, seed);
+  const std::vector<Light> lamps = lamps_in_the_open(data, tracer, kTries, seed);
   for (const Light& other : lamps) {
     if (glm::distance(to_dvec3(lamps[0].position), to_dvec3(other.position)) > distance) {
       return {lamps[0], other};
@@ -35,7 +35,31 @@ Light moved(Light lamp, const Light& towards, double distance) {
   return lamp;
 }
 
+/// The part of the surface's area that `irradiance` [n] reaches.
+double lit_part(const TransferData& data, std::span<const Float3> irradiance) {
+  double lit = 0, all = 0;
+  for (std::size_t i = 0; i < irradiance.size(); ++i) {
+    all += data.patches.area[i];
+    if (irradiance[i][0] > 0) lit += data.patches.area[i];
+  }
+  return lit / all;
+}
+
 }  // namespace
+
+std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
+                                     std::uint64_t seed) {
+  constexpr double kLeastLit = 0.05;
+  DirectLighting direct(data, tracer);
+  std::vector<Float3> irradiance(data.patches.size());
+  std::vector<Light> lamps = random_point_lights(data, tracer, count, seed);
+  std::erase_if(lamps, [&](const Light& lamp) {
+    direct.compute({&lamp, 1}, {}, irradiance);
+    return lit_part(data, irradiance) < kLeastLit;
+  });
+  if (lamps.empty()) throw Error("no lamp at any place lights much of the scene; give another");
+  return lamps;
+}
 
 double scene_diagonal(const TransferData& data) {
   glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;

@@ -28,6 +28,12 @@ std::vector<LightChange> light_changes(const TransferData& data,
                                        std::span<const double> motions = kMotions,
                                        std::uint64_t seed = 1);
 
+/// `count` point lights of 1 cd in the free space of the scene (random_point_lights), without those
+/// that light less than a twentieth of its surface, as from inside of a box. The same `seed`, the
+/// same lamps. Throws Error if there are none.
+std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
+                                     std::uint64_t seed);
+
 /// Length of the diagonal of the scene's bounding box, metres.
 double scene_diagonal(const TransferData& data);
 

@@ -23,15 +23,15 @@ int runs_per_sample(const TimedCase& timed, double sample_seconds) {
   return static_cast<int>(std::clamp(std::ceil(sample_seconds / seconds), 1.0, kMostRuns));
 }
 
-/// The mean of runs that are each prepared.
+/// The median of runs that are each prepared.
 double prepared_sample(const TimedCase& timed, int runs) {
-  double seconds = 0;
+  std::vector<double> seconds;
   for (int run = runs > 1 ? -1 : 0; run < runs; ++run) {
     timed.prepare();
     const double taken = seconds_of(timed.work);
-    if (run >= 0) seconds += taken;
+    if (run >= 0) seconds.push_back(taken);
   }
-  return seconds / runs;
+  return summarise(std::move(seconds)).median;
 }
 
 double sample(const TimedCase& timed, int runs) {

@@ -31,7 +31,7 @@ struct InterleavingSettings {
   int rounds = 21;  ///< samples per case. More: steadier medians
   /// A sample is the mean of as many runs in a row as take this long, in seconds, so that short
   /// work finds the caches as its last run left them. Cases with a `prepare` run once, but see
-  /// TimedCase::repeat_prepared.
+  /// TimedCase::repeat_prepared, whose sample is the median of its runs.
   double sample_seconds = 5e-3;
 };
 
