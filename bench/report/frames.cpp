@@ -15,6 +15,9 @@ namespace {
 
 constexpr double kPercent = 0.01, kPermille = 0.001;
 
+// A residual below which sweeps of a frame that are left would change nothing that is seen.
+constexpr double kConverged = 1e-6;
+
 /// The light of one path: M0 and B [n] in lx of each frame.
 struct LitFrames {
   std::vector<std::vector<Float3>> initial_exitance, truth;
@@ -50,9 +53,18 @@ struct Run {
   std::vector<double> budgets{};
 };
 
-std::vector<Run> list_runs(const std::vector<RunTime>& times, const std::vector<double>& budgets) {
+/// The dense inverse is the truth, and preconditioned conjugate gradients are for repainted scenes:
+/// neither runs.
+bool takes_part(const Contestant& contestant) {
+  return contestant.name != kDenseInverse &&
+         contestant.method != SolveMethod::kPreconditionedConjugateGradient;
+}
+
+std::vector<Run> list_runs(const std::vector<Contestant>& contestants,
+                           const std::vector<RunTime>& times, const std::vector<double>& budgets) {
   std::vector<Run> runs;
   for (std::size_t k = 0; k < times.size(); ++k) {
+    if (!takes_part(contestants[k])) continue;
     for (const double budget : budgets) {
       const int sweeps = times[k].sweeps_within(budget);
       const bool same =
@@ -69,7 +81,7 @@ std::vector<float> follow(const LitFrames& lit, int sweeps, std::span<const floa
   method.start_from(lit.truth.front());
   std::vector<float> errors;
   for (std::size_t frame = 0; frame < lit.truth.size(); ++frame) {
-    method.run(lit.initial_exitance[frame], sweeps);
+    method.run(lit.initial_exitance[frame], sweeps, kConverged);
     errors.push_back(static_cast<float>(
         reflected_error(method.radiosity(), lit.truth[frame], lit.initial_exitance[frame], area)));
   }
@@ -111,7 +123,7 @@ std::vector<FrameRow> measure_frames(const Contenders& contenders,
   const TransferData& data = *contenders.data;
   const std::vector<LightPath> paths =
       make_light_paths(data, *contenders.tracer, settings.frame_count, settings.seed);
-  const std::vector<Run> runs = list_runs(times, settings.budgets);
+  const std::vector<Run> runs = list_runs(contestants, times, settings.budgets);
   DirectLighting direct(data, *contenders.tracer);
   std::vector<FrameRow> rows;
   for (std::size_t p = 0; p < paths.size(); ++p) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <filesystem>
 
 #include "console.h"
@@ -61,10 +62,13 @@ void run(const Options& options) {
         return bar.update(fmt::format("{}: {}", name, phase), part);
       };
       const ReportSettings settings = settings_for(options, patch_count);
+      const auto begin = std::chrono::steady_clock::now();
       nlohmann::ordered_json json = provenance("bench_report", options.common);
       json["scene"] = std::filesystem::path(scene).stem().string();
       json["settings"] = json_of(settings, options.quick);
       json.update(measure_scene(scene, settings, options.folder, name, progress));
+      const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+      json["seconds"] = seconds.count();
       write_text(std::filesystem::path(options.folder) / (name + ".json"), json.dump(1) + "\n");
     }
   }

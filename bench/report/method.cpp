@@ -21,7 +21,8 @@ class ProductMethod final : public Method {
         radiosity_(reflectance.size()),
         workspace_(transfer.workspace_size()) {}
 
-  void run(std::span<const Float3> initial_exitance, int /*sweeps*/) override {
+  using Method::run;
+  void run(std::span<const Float3> initial_exitance, int /*sweeps*/, double /*residual*/) override {
     transfer_.apply(initial_exitance, radiosity_, workspace_);
     for (std::size_t i = 0; i < radiosity_.size(); ++i) {
       for (int c = 0; c < kChannelCount; ++c) {
@@ -47,9 +48,10 @@ class IterativeMethod final : public Method {
  public:
   explicit IterativeMethod(std::unique_ptr<RadiositySolver> solver) : solver_(std::move(solver)) {}
 
-  void run(std::span<const Float3> initial_exitance, int sweeps) override {
+  using Method::run;
+  void run(std::span<const Float3> initial_exitance, int sweeps, double residual) override {
     solver_->solve(initial_exitance,
-                   {.max_sweeps = sweeps, .residual = 0, .measure_residual = false});
+                   {.max_sweeps = sweeps, .residual = residual, .measure_residual = false});
   }
   std::span<const Float3> radiosity() const override { return solver_->radiosity(); }
   bool iterates() const override { return true; }

@@ -15,8 +15,12 @@ class Method {
  public:
   virtual ~Method() = default;
 
-  /// Finds the radiosity for `initial_exitance` [n] in lx, by `sweeps` sweeps where it iterates.
-  virtual void run(std::span<const Float3> initial_exitance, int sweeps) = 0;
+  /// Finds the radiosity for `initial_exitance` [n] in lx, by `sweeps` sweeps where it iterates; by
+  /// fewer where it believes the residual to be below `residual` (SolveSettings) before.
+  virtual void run(std::span<const Float3> initial_exitance, int sweeps, double residual) = 0;
+  void run(std::span<const Float3> initial_exitance, int sweeps) {
+    run(initial_exitance, sweeps, 0);
+  }
 
   /// The last solution [n] in lx; valid until the next run.
   virtual std::span<const Float3> radiosity() const = 0;

@@ -4,11 +4,11 @@ namespace rebounce::bench {
 
 void ReportSettings::make_quick() {
   operators = {{0.005, Precision::kF16}, {0.001, Precision::kF16}};
-  form_factor_tolerances = {0.0003, 0.003};
+  form_factor_tolerances = {0.0003, 0.001};
   ranks = {64};
   lamp_count = 2;
   motions = {0.001, 0.01, 0.05};
-  sweeps = {1, 2, 3, 4, 6, 8, 12};
+  sweeps = {1, 2, 3, 4, 6, 8, 12, 16, 24, 48};
   repeats = 3;
   frame_count = 60;
   patch_comparison = {.patch_count = 500, .points_per_patch = 32, .samples_per_point = 16};
