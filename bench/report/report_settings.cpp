@@ -8,7 +8,7 @@ void ReportSettings::make_quick() {
   ranks = {64};
   lamp_count = 2;
   motions = {0.001, 0.01, 0.05};
-  sweeps = {1, 2, 3, 4, 6, 8, 12, 16, 24, 48};
+  sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 24, 48};
   repeats = 3;
   frame_count = 60;
   patch_comparison = {.patch_count = 500, .points_per_patch = 32, .samples_per_point = 16};
