@@ -43,14 +43,14 @@ class AccuracyBench {
         progress_(progress),
         cases_(make_light_cases(contenders, settings, progress)) {
     for (const Form& form : contenders.forms) {
-      own_[form.name] = solve_on(*form.form_factors, contenders, cases_);
+      own_[form.name] = solve_on(*form.form_factors, contenders, cases_, progress);
     }
   }
 
   std::vector<AccuracyRow> measure() {
     std::vector<std::vector<AccuracyRow>> rows(contestants_.size());
-    if (!progress_("errors", 0)) throw Cancelled();
-    in_parallel(contestants_.size(), [&](std::size_t k) { rows[k] = errors_of(k); });
+    const Progress part = [this](double done) { return progress_("errors", done); };
+    in_parallel(contestants_.size(), part, [&](std::size_t k) { rows[k] = errors_of(k); });
     std::vector<AccuracyRow> all;
     for (auto& of_contestant : rows) std::ranges::move(of_contestant, std::back_inserter(all));
     time(all);

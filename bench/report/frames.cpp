@@ -127,10 +127,12 @@ std::vector<FrameRow> measure_frames(const Contenders& contenders,
   DirectLighting direct(data, *contenders.tracer);
   std::vector<FrameRow> rows;
   for (std::size_t p = 0; p < paths.size(); ++p) {
-    if (!progress("light paths", static_cast<double>(p) / paths.size())) throw Cancelled();
+    const Progress part = [&](double done) {
+      return progress("light paths", (static_cast<double>(p) + done) / paths.size());
+    };
     const LitFrames lit = light_frames(contenders, paths[p], direct);
     std::vector<std::vector<FrameRow>> of_run(runs.size());
-    in_parallel(runs.size(), [&](std::size_t k) {
+    in_parallel(runs.size(), part, [&](std::size_t k) {
       FrameRow row{
           .path = paths[p].name, .contestant = runs[k].contestant, .sweeps = runs[k].sweeps};
       if (row.sweeps > 0) {

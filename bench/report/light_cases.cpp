@@ -47,12 +47,12 @@ LightCase repaint(const LightCase& lit, const std::vector<bool>& painted) {
 
 void solve_truths(const TransferData& data, std::vector<LightCase>& cases,
                   const ReportProgress& progress) {
-  if (!progress("reference", 0)) throw Cancelled();
   PatchTable repainted = data.patches;
   const auto found = std::ranges::find(cases, kRepainted, &LightCase::change);
   if (found != cases.end()) repainted.reflectance = found->reflectance;
   const ReferenceSolver usual(data.exchange, data.patches), other(data.exchange, repainted);
-  in_parallel(cases.size(), [&](std::size_t k) {
+  const Progress part = [&](double done) { return progress("reference", done); };
+  in_parallel(cases.size(), part, [&](std::size_t k) {
     LightCase& lit = cases[k];
     const auto solution =
         (lit.change == kRepainted ? other : usual).radiosity(lit.after, kReferenceResidual);
@@ -91,7 +91,7 @@ std::vector<LightCase> make_light_cases(const Contenders& contenders,
 }
 
 OwnSolutions solve_on(const FormFactorOperator& form, const Contenders& contenders,
-                      const std::vector<LightCase>& cases) {
+                      const std::vector<LightCase>& cases, const ReportProgress& progress) {
   const PatchTable& patches = contenders.data->patches;
   const auto solve = [&](const std::vector<Float3>& light, const std::vector<Float3>& reflectance) {
     std::vector<Float3> radiosity(light.size());
@@ -103,7 +103,8 @@ OwnSolutions solve_on(const FormFactorOperator& form, const Contenders& contende
   };
   OwnSolutions own{std::vector<std::vector<Float3>>(cases.size()),
                    std::vector<std::vector<Float3>>(cases.size())};
-  in_parallel(cases.size(), [&](std::size_t k) {
+  const Progress part = [&](double done) { return progress("own solutions", done); };
+  in_parallel(cases.size(), part, [&](std::size_t k) {
     own.before[k] = solve(cases[k].before, patches.reflectance);
     own.after[k] = solve(cases[k].after, cases[k].reflectance);
   });

@@ -29,12 +29,13 @@ std::vector<LightCase> make_light_cases(const Contenders& contenders,
                                         const ReportSettings& settings,
                                         const ReportProgress& progress);
 
-/// What one form of F makes of the cases: its own solutions, found by conjugate gradients.
+/// What one form of F makes of the cases: its own solutions.
 struct OwnSolutions {
   std::vector<std::vector<Float3>> before, after;  ///< B [n] in lx for each case
 };
 
+/// Finds them by conjugate gradients. Throws Cancelled if asked to stop.
 OwnSolutions solve_on(const FormFactorOperator& form, const Contenders& contenders,
-                      const std::vector<LightCase>& cases);
+                      const std::vector<LightCase>& cases, const ReportProgress& progress);
 
 }  // namespace rebounce::bench

@@ -227,6 +227,9 @@ def write_notes(notes, headlines, missing, date, pictures, folder):
 
 def main():
     options = parse_arguments()
+    # However it is asked to stop, what it has begun stops with it.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     folder = options.out / ("quick" if options.quick else "full")
     folder.mkdir(parents=True, exist_ok=True)
     jobs = list_jobs(options, folder)
