@@ -15,14 +15,17 @@
 namespace rebounce::bench {
 namespace {
 
-/// Two places for a lamp, far enough from each other that it can move between them.
+/// Two places for a lamp, far enough from each other that it can move between them, and free to.
 std::pair<Light, Light> find_places(const TransferData& data, const RayTracer& tracer,
                                     double distance, std::uint64_t seed) {
   constexpr int kTries = 64;
   const std::vector<Light> lamps = lamps_in_the_open(data, tracer, kTries, seed);
-  for (const Light& other : lamps) {
-    if (glm::distance(to_dvec3(lamps[0].position), to_dvec3(other.position)) > distance) {
-      return {lamps[0], other};
+  for (const Light& lamp : lamps) {
+    for (const Light& other : lamps) {
+      if (glm::distance(to_dvec3(lamp.position), to_dvec3(other.position)) > distance &&
+          free_way(tracer, lamp.position, other.position)) {
+        return {lamp, other};
+      }
     }
   }
   throw Error("the scene has no room to move a lamp in; give another");
@@ -59,6 +62,15 @@ std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& 
   });
   if (lamps.empty()) throw Error("no lamp at any place lights much of the scene; give another");
   return lamps;
+}
+
+bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to) {
+  std::array<Ray, 1> ray = {{{.origin = from,
+                              .t_near = 0,
+                              .direction = to_float3(to_glm(to) - to_glm(from)),
+                              .t_far = 1}}};
+  tracer.occluded(ray);
+  return !is_occluded(ray[0]);
 }
 
 double scene_diagonal(const TransferData& data) {

@@ -23,7 +23,7 @@ inline constexpr std::array kMotions = {0.01, 0.05, 0.2};
 
 /// One lamp in the free space of the scene, of those that `seed` draws: switched on in the dark,
 /// moved by these parts of the scene's diagonal ("moved 1 %"; each in (0, 0.2]), and replaced by
-/// another one elsewhere ("switched"). Throws Error if it lights nothing.
+/// another one elsewhere ("switched"), towards which it moved. Throws Error if it lights nothing.
 std::vector<LightChange> light_changes(const TransferData& data,
                                        std::span<const double> motions = kMotions,
                                        std::uint64_t seed = 1);
@@ -33,6 +33,9 @@ std::vector<LightChange> light_changes(const TransferData& data,
 /// same lamps. Throws Error if there are none.
 std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
                                      std::uint64_t seed);
+
+/// True if nothing stands between two places.
+bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to);
 
 /// Length of the diagonal of the scene's bounding box, metres.
 double scene_diagonal(const TransferData& data);

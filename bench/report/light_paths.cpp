@@ -44,11 +44,8 @@ class Places {
 
  private:
   bool sees(const Float3& a, const Float3& b) const {
-    const glm::vec3 way = to_glm(b) - to_glm(a);
-    if (glm::length(way) < kLeastLeg * diagonal_) return false;
-    std::vector<Ray> ray = {{.origin = a, .t_near = 0, .direction = to_float3(way), .t_far = 1}};
-    tracer_.occluded(ray);
-    return !is_occluded(ray[0]);
+    return glm::distance(to_dvec3(a), to_dvec3(b)) > kLeastLeg * diagonal_ &&
+           free_way(tracer_, a, b);
   }
 
   const RayTracer& tracer_;

@@ -46,9 +46,8 @@ def parse_arguments():
         "--bench", type=pathlib.Path, default=ROOT / "build/release/bench/report/bench_report"
     )
     parser.add_argument(
-        "--notes", type=pathlib.Path, help="write the summary and its pictures into this folder too"
+        "--keep", action="store_true", help="put the summary into notes/ and quote it in README.md"
     )
-    parser.add_argument("--readme", type=pathlib.Path, help="quote the summary in this file")
     return parser.parse_args()
 
 
@@ -213,7 +212,8 @@ def write_notes(notes, headlines, missing, date, pictures, folder):
     target.mkdir(parents=True, exist_ok=True)
 
     def kept(path):
-        shutil.copyfile(path, target / path.name)
+        if path.parent != target:
+            shutil.copyfile(path, target / path.name)
         return f"pictures/{path.name}"
 
     named = {
@@ -222,7 +222,8 @@ def write_notes(notes, headlines, missing, date, pictures, folder):
     }
     text = summary.markdown(headlines, missing, date, named)
     (notes / "report.md").write_text(text, encoding="utf-8")
-    shutil.copyfile(folder / "claims.csv", notes / "report_claims.csv")
+    if notes != folder:
+        shutil.copyfile(folder / "claims.csv", notes / "report_claims.csv")
 
 
 def main():
@@ -251,12 +252,14 @@ def main():
     headlines = [summary.Headline(r) for r in results_module.load(job.result for job in done)]
     claims = [claim for h in headlines for claim in h.claims]
     tables.write_all(folder, [h.result for h in headlines], claims)
-    pictures = draw(headlines, folder)
+    drawn = folder / "pictures"
+    drawn.mkdir(exist_ok=True)
+    pictures = draw(headlines, drawn)
     write_page(headlines, missing, date, pictures, folder)
-    if options.notes:
-        write_notes(options.notes, headlines, missing, date, pictures, folder)
-    if options.readme:
-        summary.quote_in_readme(options.readme, summary.readme_block(headlines))
+    write_notes(folder, headlines, missing, date, pictures, folder)
+    if options.keep:
+        write_notes(ROOT / "notes", headlines, missing, date, pictures, folder)
+        summary.quote_in_readme(ROOT / "README.md", summary.readme_block(headlines))
     print(f"\n{summary.aims(headlines)}\n\n{folder / 'report.html'}")
     return 0
 
