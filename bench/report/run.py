@@ -40,6 +40,7 @@ def parse_arguments():
     parser.add_argument("--minutes", type=float, help="begin nothing that would take longer in all")
     parser.add_argument("--threads", type=int, default=0, help="threads of offline work; 0: all")
     parser.add_argument("--repeats", type=int, default=0, help="timings of each thing; 0: as usual")
+    parser.add_argument("--no-truth", action="store_true", help="leave the path tracer out")
     parser.add_argument("--page-only", action="store_true", help="measure nothing, show what there is")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "report-out")
     parser.add_argument(
@@ -102,6 +103,8 @@ def measure(job, options, folder):
     command += ["--threads", str(options.threads), "--repeats", str(options.repeats)]
     if options.quick:
         command.append("--quick")
+    if options.no_truth:
+        command.append("--no-truth")
     process = subprocess.Popen([str(word) for word in command])
     try:
         return process.wait() == 0
@@ -174,7 +177,7 @@ def write_page(headlines, missing, date, pictures, folder):
     page.table(summary.LOSS_NAMES, summary.losses(headlines))
     page.heading("Light paths")
     for h in headlines:
-        for budget in claims_module.LAG_BUDGETS:
+        for budget in budgets_shown(h.result):
             path = folder / f"{h.result.path.stem}-frames-{budget}.png"
             page.picture(plots.frames(h.result, budget, path), "error by frame")
             page.table(summary.FRAME_NAMES, summary.frame_rows(h.result, budget),
@@ -193,6 +196,11 @@ def write_page(headlines, missing, date, pictures, folder):
     for h in headlines:
         page.paragraph(f"{h.result.title}: {json.dumps(h.result['settings'])}")
     page.write(folder / "report.html")
+
+
+def budgets_shown(result):
+    """Of a quick report one is enough."""
+    return [summary.PATH_BUDGET] if result["settings"]["quick"] else claims_module.LAG_BUDGETS
 
 
 def claim_table(headline):
