@@ -25,6 +25,7 @@ struct Options {
 
 ReportSettings settings_for(const Options& options, std::size_t patch_count) {
   ReportSettings settings;
+  if (patch_count >= ReportSettings::kLarge) settings.make_large();
   if (options.quick) settings.make_quick();
   settings.patch_count = patch_count;
   settings.solve_threads = options.solve_threads;

@@ -43,6 +43,9 @@ struct ReportSettings {
   int frame_count = 300;                                 ///< of each light path
   std::vector<double> budgets = {250, 500, 1000, 2000};  ///< microseconds a frame
 
+  /// From so many patches on, a scene is large.
+  static constexpr std::size_t kLarge = 8000;
+
   bool truth = true;  ///< compare with the path tracer
   reference::PatchComparisonSettings patch_comparison;
   std::size_t truth_point_count = 8000;
@@ -52,6 +55,9 @@ struct ReportSettings {
 
   /// The same on a small part of it: some seconds at 1,000 patches.
   void make_quick();
+
+  /// What is left out of many patches, so that they take minutes and not hours.
+  void make_large();
 };
 
 }  // namespace rebounce::bench

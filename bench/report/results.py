@@ -50,7 +50,12 @@ class Result:
         return list(dict.fromkeys(row["change"] for row in self["accuracy"]))
 
     def accuracy(self, change, methods):
-        return [r for r in self["accuracy"] if r["change"] == change and r["method"] in methods]
+        """Rows of a change; without those that have no error, as nothing was reflected."""
+        return [
+            r
+            for r in self["accuracy"]
+            if r["change"] == change and r["method"] in methods and r["error"] is not None
+        ]
 
     def fastest(self, change, methods, target, error="error", form=None, time="microseconds"):
         """The row of least time whose error is within `target`, or None."""
