@@ -53,11 +53,9 @@ struct Run {
   std::vector<double> budgets{};
 };
 
-/// The dense inverse is the truth, and preconditioned conjugate gradients are for repainted scenes:
-/// neither runs.
+/// Preconditioned conjugate gradients are for repainted scenes.
 bool takes_part(const Contestant& contestant) {
-  return contestant.name != kDenseInverse &&
-         contestant.method != SolveMethod::kPreconditionedConjugateGradient;
+  return contestant.method != SolveMethod::kPreconditionedConjugateGradient;
 }
 
 std::vector<Run> list_runs(const std::vector<Contestant>& contestants,
@@ -117,7 +115,7 @@ Lag lag_after(const std::vector<int>& switches, const std::vector<float>& errors
 
 std::vector<FrameRow> measure_frames(const Contenders& contenders,
                                      const std::vector<Contestant>& contestants,
-                                     const std::vector<RunTime>& times,
+                                     const std::vector<RunTime>& times, double truth_error,
                                      const ReportSettings& settings,
                                      const ReportProgress& progress) {
   const TransferData& data = *contenders.data;
@@ -132,12 +130,17 @@ std::vector<FrameRow> measure_frames(const Contenders& contenders,
     };
     const LitFrames lit = light_frames(contenders, paths[p], direct);
     std::vector<std::vector<FrameRow>> of_run(runs.size());
+    const auto errors_of = [&](const Contestant& contestant, int sweeps) {
+      if (contestant.name == kDenseInverse) {
+        return std::vector<float>(lit.truth.size(), static_cast<float>(truth_error));
+      }
+      return follow(lit, sweeps, data.patches.area, *contestant.make(contenders));
+    };
     in_parallel(runs.size(), part, [&](std::size_t k) {
       FrameRow row{
           .path = paths[p].name, .contestant = runs[k].contestant, .sweeps = runs[k].sweeps};
       if (row.sweeps > 0) {
-        const auto method = contestants[row.contestant].make(contenders);
-        row.errors = follow(lit, row.sweeps, data.patches.area, *method);
+        row.errors = errors_of(contestants[row.contestant], row.sweeps);
         summarise(paths[p], row);
       }
       for (const double budget : runs[k].budgets) {

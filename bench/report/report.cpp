@@ -148,10 +148,12 @@ ordered_json measure_scene(const std::string& scene, const ReportSettings& setti
   for (const AccuracyRow& row : accuracy) {
     json["accuracy"].push_back(json_of(row, contestants[row.contestant]));
   }
-  json["dense_error"] = dense_error(accuracy, contestants);
+  const double truth_error = dense_error(accuracy, contestants);
+  json["dense_error"] = truth_error;
 
   const std::vector<RunTime> times = run_times(accuracy, contestants.size());
-  for (const FrameRow& row : measure_frames(contenders, contestants, times, settings, progress)) {
+  for (const FrameRow& row :
+       measure_frames(contenders, contestants, times, truth_error, settings, progress)) {
     json["frames"].push_back(json_of(row, contestants[row.contestant]));
   }
   const FurnaceResult furnace = measure_furnace(*contenders.data);
