@@ -5,6 +5,7 @@ import dataclasses
 import results
 
 LAG_BUDGETS = (250, 500, 1000, 2000)
+LAG, FINE_LAG = "lag after a switch", "lag after a switch to 0.1 %"
 
 
 @dataclasses.dataclass
@@ -116,7 +117,7 @@ def lag(result, budget, key="lag_1_percent"):
     return Claim(
         result.scene,
         result.patches,
-        "lag after a switch" + ("" if key == "lag_1_percent" else " to 0.1 %"),
+        LAG if key == "lag_1_percent" else FINE_LAG,
         f"{budget:g} microseconds a frame",
         results.describe(inverse),
         inverse[key]["mean"],

@@ -111,7 +111,7 @@ def winners(all_results, path):
                 claim = claims.equal_error(result, change, target)
                 if claim is not None:
                     ratio[y, x] = claim.ratio
-                    panel.text(x, y, f"{claim.ratio:.2g}", ha="center", va="center", fontsize=8)
+                    panel.text(x, y, f"{claim.ratio:.3g}"[:4].rstrip("."), ha="center", va="center", fontsize=8)
         panel.imshow(np.log2(ratio), cmap="RdBu_r", vmin=-4, vmax=4, aspect="auto")
         panel.set_xticks(range(len(results.TARGETS)), [f"{t:g}" for t in results.TARGETS])
         panel.set_yticks(range(len(changes)), changes if panel is axes[0][0] else [])
@@ -126,7 +126,8 @@ def pictures(result, folder, path):
     gain = drawn["difference_gain"]
     panels = []
     for method in drawn["methods"]:
-        sweeps = f", {method['sweeps']} sweeps" if method["sweeps"] else ""
+        count = method["sweeps"]
+        sweeps = f", {count} sweep{'s' if count > 1 else ''}" if count else ""
         panels.append(
             [
                 ("reference", drawn["reference"]),

@@ -14,10 +14,13 @@ import subprocess
 import sys
 import time
 
+import aims
 import claims as claims_module
+import formats
 import page as page_module
 import plots
 import results as results_module
+import rows
 import summary
 import tables
 
@@ -28,7 +31,7 @@ TINY = (("cornell_box", 100), ("cornell_box", 300))
 
 # Seconds that a measurement takes on two cores that do nothing else, at 1,000 patches and with what
 # exponent of their number; replaced by what finished ones took.
-USUAL_SECONDS, QUICK_SECONDS, EXPONENT = 60, 20, 1.3
+USUAL_SECONDS, QUICK_SECONDS, EXPONENT = 120, 20, 1.3
 
 
 def parse_arguments():
@@ -145,11 +148,11 @@ def draw(headlines, folder):
         if result.scene not in largest or result.patches > largest[result.scene].patches:
             largest[result.scene] = result
     most = max(all_results, key=lambda r: r.patches)
-    changes = [results_module.SWITCHED, summary.WARM]
+    changes = [results_module.SWITCHED, aims.WARM]
     pictures = {
         "accuracy": plots.accuracy(list(largest.values()), changes, folder / "report_accuracy.png"),
         "winners": plots.winners(list(largest.values()), folder / "report_winners.png"),
-        "frames": plots.frames(most, summary.PATH_BUDGET, folder / "report_frames.png"),
+        "frames": plots.frames(most, rows.PATH_BUDGET, folder / "report_frames.png"),
         "scenes": {},
     }
     for scene, result in largest.items():
@@ -164,31 +167,35 @@ def write_page(headlines, missing, date, pictures, folder):
     all_results = [h.result for h in headlines]
     page.paragraph(summary.provenance(all_results, date))
     page.paragraph(summary.missing_line(missing).replace("*", ""))
-    page.table(summary.HEADLINE_NAMES, [h.row() for h in headlines], "Summary")
-    for line in summary.aims(headlines).splitlines():
+    page.table(aims.HEADLINE_NAMES, [h.row() for h in headlines], "Summary")
+    for line in aims.aims(headlines).splitlines():
         page.paragraph(line)
     page.heading("Accuracy and time")
     page.picture(pictures["accuracy"], "error against time")
     page.picture(pictures["winners"], "ratios")
+    page.table(rows.EQUAL_TIME_NAMES, rows.equal_time_rows(headlines), "Equal time, switched")
     for h in headlines:
         page.table(*claim_table(h), f"Equal error: {h.result.title}")
     page.heading("Where Gauss-Seidel wins")
-    page.table(summary.MOTION_NAMES, summary.motion_rows(headlines), "Up to a motion of")
-    page.table(summary.LOSS_NAMES, summary.losses(headlines))
+    page.table(rows.MOTION_NAMES, rows.motion_rows(headlines), "Up to a motion of")
+    slow = rows.losses(headlines, rows.TIME_SUBJECTS)
+    page.table(rows.LOSS_NAMES, rows.loss_rows(slow), "As fast or faster")
+    paths = rows.losses(headlines, rows.PATH_SUBJECTS)
+    page.table(rows.PATH_LOSS_NAMES, rows.path_loss_rows(paths), "Less error on a light path")
     page.heading("Light paths")
     for h in headlines:
         for budget in budgets_shown(h.result):
             path = folder / f"{h.result.path.stem}-frames-{budget}.png"
             page.picture(plots.frames(h.result, budget, path), "error by frame")
-            page.table(summary.FRAME_NAMES, summary.frame_rows(h.result, budget),
+            page.table(rows.FRAME_NAMES, rows.frame_rows(h.result, budget),
                        f"{h.result.title}, {budget} µs a frame")
             path.unlink()
     page.heading("What it costs to have")
-    page.table(summary.COST_SUMMARY_NAMES, summary.cost_summary_rows(headlines))
+    page.table(rows.COST_SUMMARY_NAMES, rows.cost_summary_rows(headlines))
     for h in headlines:
-        page.table(summary.COST_NAMES, summary.cost_rows(h.result), h.result.title)
+        page.table(rows.COST_NAMES, rows.cost_rows(h.result), h.result.title)
     page.heading("Truth")
-    page.table(summary.TRUTH_NAMES, summary.truth_rows(headlines))
+    page.table(rows.TRUTH_NAMES, rows.truth_rows(headlines))
     page.heading("Pictures")
     for scene, path in pictures["scenes"].items():
         page.picture(path, scene)
@@ -200,18 +207,18 @@ def write_page(headlines, missing, date, pictures, folder):
 
 def budgets_shown(result):
     """Of a quick report one is enough."""
-    return [summary.PATH_BUDGET] if result["settings"]["quick"] else claims_module.LAG_BUDGETS
+    return [rows.PATH_BUDGET] if result["settings"]["quick"] else claims_module.LAG_BUDGETS
 
 
 def claim_table(headline):
     names = ("condition", "inverse", "µs", "Gauss-Seidel", "µs", "ratio")
-    rows = [
-        (c.condition, c.inverse, summary.number(c.inverse_value), c.rival,
-         summary.number(c.rival_value), summary.times(c.ratio))
+    lines = [
+        (c.condition, c.inverse, formats.number(c.inverse_value), c.rival,
+         formats.number(c.rival_value), formats.times(c.ratio))
         for c in headline.claims
         if c.subject == "equal error"
     ]
-    return names, rows
+    return names, lines
 
 
 def write_notes(notes, headlines, missing, date, pictures, folder):
@@ -257,7 +264,7 @@ def main():
         return 1
     missing = [(job.name, job.patches) for job in jobs if job not in done]
     date = datetime.date.today().isoformat()
-    headlines = [summary.Headline(r) for r in results_module.load(job.result for job in done)]
+    headlines = [aims.Headline(r) for r in results_module.load(job.result for job in done)]
     claims = [claim for h in headlines for claim in h.claims]
     tables.write_all(folder, [h.result for h in headlines], claims)
     drawn = folder / "pictures"
@@ -268,7 +275,7 @@ def main():
     if options.keep:
         write_notes(ROOT / "notes", headlines, missing, date, pictures, folder)
         summary.quote_in_readme(ROOT / "README.md", summary.readme_block(headlines))
-    print(f"\n{summary.aims(headlines)}\n\n{folder / 'report.html'}")
+    print(f"\n{aims.aims(headlines)}\n\n{folder / 'report.html'}")
     return 0
 
 
