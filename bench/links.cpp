@@ -69,7 +69,7 @@ class SceneBench {
     LinkBuild build;
     const double seconds = seconds_of([&] { build = build_links(model_, tracer_, settings_); });
     const auto n = static_cast<double>(model_.patches.size());
-    const double rays = static_cast<double>(build.ray_count) - n * settings_.escape_rays;
+    const double rays = static_cast<double>(build.ray_count) - n * settings_.hemisphere_rays;
     const LinkedFormFactors links(build.links, model_.patches.area, model_.patches.centroid);
     std::vector<Table::Cell> row = {name,
                                     n,
@@ -160,14 +160,14 @@ class SceneBench {
     EscapeScratch scratch;
     std::vector<Escape> escape;
     for (const std::uint32_t patch : rows_.patch) {
-      escape.push_back(measure_escape(model_.mesh, triangles[patch], patch, tracer_,
-                                      settings_.escape_rays, settings_.seed, scratch));
+      escape.push_back(measure_escape(model_, triangles[patch], patch, tracer_,
+                                      settings_.hemisphere_rays, settings_.seed, scratch));
     }
-    const std::vector<RowTarget> target = row_targets(escape, settings_.escape_rays);
+    const std::vector<RowTarget> target = row_targets(escape, settings_.hemisphere_rays);
     for (std::size_t k = 0; k < target.size(); ++k) {
       auto& row = rows_.form_factor[k];
       double sum = std::accumulate(row.begin(), row.end(), 0.0);
-      if (is_doubtful_row(sum, target[k], geometry_.triangles(rows_.patch[k]).size())) {
+      if (is_doubtful_row(sum, target[k])) {
         compute_row(rows_.patch[k], settings_.full_rays, row);
         sum = std::accumulate(row.begin(), row.end(), 0.0);
       }

@@ -161,7 +161,7 @@ class OfflineStage {
   void report_form_factors(Table& table) const {
     const Timing phase = timing("form factors");
     const auto rays = static_cast<double>(report_.ray_count);
-    const double escape = static_cast<double>(model_.patches.size()) * ff_settings().escape_rays;
+    const double escape = static_cast<double>(model_.patches.size()) * ff_settings().hemisphere_rays;
     // Seconds of bare Embree for all rays of the phase, in the proportion of their kinds.
     const double bare =
         (rays - escape) * fastest("shadow") / static_cast<double>(sampled_shadow_count_) +

@@ -34,7 +34,8 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
     result.hidden_count += hidden_among(rays);
   };
   for (std::uint32_t row = 0; row < geometry.patch_count(); row += row_step) {
-    shadow_rays.find_facing(row, facing, [](std::uint32_t) { return true; });
+    shadow_rays.find_facing(
+        row, facing, [&](std::uint32_t column) { return !is_coarse_pair(geometry, row, column); });
     add_shadow_stream(row, facing, settings.probe_rays);
     mixed.clear();
     const auto probe_rays = static_cast<std::size_t>(settings.probe_rays);
@@ -45,7 +46,7 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
       if (agreement == ShadowRays::Agreement::kMixed) mixed.push_back(facing[p]);
     }
     add_shadow_stream(row, mixed, settings.full_rays);
-    measure_escape(model.mesh, patch_triangles[row], row, tracer, settings.escape_rays,
+    measure_escape(model, patch_triangles[row], row, tracer, settings.hemisphere_rays,
                    settings.seed, escape);
     result.escape.push_back(escape.rays);
     result.escape_count += escape.rays.size();

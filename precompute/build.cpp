@@ -153,7 +153,7 @@ std::string settings_json(const BuildSettings& settings) {
                         {"seed", f.seed},
                         {"probe_rays", f.probe_rays},
                         {"full_rays", f.full_rays},
-                        {"escape_rays", f.escape_rays},
+                        {"hemisphere_rays", f.hemisphere_rays},
                         {"link_epsilon", f.link_epsilon},
                         {"store_links", settings.store_links},
                         {"kernel_tolerance", f.kernel_tolerance},

@@ -44,7 +44,7 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
   copy_links(refined.links, build.links);
   const std::vector<double> scale = scale_links(refined.tree, refined.links, refined.target);
   build.links.scale.assign(scale.begin(), scale.end());
-  build.ray_count = refined.ray_count + model.patches.size() * settings.escape_rays;
+  build.ray_count = refined.ray_count + model.patches.size() * settings.hemisphere_rays;
   build.candidate_count = refined.candidate_count;
   return build;
 }

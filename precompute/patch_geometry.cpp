@@ -225,6 +225,12 @@ double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t 
   return sum;
 }
 
+/// The sum of the radii by the distance: the larger, the nearer.
+double relative_reach(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
+  const PatchBounds &a = geometry.bounds(i), &b = geometry.bounds(j);
+  return (a.radius + b.radius) / glm::distance(a.centre, b.centre);
+}
+
 }  // namespace
 
 bool PatchBounds::is_flat() const {
@@ -287,12 +293,17 @@ std::span<const PatchPart> PatchGeometry::parts(std::size_t patch, int level) co
   return {&parts_[patch * kPartStride + part_offset(level)], std::size_t{1} << level};
 }
 
+bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
+  if (geometry.triangles(i).size() * geometry.triangles(j).size() <= kFewTrianglePairs)
+    return false;
+  return i == j || !(relative_reach(geometry, i, j) < kPartReach.back());
+}
+
 double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, std::size_t j,
                                 double tolerance) {
   const std::span<const FlatTriangle> a = geometry.triangles(i), b = geometry.triangles(j);
   if (a.size() * b.size() <= kFewTrianglePairs) return between_triangles(a, b, tolerance);
-  const PatchBounds &near = geometry.bounds(i), &far = geometry.bounds(j);
-  const double reach = (near.radius + far.radius) / glm::distance(near.centre, far.centre);
+  const double reach = relative_reach(geometry, i, j);
   for (std::size_t k = 0; i != j && k < kPartReach.size(); ++k) {
     if (!(reach < kPartReach[k])) continue;
     return between_parts(geometry.parts(i, std::max(kPartLevel[k], geometry.flat_level(i))),
@@ -301,7 +312,8 @@ double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, st
   if (a.size() * b.size() <= kFewNearTrianglePairs) return between_triangles(a, b, tolerance);
   // The smaller patch tells better what it sees: a large part of the other, taken as a point beside
   // it, would give it all that the whole part has. No patch gives more than all.
-  const double own = near.radius * near.radius, other = far.radius * far.radius;
+  const double own = std::pow(geometry.bounds(i).radius, 2),
+               other = std::pow(geometry.bounds(j).radius, 2);
   const double exchange =
       (other * parts_to_patch(geometry, i, j) + own * parts_to_patch(geometry, j, i)) /
       (own + other);

@@ -15,7 +15,7 @@ std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tr
     EscapeScratch scratch;
 #pragma omp for schedule(dynamic, 16)
     for (std::uint32_t i = 0; i < escape.size(); ++i) {
-      escape[i] = measure_escape(model.mesh, triangles[i], i, tracer, settings.escape_rays,
+      escape[i] = measure_escape(model, triangles[i], i, tracer, settings.hemisphere_rays,
                                  settings.seed, scratch);
     }
   }
@@ -37,11 +37,10 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
   LinkRefinement refinement(result.tree, shadow_rays, tracer, settings);
   refinement.run(part_of(progress, 0.0, 0.5));
   result.escape = measure_escapes(model, tracer, settings);
-  result.target = row_targets(result.escape, settings.escape_rays);
+  result.target = row_targets(result.escape, settings.hemisphere_rays);
   const std::vector<double> ones(model.patches.size(), 1.0);
   const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
-  refinement.revise(find_doubtful_rows(sum, result.target, shadow_rays.geometry()),
-                    part_of(progress, 0.5, 1.0));
+  refinement.revise(find_doubtful_rows(sum, result.target), part_of(progress, 0.5, 1.0));
   result.links.assign(refinement.links().begin(), refinement.links().end());
   result.ray_count = refinement.ray_count();
   result.candidate_count = refinement.candidate_count();
@@ -52,8 +51,9 @@ void check_form_factor_settings(const FormFactorSettings& settings) {
   const auto in_range = [](int rays) {
     return rays >= 1 && rays <= static_cast<int>(ShadowRays::kPointCount);
   };
-  if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) || settings.escape_rays < 1) {
-    throw Error("form factors: rays per pair must be between 1 and 64, escape rays at least 1");
+  if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) ||
+      settings.hemisphere_rays < 1) {
+    throw Error("form factors: rays per pair must be between 1 and 64, hemisphere rays at least 1");
   }
   if (!(settings.link_epsilon >= 0)) {
     throw Error("form factors: the error of a link must not be negative");

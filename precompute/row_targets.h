@@ -5,7 +5,6 @@
 
 #include "closure.h"
 #include "escape.h"
-#include "rebounce/precompute/patch_geometry.h"
 
 namespace rebounce {
 
@@ -14,11 +13,11 @@ namespace rebounce {
 std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count);
 
 /// True if the `sum` of a patch's row is off its target by so much that visibility must have been
-/// misjudged. `triangle_count` is that of the patch.
-bool is_doubtful_row(double sum, const RowTarget& target, std::size_t triangle_count);
+/// misjudged.
+bool is_doubtful_row(double sum, const RowTarget& target);
 
 /// The same of every row [n].
-std::vector<bool> find_doubtful_rows(std::span<const double> sum, std::span<const RowTarget> target,
-                                     const PatchGeometry& geometry);
+std::vector<bool> find_doubtful_rows(std::span<const double> sum,
+                                     std::span<const RowTarget> target);
 
 }  // namespace rebounce

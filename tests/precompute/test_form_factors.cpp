@@ -223,7 +223,7 @@ TEST(FormFactors, RefuseSettingsOutOfRange) {
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(compute_form_factors(model, tracer, {.probe_rays = 0}), Error);
   EXPECT_THROW(compute_form_factors(model, tracer, {.full_rays = 65}), Error);
-  EXPECT_THROW(compute_form_factors(model, tracer, {.escape_rays = 0}), Error);
+  EXPECT_THROW(compute_form_factors(model, tracer, {.hemisphere_rays = 0}), Error);
 }
 
 }  // namespace

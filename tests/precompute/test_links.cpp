@@ -178,14 +178,14 @@ TEST(Links, ExpandToAllPairs) {
 }
 
 TEST(Links, WithoutErrorAreAllPairs) {
+  // But for what hemisphere rays add to pairs that are partly hidden.
   const PatchModel model = model_of(furnished_room(), 300);
   const FormFactors pairs = form_factors_of(model, 0), links = form_factors_of(model, 1e-30);
-  ASSERT_TRUE(std::ranges::equal(links.exchange.column, pairs.exchange.column));
-  for (std::size_t k = 0; k < pairs.exchange.column.size(); ++k) {
-    const float s = pairs.exchange.exchange_area[k];
-    EXPECT_NEAR(links.exchange.exchange_area[k], s, 1e-5F * s);
-  }
-  EXPECT_EQ(links.ray_count, pairs.ray_count);
+  const std::vector<Float3> light = smooth_light(model.patches);
+  const auto gathered = [&](const FormFactors& f) {
+    return gather(FormFactorBlocks(f.exchange, model.patches.area), light);
+  };
+  EXPECT_LT(relative_difference(gathered(links), gathered(pairs), model.patches.area), 1e-3);
 }
 
 TEST(Links, SmallerErrorsAreSmaller) {

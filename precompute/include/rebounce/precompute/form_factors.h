@@ -18,9 +18,10 @@ struct FormFactorSettings {
   int probe_rays = 8;
   /// Shadow rays for a pair that is partly hidden. More: smoother penumbrae, slower. At most 64.
   int full_rays = 64;
-  /// Rays per patch that measure what escapes or meets back faces. More: better row sums in open
-  /// scenes; closed rooms do not need them.
-  int escape_rays = 1024;
+  /// Rays per patch into its hemisphere. They measure what escapes, and what near patches of many
+  /// triangles exchange; they find the pairs that probe rays misjudge. More: better row sums in
+  /// open scenes, less noise between near patches.
+  int hemisphere_rays = 4096;
   /// Relative error aimed at by the unoccluded kernel.
   double kernel_tolerance = 3e-4;
   /// Above 0: visibility is found for links between sets of patches (links.h) instead of for all
@@ -47,8 +48,9 @@ struct FormFactors {
   std::uint64_t pair_count = 0;  ///< pairs of patches that face each other
 };
 
-/// Finds the form factors of every pair of patches: exact exchange of the unoccluded triangles
-/// times the kernel-weighted part of shadow rays that get through (form_factor_kernel.h), corrected
+/// Finds the form factors of every pair of patches: the exact exchange of the unoccluded patches
+/// times the kernel-weighted part of shadow rays that get through (form_factor_kernel.h), joined
+/// with what hemisphere rays count, which alone speak for near patches of many triangles; corrected
 /// so that reciprocity and closure hold together (closure.h).
 ///
 /// `tracer` holds the first surface_count triangles of model.mesh. Rows are shared out among OpenMP

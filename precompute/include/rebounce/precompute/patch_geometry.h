@@ -98,6 +98,10 @@ class PatchGeometry {
   std::vector<PatchPart> parts_;          ///< [n][all levels, the coarsest first]
 };
 
+/// True for a pair (i, j) of many triangles so near to each other that their kernel is slow to find
+/// and coarse: hemisphere rays tell better what they exchange. A patch is near itself.
+bool is_coarse_pair(const PatchGeometry& geometry, std::size_t i, std::size_t j);
+
 /// Exchange area A_i F_ij in m² of patches i and j with nothing between them: symmetric up to
 /// rounding, >= 0. With i == j what a patch that is not flat gives to itself.
 ///

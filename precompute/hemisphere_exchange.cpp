@@ -1,0 +1,82 @@
+#include "hemisphere_exchange.h"
+
+#include <algorithm>
+
+#include "escape.h"
+
+namespace rebounce {
+namespace {
+
+// Low-discrepancy rays err about half as much as random ones: variances are a quarter.
+constexpr double kLowDiscrepancy = 0.25;
+
+}  // namespace
+
+std::vector<MetPatch> count_met_patches(const PatchModel& model, std::span<const Hit> hits) {
+  std::vector<std::uint32_t> patches;
+  patches.reserve(hits.size());
+  for (const Hit& hit : hits) {
+    if (hit.triangle == kNone) continue;
+    const std::uint32_t patch = patch_at(model, hit);
+    if (patch != kNone) patches.push_back(patch);
+  }
+  std::ranges::sort(patches);
+  std::vector<MetPatch> met;
+  for (const std::uint32_t patch : patches) {
+    if (met.empty() || met.back().patch != patch) met.push_back({patch, 0});
+    ++met.back().count;
+  }
+  return met;
+}
+
+/// The counts of both sides, n_i of N from area A_i and n_j of N from A_j, weighted by the inverse
+/// of their variances: (n_i + n_j) A_i A_j / ((A_i + A_j) N), whatever the exchange is.
+HemisphereExchange::HemisphereExchange(const std::vector<std::vector<MetPatch>>& met,
+                                       std::span<const double> area, int ray_count)
+    : area_(area.begin(), area.end()), ray_count_(ray_count), pairs_(met.size()) {
+  // In the order of the other patch, so that each list below comes out in order.
+  std::vector<std::vector<MetPatch>> met_by(met.size());
+  for (std::uint32_t k = 0; k < met.size(); ++k) {
+    for (const MetPatch& m : met[k]) {
+      if (m.patch < k) met_by[m.patch].push_back({k, m.count});
+    }
+  }
+  for (std::uint32_t i = 0; i < met.size(); ++i) {
+    auto own = std::ranges::lower_bound(met[i], i, {}, &MetPatch::patch);
+    auto other = met_by[i].begin();
+    while (own != met[i].end() || other != met_by[i].end()) {
+      const bool take_own =
+          other == met_by[i].end() || (own != met[i].end() && own->patch <= other->patch);
+      const bool take_other =
+          own == met[i].end() || (other != met_by[i].end() && other->patch <= own->patch);
+      const std::uint32_t j = take_own ? own->patch : other->patch;
+      // A patch's rays to itself count for either side.
+      const std::uint32_t count =
+          (take_own ? (j == i ? 2 : 1) * own->count : 0) + (take_other ? other->count : 0);
+      pairs_[i].push_back({j, count, count * area_per_ray(i, j)});
+      if (take_own) ++own;
+      if (take_other) ++other;
+    }
+  }
+}
+
+double HemisphereExchange::area_per_ray(std::uint32_t i, std::uint32_t j) const {
+  return area_[i] * area_[j] / ((area_[i] + area_[j]) * ray_count_);
+}
+
+HemisphereExchange::Pair HemisphereExchange::find(std::uint32_t i, std::uint32_t j) const {
+  const auto pair = std::ranges::lower_bound(pairs_[i], j, {}, &Pair::patch);
+  if (pair != pairs_[i].end() && pair->patch == j) return *pair;
+  return {j, 0, 0};
+}
+
+double HemisphereExchange::variance(std::uint32_t i, std::uint32_t j, double truth) const {
+  const double unit = area_per_ray(i, j);
+  return kLowDiscrepancy * unit * (truth + unit);
+}
+
+double HemisphereExchange::expected_count(std::uint32_t i, std::uint32_t j, double exchange) const {
+  return exchange / area_per_ray(i, j);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/precompute/patch_model.h"
+#include "rebounce/runtime/ray_tracer.h"
+
+namespace rebounce {
+
+/// How many hemisphere rays of one patch met another.
+struct MetPatch {
+  std::uint32_t patch;
+  std::uint32_t count;
+};
+
+/// Counts what the `hits` of one patch's hemisphere rays say, by patch in ascending order. A side
+/// that another covers stands for that one; rays that met a side without a patch are left out.
+std::vector<MetPatch> count_met_patches(const PatchModel& model, std::span<const Hit> hits);
+
+/// What pairs of patches exchange as hemisphere rays have it: a Monte Carlo estimate without bias,
+/// visibility and all bends of the patches included, and rows that add up. Coarse for what is far
+/// and small, good for what is near, where kernels times visibility are at their worst.
+class HemisphereExchange {
+ public:
+  /// `met` [n] of each patch, of `ray_count` cosine-distributed rays each; `area` [n] in m².
+  HemisphereExchange(const std::vector<std::vector<MetPatch>>& met, std::span<const double> area,
+                     int ray_count);
+
+  /// One pair (i, j), i <= j, that at least one ray went between.
+  struct Pair {
+    std::uint32_t patch;  ///< j
+    std::uint32_t count;  ///< rays of either
+    double exchange;      ///< m²
+  };
+
+  /// The pairs of patch i, j ascending.
+  std::span<const Pair> pairs(std::uint32_t i) const { return pairs_[i]; }
+
+  /// The pair (i, j), i <= j; count and exchange 0 if no ray went between.
+  Pair find(std::uint32_t i, std::uint32_t j) const;
+
+  /// Variance of a pair's `exchange`, m⁴, if `truth` in m² is what the pair exchanges.
+  double variance(std::uint32_t i, std::uint32_t j, double truth) const;
+
+  /// How many rays are expected between the pair if it exchanges `exchange` m².
+  double expected_count(std::uint32_t i, std::uint32_t j, double exchange) const;
+
+ private:
+  double area_per_ray(std::uint32_t i, std::uint32_t j) const;
+
+  std::vector<double> area_;
+  double ray_count_;
+  std::vector<std::vector<Pair>> pairs_;
+};
+
+}  // namespace rebounce

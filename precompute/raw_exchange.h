@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "closure.h"
+#include "escape.h"
+#include "rebounce/precompute/progress.h"
+#include "shadow_rays.h"
+
+namespace rebounce {
+
+/// A pair whose rays all agree may still be partly hidden: its variance is not zero but this part
+/// of the squared exchange.
+inline constexpr double kVisibilityVarianceFloor = 1e-6;
+
+/// The exchange of all pairs of patches as rays and kernels have it, before closure.
+struct RawExchange {
+  ExchangeRows rows;
+  std::vector<Escape> escape;     ///< [n]
+  std::vector<RowTarget> target;  ///< [n]
+  std::uint64_t ray_count = 0;
+  std::uint64_t pair_count = 0;  ///< pairs that face each other and were asked by shadow rays
+};
+
+/// Looks at every pair of patches:
+///
+/// - 1. Hemisphere rays of every patch say what escapes, and which patches see each other.
+/// - 2. A pair with a good kernel gets a few shadow rays. If they agree with each other and with
+/// the
+///   hemisphere rays, that is the answer; else it gets all of its rays, and the mean of what they
+///   and the hemisphere rays say, weighted by the inverse of their variances.
+/// - 3. A near pair of many triangles is taken from the hemisphere rays alone.
+/// - 4. Rows whose sum is off its target get all rays for every pair.
+///
+/// Rows are shared out among OpenMP threads; the bits do not depend on how many. Throws Cancelled
+/// when `progress` says so.
+RawExchange compute_raw_exchange(const PatchModel& model, const ShadowRays& shadow_rays,
+                                 const RayTracer& tracer, const FormFactorSettings& settings,
+                                 const Progress& progress);
+
+}  // namespace rebounce
