@@ -106,6 +106,7 @@ TEST_F(CommandLine, RefusesWrongUsageWithStatusTwo) {
       {{"solve", out, "-o", path("x.txt")}, ".npz"},
       {{"solve", out, "-o", path("x.csv"), "--method", "guess"}, "--method"},
       {{"solve", out, "-o", path("x.csv"), "--iterations", "0"}, "--iterations"},
+      {{"solve", out, "-o", path("x.csv"), "--error", "0"}, "--error"},
       {{"solve", out, "-o", path("x.csv"), "--residual", "-1"}, "--residual"},
       {{"export", out, "-o", path("x.npz")}, "--what"},
       {{"export", out, "-o", path("x.csv"), "--what", "mesh"}, ".npz"},
@@ -311,6 +312,18 @@ TEST_F(CommandLine, EveryMethodReachesTheResidualItWasAsked) {
                     "--residual", "0", "--iterations", "1000000", "--time-budget", "500"});
     EXPECT_LT(hurried["sweeps"].get<int>(), 1000000) << name;
   }
+}
+
+TEST_F(CommandLine, ChoosesByTheErrorThatMayBeLeft) {
+  const std::string file = precompute("box.safetensors", {"--tolerance", "0.01"});
+  const auto chosen = [&](const char* error) {
+    return summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"), "--method", "auto",
+                       "--error", error});
+  };
+  EXPECT_EQ(chosen("0.05")["chosen"], "transfer");
+  const json exact = chosen("1e-5");
+  EXPECT_NE(exact["chosen"], "transfer");
+  EXPECT_LT(exact["residual"], 1e-5);
 }
 
 TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
