@@ -87,26 +87,21 @@ def motion_rows(headlines):
 MOTION_NAMES = ("scene", "patches", *(f"error {percent(t)}" for t in results_module.TARGETS))
 
 
-EQUAL_TIME_NAMES = ("scene", "patches", "time", "inverse", "Gauss-Seidel", "how")
+EQUAL_TIME_NAMES = (
+    "scene",
+    "patches",
+    *(f"{t:,} µs: inverse / Gauss-Seidel" for t in claims_module.EQUAL_TIMES),
+)
 
 
 def equal_time_rows(headlines):
     rows = []
     for h in headlines:
-        claim = claims_module.find(h.claims, "equal time", SWITCHED)
-        if claim is None:
-            rows.append((name_of(h.result), f"{h.result.patches:,}", "–", "–", "no sweep fits", ""))
-            continue
-        rows.append(
-            (
-                name_of(h.result),
-                f"{h.result.patches:,}",
-                claim.condition.removeprefix(f"{SWITCHED}, "),
-                f"{claim.inverse_value:.1e}",
-                f"{claim.rival_value:.1e}",
-                claim.rival,
-            )
-        )
+        cells = []
+        for t in claims_module.EQUAL_TIMES:
+            c = claims_module.find(h.claims, "equal time", f"{SWITCHED}, {t} microseconds")
+            cells.append("–" if c is None else f"{c.inverse_value:.1e} / {c.rival_value:.1e}")
+        rows.append((name_of(h.result), f"{h.result.patches:,}", *cells))
     return rows
 
 

@@ -31,7 +31,7 @@ TINY = (("cornell_box", 100), ("cornell_box", 300))
 
 # Seconds that a measurement takes on two cores that do nothing else, at 1,000 patches and with what
 # exponent of their number; replaced by what finished ones took.
-USUAL_SECONDS, QUICK_SECONDS, EXPONENT = 120, 20, 1.3
+USUAL_SECONDS, QUICK_SECONDS, EXPONENT = 90, 20, 1.3
 
 
 def parse_arguments():

@@ -79,7 +79,7 @@ def markdown(headlines, missing, date, pictures):
         f"![Error against time]({pictures['accuracy']})",
         f"![How many times faster the inverse is]({pictures['winners']})",
         "Ratio of the times to an error, Gauss-Seidel ÷ inverse, by change of the light: red, the inverse is faster.",
-        "Errors after a switch at equal time, that of the product with the operator of 0.5 %:",
+        "Least errors after a switch at equal time (–: one side has nothing that fits):",
         markdown_table(rows.EQUAL_TIME_NAMES, rows.equal_time_rows(headlines)),
         "## Where Gauss-Seidel wins",
         where_gauss_seidel_wins(headlines),
@@ -125,9 +125,10 @@ def where_gauss_seidel_wins(headlines):
         parts.append(markdown_table(rows.LOSS_NAMES, some(slow)))
     parts.append(
         f"Light paths on which Gauss-Seidel, warm from frame to frame, has the smaller mean error at the same budget: {len(paths)} "
-        f"of {path_count}. Where light changes little by little sweeps add up over the frames, and a product starts anew in each."
+        f"of {path_count}."
     )
     if paths:
+        parts[-1] += " Where light changes little by little sweeps add up over the frames; a product starts anew in each."
         parts.append(markdown_table(rows.PATH_LOSS_NAMES, some(rows.path_loss_rows(paths))))
     parts.append(
         "\n".join(
