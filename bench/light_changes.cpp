@@ -1,6 +1,10 @@
 #include "light_changes.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <glm/glm.hpp>
+#include <limits>
 
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/direct_lighting.h"
@@ -11,23 +15,17 @@
 namespace rebounce::bench {
 namespace {
 
-double diagonal(const TransferData& data) {
-  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
-  for (const Float3& p : data.mesh.position) {
-    low = glm::min(low, to_dvec3(p));
-    high = glm::max(high, to_dvec3(p));
-  }
-  return glm::length(high - low);
-}
-
-/// Two places for a lamp, far enough from each other that it can move between them.
+/// Two places for a lamp, far enough from each other that it can move between them, and free to.
 std::pair<Light, Light> find_places(const TransferData& data, const RayTracer& tracer,
-                                    double distance) {
+                                    double distance, std::uint64_t seed) {
   constexpr int kTries = 64;
-  const std::vector<Light> lamps = random_point_lights(data, tracer, kTries, 1);
-  for (const Light& other : lamps) {
-    if (glm::distance(to_dvec3(lamps[0].position), to_dvec3(other.position)) > distance) {
-      return {lamps[0], other};
+  const std::vector<Light> lamps = lamps_in_the_open(data, tracer, kTries, seed);
+  for (const Light& lamp : lamps) {
+    for (const Light& other : lamps) {
+      if (glm::distance(to_dvec3(lamp.position), to_dvec3(other.position)) > distance &&
+          free_way(tracer, lamp.position, other.position)) {
+        return {lamp, other};
+      }
     }
   }
   throw Error("the scene has no room to move a lamp in; give another");
@@ -40,9 +38,52 @@ Light moved(Light lamp, const Light& towards, double distance) {
   return lamp;
 }
 
+/// The part of the surface's area that `irradiance` [n] reaches.
+double lit_part(const TransferData& data, std::span<const Float3> irradiance) {
+  double lit = 0, all = 0;
+  for (std::size_t i = 0; i < irradiance.size(); ++i) {
+    all += data.patches.area[i];
+    if (irradiance[i][0] > 0) lit += data.patches.area[i];
+  }
+  return lit / all;
+}
+
 }  // namespace
 
-std::vector<LightChange> light_changes(const TransferData& data) {
+std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
+                                     std::uint64_t seed) {
+  constexpr double kLeastLit = 0.05;
+  DirectLighting direct(data, tracer);
+  std::vector<Float3> irradiance(data.patches.size());
+  std::vector<Light> lamps = random_point_lights(data, tracer, count, seed);
+  std::erase_if(lamps, [&](const Light& lamp) {
+    direct.compute({&lamp, 1}, {}, irradiance);
+    return lit_part(data, irradiance) < kLeastLit;
+  });
+  if (lamps.empty()) throw Error("no lamp at any place lights much of the scene; give another");
+  return lamps;
+}
+
+bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to) {
+  std::array<Ray, 1> ray = {{{.origin = from,
+                              .t_near = 0,
+                              .direction = to_float3(to_glm(to) - to_glm(from)),
+                              .t_far = 1}}};
+  tracer.occluded(ray);
+  return !is_occluded(ray[0]);
+}
+
+double scene_diagonal(const TransferData& data) {
+  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const Float3& p : data.mesh.position) {
+    low = glm::min(low, to_dvec3(p));
+    high = glm::max(high, to_dvec3(p));
+  }
+  return glm::length(high - low);
+}
+
+std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
+                                       std::uint64_t seed) {
   const RayTracer tracer(data.mesh.position,
                          std::span(data.mesh.triangle).first(data.mesh.surface_count()));
   DirectLighting direct(data, tracer);
@@ -57,13 +98,13 @@ std::vector<LightChange> light_changes(const TransferData& data) {
     }
     return exitance;
   };
-  const double size = diagonal(data);
-  const auto [lamp, other] = find_places(data, tracer, 0.2 * size);
+  const double size = scene_diagonal(data);
+  const auto [lamp, other] = find_places(data, tracer, 0.2 * size, seed);
   const std::vector<Float3> before = light(lamp);
   std::vector<LightChange> changes = {{"from zero", {}, before}};
-  for (const auto& [name, part] :
-       {std::pair{"moved 1 %", 0.01}, {"moved 5 %", 0.05}, {"moved 20 %", 0.2}}) {
-    changes.push_back({name, before, light(moved(lamp, other, part * size))});
+  for (const double part : motions) {
+    changes.push_back(
+        {fmt::format("moved {:g} %", 100 * part), before, light(moved(lamp, other, part * size))});
   }
   changes.push_back({"switched", before, light(other)});
   return changes;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,8 +18,26 @@ struct LightChange {
   std::vector<Float3> before, after;
 };
 
-/// One lamp in the free space of the scene: switched on in the dark, moved by 1, 5 and 20 % of the
-/// scene's diagonal, and replaced by another one elsewhere. Throws Error if it lights nothing.
-std::vector<LightChange> light_changes(const TransferData& data);
+/// Parts of the scene's diagonal by which a lamp is moved, unless others are wanted.
+inline constexpr std::array kMotions = {0.01, 0.05, 0.2};
+
+/// One lamp in the free space of the scene, of those that `seed` draws: switched on in the dark,
+/// moved by these parts of the scene's diagonal ("moved 1 %"; each in (0, 0.2]), and replaced by
+/// another one elsewhere ("switched"), towards which it moved. Throws Error if it lights nothing.
+std::vector<LightChange> light_changes(const TransferData& data,
+                                       std::span<const double> motions = kMotions,
+                                       std::uint64_t seed = 1);
+
+/// `count` point lights of 1 cd in the free space of the scene (random_point_lights), without those
+/// that light less than a twentieth of its surface, as from inside of a box. The same `seed`, the
+/// same lamps. Throws Error if there are none.
+std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
+                                     std::uint64_t seed);
+
+/// True if nothing stands between two places.
+bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to);
+
+/// Length of the diagonal of the scene's bounding box, metres.
+double scene_diagonal(const TransferData& data);
 
 }  // namespace rebounce::bench

@@ -13,13 +13,25 @@ namespace {
 
 constexpr int kBadInput = 1, kUsage = 2;
 
-void write_text(const std::string& path, const std::string& text) {
+}  // namespace
+
+void write_text(const std::filesystem::path& path, const std::string& text) {
   AtomicFile file(path);
   file.write(std::as_bytes(std::span(text)));
   file.commit();
 }
 
-}  // namespace
+nlohmann::ordered_json provenance(const std::string& benchmark, const CommonOptions& options) {
+  const Machine machine = describe_machine();
+  return {{"benchmark", benchmark},
+          {"processor", machine.processor},
+          {"processors", machine.processor_count},
+          {"threads", thread_count(options)},
+          {"compiler", machine.compiler},
+          {"build_type", machine.build_type},
+          {"commit", machine.commit},
+          {"repeats", options.repeats}};
+}
 
 void add_common_options(CLI::App& app, CommonOptions& options) {
   app.add_option("--repeats", options.repeats, "Measurements of each thing")
@@ -61,15 +73,8 @@ void publish(const std::string& benchmark, const Table& table, const CommonOptio
              machine.build_type, machine.commit, options.repeats, table.text());
   if (!options.csv.empty()) write_text(options.csv, table.csv());
   if (options.json.empty()) return;
-  const nlohmann::ordered_json json = {{"benchmark", benchmark},
-                                       {"processor", machine.processor},
-                                       {"processors", machine.processor_count},
-                                       {"threads", threads},
-                                       {"compiler", machine.compiler},
-                                       {"build_type", machine.build_type},
-                                       {"commit", machine.commit},
-                                       {"repeats", options.repeats},
-                                       {"rows", table.json()}};
+  nlohmann::ordered_json json = provenance(benchmark, options);
+  json["rows"] = table.json();
   write_text(options.json, json.dump(2) + "\n");
 }
 

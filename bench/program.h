@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <string>
 
@@ -25,6 +26,12 @@ int thread_count(const CommonOptions& options);
 /// exit with: 0, or after a line on standard error 1 (bad input) or 2 (usage).
 int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
                 const std::function<void()>& work);
+
+/// Where figures come from: machine, threads, compiler, commit, repeats.
+nlohmann::ordered_json provenance(const std::string& benchmark, const CommonOptions& options);
+
+/// Writes a file whole or not at all. Throws Error if it cannot.
+void write_text(const std::filesystem::path& path, const std::string& text);
 
 /// Prints where the figures come from and the table, and writes the files that `options` names.
 void publish(const std::string& benchmark, const Table& table, const CommonOptions& options);

@@ -15,10 +15,10 @@
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/runtime/solve_radiosity.h"
-#include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
+#include "reflected_light.h"
 #include "timing.h"
 
 namespace rebounce::bench {
@@ -44,13 +44,8 @@ struct Form {
 std::shared_ptr<const HierarchicalOperator> compressed(const TransferData& data,
                                                        const BuildSettings& settings) {
   if (data.compressed_form_factors) return data.compressed_form_factors;
-  const RayTracer tracer(data.mesh.position,
-                         std::span(data.mesh.triangle).first(data.mesh.surface_count()));
-  const DrawnLights lights = draw_fitting_lights(data, tracer, 1);
-  const auto radiosities = [&](const std::vector<std::vector<Float3>>& exitances) {
-    return radiosities_of(*data.transfer, data.patches.reflectance, exitances);
-  };
-  const DrawnLights fitting{radiosities(lights.shaping), radiosities(lights.judging)};
+  const DrawnLights lights = draw_fitting_lights(data, make_surface_tracer(data.mesh), 1);
+  const DrawnLights fitting = radiosities_of(lights, data);
   return compress_form_factors(
       data.exchange, data.patches, fitting.view(),
       {.tolerance = settings.form_factor_tolerance, .precision = Precision::kF16});
@@ -174,17 +169,9 @@ class SolverBenchmark {
     return radiosity;
   }
 
-  /// Error of the light that is reflected after arriving from other patches.
   double error(std::span<const Float3> radiosity, const std::vector<Float3>& truth,
                const std::vector<Float3>& light) const {
-    std::vector<Float3> difference(light.size()), reflected(light.size());
-    for (std::size_t i = 0; i < light.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        difference[i][c] = radiosity[i][c] - truth[i][c];
-        reflected[i][c] = truth[i][c] - light[i][c];
-      }
-    }
-    return area_norm(difference, data_.patches.area) / area_norm(reflected, data_.patches.area);
+    return reflected_error(radiosity, truth, light, data_.patches.area);
   }
 
   void measure_solve(const Form& form, const NamedSolveMethod& named, const LightChange& change,

@@ -17,13 +17,25 @@ double quantile(const std::vector<double>& sorted, double part) {
 
 int runs_per_sample(const TimedCase& timed, double sample_seconds) {
   constexpr double kMostRuns = 1e5;
-  if (timed.prepare) return 1;
+  if (timed.prepare && !timed.repeat_prepared) return 1;
+  if (timed.prepare) timed.prepare();
   const double seconds = std::max(seconds_of(timed.work), 1e-9);
   return static_cast<int>(std::clamp(std::ceil(sample_seconds / seconds), 1.0, kMostRuns));
 }
 
+/// The median of runs that are each prepared.
+double prepared_sample(const TimedCase& timed, int runs) {
+  std::vector<double> seconds;
+  for (int run = runs > 1 ? -1 : 0; run < runs; ++run) {
+    timed.prepare();
+    const double taken = seconds_of(timed.work);
+    if (run >= 0) seconds.push_back(taken);
+  }
+  return summarise(std::move(seconds)).median;
+}
+
 double sample(const TimedCase& timed, int runs) {
-  if (timed.prepare) timed.prepare();
+  if (timed.prepare) return prepared_sample(timed, runs);
   if (runs > 1) timed.work();
   return seconds_of([&] {
            for (int run = 0; run < runs; ++run) timed.work();

@@ -23,12 +23,16 @@ Timing summarise(std::vector<double> samples);
 struct TimedCase {
   std::function<void()> work;
   std::function<void()> prepare = {};  ///< runs untimed before each `work`; may be empty
+  /// Runs of a sample although there is a `prepare`, as many as one without would have: for a
+  /// `prepare` that is short and leaves the caches to `work`.
+  bool repeat_prepared = false;
 };
 
 struct InterleavingSettings {
   int rounds = 21;  ///< samples per case. More: steadier medians
   /// A sample is the mean of as many runs in a row as take this long, in seconds, so that short
-  /// work finds the caches as its last run left them. Cases with a `prepare` run once.
+  /// work finds the caches as its last run left them. Cases with a `prepare` run once, but see
+  /// TimedCase::repeat_prepared, whose sample is the median of its runs.
   double sample_seconds = 5e-3;
 };
 

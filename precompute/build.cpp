@@ -235,18 +235,15 @@ void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
                               const BuildSettings& settings, BuildReport& report,
                               const Progress& progress) {
   const std::uint64_t seed = settings.form_factors.seed;
-  const auto radiosities = [&](std::span<const std::vector<Float3>> lights) {
-    return radiosities_of(*data.transfer, data.patches.reflectance, lights);
-  };
-  const DrawnLights lights = draw_fitting_lights(data, tracer, seed);
-  const DrawnLights fitting{radiosities(lights.shaping), radiosities(lights.judging)};
+  const DrawnLights fitting = radiosities_of(draw_fitting_lights(data, tracer, seed), data);
   data.compressed_form_factors =
       compress_form_factors(data.exchange, data.patches, fitting.view(),
                             {settings.form_factor_tolerance, Precision::kF16}, progress);
-  report.form_factor_error =
-      form_factor_error(*data.compressed_form_factors, data.exchange, data.patches,
-                        radiosities(random_initial_exitances(data, tracer, LightKind::kPoint,
-                                                             kTestLightCount, seed)));
+  report.form_factor_error = form_factor_error(
+      *data.compressed_form_factors, data.exchange, data.patches,
+      radiosities_of(
+          *data.transfer, data.patches.reflectance,
+          random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed)));
 }
 
 /// Mean and largest are those of point lights, which the tolerance is about; the bound holds for

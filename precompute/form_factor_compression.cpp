@@ -47,4 +47,9 @@ std::vector<std::vector<Float3>> radiosities_of(
   return radiosities;
 }
 
+DrawnLights radiosities_of(const DrawnLights& lights, const TransferData& data) {
+  return {radiosities_of(*data.transfer, data.patches.reflectance, lights.shaping),
+          radiosities_of(*data.transfer, data.patches.reflectance, lights.judging)};
+}
+
 }  // namespace rebounce

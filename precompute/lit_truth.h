@@ -13,8 +13,8 @@ namespace rebounce {
 /// are judged by.
 class LitTruth {
  public:
-  /// `lights`: what the matrix multiplies, initial exitances [n] in lx. Those that are zero are
-  /// left out.
+  /// `lights`: what the matrix multiplies, initial exitances [n] in lx. Those from
+  /// which nothing arrives anywhere are left out.
   LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights);
 
   std::size_t light_count() const { return lights_.size(); }
@@ -32,6 +32,8 @@ class LitTruth {
   /// Fills in one channel of the truths of lights [begin, end).
   void light_channel(const SymmetricMatrix& matrix, int channel, std::size_t begin,
                      std::size_t end);
+
+  void leave_out_dark();
 
   std::vector<float> area_;
   std::vector<std::vector<Float3>> lights_, truths_;

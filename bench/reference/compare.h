@@ -37,8 +37,10 @@ struct PatchComparisonSettings {
 
 struct PatchComparison {
   RelativeError relative;
-  std::vector<std::uint32_t> patch;  ///< [m] the compared patches, ascending
-  std::vector<Float3> truth;         ///< [m] the path tracer's means of H over them, lx
+  std::vector<std::uint32_t> patch;    ///< [m] the compared patches, ascending
+  std::vector<Float3> truth;           ///< [m] the path tracer's means of H over them, lx
+  std::vector<Float3> standard_error;  ///< [m] of the truth, lx
+  std::vector<double> weight;          ///< [m] in sums over the surface
 };
 
 /// Compares `indirect_irradiance` [n] of the patches of `data` with the path tracer's mean over
@@ -50,6 +52,10 @@ PatchComparison compare_patch_means(const TransferData& data,
                                     const LitScene& lit_scene,
                                     const PatchComparisonSettings& settings,
                                     const Progress& progress = {});
+
+/// Compares another indirect irradiance [n] of the same patches with what `traced` holds already.
+RelativeError compare_patch_means(const PatchComparison& traced,
+                                  std::span<const Float3> indirect_irradiance);
 
 /// Compares the smooth reconstruction of `indirect_irradiance` [n] with the path tracer's `truth`
 /// at `points` (sample_surface), each of equal weight. The value at a point is that of the display

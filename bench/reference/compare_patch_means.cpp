@@ -136,17 +136,28 @@ PatchComparison compare_patch_means(const TransferData& data,
       lit_scene, points, settings.samples_per_point, settings.seed, progress);
 
   PatchComparison comparison;
-  ErrorSum sum;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const std::uint32_t patch = chosen[k].patch;
     const PatchMean truth =
         mean_over(std::span(estimate.mean).subspan(k * per_patch, per_patch), per_replicate);
-    sum.add(chosen[k].weight, indirect_irradiance[patch], truth.mean, truth.standard_error);
     comparison.patch.push_back(patch);
     comparison.truth.push_back(truth.mean);
+    comparison.standard_error.push_back(truth.standard_error);
+    comparison.weight.push_back(chosen[k].weight);
   }
-  comparison.relative = sum.result(left_out);
+  comparison.relative.left_out_count = left_out;
+  comparison.relative = compare_patch_means(comparison, indirect_irradiance);
   return comparison;
+}
+
+RelativeError compare_patch_means(const PatchComparison& traced,
+                                  std::span<const Float3> indirect_irradiance) {
+  ErrorSum sum;
+  for (std::size_t k = 0; k < traced.patch.size(); ++k) {
+    sum.add(traced.weight[k], indirect_irradiance[traced.patch[k]], traced.truth[k],
+            traced.standard_error[k]);
+  }
+  return sum.result(traced.relative.left_out_count);
 }
 
 }  // namespace rebounce::reference

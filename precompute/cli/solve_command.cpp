@@ -11,6 +11,7 @@
 #include "method_names.h"
 #include "rebounce/precompute/csv_writer.h"
 #include "rebounce/precompute/npz_writer.h"
+#include "rebounce/runtime/automatic_solver.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/hierarchical_solver.h"
 #include "rebounce/runtime/solve_radiosity.h"
@@ -23,11 +24,13 @@ namespace {
 
 constexpr const char *kExact = "exact", *kCompressed = "compressed";  // F as methods see it
 
-// Gathering along links; they are another F than the solvers in solve_radiosity.h are given.
+// The runtime's choice: automatic_solver.h.
+constexpr const char* kAutomatic = "auto";
 
 struct SolveOptions {
   std::string file, lights, method = kTransferMethod, form_factors = kExact, output;
   SolveSettings settings;
+  double error = 0.01;  // that kAutomatic may leave
 };
 
 struct Solution {
@@ -35,6 +38,7 @@ struct Solution {
   int sweeps = 0;
   bool diverged = false;
   double microseconds = 0;
+  std::string chosen{};  ///< by kAutomatic
 };
 
 /// Median of the microseconds that `work` says it took, repeated for about half a second but at
@@ -49,6 +53,14 @@ double median_microseconds(const Work& work) {
   }
   std::ranges::nth_element(times, times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2));
   return times[times.size() / 2];
+}
+
+std::vector<Float3> gather(const FormFactorOperator& form_factors,
+                           const std::vector<Float3>& radiosity) {
+  std::vector<Float3> gathered(radiosity.size());
+  std::vector<float> workspace(form_factors.workspace_size());
+  form_factors.gather(radiosity, gathered, workspace);
+  return gathered;
 }
 
 Solution solve_by_transfer(Engine& engine) {
@@ -68,7 +80,6 @@ Solution solve_by_transfer(Engine& engine) {
 
 Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
                             const FormFactorOperator& form_factors, const SolveSettings& settings) {
-  const std::size_t n = engine.data().patches.size();
   Solution solution;
   SolveResult result;
   solution.microseconds = median_microseconds([&] {
@@ -79,9 +90,27 @@ Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
   solution.sweeps = result.sweeps;
   solution.diverged = result.diverged;
   solution.radiosity.assign(solver.radiosity().begin(), solver.radiosity().end());
-  solution.indirect_irradiance.resize(n);
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(solution.radiosity, solution.indirect_irradiance, workspace);
+  solution.indirect_irradiance = gather(form_factors, solution.radiosity);
+  return solution;
+}
+
+Solution solve_automatically(const SolveOptions& chosen, const Engine& engine,
+                             const FormFactorOperator& form_factors) {
+  const TransferData& data = engine.data();
+  AutomaticSolver solver(dynamic_cast<const SweepableFormFactors&>(form_factors),
+                         {data.patches.area, data.patches.reflectance}, data.transfer,
+                         data.record.error_mean);
+  Solution solution;
+  AutomaticSolver::Result result;
+  solution.microseconds = median_microseconds([&] {
+    solver.forget();
+    result = solver.solve(engine.initial_exitance(), chosen.error, chosen.settings.max_sweeps);
+    return result.microseconds;
+  });
+  solution.sweeps = result.sweeps;
+  solution.chosen = name(result.method);
+  solution.radiosity.assign(solver.radiosity().begin(), solver.radiosity().end());
+  solution.indirect_irradiance = gather(form_factors, solution.radiosity);
   return solution;
 }
 
@@ -89,9 +118,7 @@ Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
 double radiosity_residual(const Engine& engine, const FormFactorOperator& form_factors,
                           const std::vector<Float3>& radiosity) {
   const PatchTable& patches = engine.data().patches;
-  std::vector<Float3> rest(patches.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(radiosity, rest, workspace);
+  std::vector<Float3> rest = gather(form_factors, radiosity);
   for (std::size_t i = 0; i < rest.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
       rest[i][c] = engine.initial_exitance()[i][c] + patches.reflectance[i][c] * rest[i][c] -
@@ -125,10 +152,10 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
   write_csv(path, columns);
 }
 
-/// What --method names; for the product with the operator, the method that reads F least.
+/// What --method names; for the product and for the choice, a method that reads F least.
 SolveMethod method_of(const SolveOptions& chosen) {
   const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
-  return named == kSolveMethods.end() ? SolveMethod::kGathering : named->method;
+  return named == kSolveMethods.end() ? SolveMethod::kSymmetricGaussSeidel : named->method;
 }
 
 Solution solve_on_links(const SolveOptions& chosen, Engine& engine) {
@@ -145,6 +172,7 @@ Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorOperator& form_factors) {
   if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
   if (chosen.method == kHierarchicalMethod) return solve_on_links(chosen, engine);
+  if (chosen.method == kAutomatic) return solve_automatically(chosen, engine, form_factors);
   const TransferData& data = engine.data();
   const auto solver = make_solver(method_of(chosen), form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
@@ -179,15 +207,17 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   const double residual = radiosity_residual(engine, *form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);
   if (options.json) {
-    const nlohmann::json summary = {{"method", chosen.method},
-                                    {"form_factors", chosen.form_factors},
-                                    {"sweeps", solution.sweeps},
-                                    {"residual", residual},
-                                    {"microseconds", solution.microseconds}};
+    nlohmann::json summary = {{"method", chosen.method},
+                              {"form_factors", chosen.form_factors},
+                              {"sweeps", solution.sweeps},
+                              {"residual", residual},
+                              {"microseconds", solution.microseconds}};
+    if (!solution.chosen.empty()) summary["chosen"] = solution.chosen;
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
-    fmt::print("{}: {:.0f} microseconds, {} sweeps, residual {:.2e}\n", chosen.method,
-               solution.microseconds, solution.sweeps, residual);
+    fmt::print("{}: {:.0f} microseconds, {} sweeps, residual {:.2e}\n",
+               solution.chosen.empty() ? chosen.method : solution.chosen, solution.microseconds,
+               solution.sweeps, residual);
   }
 }
 
@@ -195,12 +225,16 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
 
 void add_solve_command(CLI::App& app, const CommonOptions& options) {
   auto chosen = std::make_shared<SolveOptions>();
+  std::vector<std::string> methods = method_names();
+  methods.emplace_back(kAutomatic);
   CLI::App* command = app.add_subcommand("solve", "Relight a transfer file once");
   command->add_option("file", chosen->file, "Transfer file")->required();
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
-  command->add_option("--method", chosen->method, "How to find the indirect light")
-      ->check(CLI::IsMember(method_names()))
+  command
+      ->add_option("--method", chosen->method,
+                   "How to find the indirect light; auto: whichever is cheapest for --error")
+      ->check(CLI::IsMember(methods))
       ->capture_default_str();
   command
       ->add_option("--form-factors", chosen->form_factors,
@@ -217,6 +251,11 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--residual", chosen->settings.residual,
                    "Stop an iterative method at this part of the initial exitance")
       ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--error", chosen->error,
+                   "Error of the reflected light that auto may leave, relative")
+      ->check(CLI::Range(1e-6, 1.0))
       ->capture_default_str();
   command
       ->add_option("--time-budget", chosen->settings.time_budget_microseconds,

@@ -106,6 +106,7 @@ TEST_F(CommandLine, RefusesWrongUsageWithStatusTwo) {
       {{"solve", out, "-o", path("x.txt")}, ".npz"},
       {{"solve", out, "-o", path("x.csv"), "--method", "guess"}, "--method"},
       {{"solve", out, "-o", path("x.csv"), "--iterations", "0"}, "--iterations"},
+      {{"solve", out, "-o", path("x.csv"), "--error", "0"}, "--error"},
       {{"solve", out, "-o", path("x.csv"), "--residual", "-1"}, "--residual"},
       {{"export", out, "-o", path("x.npz")}, "--what"},
       {{"export", out, "-o", path("x.csv"), "--what", "mesh"}, ".npz"},
@@ -321,6 +322,18 @@ TEST_F(CommandLine, QualitySetsTheRaysOfFormFactors) {
   EXPECT_EQ(low["settings"]["hemisphere_rays"], 1024);
   EXPECT_EQ(low["settings"]["full_rays"], 16);
   EXPECT_EQ(usual["settings"]["hemisphere_rays"], 4096);
+}
+
+TEST_F(CommandLine, ChoosesByTheErrorThatMayBeLeft) {
+  const std::string file = precompute("box.safetensors", {"--tolerance", "0.01"});
+  const auto chosen = [&](const char* error) {
+    return summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"), "--method", "auto",
+                       "--error", error});
+  };
+  EXPECT_EQ(chosen("0.05")["chosen"], "transfer");
+  const json exact = chosen("1e-5");
+  EXPECT_NE(exact["chosen"], "transfer");
+  EXPECT_LT(exact["residual"], 1e-5);
 }
 
 TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
@@ -623,12 +636,17 @@ TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
   }
 }
 
-TEST_F(CommandLine, TheShippedSceneIsWhatItsScriptMakes) {
+TEST_F(CommandLine, TheShippedScenesAreWhatTheirScriptsMake) {
   if (std::system("python3 --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "needs python3";
   const std::string command =
       "python3 '" + kScenes + "make_cornell_box.py' '" + path("box.gltf") + "'";
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(test::read_bytes(path("box.gltf")), test::read_bytes(kScene));
+  ASSERT_EQ(std::system(("python3 '" + kScenes + "make_rooms.py' '" + path(".") + "'").c_str()), 0);
+  for (const std::string name : {"two_rooms", "furnished_room", "white_room", "pavilion"}) {
+    const std::string file = name + ".gltf";
+    EXPECT_EQ(test::read_bytes(path(file)), test::read_bytes(kScenes + file)) << name;
+  }
 }
 
 }  // namespace

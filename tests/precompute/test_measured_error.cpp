@@ -111,6 +111,25 @@ TEST(MeasuredError, BothTruthsAgree) {
   }
 }
 
+TEST(LitTruth, LightFromWhichNothingArrivesIsLeftOut) {
+  const Built built = build(room(), 200);
+  // A patch that sees nothing, as the floor in a box that has no bottom.
+  ExchangeMatrix exchange;
+  const std::size_t n = built.data.patches.size();
+  std::vector<std::uint64_t> begin(built.data.exchange.row_begin.begin(),
+                                   built.data.exchange.row_begin.end());
+  begin.push_back(begin.back());
+  exchange.row_begin = SharedArray(std::move(begin));
+  exchange.column = built.data.exchange.column;
+  exchange.exchange_area = built.data.exchange.exchange_area;
+  std::vector<float> area = built.data.patches.area;
+  area.push_back(1);
+  std::vector<std::vector<Float3>> lights(3, std::vector<Float3>(n + 1, Float3{0, 0, 0}));
+  lights[1][n] = {1, 1, 1};
+  lights[2][0] = {1, 1, 1};
+  EXPECT_EQ(LitTruth(FormFactorMatrix(exchange, area), lights).light_count(), 1U);
+}
+
 TEST(RandomLights, AreTheSameForASeedAndOthersForAnother) {
   const Built built = build(yard(), 200);
   for (const LightKind kind : kLightKinds) {

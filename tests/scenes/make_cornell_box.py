@@ -16,12 +16,11 @@ What is ours:
 Usage: make_cornell_box.py [OUTPUT.gltf]; the same bytes on every machine.
 """
 
-import base64
-import json
 import math
 import pathlib
-import struct
 import sys
+
+from gltf_document import GltfDocument, ring
 
 MILLIMETRE = 0.001
 LAMP_LUMINANCE = 500.0  # cd/m2
@@ -137,106 +136,8 @@ def reflectance_color(name):
     return [round(max(c / w, 0.0), 3) for c, w in zip(color, white)]
 
 
-def ring(outer, inner):
-    """The quads between two quads that are wound alike, without T-junctions."""
-    nearest = [min(inner, key=lambda p: math.dist(p, corner)) for corner in outer]
-    return tuple(
-        (outer[i], outer[(i + 1) % 4], nearest[(i + 1) % 4], nearest[i]) for i in range(4)
-    )
-
-
-class Gltf:
-    """A glTF document that grows by one mesh of quads at a time."""
-
-    def __init__(self):
-        self.bytes = b""
-        self.document = {
-            "asset": {"version": "2.0", "generator": "make_cornell_box.py"},
-            "extensionsUsed": ["KHR_materials_emissive_strength"],
-            "scene": 0,
-            "scenes": [{"name": "Cornell box", "nodes": []}],
-            "nodes": [],
-            "meshes": [],
-            "cameras": [],
-            "materials": [],
-            "accessors": [],
-            "bufferViews": [],
-        }
-
-    def add(self, kind, value):
-        self.document[kind].append(value)
-        return len(self.document[kind]) - 1
-
-    def add_node(self, node):
-        self.document["scenes"][0]["nodes"].append(self.add("nodes", node))
-
-    def add_material(self, name, color, luminance=0.0):
-        material = {
-            "name": name,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [*color, 1.0],
-                "metallicFactor": 0.0,
-                "roughnessFactor": 1.0,
-            },
-        }
-        if luminance > 0:
-            material["emissiveFactor"] = [1.0, 1.0, 1.0]
-            material["extensions"] = {
-                "KHR_materials_emissive_strength": {"emissiveStrength": luminance}
-            }
-        return self.add("materials", material)
-
-    def add_accessor(self, data, description):
-        view = {"buffer": 0, "byteOffset": len(self.bytes), "byteLength": len(data)}
-        self.bytes += data + bytes(-len(data) % 4)
-        return self.add("accessors", {"bufferView": self.add("bufferViews", view), **description})
-
-    def add_quads(self, name, quads, material):
-        corners = [[c * MILLIMETRE for c in corner] for quad in quads for corner in quad]
-        stored = [struct.unpack("<3f", struct.pack("<3f", *corner)) for corner in corners]
-        indices = [4 * q + i for q in range(len(quads)) for i in (0, 1, 2, 0, 2, 3)]
-        positions = self.add_accessor(
-            b"".join(struct.pack("<3f", *corner) for corner in stored),
-            {
-                "componentType": 5126,
-                "count": len(stored),
-                "type": "VEC3",
-                "min": [min(axis) for axis in zip(*stored)],
-                "max": [max(axis) for axis in zip(*stored)],
-            },
-        )
-        triangles = self.add_accessor(
-            struct.pack(f"<{len(indices)}H", *indices),
-            {"componentType": 5123, "count": len(indices), "type": "SCALAR"},
-        )
-        primitive = {
-            "attributes": {"POSITION": positions},
-            "indices": triangles,
-            "material": material,
-        }
-        self.add_node({"name": name, "mesh": self.add("meshes", {"primitives": [primitive]})})
-
-    def add_camera(self):
-        fov = 2 * math.atan(CAMERA_HEIGHT / 2 / CAMERA_FOCAL_LENGTH)
-        perspective = {"yfov": round(fov, 6), "aspectRatio": 1.0, "znear": 0.01}
-        camera = {"name": "measured", "type": "perspective", "perspective": perspective}
-        self.add_node(
-            {
-                "name": "measured",
-                "camera": self.add("cameras", camera),
-                "translation": [round(c * MILLIMETRE, 6) for c in CAMERA_POSITION],
-                "rotation": [0.0, 1.0, 0.0, 0.0],  # half a turn: glTF's cameras look along -z
-            }
-        )
-
-    def text(self):
-        uri = "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()
-        self.document["buffers"] = [{"byteLength": len(self.bytes), "uri": uri}]
-        return json.dumps(self.document, indent=1) + "\n"
-
-
 def cornell_box():
-    gltf = Gltf()
+    gltf = GltfDocument("make_cornell_box.py", "Cornell box", unit=MILLIMETRE)
     materials = {name: gltf.add_material(name, reflectance_color(name)) for name in REFLECTANCE}
     lamp = gltf.add_material("lamp", [LAMP_REFLECTANCE] * 3, LAMP_LUMINANCE)
     for name, quads in WHITE_QUADS.items():
@@ -245,7 +146,9 @@ def cornell_box():
     gltf.add_quads("green wall", GREEN_WALL, materials["green"])
     gltf.add_quads("red wall", RED_WALL, materials["red"])
     gltf.add_quads("lamp", (LAMP,), lamp)
-    gltf.add_camera()
+    fov = 2 * math.atan(CAMERA_HEIGHT / 2 / CAMERA_FOCAL_LENGTH)
+    # Half a turn: glTF's cameras look along -z.
+    gltf.add_camera("measured", CAMERA_POSITION, fov, rotation=[0.0, 1.0, 0.0, 0.0], aspect_ratio=1.0)
     return gltf.text()
 
 

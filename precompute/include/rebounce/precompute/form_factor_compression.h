@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/exchange_matrix.h"
@@ -35,5 +36,8 @@ FormFactorError form_factor_error(const HierarchicalOperator& compressed,
 std::vector<std::vector<Float3>> radiosities_of(
     const TransferOperator& transfer, std::span<const Float3> reflectance,
     std::span<const std::vector<Float3>> initial_exitances);
+
+/// Those of fitting lights through data.transfer: what compress_form_factors is fitted to.
+DrawnLights radiosities_of(const DrawnLights& lights, const TransferData& data);
 
 }  // namespace rebounce

@@ -1,0 +1,226 @@
+#include "accuracy.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include "in_parallel.h"
+#include "read_buffer.h"
+#include "rebounce/transfer/error.h"
+#include "reflected_light.h"
+
+namespace rebounce::bench {
+namespace {
+
+/// An iteration that is this near to its own solution has converged for the report.
+constexpr double kConverged = 3e-5;
+
+/// More than the caches of most processors hold.
+constexpr std::size_t kCacheBytes = std::size_t{96} << 20;
+
+/// Samples of cases that take less are means over as many runs as take this long, seconds.
+constexpr double kSampleSeconds = 1e-3;
+
+/// Sweeps of one frame at most.
+constexpr int kMostFrameSweeps = 64;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+class AccuracyBench {
+ public:
+  AccuracyBench(const Contenders& contenders, const std::vector<Contestant>& contestants,
+                const ReportSettings& settings, const ReportProgress& progress)
+      : contenders_(contenders),
+        contestants_(contestants),
+        settings_(settings),
+        progress_(progress),
+        cases_(make_light_cases(contenders, settings, progress)) {
+    for (const Form& form : contenders.forms) {
+      own_[form.name] = solve_on(*form.form_factors, contenders, cases_, progress);
+    }
+  }
+
+  std::vector<AccuracyRow> measure() {
+    std::vector<std::vector<AccuracyRow>> rows(contestants_.size());
+    const Progress part = [this](double done) { return progress_("errors", done); };
+    in_parallel(contestants_.size(), part, [&](std::size_t k) { rows[k] = errors_of(k); });
+    std::vector<AccuracyRow> all;
+    for (auto& of_contestant : rows) std::ranges::move(of_contestant, std::back_inserter(all));
+    time(all);
+    return all;
+  }
+
+ private:
+  /// A timed run: how it begins and how many sweeps it makes.
+  using TimeKey = std::tuple<std::size_t, bool, int>;  ///< contestant, cold start, sweeps
+
+  const std::vector<std::vector<Float3>>& own_after(const Contestant& contestant) const {
+    return own_.at(contestant.form).after;
+  }
+
+  void begin(const Contestant& contestant, std::size_t k, Method& method) const {
+    method.set_reflectance(cases_[k].reflectance);
+    if (cases_[k].cold()) {
+      method.forget();
+    } else if (method.iterates()) {
+      method.start_from(own_.at(contestant.form).before[k]);
+    }
+  }
+
+  std::vector<AccuracyRow> errors_of(std::size_t contestant) const {
+    const auto method = contestants_[contestant].make(contenders_);
+    std::vector<AccuracyRow> rows;
+    for (std::size_t first = 0; first < cases_.size();
+         first += static_cast<std::size_t>(settings_.lamp_count)) {
+      if (!method->iterates()) {
+        rows.push_back(row(contestant, first, 0, *method));
+        continue;
+      }
+      for (const int sweeps : settings_.sweeps) {
+        rows.push_back(row(contestant, first, sweeps, *method));
+        if (rows.back().iteration_error < kConverged) break;
+      }
+    }
+    return rows;
+  }
+
+  /// Over the lamps of the change whose first case is `first`.
+  AccuracyRow row(std::size_t contestant, std::size_t first, int sweeps, Method& method) const {
+    AccuracyRow result{.contestant = contestant, .change = cases_[first].change, .sweeps = sweeps};
+    for (std::size_t k = first; k < first + settings_.lamp_count; ++k) {
+      begin(contestants_[contestant], k, method);
+      method.run(cases_[k].after, sweeps);
+      const auto error = [&](const std::vector<Float3>& truth) {
+        return reflected_error(method.radiosity(), truth, cases_[k].after,
+                               contenders_.data->patches.area);
+      };
+      const double against_reference = error(cases_[k].truth);
+      result.error += against_reference / settings_.lamp_count;
+      result.error_max = std::max(result.error_max, against_reference);
+      result.iteration_error +=
+          (method.iterates() ? error(own_after(contestants_[contestant])[k]) : against_reference) /
+          settings_.lamp_count;
+    }
+    return result;
+  }
+
+  static TimeKey key_of(const AccuracyRow& row) {
+    return {row.contestant, row.sweeps > 0 && row.change == "from zero", row.sweeps};
+  }
+
+  /// Adds the times, each found once for all rows that share it.
+  void time(std::vector<AccuracyRow>& rows) const {
+    std::map<TimeKey, Timing> warm, cold;
+    for (const AccuracyRow& r : rows) warm[key_of(r)] = {};
+    cold = warm;
+    const int threads = omp_get_max_threads();
+    omp_set_num_threads(settings_.solve_threads);
+    fill_in(warm, false);
+    fill_in(cold, true);
+    omp_set_num_threads(threads);
+    for (AccuracyRow& r : rows) {
+      r.time = warm.at(key_of(r));
+      r.cold_time = cold.at(key_of(r));
+    }
+  }
+
+  void fill_in(std::map<TimeKey, Timing>& times, bool cold_caches) const {
+    const char* phase = cold_caches ? "times with cold caches" : "times";
+    if (!progress_(phase, 0)) throw Cancelled();
+    ReadBuffer other_work(cold_caches ? kCacheBytes : 0);
+    std::vector<std::unique_ptr<Method>> methods;
+    for (const Contestant& contestant : contestants_)
+      methods.push_back(contestant.make(contenders_));
+    std::vector<TimedCase> timed;
+    std::size_t begun = 0;
+    for (const auto& [key, unused] : times) {
+      const auto [contestant, cold, sweeps] = key;
+      Method& method = *methods[contestant];
+      const std::size_t k = cold ? 0 : static_cast<std::size_t>(settings_.lamp_count);
+      timed.push_back(
+          {.work = [this, &method, k, sweeps = sweeps] { method.run(cases_[k].after, sweeps); },
+           .prepare =
+               [this, &method, &other_work, &begun, &times, contestant = contestant, k, cold_caches,
+                phase] {
+                 begin(contestants_[contestant], k, method);
+                 if (!cold_caches) return;
+                 other_work.read();
+                 const double part = static_cast<double>(++begun) /
+                                     static_cast<double>(times.size()) / (settings_.repeats + 1);
+                 if (!progress_(phase, std::min(part, 1.0))) throw Cancelled();
+               },
+           .repeat_prepared = !cold_caches});
+    }
+    const std::vector<Timing> found =
+        time_interleaved(timed, {.rounds = settings_.repeats, .sample_seconds = kSampleSeconds});
+    std::size_t k = 0;
+    for (auto& [key, timing] : times) timing = found[k++];
+  }
+
+  const Contenders& contenders_;
+  const std::vector<Contestant>& contestants_;
+  const ReportSettings& settings_;
+  const ReportProgress& progress_;
+  std::vector<LightCase> cases_;
+  std::map<std::string, OwnSolutions> own_;  ///< by form
+};
+
+}  // namespace
+
+int RunTime::sweeps_within(double microseconds) const {
+  if (sweep <= 0) return start <= microseconds ? 1 : 0;
+  const double fit = std::floor((microseconds - start) / sweep);
+  return static_cast<int>(std::clamp(fit, 0.0, static_cast<double>(kMostFrameSweeps)));
+}
+
+std::vector<AccuracyRow> measure_accuracy(const Contenders& contenders,
+                                          const std::vector<Contestant>& contestants,
+                                          const ReportSettings& settings,
+                                          const ReportProgress& progress) {
+  return AccuracyBench(contenders, contestants, settings, progress).measure();
+}
+
+namespace {
+
+/// The line through times by sweeps whose slope is the median of those of all pairs (P. K. Sen,
+/// "Estimates of the regression coefficient based on Kendall's tau", 1968): a time that was
+/// disturbed does not turn it.
+RunTime fit(const std::map<int, double>& time_by_sweeps) {
+  std::vector<double> slopes, starts;
+  for (auto a = time_by_sweeps.begin(); a != time_by_sweeps.end(); ++a) {
+    for (auto b = std::next(a); b != time_by_sweeps.end(); ++b) {
+      slopes.push_back((b->second - a->second) / (b->first - a->first));
+    }
+  }
+  const auto& [sweeps, time] = *time_by_sweeps.begin();
+  if (slopes.empty()) return {0, time / sweeps};
+  const double slope = std::max(0.0, median(slopes));
+  for (const auto& [k, t] : time_by_sweeps) starts.push_back(t - k * slope);
+  return {std::max(0.0, median(starts)), slope};
+}
+
+}  // namespace
+
+std::vector<RunTime> run_times(const std::vector<AccuracyRow>& rows, std::size_t contestant_count) {
+  std::vector<RunTime> times(contestant_count);
+  std::vector<std::map<int, double>> by_sweeps(contestant_count);
+  for (const AccuracyRow& row : rows) {
+    if (row.sweeps == 0) times[row.contestant].start = row.time.median * 1e6;
+    if (row.sweeps > 0 && row.change != "from zero") {
+      by_sweeps[row.contestant][row.sweeps] = row.time.median * 1e6;
+    }
+  }
+  for (std::size_t k = 0; k < contestant_count; ++k) {
+    if (!by_sweeps[k].empty()) times[k] = fit(by_sweeps[k]);
+  }
+  return times;
+}
+
+}  // namespace rebounce::bench

@@ -1,0 +1,212 @@
+"""What the summary says, each figure with the rows that it comes from."""
+
+import dataclasses
+
+import results
+
+LAG_BUDGETS = (250, 500, 1000, 2000)
+EQUAL_TIMES = (50, 100, 250, 1000)  # microseconds
+LAG, FINE_LAG = "lag after a switch", "lag after a switch to 0.1 %"
+
+
+@dataclasses.dataclass
+class Claim:
+    """A figure of the summary; `claims.csv` holds all of them."""
+
+    scene: str
+    patches: int
+    subject: str  # what is claimed: "equal error", "equally compressed", "lag"...
+    condition: str  # change of the light and error, or path and budget
+    inverse: str  # how the inverse did it
+    inverse_value: float
+    rival: str
+    rival_value: float
+    unit: str
+
+    @property
+    def ratio(self):
+        return self.rival_value / self.inverse_value if self.inverse_value else None
+
+
+def time_claim(result, subject, change, target, inverse, rival, time="microseconds"):
+    if inverse is None or rival is None:
+        return None
+    return Claim(
+        result.scene,
+        result.patches,
+        subject,
+        f"{change}, error {target:g}",
+        results.describe(inverse),
+        inverse[time],
+        results.describe(rival),
+        rival[time],
+        "microseconds",
+    )
+
+
+def equal_error(result, change, target, rivals=results.GAUSS_SEIDEL, time="microseconds"):
+    """Times to an error against the exact solution, each side in its best form."""
+    subject = "equal error" if time == "microseconds" else "equal error, cold caches"
+    if rivals != results.GAUSS_SEIDEL:
+        subject += ", any iteration"
+    return time_claim(
+        result,
+        subject,
+        change,
+        target,
+        result.fastest(change, results.INVERSES, target, time=time),
+        result.fastest(change, rivals, target, time=time),
+        time,
+    )
+
+
+def equally_compressed(result, change, target=0.001):
+    """Y and F both compressed to `target`; Gauss-Seidel is forgiven what compression does to F."""
+    name = results.percent(target)
+    return time_claim(
+        result,
+        "equally compressed",
+        change,
+        target,
+        result.fastest(change, ("inverse",), 1, form=f"hierarchical {name} f16"),
+        result.fastest(
+            change,
+            results.GAUSS_SEIDEL,
+            target,
+            error="iteration_error",
+            form=f"compressed {name}",
+        ),
+    )
+
+
+def equal_time(result, change, microseconds):
+    """The least errors that either side reaches in this time."""
+    inverse = result.most_exact(change, results.INVERSES, microseconds)
+    rival = result.most_exact(change, results.GAUSS_SEIDEL, microseconds)
+    if inverse is None or rival is None:
+        return None
+    return Claim(
+        result.scene,
+        result.patches,
+        "equal time",
+        f"{change}, {microseconds} microseconds",
+        results.describe(inverse),
+        inverse["error"],
+        results.describe(rival),
+        rival["error"],
+        "relative error",
+    )
+
+
+def lag(result, budget, key="lag_1_percent"):
+    """Frames after a switch until the error is within 1 %, each side in its best form."""
+
+    def best(methods):
+        rows = [
+            r
+            for r in result["frames"]
+            if r["method"] in methods
+            and r["budget_microseconds"] == budget
+            and r["sweeps"] > 0
+            and key in r
+        ]
+        return min(rows, key=lambda r: (r[key]["mean"], r["error_mean"]), default=None)
+
+    inverse, rival = best(results.INVERSES), best(results.GAUSS_SEIDEL)
+    if inverse is None or rival is None:
+        return None
+    return Claim(
+        result.scene,
+        result.patches,
+        LAG if key == "lag_1_percent" else FINE_LAG,
+        f"{budget:g} microseconds a frame",
+        results.describe(inverse),
+        inverse[key]["mean"],
+        results.describe(rival),
+        rival[key]["mean"],
+        "frames",
+    )
+
+
+def frame_errors(result, path, budget):
+    inverse = result.best_frames(path, results.INVERSES, budget)
+    rival = result.best_frames(path, results.GAUSS_SEIDEL, budget)
+    if inverse is None or rival is None:
+        return None
+    return Claim(
+        result.scene,
+        result.patches,
+        f"light path: {path}",
+        f"{budget:g} microseconds a frame",
+        results.describe(inverse),
+        inverse["error_mean"],
+        results.describe(rival),
+        rival["error_mean"],
+        "mean relative error",
+    )
+
+
+def break_even(result, change=results.SWITCHED, target=0.001):
+    """Frames after which the inverse has earned its offline seconds, over compressed F's."""
+    times = equal_error(result, change, target)
+    inverse = result.fastest(change, results.INVERSES, target)
+    rival = result.fastest(change, results.GAUSS_SEIDEL, target)
+    if times is None or times.rival_value <= times.inverse_value:
+        return None
+    needed = result.seconds("operator") + result.seconds(inverse["transfer"])
+    spared = result.seconds(f"form factors {rival['form']}")
+    frames = max(0.0, needed - spared) / (times.rival_value - times.inverse_value) * 1e6
+    return Claim(
+        result.scene,
+        result.patches,
+        "break-even",
+        times.condition,
+        times.inverse,
+        needed,
+        times.rival,
+        frames,
+        "offline seconds (inverse), frames (rival)",
+    )
+
+
+def all_claims(result):
+    """Every claim about one result, in the order of the summary."""
+    claims = []
+    changes = [c for c in result.changes() if c != results.REPAINTED]
+    for change in changes:
+        for target in results.TARGETS:
+            claims.append(equal_error(result, change, target))
+            claims.append(equal_error(result, change, target, results.ITERATIONS))
+            claims.append(
+                equal_error(result, change, target, time="microseconds_cold_cache")
+            )
+        claims.append(equally_compressed(result, change))
+        claims += [equal_time(result, change, t) for t in EQUAL_TIMES]
+    claims.append(repainted(result))
+    for budget in LAG_BUDGETS:
+        claims.append(lag(result, budget))
+        claims.append(lag(result, budget, "lag_0.1_percent"))
+        claims += [frame_errors(result, path, budget) for path in result.paths()]
+    claims.append(break_even(result))
+    return [c for c in claims if c is not None]
+
+
+def repainted(result, target=0.001):
+    """After surfaces were repainted the operator is a preconditioner at best."""
+    return time_claim(
+        result,
+        "equal error",
+        results.REPAINTED,
+        target,
+        result.fastest(
+            results.REPAINTED, (*results.INVERSES, "preconditioned-conjugate-gradient"), target
+        ),
+        result.fastest(results.REPAINTED, results.ITERATIONS, target),
+    )
+
+
+def find(claims, subject, condition):
+    """The claim of that subject whose condition begins so, or None."""
+    return next(
+        (c for c in claims if c.subject == subject and c.condition.startswith(condition)), None
+    )

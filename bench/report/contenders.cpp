@@ -1,0 +1,193 @@
+#include "contenders.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/precompute/form_factor_compression.h"
+#include "rebounce/precompute/low_rank_transfer.h"
+#include "rebounce/transfer/compressed_form_factors.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/exchange_blocks.h"
+#include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/linked_form_factors.h"
+#include "rebounce/transfer/transfer_file.h"
+#include "timing.h"
+
+namespace rebounce::bench {
+namespace {
+
+/// As Linux counts it for this program alone; what getrusage says is at least what the program that
+/// started this one had. 0 where it cannot be known.
+std::size_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    std::size_t kibibytes = 0;
+    if (word == "VmHWM:" && status >> kibibytes) return kibibytes * 1024;
+  }
+  return 0;
+}
+
+std::string percent(double part) {
+  return fmt::format("{:g} %", 100 * part);
+}
+
+/// Builds one thing after the other and notes what each costs.
+class ContenderBuilder {
+ public:
+  ContenderBuilder(const ReportSettings& settings, const ReportProgress& progress)
+      : settings_(settings), progress_(progress) {}
+
+  Contenders build(const std::string& scene) {
+    build_data(scene);
+    lights_ = draw_fitting_lights(*result_.data, *result_.tracer, settings_.seed);
+    for (const OperatorChoice& choice : settings_.operators) add_hierarchical(choice);
+    add_dense();
+    add_exact_forms();
+    const DrawnLights radiosities = radiosities_of(lights_, *result_.data);
+    for (const double tolerance : settings_.form_factor_tolerances) {
+      add_compressed(tolerance, radiosities);
+    }
+    for (const std::size_t rank : settings_.ranks) add_low_ranks(rank);
+    if (settings_.links) add_links();
+    measure_file();
+    return std::move(result_);
+  }
+
+ private:
+  const DenseOperator& dense() const {
+    return static_cast<const DenseOperator&>(*result_.data->transfer);
+  }
+
+  /// Runs `work`, which takes a Progress, and appends its cost; `bytes_of` what it made.
+  template <typename Work, typename BytesOf>
+  auto timed(const std::string& phase, const Work& work, const BytesOf& bytes_of) {
+    const Progress progress = [this, &phase](double part) { return progress_(phase, part); };
+    if (!progress(0)) throw Cancelled();
+    decltype(work(progress)) made;
+    const double seconds = seconds_of([&] { made = work(progress); });
+    result_.costs.push_back({phase, seconds, bytes_of(*made)});
+    return made;
+  }
+
+  void build_data(const std::string& scene) {
+    BuildSettings build;
+    build.subdivision.patch_count = settings_.patch_count;
+    build.form_factors.seed = settings_.seed;
+    build.operator_kind = OperatorKind::kDense;
+    build.precision = Precision::kF32;
+    build.store_links = settings_.links;
+    result_.data = std::make_shared<const TransferData>(
+        build_transfer_data(scene, build, result_.report, progress_));
+    result_.peak_memory_bytes = peak_memory_bytes();
+    result_.tracer = std::make_unique<const RayTracer>(make_surface_tracer(result_.data->mesh));
+    for (const auto& [phase, seconds] : result_.report.seconds) {
+      result_.costs.push_back({phase, seconds});
+    }
+  }
+
+  void add_dense() { result_.operators.push_back({"dense f32", result_.data->transfer}); }
+
+  void add_hierarchical(const OperatorChoice& choice) {
+    const std::string name = fmt::format("hierarchical {} {}", percent(choice.tolerance),
+                                         precision_name(choice.precision));
+    const auto work = [&](const Progress& progress) {
+      return build_hierarchical_transfer(dense(), result_.data->patches, lights_.view(),
+                                         {choice.tolerance, choice.precision}, progress);
+    };
+    result_.operators.push_back({name, timed(name, work, bytes_of_operator)});
+  }
+
+  void add_low_ranks(std::size_t rank) {
+    for (const bool first_bounce : {false, true}) {
+      const std::string name =
+          fmt::format("{}low rank {}", first_bounce ? "first bounce + " : "", rank);
+      const auto work = [&](const Progress& progress) {
+        return build_low_rank_transfer(dense(), result_.data->exchange,
+                                       {rank, Precision::kF16, first_bounce}, progress);
+      };
+      const auto made = timed(name, work, bytes_of_operator);
+      result_.operators.push_back({name, made});
+      if (first_bounce) add_compressed_first_bounce(name, *made);
+    }
+  }
+
+  /// The same operator, its first bounce through the most exact compressed form factors.
+  void add_compressed_first_bounce(const std::string& name, const LowRankOperator& exact) {
+    const std::string form = compressed_name(settings_.form_factor_tolerances.front());
+    result_.operators.push_back({name + ", F " + form, std::make_shared<const LowRankOperator>(
+                                                           exact.storage(), result_.form(form))});
+  }
+
+  void add_exact_forms() {
+    const TransferData& data = *result_.data;
+    result_.forms.push_back(
+        {kExactRows, std::make_unique<FormFactorBlocks>(data.exchange, data.patches.area)});
+    result_.forms.push_back(
+        {kExactHalf, std::make_unique<ExchangeBlocks>(data.exchange, data.patches.area)});
+  }
+
+  void add_compressed(double tolerance, const DrawnLights& radiosities) {
+    const std::string name = compressed_name(tolerance);
+    const auto work = [&](const Progress& progress) {
+      return compress_form_factors(result_.data->exchange, result_.data->patches,
+                                   radiosities.view(), {tolerance, Precision::kF16}, progress);
+    };
+    const auto compressed = timed("form factors " + name, work, bytes_of_operator);
+    if (!compressed_) compressed_ = compressed;
+    result_.forms.push_back({name, std::make_unique<CompressedFormFactors>(compressed)});
+  }
+
+  void add_links() {
+    const TransferData& data = *result_.data;
+    result_.forms.push_back({kLinks, std::make_unique<LinkedFormFactors>(
+                                         data.links, data.patches.area, data.patches.centroid)});
+  }
+
+  void measure_file() {
+    TransferData stored = *result_.data;
+    stored.transfer = result_.operators.front().transfer;
+    stored.compressed_form_factors = compressed_;
+    stored.links = {};
+    const auto path = std::filesystem::temp_directory_path() /
+                      fmt::format("rebounce_report_{}.safetensors", getpid());
+    save_transfer_file(path, stored);
+    result_.file_bytes = std::filesystem::file_size(path);
+    std::filesystem::remove(path);
+  }
+
+  static std::size_t bytes_of_operator(const TransferOperator& transfer) {
+    return transfer.bytes();
+  }
+
+  const ReportSettings& settings_;
+  const ReportProgress& progress_;
+  Contenders result_;
+  DrawnLights lights_;
+  std::shared_ptr<const HierarchicalOperator> compressed_;  ///< the first
+};
+
+}  // namespace
+
+const std::shared_ptr<const FormFactorOperator>& Contenders::form(std::string_view name) const {
+  const auto found = std::ranges::find(forms, name, &Form::name);
+  if (found == forms.end())
+    throw Error("the report has no form factors named " + std::string(name));
+  return found->form_factors;
+}
+
+std::string compressed_name(double tolerance) {
+  return "compressed " + percent(tolerance);
+}
+
+Contenders build_contenders(const std::string& scene, const ReportSettings& settings,
+                            const ReportProgress& progress) {
+  return ContenderBuilder(settings, progress).build(scene);
+}
+
+}  // namespace rebounce::bench

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "rebounce/precompute/build.h"
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/form_factor_operator.h"
+#include "report_settings.h"
+
+namespace rebounce::bench {
+
+/// Called when work begins and during it, with its name and the fraction done; false asks to stop.
+using ReportProgress = std::function<bool(std::string_view, double)>;
+
+/// A form of F that methods iterate on.
+struct Form {
+  std::string name;  ///< "exact rows", "exact half", "compressed 0.1 %", "links"
+  std::shared_ptr<const FormFactorOperator> form_factors;
+};
+
+/// Y in one form.
+struct StoredOperator {
+  std::string name;  ///< "dense f32", "hierarchical 0.5 % f16", "low rank 64", ...
+  std::shared_ptr<const TransferOperator> transfer;
+};
+
+/// What one phase of the offline stage took.
+struct Cost {
+  std::string phase;
+  double seconds = 0;
+  std::size_t bytes = 0;  ///< of what it made; 0: of no interest
+};
+
+/// One scene with everything that takes part: the data with a dense operator in f32, which is exact
+/// to rounding, every other operator, and every form of F.
+struct Contenders {
+  std::shared_ptr<const TransferData> data;
+  std::unique_ptr<const RayTracer> tracer;
+  std::vector<StoredOperator> operators;  ///< hierarchical ones first, in the settings' order
+  std::vector<Form> forms;                ///< exact ones first
+  std::vector<Cost> costs;
+  BuildReport report;
+  std::size_t peak_memory_bytes = 0;  ///< of the process, when the dense operator was there
+  std::size_t file_bytes = 0;         ///< of a file with the first operator and first compressed F
+
+  /// Throws Error if there is no such form.
+  const std::shared_ptr<const FormFactorOperator>& form(std::string_view name) const;
+};
+
+inline constexpr const char *kExactRows = "exact rows", *kExactHalf = "exact half";
+inline constexpr const char* kLinks = "links";
+
+/// "compressed 0.1 %"
+std::string compressed_name(double tolerance);
+
+/// Builds them. Throws Error if the scene cannot be used, Cancelled if asked to stop.
+Contenders build_contenders(const std::string& scene, const ReportSettings& settings,
+                            const ReportProgress& progress);
+
+}  // namespace rebounce::bench

@@ -1,0 +1,27 @@
+"""How figures are written."""
+
+
+def times(ratio):
+    return "–" if ratio is None else f"{ratio:.1f}" if ratio < 10 else f"{ratio:.0f}"
+
+
+def number(value):
+    return "–" if value is None else f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
+
+
+def markdown_table(names, rows):
+    lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
+    return "\n".join(lines + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows])
+
+
+def name_of(thing):
+    """The scene of a result or a claim, for people."""
+    return thing.scene.replace("_", " ")
+
+
+def span(values):
+    values = [v for v in values if v is not None]
+    if not values:
+        return "–"
+    low, high = times(min(values)), times(max(values))
+    return low if low == high else f"{low} to {high}"

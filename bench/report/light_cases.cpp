@@ -1,0 +1,114 @@
+#include "light_cases.h"
+
+#include <algorithm>
+
+#include "in_parallel.h"
+#include "light_changes.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/runtime/solve_radiosity.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce::bench {
+namespace {
+
+constexpr float kRepaint = 0.5F;
+constexpr double kReferenceResidual = 1e-10;
+
+/// For each patch whether it is repainted: whether its first triangle is of the material that most
+/// of the surface is of.
+std::vector<bool> repainted_patches(const TransferData& data) {
+  const std::size_t n = data.patches.size();
+  std::vector<std::uint32_t> material(n, kNone);
+  for (std::size_t t = data.mesh.triangle.size(); t-- > 0;) {
+    const std::uint32_t patch = data.mesh.triangle_patch[t];
+    if (patch != kNone) material[patch] = data.mesh.triangle_material[t];
+  }
+  std::vector<double> area(data.materials.size(), 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (material[i] != kNone) area[material[i]] += data.patches.area[i];
+  }
+  const auto most = static_cast<std::uint32_t>(std::ranges::max_element(area) - area.begin());
+  std::vector<bool> repainted(n);
+  for (std::size_t i = 0; i < n; ++i) repainted[i] = material[i] == most;
+  return repainted;
+}
+
+/// The light of a cold start, with surfaces repainted.
+LightCase repaint(const LightCase& lit, const std::vector<bool>& painted) {
+  LightCase result{kRepainted, lit.after, lit.after, lit.reflectance, {}};
+  for (std::size_t i = 0; i < painted.size(); ++i) {
+    for (int c = 0; c < kChannelCount && painted[i]; ++c) {
+      result.after[i][c] *= kRepaint;
+      result.reflectance[i][c] *= kRepaint;
+    }
+  }
+  return result;
+}
+
+void solve_truths(const TransferData& data, std::vector<LightCase>& cases,
+                  const ReportProgress& progress) {
+  PatchTable repainted = data.patches;
+  const auto found = std::ranges::find(cases, kRepainted, &LightCase::change);
+  if (found != cases.end()) repainted.reflectance = found->reflectance;
+  const ReferenceSolver usual(data.exchange, data.patches), other(data.exchange, repainted);
+  const Progress part = [&](double done) { return progress("reference", done); };
+  in_parallel(cases.size(), part, [&](std::size_t k) {
+    LightCase& lit = cases[k];
+    const auto solution =
+        (lit.change == kRepainted ? other : usual).radiosity(lit.after, kReferenceResidual);
+    for (const ReferenceSolver::Double3& b : solution) {
+      lit.truth.push_back(
+          {static_cast<float>(b[0]), static_cast<float>(b[1]), static_cast<float>(b[2])});
+    }
+  });
+}
+
+}  // namespace
+
+std::vector<LightCase> make_light_cases(const Contenders& contenders,
+                                        const ReportSettings& settings,
+                                        const ReportProgress& progress) {
+  const TransferData& data = *contenders.data;
+  const std::vector<bool> painted = repainted_patches(data);
+  std::vector<LightCase> cases;
+  for (int lamp = 0; lamp < settings.lamp_count; ++lamp) {
+    const auto changes = light_changes(data, settings.motions, settings.seed + lamp);
+    for (const LightChange& change : changes) {
+      cases.push_back({change.name, change.before, change.after, data.patches.reflectance, {}});
+    }
+    cases.push_back(repaint(cases[cases.size() - changes.size()], painted));
+  }
+  // Stable: changes in the order of the first lamp.
+  std::vector<LightCase> ordered;
+  const std::size_t per_lamp = cases.size() / settings.lamp_count;
+  for (std::size_t change = 0; change < per_lamp; ++change) {
+    for (std::size_t k = change; k < cases.size(); k += per_lamp) {
+      ordered.push_back(std::move(cases[k]));
+    }
+  }
+  solve_truths(data, ordered, progress);
+  return ordered;
+}
+
+OwnSolutions solve_on(const FormFactorOperator& form, const Contenders& contenders,
+                      const std::vector<LightCase>& cases, const ReportProgress& progress) {
+  const PatchTable& patches = contenders.data->patches;
+  const auto solve = [&](const std::vector<Float3>& light, const std::vector<Float3>& reflectance) {
+    std::vector<Float3> radiosity(light.size());
+    if (!light.empty()) {
+      solve_radiosity(SolveMethod::kConjugateGradient, form, {patches.area, reflectance}, light,
+                      {.max_sweeps = 1000, .residual = 1e-7}, radiosity);
+    }
+    return radiosity;
+  };
+  OwnSolutions own{std::vector<std::vector<Float3>>(cases.size()),
+                   std::vector<std::vector<Float3>>(cases.size())};
+  const Progress part = [&](double done) { return progress("own solutions", done); };
+  in_parallel(cases.size(), part, [&](std::size_t k) {
+    own.before[k] = solve(cases[k].before, patches.reflectance);
+    own.after[k] = solve(cases[k].after, cases[k].reflectance);
+  });
+  return own;
+}
+
+}  // namespace rebounce::bench

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "contenders.h"
+
+namespace rebounce::bench {
+
+/// A change of the light under one lamp, or of the surfaces.
+struct LightCase {
+  std::string change;               ///< "from zero", "moved 1 %", "switched", "repainted"
+  std::vector<Float3> before;       ///< M0 [n] in lx; empty before a cold start
+  std::vector<Float3> after;        ///< M0 [n] in lx
+  std::vector<Float3> reflectance;  ///< [n] that holds after the change
+  std::vector<Float3> truth;        ///< B [n] in lx: Gauss-Seidel in double precision to 1e-10
+
+  bool cold() const { return before.empty(); }
+};
+
+/// The change after which surfaces of the commonest material reflect half of what they did.
+inline constexpr const char* kRepainted = "repainted";
+
+/// The changes of light_changes.h for each of settings.lamp_count lamps, and a repainted scene
+/// under each; all lamps of a change follow each other. Throws Error if the scene cannot be lit so,
+/// Cancelled if asked to stop.
+std::vector<LightCase> make_light_cases(const Contenders& contenders,
+                                        const ReportSettings& settings,
+                                        const ReportProgress& progress);
+
+/// What one form of F makes of the cases: its own solutions.
+struct OwnSolutions {
+  std::vector<std::vector<Float3>> before, after;  ///< B [n] in lx for each case
+};
+
+/// Finds them by conjugate gradients. Throws Cancelled if asked to stop.
+OwnSolutions solve_on(const FormFactorOperator& form, const Contenders& contenders,
+                      const std::vector<LightCase>& cases, const ReportProgress& progress);
+
+}  // namespace rebounce::bench

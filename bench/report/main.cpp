@@ -1,0 +1,113 @@
+// bench_report: the stored inverse against the iterative methods on chosen scenes, in full; one
+// JSON file for each scene and number of patches. ./dev report makes a page of them.
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "console.h"
+#include "program.h"
+#include "rebounce/transfer/error.h"
+#include "report.h"
+
+namespace rebounce::bench {
+namespace {
+
+struct Options {
+  std::vector<std::string> scenes;
+  std::vector<std::size_t> patch_counts = {1000, 4000};
+  std::string folder = ".";
+  bool quick = false, no_truth = false, no_pictures = false, describe = false;
+  int solve_threads = ReportSettings{}.solve_threads;
+  CommonOptions common{.repeats = 0};
+};
+
+ReportSettings settings_for(const Options& options, std::size_t patch_count) {
+  ReportSettings settings;
+  if (patch_count >= ReportSettings::kLarge) settings.make_large();
+  if (options.quick) settings.make_quick();
+  settings.patch_count = patch_count;
+  settings.solve_threads = options.solve_threads;
+  if (options.common.repeats > 0) settings.repeats = options.common.repeats;
+  if (options.no_truth) settings.truth = false;
+  if (options.no_pictures) settings.picture_width = 0;
+  return settings;
+}
+
+nlohmann::ordered_json json_of(const ReportSettings& settings, bool quick) {
+  return {{"quick", quick},
+          {"seed", settings.seed},
+          {"lamps", settings.lamp_count},
+          {"solve_threads", settings.solve_threads},
+          {"repeats", settings.repeats},
+          {"frames", settings.frame_count},
+          {"budgets_microseconds", settings.budgets},
+          {"motions", settings.motions},
+          {"form_factor_tolerances", settings.form_factor_tolerances},
+          {"ranks", settings.ranks}};
+}
+
+void run(const Options& options) {
+  if (options.describe) {
+    fmt::print("{}\n", provenance("bench_report", options.common).dump(2));
+    return;
+  }
+  cli::ProgressBar bar(true);
+  std::filesystem::create_directories(options.folder);
+  for (const std::string& scene : options.scenes) {
+    for (const std::size_t patch_count : options.patch_counts) {
+      const std::string name =
+          fmt::format("{}-{}", std::filesystem::path(scene).stem().string(), patch_count);
+      const ReportProgress progress = [&](std::string_view phase, double part) {
+        return bar.update(fmt::format("{}: {}", name, phase), part);
+      };
+      const ReportSettings settings = settings_for(options, patch_count);
+      const auto begin = std::chrono::steady_clock::now();
+      nlohmann::ordered_json json = provenance("bench_report", options.common);
+      json["scene"] = std::filesystem::path(scene).stem().string();
+      json["settings"] = json_of(settings, options.quick);
+      json.update(measure_scene(scene, settings, options.folder, name, progress));
+      const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+      json["seconds"] = seconds.count();
+      write_text(std::filesystem::path(options.folder) / (name + ".json"), json.dump(1) + "\n");
+    }
+  }
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("scenes", options.scenes, "Scenes: .glb or .gltf");
+  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  app.add_option("-o,--output", options.folder, "Folder for SCENE-PATCHES.json and pictures")
+      ->capture_default_str();
+  app.add_flag("--quick", options.quick, "A small part of everything");
+  app.add_flag("--no-truth", options.no_truth, "Leave the path tracer out");
+  app.add_flag("--no-pictures", options.no_pictures, "Draw nothing");
+  app.add_flag("--describe", options.describe,
+               "Print machine, compiler and commit as JSON, and do nothing");
+  app.add_option("--solve-threads", options.solve_threads, "Threads while relighting is timed")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+  app.add_option("--repeats", options.common.repeats,
+                 "Timings of each thing; 0: 7, or 3 with --quick")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
+  app.add_option("--threads", options.common.threads, "Threads for all else; 0: one per processor")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+}
+
+}  // namespace
+}  // namespace rebounce::bench
+
+int main(int argc, char** argv) {
+  rebounce::cli::install_interrupt_handler();
+  rebounce::bench::Options options;
+  CLI::App app("The stored inverse against the iterative methods, in full.", "bench_report");
+  rebounce::bench::add_options(app, options);
+  return rebounce::bench::run_program(app, argc, argv, options.common,
+                                      [&] { rebounce::bench::run(options); });
+}

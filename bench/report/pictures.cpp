@@ -1,0 +1,151 @@
+#include "pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "rebounce/demo/camera.h"
+#include "rebounce/demo/image_file.h"
+#include "rebounce/demo/key_light.h"
+#include "rebounce/demo/picture.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/runtime/engine.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce::bench {
+namespace {
+
+constexpr int kSamplesPerAxis = 3;
+constexpr const char* kGaussSeidel = "gauss-seidel";
+
+Picture difference(const Picture& a, const Picture& b) {
+  Picture result = b;
+  for (std::size_t k = 0; k < result.pixel.size(); ++k) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      result.pixel[k][c] = kDifferenceGain * std::abs(a.pixel[k][c] - b.pixel[k][c]);
+    }
+  }
+  return result;
+}
+
+class Painter {
+ public:
+  Painter(const Contenders& contenders, const ReportSettings& settings,
+          std::filesystem::path folder, std::string name)
+      : data_(*contenders.data),
+        engine_(contenders.data),
+        renderer_(data_, engine_.tracer()),
+        folder_(std::move(folder)),
+        name_(std::move(name)),
+        lights_{make_key_light(data_, engine_.tracer())},
+        emitted_(irradiance_from_emitters(data_)) {
+    engine_.relight(lights_, {});
+    picture_settings_.width = settings.picture_width;
+    picture_settings_.height = settings.picture_height;
+    picture_settings_.samples_per_axis = kSamplesPerAxis;
+    picture_settings_.camera = data_.cameras.empty()
+                                   ? fit_camera(data_, engine_.tracer(), engine_.radiosity())
+                                   : data_.cameras.front();
+    truth_ = ReferenceSolver(data_.exchange, data_.patches)
+                 .indirect_irradiance(engine_.initial_exitance());
+    reference_ = draw(truth_);
+    picture_settings_.exposure = reference_.exposure;
+  }
+
+  std::span<const Float3> initial_exitance() const { return engine_.initial_exitance(); }
+
+  std::string save_reference() const { return save(reference_, "reference"); }
+
+  /// H of a method, as a picture and its difference.
+  void save_method(std::span<const Float3> indirect, const std::string& tag,
+                   DrawnMethod& method) const {
+    const Picture picture = draw(indirect);
+    method.error = relative_difference(indirect, truth_, data_.patches.area);
+    method.picture = save(picture, tag);
+    method.difference = save(difference(picture, reference_), tag + "-difference");
+  }
+
+  /// F B [n] in lx.
+  std::vector<Float3> gather(const FormFactorOperator& form,
+                             std::span<const Float3> radiosity) const {
+    std::vector<Float3> indirect(radiosity.size());
+    std::vector<float> workspace(form.workspace_size());
+    form.gather(radiosity, indirect, workspace);
+    return indirect;
+  }
+
+  double error(std::span<const Float3> indirect) const {
+    return relative_difference(indirect, truth_, data_.patches.area);
+  }
+
+ private:
+  Picture draw(std::span<const Float3> indirect) const {
+    PictureLight light;
+    light.lights = lights_;
+    light.indirect_irradiance = indirect;
+    light.emitted_irradiance = emitted_;
+    return renderer_.render(light, picture_settings_);
+  }
+
+  std::string save(const Picture& picture, const std::string& tag) const {
+    std::string file = name_ + "-" + tag + ".png";
+    write_png(folder_ / file, tone_map(picture));
+    return file;
+  }
+
+  const TransferData& data_;
+  Engine engine_;
+  PictureRenderer renderer_;
+  std::filesystem::path folder_;
+  std::string name_;
+  std::vector<Light> lights_;
+  std::vector<Float3> emitted_, truth_;
+  PictureSettings picture_settings_;
+  Picture reference_;
+};
+
+}  // namespace
+
+Pictures draw_pictures(const Contenders& contenders, const std::vector<Contestant>& contestants,
+                       const std::vector<RunTime>& times, const ReportSettings& settings,
+                       const std::filesystem::path& folder, const std::string& name,
+                       const ReportProgress& progress) {
+  if (!progress("pictures", 0)) throw Cancelled();
+  const Painter painter(contenders, settings, folder, name);
+  Pictures pictures;
+  pictures.reference = painter.save_reference();
+
+  const auto inverse =
+      std::ranges::find(contestants, contenders.operators.front().name, &Contestant::transfer);
+  pictures.time = times[inverse - contestants.begin()].start;
+  const TransferOperator& transfer = *contenders.operators.front().transfer;
+  std::vector<Float3> indirect(painter.initial_exitance().size());
+  std::vector<float> workspace(transfer.workspace_size());
+  transfer.apply(painter.initial_exitance(), indirect, workspace);
+  DrawnMethod product{.name = inverse->name + ", " + inverse->transfer};
+  painter.save_method(indirect, "inverse", product);
+  pictures.methods.push_back(product);
+
+  if (!progress("pictures", 0.5)) throw Cancelled();
+  DrawnMethod best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < contestants.size(); ++k) {
+    const Contestant& contestant = contestants[k];
+    if (contestant.name.find(kGaussSeidel) == std::string::npos) continue;
+    if (contestant.form == kExactRows || contestant.form == kExactHalf) continue;  // too slow
+    const int sweeps = std::max(1, times[k].sweeps_within(pictures.time));
+    const auto method = contestant.make(contenders);
+    method->run(painter.initial_exitance(), sweeps);
+    auto gathered = painter.gather(*contenders.form(contestant.form), method->radiosity());
+    if (painter.error(gathered) >= least) continue;
+    least = painter.error(gathered);
+    best = {.name = contestant.name + ", " + contestant.form, .sweeps = sweeps};
+    indirect = std::move(gathered);
+  }
+  painter.save_method(indirect, kGaussSeidel, best);
+  pictures.methods.push_back(best);
+  return pictures;
+}
+
+}  // namespace rebounce::bench

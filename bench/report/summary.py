@@ -1,0 +1,158 @@
+"""The report in words: a Markdown file for notes/ and the block that README quotes."""
+
+import rows
+from aims import AIM_ERROR, HEADLINE_NAMES, TIGHTEST_BUDGET, aims, ratio_of
+from formats import markdown_table, span
+from results import REPAINTED, SWITCHED, percent
+
+README_BEGIN, README_END = "<!-- report -->", "<!-- /report -->"
+SHOWN_LOSSES = 12
+
+
+def provenance(results, date):
+    r = results[0]
+    commits = ", ".join(dict.fromkeys(x["commit"] for x in results))
+    return (
+        f"{r['processor']}, {r['processors']} processors; {r['compiler']}, {r['build_type']}; "
+        f"commit {commits}; {date}. Offline work on {r['threads']} threads, relighting on "
+        f"{r['settings']['solve_threads']}. Times are medians of {r['settings']['repeats']} rounds in "
+        f"which all methods take turns; median spread of a time (interquartile range ÷ median) "
+        f"{percent(round(median_spread(results), 3))}."
+    )
+
+
+def median_spread(results):
+    spreads = sorted(row["spread"] for r in results for row in r["accuracy"])
+    return spreads[len(spreads) // 2]
+
+
+METHOD = """Errors are of the light that patches reflect after it came from other patches, B − M0: relative,
+area-weighted L2 over three channels, mean over {lamps} lamps, against Gauss-Seidel in double precision to 1e-10
+on the exact form factors. The truth of the light paths is the dense inverse, which is within {dense:.0e} of that.
+
+Each side has its best form. The inverse: hierarchical at several tolerances, dense, or refined. Gauss-Seidel: forward or
+symmetric, on exact form factors or on compressed ones at several tolerances, whichever is fastest to the error. Warm
+starts begin at the converged solution of the frame before on the same form. Caches hold what the method's own last run
+left; `accuracy.csv` has the same with caches that something else has used. Sweeps that fit into a budget are told by the
+measured times, so that a light path has the same errors in every run with the same times; a method that makes no
+sweep within the budget is left out. Lamps are points of 1 cd in free space, alone: the scene's own emitters are dark."""
+
+
+def missing_line(missing):
+    if not missing:
+        return ""
+    return "\n**Not run:** " + ", ".join(f"{s.replace('_', ' ')} at {n:,}" for s, n in missing) + ".\n"
+
+
+def readme_block(headlines):
+    headline_rows = [h.row() for h in headlines]
+    return (
+        f"{markdown_table(HEADLINE_NAMES, headline_rows)}\n\n"
+        f"Microseconds to an error of {percent(AIM_ERROR)} after a lamp was switched for another, one "
+        f"thread, and how many times faster the inverse is; lag in frames to 1 % at {TIGHTEST_BUDGET} µs "
+        "a frame. [notes/report.md](notes/report.md) has the conditions, and where Gauss-Seidel wins.\n\n"
+        f"{aims(headlines)}"
+    )
+
+
+def markdown(headlines, missing, date, pictures):
+    """The whole file; `pictures` maps "accuracy", "winners", "frames" and scenes to paths."""
+    all_results = [h.result for h in headlines]
+    largest = max(all_results, key=lambda r: r.patches)
+    parts = [
+        "# The stored inverse against Gauss-Seidel",
+        "Written by `./dev report`; the raw figures are in `report-out/` after a run, each claim with its "
+        "rows in `report_claims.csv` beside this file.",
+        provenance(all_results, date) + missing_line(missing),
+        "## Summary",
+        markdown_table(HEADLINE_NAMES, [h.row() for h in headlines]),
+        f"Microseconds to an error of {percent(AIM_ERROR)} after a lamp was switched for another; then how many "
+        f"times faster the inverse is. Lag: frames after a switch until the error is within 1 %, at "
+        f"{TIGHTEST_BUDGET} µs a frame.",
+        aims(headlines),
+        "## How it was measured",
+        METHOD.format(
+            lamps=largest["settings"]["lamps"],
+            dense=max(r["dense_error"] for r in all_results),
+        ),
+        "## Accuracy and time",
+        f"![Error against time]({pictures['accuracy']})",
+        f"![How many times faster the inverse is]({pictures['winners']})",
+        "Ratio of the times to an error, Gauss-Seidel ÷ inverse, by change of the light: red, the inverse is faster.",
+        "Least errors after a switch at equal time (–: one side has nothing that fits):",
+        markdown_table(rows.EQUAL_TIME_NAMES, rows.equal_time_rows(headlines)),
+        "## Where Gauss-Seidel wins",
+        where_gauss_seidel_wins(headlines),
+        "## Light paths",
+        f"{largest.title}, {rows.PATH_BUDGET} µs a frame, each method in its best form and warm from its last frame:",
+        f"![Error by frame]({pictures['frames']})",
+        markdown_table(rows.FRAME_NAMES, rows.frame_rows(largest)),
+        "## What it costs to have",
+        markdown_table(rows.COST_SUMMARY_NAMES, rows.cost_summary_rows(headlines)),
+        "Break-even: after so many switched frames at an error of 0.1 % the inverse has saved the seconds that it takes "
+        "beyond what compressing F takes.",
+        "## Truth",
+        markdown_table(rows.TRUTH_NAMES, rows.truth_rows(headlines)),
+        "Against the path tracer under a key light. *Discretisation* is what is left with 64 shadow rays for every pair and "
+        "the dense inverse: one value per patch, lamps looked at at eight points. *Form factors* and *compression* are the "
+        "difference that each makes to H. An error below the noise is not known. The furnace: every surface reflects half, "
+        "and openings send in what surfaces would.",
+        "## Pictures",
+        *(f"![{scene}]({path})" for scene, path in pictures["scenes"].items()),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def some(rows):
+    return rows[:SHOWN_LOSSES]
+
+
+def where_gauss_seidel_wins(headlines):
+    slow = rows.loss_rows(rows.losses(headlines, rows.TIME_SUBJECTS))
+    paths = rows.losses(headlines, rows.PATH_SUBJECTS)
+    path_count = sum(c.subject.startswith(rows.PATH_SUBJECTS) for h in headlines for c in h.claims)
+    switch = f"{SWITCHED}, error {AIM_ERROR:g}"
+    cold = [ratio_of(h.claims, "equal error, cold caches", switch) for h in headlines]
+    repainted = [ratio_of(h.claims, "equal error", REPAINTED) for h in headlines]
+    parts = [
+        "The largest motion of a lamp, as a part of the scene's diagonal, at which Gauss-Seidel, warm, reaches an error in no "
+        "more time than the inverse:",
+        markdown_table(rows.MOTION_NAMES, rows.motion_rows(headlines)),
+        f"Measured conditions in which an iteration takes no more time to an error: {len(slow)}. "
+        "Ratio: its time ÷ that of the inverse.",
+    ]
+    if slow:
+        parts.append(markdown_table(rows.LOSS_NAMES, some(slow)))
+    parts.append(
+        f"Light paths on which Gauss-Seidel, warm from frame to frame, has the smaller mean error at the same budget: {len(paths)} "
+        f"of {path_count}."
+    )
+    if paths:
+        parts[-1] += " Where light changes little by little sweeps add up over the frames; a product starts anew in each."
+        parts.append(markdown_table(rows.PATH_LOSS_NAMES, some(rows.path_loss_rows(paths))))
+    parts.append(
+        "\n".join(
+            (
+                "- Repainted (the commonest material reflects half of what it did): the operator is wrong, and helps only as a "
+                f"preconditioner. Time of the best iteration ÷ time of the best method that uses it: {span(repainted)}.",
+                f"- Against the best iteration of any kind instead of Gauss-Seidel, after a switch to 0.1 %: "
+                f"{span([h.switch_any for h in headlines])}.",
+                f"- With caches that something else has used, after a switch to 0.1 %: {span(cold)}.",
+                "- Before break-even (below), and where memory for F is there and for an operator is not.",
+                "- `--method auto` chooses by the rule in [solvers.md](solvers.md), which follows from these figures.",
+            )
+        )
+    )
+    return "\n\n".join(parts)
+
+
+def quote_in_readme(path, block):
+    """Replaces what stands between the markers of README."""
+    text = path.read_text(encoding="utf-8")
+    before, _, rest = text.partition(README_BEGIN)
+    _, end, after = rest.partition(README_END)
+    if not end:
+        raise SystemExit(f"{path} has no {README_BEGIN} ... {README_END} to quote the summary in")
+    path.write_text(
+        f"{before}{README_BEGIN}\n{block}\n{README_END}{after}", encoding="utf-8"
+    )

@@ -1,0 +1,280 @@
+// The quick report on the smallest scene, from measurement to page: its figures are those that
+// direct calls of the libraries give.
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "accuracy.h"
+#include "frames.h"
+#include "light_changes.h"
+#include "light_paths.h"
+#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/precompute/form_factor_compression.h"
+#include "rebounce/precompute/hierarchical_transfer.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/runtime/direct_lighting.h"
+#include "rebounce/runtime/solve_radiosity.h"
+#include "rebounce/transfer/compressed_form_factors.h"
+#include "reflected_light.h"
+#include "report_settings.h"
+#include "temporary_folder.h"
+#include "truth.h"
+
+namespace rebounce::bench {
+namespace {
+
+constexpr std::size_t kPatches = 100;
+const std::string kScene = REBOUNCE_SOURCE_DIR "/tests/scenes/cornell_box.gltf";
+
+ReportSettings quick_settings() {
+  ReportSettings settings;
+  settings.make_quick();
+  return settings;
+}
+
+TransferData build_directly() {
+  BuildSettings build;
+  build.subdivision.patch_count = kPatches;
+  build.operator_kind = OperatorKind::kDense;
+  build.precision = Precision::kF32;
+  build.store_links = true;
+  BuildReport report;
+  return build_transfer_data(kScene, build, report);
+}
+
+/// The report of the scene, made once, and what it was made from, made again.
+class QuickReport : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    std::filesystem::create_directories(folder());
+    const std::string command = "'" REBOUNCE_REPORT_PROGRAM "' '" + kScene +
+                                "' --quick --no-truth --repeats 1 --patches " +
+                                std::to_string(kPatches) + " -o '" + folder().string() + "'";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    std::ifstream file(folder() / result_name());
+    report_ = new nlohmann::json(nlohmann::json::parse(file));
+    data_ = new TransferData(build_directly());
+  }
+  static void TearDownTestSuite() {
+    delete data_;
+    delete report_;
+    std::filesystem::remove_all(folder());
+  }
+
+  static std::string result_name() { return "cornell_box-" + std::to_string(kPatches) + ".json"; }
+  static std::filesystem::path folder() {
+    return std::filesystem::temp_directory_path() /
+           ("rebounce-quick-report-" + std::to_string(::getpid()));
+  }
+
+  /// The row of that list in which all of these are so.
+  static const nlohmann::json& row(const char* list, const nlohmann::json& wanted) {
+    for (const nlohmann::json& row : report_->at(list)) {
+      const auto same = [&](const auto& item) { return row.at(item.key()) == item.value(); };
+      bool all = true;
+      for (const auto& item : wanted.items()) all = all && same(item);
+      if (all) return row;
+    }
+    throw std::runtime_error("no row " + wanted.dump());
+  }
+
+  static std::shared_ptr<const HierarchicalOperator> compressed_operator(double tolerance) {
+    const auto lights = draw_fitting_lights(*data_, make_surface_tracer(data_->mesh), 1);
+    return build_hierarchical_transfer(static_cast<const DenseOperator&>(*data_->transfer),
+                                       data_->patches, lights.view(), {tolerance, Precision::kF16});
+  }
+
+  static std::vector<Float3> multiply(const TransferOperator& transfer,
+                                      const std::vector<Float3>& light) {
+    return radiosities_of(transfer, data_->patches.reflectance, {&light, 1}).front();
+  }
+
+  static std::vector<Float3> truth(const std::vector<Float3>& light) {
+    std::vector<Float3> result;
+    for (const auto& b : ReferenceSolver(data_->exchange, data_->patches).radiosity(light)) {
+      result.push_back(
+          {static_cast<float>(b[0]), static_cast<float>(b[1]), static_cast<float>(b[2])});
+    }
+    return result;
+  }
+
+  static double error(std::span<const Float3> radiosity, std::span<const Float3> truth,
+                      std::span<const Float3> light) {
+    return reflected_error(radiosity, truth, light, data_->patches.area);
+  }
+
+  /// Over the lamps of the report, of what `solve` makes of each one's change `k`.
+  template <typename Solve>
+  static double mean_error(std::size_t k, const Solve& solve) {
+    const ReportSettings settings = quick_settings();
+    double mean = 0;
+    for (int lamp = 0; lamp < settings.lamp_count; ++lamp) {
+      const LightChange change = light_changes(*data_, settings.motions, 1 + lamp)[k];
+      mean += error(solve(change), truth(change.after), change.after) / settings.lamp_count;
+    }
+    return mean;
+  }
+
+  inline static nlohmann::json* report_ = nullptr;
+  inline static TransferData* data_ = nullptr;
+};
+
+TEST_F(QuickReport, SaysWhatItIsAbout) {
+  EXPECT_EQ(report_->at("patches"), data_->patches.size());
+  EXPECT_EQ(report_->at("form_factors"), 2 * data_->exchange.column.size());
+  EXPECT_EQ(report_->at("settings").at("quick"), true);
+  EXPECT_LT(report_->at("dense_error"), 1e-6);
+  const FurnaceResult furnace = measure_furnace(*data_);
+  EXPECT_DOUBLE_EQ(report_->at("furnace").at("error_max"), furnace.error_max);
+  EXPECT_LT(furnace.error_max, 1e-4);
+}
+
+TEST_F(QuickReport, ErrorsOfTheInverseAreThoseOfTheProduct) {
+  const auto transfer = compressed_operator(0.005);
+  const auto& reported =
+      row("accuracy",
+          {{"transfer", "hierarchical 0.5 % f16"}, {"method", "inverse"}, {"change", "switched"}});
+  EXPECT_EQ(reported.at("bytes"), transfer->bytes());
+  const std::size_t switched = quick_settings().motions.size() + 1;
+  const double direct = mean_error(
+      switched, [&](const LightChange& change) { return multiply(*transfer, change.after); });
+  EXPECT_NEAR(reported.at("error"), direct, 1e-9);
+  EXPECT_LT(direct, 0.01);
+}
+
+TEST_F(QuickReport, ErrorsOfGaussSeidelAreThoseOfTheSolver) {
+  const auto form_factors =
+      make_form_factors(SolveMethod::kGaussSeidel, data_->exchange, data_->patches.area);
+  const RadiosityProblem problem{data_->patches.area, data_->patches.reflectance};
+  for (const int sweeps : {1, 4}) {
+    const auto solve = [&](const LightChange& change) {
+      std::vector<Float3> radiosity(data_->patches.size());
+      solve_radiosity(SolveMethod::kGaussSeidel, *form_factors, problem, change.after,
+                      {.max_sweeps = sweeps, .residual = 0}, radiosity);
+      return radiosity;
+    };
+    const auto& reported = row("accuracy", {{"method", "gauss-seidel"},
+                                            {"form", "exact rows"},
+                                            {"change", "from zero"},
+                                            {"sweeps", sweeps}});
+    EXPECT_NEAR(reported.at("error"), mean_error(0, solve), 1e-6);
+    EXPECT_GT(reported.at("microseconds"), 0);
+  }
+}
+
+TEST_F(QuickReport, MoreSweepsTakeLongerAndErrLess) {
+  const auto after = [](int sweeps) -> const nlohmann::json& {
+    return row("accuracy", {{"method", "gauss-seidel"},
+                            {"form", "exact rows"},
+                            {"change", "switched"},
+                            {"sweeps", sweeps}});
+  };
+  EXPECT_LT(after(4).at("error"), 0.3 * after(1).at("error").get<double>());
+  EXPECT_LT(after(8).at("error"), 0.3 * after(4).at("error").get<double>());
+  EXPECT_GT(after(8).at("microseconds"), 2 * after(1).at("microseconds").get<double>());
+}
+
+TEST_F(QuickReport, FramesAreThoseOfAWarmSolver) {
+  const auto& reported = row("frames", {{"method", "gauss-seidel"},
+                                        {"form", "exact rows"},
+                                        {"path", "switching"},
+                                        {"budget_microseconds", 250}});
+  const RayTracer tracer = make_surface_tracer(data_->mesh);
+  const auto paths = make_light_paths(*data_, tracer, quick_settings().frame_count, 1);
+  const auto path = std::ranges::find(paths, "switching", &LightPath::name);
+  const auto form_factors =
+      make_form_factors(SolveMethod::kGaussSeidel, data_->exchange, data_->patches.area);
+  const auto solver = make_solver(SolveMethod::kGaussSeidel, *form_factors,
+                                  {data_->patches.area, data_->patches.reflectance});
+  DirectLighting direct(*data_, tracer);
+  std::vector<float> errors;
+  for (const std::vector<Light>& lights : path->frames) {
+    std::vector<Float3> light(data_->patches.size());
+    direct.compute(lights, {}, light);
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) light[i][c] *= data_->patches.reflectance[i][c];
+    }
+    const std::vector<Float3> exact = multiply(*data_->transfer, light);
+    if (errors.empty()) solver->start_from(exact);
+    solver->solve(
+        light, {.max_sweeps = reported.at("sweeps"), .residual = 1e-6, .measure_residual = false});
+    errors.push_back(static_cast<float>(error(solver->radiosity(), exact, light)));
+  }
+  EXPECT_NEAR(reported.at("error_worst"), std::ranges::max(errors), 1e-6);
+  const Lag lag = lag_after(path->switches, errors, 0.01);
+  EXPECT_DOUBLE_EQ(reported.at("lag_1_percent").at("mean"), lag.mean);
+}
+
+TEST_F(QuickReport, ThePageHasTheSameFigures) {
+  const std::string with_python = "/usr/bin/python3 -c 'import matplotlib' >/dev/null 2>&1";
+  if (std::system(with_python.c_str()) != 0) GTEST_SKIP() << "needs python3-matplotlib";
+  std::filesystem::create_directory(folder() / "quick");
+  for (const auto& file : std::filesystem::directory_iterator(folder())) {
+    if (file.is_regular_file()) {
+      std::filesystem::copy(file, folder() / "quick" / file.path().filename());
+    }
+  }
+  const std::string command = "/usr/bin/python3 '" REBOUNCE_SOURCE_DIR
+                              "/bench/report/run.py' --page-only --quick --only "
+                              "--sizes " +
+                              std::to_string(kPatches) + " --out '" + folder().string() + "' '" +
+                              kScene + "' >/dev/null";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const std::string page = test::read_bytes(folder() / "quick" / "report.html");
+  EXPECT_NE(page.find("data:image/png;base64,"), std::string::npos);
+  EXPECT_EQ(page.find("http"), std::string::npos) << "the page needs something else";
+
+  // The fastest product within 1 %, as the claims have it.
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& r : report_->at("accuracy")) {
+    const std::string method = r.at("method");
+    const bool inverse = method == "inverse" || method == "dense inverse" || method == "refine";
+    if (inverse && r.at("change") == "switched" && r.at("error") <= 0.01) {
+      least = std::min(least, r.at("microseconds").get<double>());
+    }
+  }
+  const std::string claims = test::read_bytes(folder() / "quick" / "claims.csv");
+  const auto begin = claims.find("equal error,\"switched, error 0.01\"");
+  ASSERT_NE(begin, std::string::npos);
+  const std::string line = claims.substr(begin, claims.find('\n', begin) - begin);
+  const auto last = line.rfind("microseconds");
+  ASSERT_NE(last, std::string::npos);
+  EXPECT_NE(line.find(nlohmann::json(least).dump()), std::string::npos) << line;
+}
+
+TEST(LagAfter, CountsFramesUntilTheErrorIsSmall) {
+  const std::vector<float> errors = {0, 0.5F, 0.1F, 0.001F, 0, 0.2F, 0.2F, 0.2F};
+  const Lag lag = lag_after({1, 5}, errors, 0.01);
+  EXPECT_DOUBLE_EQ(lag.mean, 2.5);  // two, and three until the end
+  EXPECT_EQ(lag.worst, 3);
+  EXPECT_EQ(lag_after({4}, errors, 0.01).worst, 0);
+}
+
+TEST(RunTimes, AreALineThroughWhatWasMeasuredThatOutliersDoNotTurn) {
+  std::vector<AccuracyRow> rows;
+  for (const int sweeps : {1, 2, 3, 4, 8, 16}) {
+    const double disturbed = sweeps == 3 ? 50 : 1;
+    rows.push_back({.contestant = 1,
+                    .change = "switched",
+                    .sweeps = sweeps,
+                    .time = {.median = disturbed * (10 + 5 * sweeps) * 1e-6}});
+  }
+  rows.push_back({.contestant = 0, .change = "switched", .time = {.median = 80e-6}});
+  const std::vector<RunTime> times = run_times(rows, 2);
+  EXPECT_NEAR(times[1].start, 10, 1e-6);
+  EXPECT_NEAR(times[1].sweep, 5, 1e-6);
+  EXPECT_EQ(times[1].sweeps_within(14), 0);
+  EXPECT_EQ(times[1].sweeps_within(36), 5);
+  EXPECT_EQ(times[0].sweeps_within(79), 0);
+  EXPECT_EQ(times[0].sweeps_within(80), 1);
+}
+
+}  // namespace
+}  // namespace rebounce::bench
