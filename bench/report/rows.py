@@ -8,6 +8,9 @@ from results import SWITCHED, moved, percent
 
 PATH_BUDGET = 500
 
+# Errors below this are of single precision, and neither side's merit.
+ROUNDING = 1e-6
+
 
 def losses(headlines, subjects):
     """The claims of these subjects in which Gauss-Seidel is as good or better, the clearest first."""
@@ -15,7 +18,10 @@ def losses(headlines, subjects):
         c
         for h in headlines
         for c in h.claims
-        if c.subject.startswith(subjects) and c.ratio is not None and c.ratio <= 1
+        if c.subject.startswith(subjects)
+        and c.ratio is not None
+        and c.ratio <= 1
+        and (c.unit == "microseconds" or c.inverse_value > ROUNDING)
     ]
     return sorted(claims, key=lambda c: c.ratio)
 
