@@ -46,6 +46,7 @@ void LitTruth::leave_out_dark() {
     std::swap(truths_[kept], truths_[k]);
     ++kept;
   }
+  if (kept == 0) return;  // light arrives nowhere: the matrix is zero
   lights_.resize(kept);
   truths_.resize(kept);
 }
