@@ -141,9 +141,9 @@ typedef struct rebounce_sky {
   float luminance;
 } rebounce_sky;
 
-/* Cells of the sky: 0 is all that is below the horizon, 1 to 145 are Tregenza's, in rows of 12 degrees
- * of altitude from the horizon up, each from north (-z) clockwise as seen from above, its first
- * cell around north; the last is the zenith (+y). */
+/* Cells of the sky: 0 is all that is below the horizon, 1 to 145 are Tregenza's, in rows of 12
+ * degrees of altitude from the horizon up, each from north (-z) clockwise as seen from above, its
+ * first cell around north; the last is the zenith (+y). */
 #define REBOUNCE_SKY_CELL_COUNT 146
 
 /* Writes the relative luminance [REBOUNCE_SKY_CELL_COUNT] of a sky of the CIE standard general sky,
@@ -206,9 +206,9 @@ const float* rebounce_engine_radiosity(const rebounce_engine* engine);
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count);
 
-/* Radiance in cd/m² that arrives at the vertices from patches and sky in the last frame, lamps apart:
- * [vertex_count][4][3], coefficients of real spherical harmonics of degree 0 and 1. Needs a file
- * made with --surface-harmonics. */
+/* Radiance in cd/m² that arrives at the vertices from patches and sky in the last frame, lamps
+ * apart: [vertex_count][4][3], coefficients of real spherical harmonics of degree 0 and 1. Needs a
+ * file made with --surface-harmonics. */
 rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* harmonics,
                                              size_t vertex_count);
 
