@@ -24,7 +24,7 @@ namespace {
 // All in units of the patch size, the root of a patch's area.
 constexpr double kShortestContact = 0.5;
 constexpr double kTolerance = 1.0 / 1024;  // far below what a patch resolves
-constexpr double kGap = 1.0 / 8;           // light that gets through below does not get far
+constexpr double kGap = 1.0 / 2;           // light that gets through below does not get far
 
 // The tolerance is never less than this part of the largest coordinate, which is some tens of its
 // rounding errors: a vertex put on a line must count as lying there.
