@@ -284,10 +284,7 @@ void run(const ApplyOptions& options) {
   for (const std::string& input : options.inputs) {
     const TransferData data = load_or_build(input, options.settings);
     ApplyBenchmark benchmark(data, options.common);
-    benchmark.run(1, table);
-    const int all = thread_count(options.common);
-    if (all > 1) benchmark.run(all, table);
-    omp_set_num_threads(all);
+    run_at_thread_counts(options.common, [&](int threads) { benchmark.run(threads, table); });
   }
   publish("apply", table, options.common);
 }
@@ -298,8 +295,7 @@ void run(const ApplyOptions& options) {
 int main(int argc, char** argv) {
   rebounce::bench::ApplyOptions options;
   CLI::App app("Times a relight beside the bandwidth of memory in the same run.", "bench_apply");
-  app.add_option("inputs", options.inputs, "Transfer files, or scenes to build them from")
-      ->required();
+  rebounce::bench::add_input_option(app, options.inputs);
   app.add_option("--patches", options.settings.subdivision.patch_count,
                  "Patches of each scene, about")
       ->check(CLI::Range(1, 1000000))

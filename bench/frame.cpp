@@ -137,10 +137,7 @@ void run(const FrameOptions& options) {
     FrameBenchmark benchmark(
         std::make_shared<const TransferData>(load_or_build(input, options.settings)),
         options.common);
-    benchmark.run(1, table);
-    const int all = thread_count(options.common);
-    if (all > 1) benchmark.run(all, table);
-    omp_set_num_threads(all);
+    run_at_thread_counts(options.common, [&](int threads) { benchmark.run(threads, table); });
   }
   publish("frame", table, options.common);
 }
@@ -151,8 +148,7 @@ void run(const FrameOptions& options) {
 int main(int argc, char** argv) {
   rebounce::bench::FrameOptions options;
   CLI::App app("Times the stages of a frame, with 1, 4 and 16 lights.", "bench_frame");
-  app.add_option("inputs", options.inputs, "Transfer files, or scenes to build them from")
-      ->required();
+  rebounce::bench::add_input_option(app, options.inputs);
   app.add_option("--patches", options.settings.subdivision.patch_count,
                  "Patches of each scene, about")
       ->check(CLI::Range(1, 1000000))

@@ -48,6 +48,17 @@ int thread_count(const CommonOptions& options) {
   return options.threads > 0 ? options.threads : omp_get_num_procs();
 }
 
+void add_input_option(CLI::App& app, std::vector<std::string>& inputs) {
+  app.add_option("inputs", inputs, "Transfer files, or scenes to build them from")->required();
+}
+
+void run_at_thread_counts(const CommonOptions& options, const std::function<void(int)>& work) {
+  const int all = thread_count(options);
+  work(1);
+  if (all > 1) work(all);
+  omp_set_num_threads(all);
+}
+
 int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
                 const std::function<void()>& work) {
   try {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "table.h"
 
@@ -26,6 +27,13 @@ int thread_count(const CommonOptions& options);
 /// exit with: 0, or after a line on standard error 1 (bad input) or 2 (usage).
 int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
                 const std::function<void()>& work);
+
+/// Adds the transfer files or scenes that a benchmark is to run on.
+void add_input_option(CLI::App& app, std::vector<std::string>& inputs);
+
+/// Runs `work`(threads) with one thread and with as many as `options` asks for, and leaves OpenMP
+/// with those.
+void run_at_thread_counts(const CommonOptions& options, const std::function<void(int)>& work);
 
 /// Where figures come from: machine, threads, compiler, commit, repeats.
 nlohmann::ordered_json provenance(const std::string& benchmark, const CommonOptions& options);

@@ -250,8 +250,7 @@ int main(int argc, char** argv) {
   options.settings.form_factor_tolerance = rebounce::bench::kDefaultTolerance;
   CLI::App app("Times sweeps and solves of the iterative methods on each form of F.",
                "bench_solvers");
-  app.add_option("inputs", options.inputs, "Transfer files, or scenes to build them from")
-      ->required();
+  rebounce::bench::add_input_option(app, options.inputs);
   app.add_option("--patches", options.settings.subdivision.patch_count,
                  "Patches of each scene, about")
       ->check(CLI::Range(1, 1000000))

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/fitting_lights.h"
@@ -280,109 +281,148 @@ Scene import_usable(const std::filesystem::path& path, double scale) {
   return scene;
 }
 
+/// The offline stage, a step at a time, each with what the steps before have left.
+class TransferBuild {
+ public:
+  TransferBuild(const BuildSettings& settings, BuildReport& report, const BuildProgress& progress)
+      : settings_(settings), report_(report), clock_(report, progress) {}
+
+  Scene import_scene(const std::filesystem::path& path) {
+    Scene scene =
+        clock_.run("import", [&](const Progress&) { return import_usable(path, settings_.scale); });
+    report_.triangle_count = scene.triangle.size();
+    report_.degenerate_triangle_count = scene.degenerate_triangle_count;
+    report_.warnings = scene.warnings;
+    data_.materials = scene.materials;
+    data_.textures = scene.textures;
+    data_.cameras = scene.cameras;
+    data_.lights = scene.lights;
+    data_.record.generator = std::string("rebounce ") + version();
+    data_.record.scene_name = scene.name;
+    data_.record.scene_hash = scene.hash;
+    return scene;
+  }
+
+  /// Throws Error if the rest would need more memory than it may take, or cannot be made as asked.
+  void make_patches(Scene scene, const EstimateListener& on_estimate) {
+    model_ = clock_.run("patches", [&](const Progress& part) {
+      return make_patch_model(std::move(scene), settings_.subdivision, part);
+    });
+    describe_patches(model_, report_);
+    if (settings_.lightmap.size > 0) {
+      data_.lightmap = clock_.run(
+          "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
+    }
+    decided_ = decide(settings_, model_.patches.size());
+    report_.estimate = estimate_cost(model_, settings_.form_factors.probe_rays);
+    if (on_estimate) on_estimate(report_.estimate);
+    refuse_if_too_large(report_.estimate, settings_.memory_limit_bytes, report_.triangle_count);
+  }
+
+  /// Finds what patches exchange; afterwards the patches and the mesh are the data's.
+  void find_exchange() {
+    const RayTracer& tracer = tracer_.emplace(make_surface_tracer(model_.mesh));
+    FormFactors form_factors = clock_.run("form factors", [&](const Progress& part) {
+      return compute_form_factors(model_, tracer, settings_.form_factors, part);
+    });
+    report_.ray_count = form_factors.ray_count;
+    report_.pair_count = form_factors.pair_count;
+    report_.form_factor_count = form_factors.exchange.column.size();
+    report_.closure = form_factors.closure;
+    if (settings_.store_links) {
+      data_.links = clock_.run("links", [&](const Progress& part) {
+        return find_links(model_, tracer, settings_.form_factors, part);
+      });
+      report_.link_count = data_.links.pair.size();
+    }
+    data_.patches = std::move(model_.patches);
+    data_.patches.sky_visibility = std::move(form_factors.sky_visibility);
+    data_.patches.absorbed = std::move(form_factors.absorbed);
+    data_.sky_cells = std::move(form_factors.sky_cells);
+    data_.mesh = std::move(model_.mesh);
+    data_.exchange = std::move(form_factors.exchange);
+  }
+
+  /// What takes the light of patches to where it is shown.
+  void make_outputs() {
+    clock_.run("weights", [&](const Progress& part) {
+      compute_reconstruction_weights(model_.shown_patch, data_.patches.absorbed, *tracer_,
+                                     data_.mesh, part);
+      return true;
+    });
+    if (settings_.probes.grid[0] > 0 || settings_.probes.spacing > 0) {
+      data_.probes = clock_.run("probes", [&](const Progress& part) {
+        LightProbes probes = place_probes(data_.mesh, settings_.probes);
+        trace_probes(data_, *tracer_, settings_.probes, probes, part);
+        return probes;
+      });
+    }
+    if (settings_.surface_harmonics.ray_count > 0) {
+      data_.surface_harmonics = clock_.run("surface harmonics", [&](const Progress& part) {
+        return trace_surface_harmonics(data_, *tracer_, settings_.surface_harmonics, part);
+      });
+    }
+  }
+
+  /// Makes the operator, and measures how far off it is.
+  void make_operator() {
+    const bool compressed = decided_.operator_kind != OperatorKind::kDense;
+    const Precision dense_precision = compressed ? Precision::kF32 : *decided_.precision;
+    const auto dense = clock_.run("operator", [&](const Progress& part) {
+      return build_dense_transfer(data_.exchange, data_.patches, dense_precision, part);
+    });
+    check_residual(transfer_residual(*dense, data_.exchange, data_.patches), dense_precision);
+    data_.transfer = dense;
+    if (compressed) {
+      data_.transfer = clock_.run("compression", [&](const Progress& part) {
+        return compress(*dense, data_, *tracer_, decided_, part);
+      });
+    }
+    if (decided_.form_factor_tolerance > 0) {
+      clock_.run("form factor compression", [&](const Progress& part) {
+        compress_form_factors_of(data_, *tracer_, decided_, report_, part);
+        return true;
+      });
+    }
+    check(compressed ? dense.get() : nullptr);
+  }
+
+  TransferData take() { return std::move(data_); }
+
+ private:
+  void check(const DenseOperator* exact) {
+    const std::vector<KindError> errors = clock_.run("check", [&](const Progress& part) {
+      data_.record.solve_residual =
+          transfer_residual(*data_.transfer, data_.exchange, data_.patches);
+      return measure_error(data_, *tracer_, exact, settings_.form_factors.seed, part);
+    });
+    record_errors(errors, data_.record);
+    data_.record.tolerance = decided_.tolerance;
+    data_.record.settings_json = settings_json(decided_);
+    data_.record.report_json = report_json(report_, errors);
+  }
+
+  const BuildSettings& settings_;
+  BuildSettings decided_;  ///< settings_ with what was left open decided
+  BuildReport& report_;
+  PhaseClock clock_;
+  TransferData data_;
+  PatchModel model_;
+  std::optional<RayTracer> tracer_;
+};
+
 }  // namespace
 
 TransferData build_transfer_data(const std::filesystem::path& scene_path,
                                  const BuildSettings& settings, BuildReport& report,
                                  const BuildProgress& progress,
                                  const EstimateListener& on_estimate) {
-  PhaseClock clock(report, progress);
-  TransferData data;
-
-  Scene scene = clock.run(
-      "import", [&](const Progress&) { return import_usable(scene_path, settings.scale); });
-  report.triangle_count = scene.triangle.size();
-  report.degenerate_triangle_count = scene.degenerate_triangle_count;
-  report.warnings = scene.warnings;
-  data.materials = scene.materials;
-  data.textures = scene.textures;
-  data.cameras = scene.cameras;
-  data.lights = scene.lights;
-  data.record.generator = std::string("rebounce ") + version();
-  data.record.scene_name = scene.name;
-  data.record.scene_hash = scene.hash;
-
-  PatchModel model = clock.run("patches", [&](const Progress& part) {
-    return make_patch_model(std::move(scene), settings.subdivision, part);
-  });
-  describe_patches(model, report);
-  if (settings.lightmap.size > 0) {
-    data.lightmap = clock.run(
-        "lightmap", [&](const Progress&) { return make_lightmap(model, settings, report); });
-  }
-  const BuildSettings decided = decide(settings, model.patches.size());
-  report.estimate = estimate_cost(model, settings.form_factors.probe_rays);
-  if (on_estimate) on_estimate(report.estimate);
-  refuse_if_too_large(report.estimate, settings.memory_limit_bytes, report.triangle_count);
-
-  const RayTracer tracer = make_surface_tracer(model.mesh);
-  FormFactors form_factors = clock.run("form factors", [&](const Progress& part) {
-    return compute_form_factors(model, tracer, settings.form_factors, part);
-  });
-  report.ray_count = form_factors.ray_count;
-  report.pair_count = form_factors.pair_count;
-  report.form_factor_count = form_factors.exchange.column.size();
-  report.closure = form_factors.closure;
-  if (settings.store_links) {
-    data.links = clock.run("links", [&](const Progress& part) {
-      return find_links(model, tracer, settings.form_factors, part);
-    });
-    report.link_count = data.links.pair.size();
-  }
-  data.patches = std::move(model.patches);
-  data.patches.sky_visibility = std::move(form_factors.sky_visibility);
-  data.patches.absorbed = std::move(form_factors.absorbed);
-  data.sky_cells = std::move(form_factors.sky_cells);
-  data.mesh = std::move(model.mesh);
-  data.exchange = std::move(form_factors.exchange);
-  clock.run("weights", [&](const Progress& part) {
-    compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh,
-                                   part);
-    return true;
-  });
-
-  if (settings.probes.grid[0] > 0 || settings.probes.spacing > 0) {
-    data.probes = clock.run("probes", [&](const Progress& part) {
-      LightProbes probes = place_probes(data.mesh, settings.probes);
-      trace_probes(data, tracer, settings.probes, probes, part);
-      return probes;
-    });
-  }
-
-  if (settings.surface_harmonics.ray_count > 0) {
-    data.surface_harmonics = clock.run("surface harmonics", [&](const Progress& part) {
-      return trace_surface_harmonics(data, tracer, settings.surface_harmonics, part);
-    });
-  }
-
-  const bool compressed = decided.operator_kind != OperatorKind::kDense;
-  const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
-  const auto dense = clock.run("operator", [&](const Progress& part) {
-    return build_dense_transfer(data.exchange, data.patches, dense_precision, part);
-  });
-  check_residual(transfer_residual(*dense, data.exchange, data.patches), dense_precision);
-  data.transfer = dense;
-  if (compressed) {
-    data.transfer = clock.run("compression", [&](const Progress& part) {
-      return compress(*dense, data, tracer, decided, part);
-    });
-  }
-  if (decided.form_factor_tolerance > 0) {
-    clock.run("form factor compression", [&](const Progress& part) {
-      compress_form_factors_of(data, tracer, decided, report, part);
-      return true;
-    });
-  }
-  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
-    data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
-    return measure_error(data, tracer, compressed ? dense.get() : nullptr,
-                         settings.form_factors.seed, part);
-  });
-  record_errors(errors, data.record);
-  data.record.tolerance = decided.tolerance;
-  data.record.settings_json = settings_json(decided);
-  data.record.report_json = report_json(report, errors);
-  return data;
+  TransferBuild build(settings, report, progress);
+  build.make_patches(build.import_scene(scene_path), on_estimate);
+  build.find_exchange();
+  build.make_outputs();
+  build.make_operator();
+  return build.take();
 }
 
 }  // namespace rebounce

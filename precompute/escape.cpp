@@ -5,19 +5,10 @@
 #include "hemisphere_rays.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/sky_cells.h"
+#include "seen_patch.h"
 
 namespace rebounce {
 namespace {
-
-/// The display triangle of the side that was hit, kNone for the back of a one-sided one.
-std::uint32_t side_at(const DisplayMesh& mesh, const Hit& hit) {
-  return hit.front ? hit.triangle : mesh.back_triangle[hit.triangle];
-}
-
-bool has_own_patch(const DisplayMesh& mesh, const Hit& hit) {
-  const std::uint32_t side = side_at(mesh, hit);
-  return side != kNone && mesh.triangle_patch[side] != kNone;
-}
 
 /// If `hit` of `ray` is a side without a patch of its own, in whose place another one has one and
 /// faces the same way, makes that one the side that was hit. The weights of the vertices are left.
@@ -62,7 +53,7 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
   std::array<int, kSkyCellCount> count{};
   for (std::size_t k = 0; k < scratch.hits.size(); ++k) {
     Hit& hit = scratch.hits[k];
-    if (hit.triangle != kNone && !has_own_patch(model.mesh, hit)) {
+    if (hit.triangle != kNone && seen_patch(model.mesh, hit) == kNone) {
       prefer_lit_side(model, tracer, scratch.rays[k], hit, scratch);
     }
     if (hit.triangle == kNone) {
@@ -82,8 +73,8 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
 }
 
 std::uint32_t patch_at(const PatchModel& model, const Hit& hit) {
-  const std::uint32_t side = side_at(model.mesh, hit);
-  return side == kNone ? kNone : model.shown_patch[side];
+  if (meets_back(model.mesh, hit)) return kNone;
+  return model.shown_patch[hit.front ? hit.triangle : model.mesh.back_triangle[hit.triangle]];
 }
 
 }  // namespace rebounce

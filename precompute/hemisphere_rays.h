@@ -13,14 +13,17 @@
 
 namespace rebounce {
 
+/// Sample k of directions, in [0, 1)². Its steps are other irrational ones than those of r2_point,
+/// so that points and directions do not march together.
+inline glm::dvec2 direction_sample(const glm::dvec2& shift, std::uint32_t k) {
+  return glm::fract(shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
+}
+
 /// Cosine-distributed ray k from `point`; the directions are those of a low-discrepancy sequence
 /// shifted by `direction_shift`.
 inline Ray make_hemisphere_ray(const PatchPoint& point, const RayTracer& tracer,
                                const glm::dvec2& direction_shift, std::uint32_t k) {
-  // Other irrational steps than those of r2_point, so that points and directions do not march
-  // together.
-  const glm::dvec2 s =
-      glm::fract(direction_shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
+  const glm::dvec2 s = direction_sample(direction_shift, k);
   Ray ray{};
   ray.origin = tracer.offset_point(point.position, point.normal);
   ray.direction = to_float3(frame_around(to_dvec3(point.normal)) * square_to_cosine_hemisphere(s));

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
-#include <utility>
 
+#include "harmonic_view.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
-#include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/error.h"
 #include "seen_patch.h"
 
@@ -19,17 +19,7 @@ constexpr std::size_t kMostProbes = 65536;
 constexpr std::size_t kBatch = 64;  // probes between two looks at the progress
 constexpr double kLargestBackPart = 0.25;
 
-struct Entry {
-  std::uint32_t patch;
-  Harmonics weight;
-};
-
-/// What one probe sees.
-struct View {
-  std::vector<Entry> entries;  ///< ascending patches
-  Harmonics sky{};
-  bool valid = true;
-};
+using View = HarmonicView<kHarmonicCount>;  // what one probe sees
 
 /// Direction k of `count`, spread evenly over the sphere and turned about y by `turn` turns: the
 /// spherical Fibonacci lattice (R. Swinbank, R. J. Purser, 2006).
@@ -41,10 +31,6 @@ Float3 fibonacci_direction(int k, int count, double turn) {
           static_cast<float>(r * std::sin(phi))};
 }
 
-void add(Harmonics& sum, const Harmonics& y, float factor) {
-  for (std::size_t k = 0; k < kHarmonicCount; ++k) sum[k] += factor * y[k];
-}
-
 class Viewer {
  public:
   Viewer(const DisplayMesh& mesh, const RayTracer& tracer, int ray_count)
@@ -53,7 +39,8 @@ class Viewer {
         rays_(static_cast<std::size_t>(ray_count)),
         hits_(rays_.size()) {}
 
-  View look_around(const Float3& position, std::uint64_t number) {
+  /// None for a probe that sees too much of backs: it is inside of something.
+  std::optional<View> look_around(const Float3& position, std::uint64_t number) {
     const auto count = static_cast<int>(rays_.size());
     const double turn = unit_square(mix_bits(number)).x;
     for (int k = 0; k < count; ++k) {
@@ -64,55 +51,30 @@ class Viewer {
       ray.t_far = std::numeric_limits<float>::infinity();
     }
     tracer_.intersect(rays_, hits_);
-    return sum_up();
+    const auto backs =
+        std::ranges::count_if(hits_, [&](const Hit& hit) { return meets_back(mesh_, hit); });
+    if (static_cast<double>(backs) > kLargestBackPart * static_cast<double>(hits_.size())) {
+      return std::nullopt;
+    }
+    return viewer_.sum_up(mesh_, rays_, hits_,
+                          4 * std::numbers::pi_v<float> / static_cast<float>(rays_.size()));
   }
 
  private:
-  View sum_up() {
-    View view;
-    std::size_t backs = 0;
-    by_patch_.clear();
-    const float solid_angle = 4 * std::numbers::pi_v<float> / static_cast<float>(rays_.size());
-    for (std::uint32_t k = 0; k < hits_.size(); ++k) {
-      const Hit& hit = hits_[k];
-      if (hit.triangle == kNone) {
-        add(view.sky, spherical_harmonics(rays_[k].direction), solid_angle);
-        continue;
-      }
-      if (meets_back(mesh_, hit)) ++backs;
-      const std::uint32_t patch = seen_patch(mesh_, hit);
-      if (patch != kNone) by_patch_.emplace_back(patch, k);
-    }
-    if (static_cast<double>(backs) > kLargestBackPart * static_cast<double>(hits_.size())) {
-      view = View();
-      view.valid = false;
-      return view;
-    }
-    std::ranges::sort(by_patch_);
-    for (const auto& [patch, k] : by_patch_) {
-      if (view.entries.empty() || view.entries.back().patch != patch) {
-        view.entries.push_back({patch, {}});
-      }
-      // A diffuse patch of radiosity B has the luminance B / pi.
-      add(view.entries.back().weight, spherical_harmonics(rays_[k].direction),
-          solid_angle / std::numbers::pi_v<float>);
-    }
-    return view;
-  }
-
   const DisplayMesh& mesh_;
   const RayTracer& tracer_;
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_patch_;  ///< and number of the ray
+  HarmonicViewer<kHarmonicCount> viewer_;
 };
 
-void append(const View& view, LightProbes& probes) {
-  probes.valid.push_back(view.valid ? 1 : 0);
+void append(const std::optional<View>& seen, LightProbes& probes) {
+  const View& view = seen ? *seen : View();
+  probes.valid.push_back(seen ? 1 : 0);
   probes.sky.push_back(view.sky);
-  for (const Entry& entry : view.entries) {
-    probes.entry_patch.push_back(entry.patch);
-    probes.entry_weight.push_back(entry.weight);
+  for (const auto& [patch, weight] : view.entries) {
+    probes.entry_patch.push_back(patch);
+    probes.entry_weight.push_back(weight);
   }
   if (probes.entry_patch.size() >= kNone) {
     throw Error("the probes see too much for one file; ask for fewer of them or for fewer rays");
@@ -166,7 +128,7 @@ void trace_probes(const TransferData& data, const RayTracer& tracer, const Probe
   probes.entry_patch.clear();
   probes.entry_weight.clear();
   probes.patch_count = data.patches.size();
-  std::vector<View> views;
+  std::vector<std::optional<View>> views;
   for (std::size_t first = 0; first < probes.size(); first += kBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(probes.size()))) {
       throw Cancelled();
@@ -181,7 +143,7 @@ void trace_probes(const TransferData& data, const RayTracer& tracer, const Probe
         views[k] = viewer.look_around(probes.position[first + k], first + k);
       }
     }
-    for (const View& view : views) append(view, probes);
+    for (const std::optional<View>& view : views) append(view, probes);
   }
 }
 

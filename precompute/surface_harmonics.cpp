@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <limits>
 #include <numbers>
-#include <utility>
 #include <vector>
 
+#include "harmonic_view.h"
+#include "hemisphere_rays.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
-#include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/error.h"
-#include "seen_patch.h"
 
 namespace rebounce {
 namespace {
@@ -19,15 +18,7 @@ namespace {
 constexpr int kFewestRays = 16;
 constexpr std::size_t kBatch = 256;  // patches between two looks at the progress
 
-/// What one patch sees.
-struct View {
-  std::vector<std::pair<std::uint32_t, LinearHarmonics>> entries;  ///< ascending patches
-  LinearHarmonics sky{};
-};
-
-void add(LinearHarmonics& sum, const Harmonics& y, float factor) {
-  for (std::size_t k = 0; k < kLinearHarmonicCount; ++k) sum[k] += factor * y[k];
-}
+using View = HarmonicView<kLinearHarmonicCount>;  // what one patch sees
 
 /// A direction around `normal`, uniform over the hemisphere.
 glm::dvec3 hemisphere_direction(const glm::dvec3& normal, const glm::dvec2& s) {
@@ -51,50 +42,25 @@ class Viewer {
     const glm::dvec2 shift = unit_square(mix_bits(bits));
     for (std::uint32_t k = 0; k < rays_.size(); ++k) {
       const auto& [position, normal] = points_[k];
-      // Other irrational steps than those of the points, so that they do not march together.
-      const glm::dvec2 s = glm::fract(shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
       Ray& ray = rays_[k] = Ray{};
       ray.origin = tracer_.offset_point(position, normal);
-      ray.direction = to_float3(hemisphere_direction(to_dvec3(normal), s));
+      ray.direction = to_float3(hemisphere_direction(to_dvec3(normal), direction_sample(shift, k)));
       ray.t_near = 0;
       ray.t_far = std::numeric_limits<float>::infinity();
     }
     tracer_.intersect(rays_, hits_);
-    return sum_up();
+    return viewer_.sum_up(mesh_, rays_, hits_,
+                          2 * std::numbers::pi_v<float> / static_cast<float>(rays_.size()));
   }
 
  private:
-  View sum_up() {
-    View view;
-    by_patch_.clear();
-    const float solid_angle = 2 * std::numbers::pi_v<float> / static_cast<float>(rays_.size());
-    for (std::uint32_t k = 0; k < hits_.size(); ++k) {
-      if (hits_[k].triangle == kNone) {
-        add(view.sky, spherical_harmonics(rays_[k].direction), solid_angle);
-        continue;
-      }
-      const std::uint32_t patch = seen_patch(mesh_, hits_[k]);
-      if (patch != kNone) by_patch_.emplace_back(patch, k);
-    }
-    std::ranges::sort(by_patch_);
-    for (const auto& [patch, k] : by_patch_) {
-      if (view.entries.empty() || view.entries.back().first != patch) {
-        view.entries.emplace_back(patch, LinearHarmonics{});
-      }
-      // A diffuse patch of radiosity B has the luminance B / pi.
-      add(view.entries.back().second, spherical_harmonics(rays_[k].direction),
-          solid_angle / std::numbers::pi_v<float>);
-    }
-    return view;
-  }
-
   const DisplayMesh& mesh_;
   const RayTracer& tracer_;
   const SurfaceHarmonicSettings& settings_;
   std::vector<PatchPoint> points_;
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_patch_;  ///< and number of the ray
+  HarmonicViewer<kLinearHarmonicCount> viewer_;
 };
 
 void append(const View& view, SurfaceHarmonics& harmonics) {

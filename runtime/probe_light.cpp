@@ -70,13 +70,7 @@ void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, 
 }
 
 Float3 probe_irradiance(const ProbeLight& light, const Float3& normal) {
-  const Harmonics y = spherical_harmonics(normal);
-  Float3 sum{0, 0, 0};
-  for (std::size_t k = 0; k < kHarmonicCount; ++k) {
-    for (std::size_t c = 0; c < kChannelCount; ++c) sum[c] += kCosineLobe[k] * y[k] * light[k][c];
-  }
-  for (float& x : sum) x = std::max(x, 0.0F);  // the series may undershoot
-  return sum;
+  return irradiance_of(light, normal);
 }
 
 ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,

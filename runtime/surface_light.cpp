@@ -66,13 +66,7 @@ void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const SurfaceLig
 }
 
 Float3 surface_irradiance(const SurfaceLight& light, const Float3& normal) {
-  const Harmonics y = spherical_harmonics(normal);
-  Float3 sum{0, 0, 0};
-  for (std::size_t k = 0; k < kLinearHarmonicCount; ++k) {
-    for (std::size_t c = 0; c < kChannelCount; ++c) sum[c] += kCosineLobe[k] * y[k] * light[k][c];
-  }
-  for (float& x : sum) x = std::max(x, 0.0F);  // the series may undershoot
-  return sum;
+  return irradiance_of(light, normal);
 }
 
 Float3 bent_irradiance(const SurfaceLight& light, const Float3& irradiance, const Float3& normal,

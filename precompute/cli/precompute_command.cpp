@@ -155,6 +155,102 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   check_tolerances(data.record, report, settings.form_factor_tolerance);
 }
 
+// The options below are kept by CLI11 for as long as `command` lives, and so must `chosen` be.
+
+void add_scene_options(CLI::App& command, PrecomputeOptions& chosen) {
+  SubdivisionSettings& subdivision = chosen.settings.subdivision;
+  CLI::Option* patches = command
+                             .add_option("--patches", subdivision.patch_count,
+                                         "Subdivide until there are about this many patches")
+                             ->check(CLI::Range(1, 1000000))
+                             ->capture_default_str();
+  command
+      .add_option("--patch-size", subdivision.patch_size,
+                  "Subdivide until no edge is longer than this, in metres")
+      ->check(CLI::PositiveNumber)
+      ->excludes(patches)
+      ->each([&subdivision](const std::string&) { subdivision.patch_count = 0; });
+  command.add_option("--scale", chosen.settings.scale, "Metres in one unit of the scene file")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+}
+
+void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
+  command
+      .add_option("--quality", chosen.quality,
+                  "Rays and kernels of the form factors: view factors to some 0.5 % by default, to "
+                  "0.1 % in ten times as long with high")
+      ->check(CLI::IsMember({"low", "default", "high"}))
+      ->capture_default_str();
+  command
+      .add_option("--link-epsilon", chosen.settings.form_factors.link_epsilon,
+                  "Find form factors by links between sets of patches of this error each, with "
+                  "fewer rays (0.0005 is usual); 0: look at all pairs of patches")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command.add_flag("--store-links", chosen.settings.store_links,
+                   "Store links, for solve --method hierarchical");
+  command
+      .add_option(
+          "--compress-form-factors", chosen.settings.form_factor_tolerance,
+          "Keep the form factors compressed as well, for iterative methods, with this error of the "
+          "light that is gathered in the mean")
+      ->check(CLI::Range(1e-5, 0.5));
+  command.add_option("--seed", chosen.settings.form_factors.seed, "Seed of the sample points")
+      ->capture_default_str();
+}
+
+void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
+  command
+      .add_option(
+          "--operator", chosen.operator_kind,
+          "Kind of the operator; by default hierarchical if a tolerance is given or there are "
+          "more than 5000 patches, otherwise dense")
+      ->check(CLI::IsMember({"hierarchical", "low-rank", "first-bounce", "dense"}));
+  command
+      .add_option("--rank", chosen.settings.rank,
+                  "Rank of a low-rank or first-bounce operator; bytes and time grow with it")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  command
+      .add_option("--tolerance", chosen.settings.tolerance,
+                  "Error of the indirect light that the hierarchical operator may have in the mean")
+      ->check(CLI::Range(1e-5, 0.5))
+      ->each([&chosen](const std::string&) { chosen.tolerance_given = true; })
+      ->capture_default_str();
+  command
+      .add_option(
+          "--precision", chosen.precision,
+          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q16 for "
+          "those bytes and the fastest relighting, or q8 for two thirds of them where the "
+          "tolerance is 1 % or more; by default f32 for a dense operator, q16 for a hierarchical "
+          "one, f16 for others")
+      ->check(CLI::IsMember({"f16", "f32", "q16", "q8"}));
+}
+
+void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
+  command
+      .add_option("--probes", chosen.probes,
+                  "Light probes in a grid of NX,NY,NZ over the scene, or this many metres apart")
+      ->delimiter(',')
+      ->expected(1, 3);
+  command
+      .add_option("--probe-rays", chosen.settings.probes.ray_count,
+                  "Rays by which each light probe looks around")
+      ->check(CLI::Range(64, 1000000))
+      ->capture_default_str();
+  command
+      .add_option("--lightmap", chosen.settings.lightmap.size,
+                  "Texels along each side of a lightmap, for scenes with second texture "
+                  "coordinates (TEXCOORD_1)")
+      ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
+  command
+      .add_option("--surface-harmonics", chosen.settings.surface_harmonics.ray_count,
+                  "Keep from where light comes to the patches, for normal maps, found by this many "
+                  "rays of each")
+      ->check(CLI::Range(16, 1000000));
+}
+
 }  // namespace
 
 void add_precompute_command(CLI::App& app, const CommonOptions& options) {
@@ -164,95 +260,14 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("scene", chosen->scene, "Scene (.glb or .gltf)")->required();
   command->add_option("-o,--output", chosen->output, "Transfer file to write (.safetensors)")
       ->required();
-  SubdivisionSettings& subdivision = chosen->settings.subdivision;
-  CLI::Option* patches = command
-                             ->add_option("--patches", subdivision.patch_count,
-                                          "Subdivide until there are about this many patches")
-                             ->check(CLI::Range(1, 1000000))
-                             ->capture_default_str();
-  command
-      ->add_option("--patch-size", subdivision.patch_size,
-                   "Subdivide until no edge is longer than this, in metres")
-      ->check(CLI::PositiveNumber)
-      ->excludes(patches)
-      ->each([&subdivision](const std::string&) { subdivision.patch_count = 0; });
-  command->add_option("--scale", chosen->settings.scale, "Metres in one unit of the scene file")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--operator", chosen->operator_kind,
-          "Kind of the operator; by default hierarchical if a tolerance is given or there are "
-          "more than 5000 patches, otherwise dense")
-      ->check(CLI::IsMember({"hierarchical", "low-rank", "first-bounce", "dense"}));
-  command
-      ->add_option("--rank", chosen->settings.rank,
-                   "Rank of a low-rank or first-bounce operator; bytes and time grow with it")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--tolerance", chosen->settings.tolerance,
-          "Error of the indirect light that the hierarchical operator may have in the mean")
-      ->check(CLI::Range(1e-5, 0.5))
-      ->each([chosen](const std::string&) { chosen->tolerance_given = true; })
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--precision", chosen->precision,
-          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, q16 for "
-          "those bytes and the fastest relighting, or q8 for two thirds of them where the "
-          "tolerance is 1 % or more; by default f32 for a dense operator, q16 for a hierarchical "
-          "one, f16 for others")
-      ->check(CLI::IsMember({"f16", "f32", "q16", "q8"}));
-  command
-      ->add_option(
-          "--compress-form-factors", chosen->settings.form_factor_tolerance,
-          "Keep the form factors compressed as well, for iterative methods, with this error of the "
-          "light that is gathered in the mean")
-      ->check(CLI::Range(1e-5, 0.5));
-  command
-      ->add_option(
-          "--quality", chosen->quality,
-          "Rays and kernels of the form factors: view factors to some 0.5 % by default, to "
-          "0.1 % in ten times as long with high")
-      ->check(CLI::IsMember({"low", "default", "high"}))
-      ->capture_default_str();
-  command
-      ->add_option("--link-epsilon", chosen->settings.form_factors.link_epsilon,
-                   "Find form factors by links between sets of patches of this error each, with "
-                   "fewer rays (0.0005 is usual); 0: look at all pairs of patches")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
-  command->add_flag("--store-links", chosen->settings.store_links,
-                    "Store links, for solve --method hierarchical");
+  add_scene_options(*command, *chosen);
+  add_form_factor_options(*command, *chosen);
+  add_operator_options(*command, *chosen);
+  add_output_options(*command, *chosen);
   command
       ->add_option("--memory-limit", chosen->memory_limit_gib,
                    "Refuse to start what needs more GiB; by default half of the machine's memory")
       ->check(CLI::PositiveNumber);
-  command
-      ->add_option("--probes", chosen->probes,
-                   "Light probes in a grid of NX,NY,NZ over the scene, or this many metres apart")
-      ->delimiter(',')
-      ->expected(1, 3);
-  command
-      ->add_option("--probe-rays", chosen->settings.probes.ray_count,
-                   "Rays by which each light probe looks around")
-      ->check(CLI::Range(64, 1000000))
-      ->capture_default_str();
-  command
-      ->add_option("--lightmap", chosen->settings.lightmap.size,
-                   "Texels along each side of a lightmap, for scenes with second texture "
-                   "coordinates (TEXCOORD_1)")
-      ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
-  command
-      ->add_option(
-          "--surface-harmonics", chosen->settings.surface_harmonics.ray_count,
-          "Keep from where light comes to the patches, for normal maps, found by this many "
-          "rays of each")
-      ->check(CLI::Range(16, 1000000));
-  command->add_option("--seed", chosen->settings.form_factors.seed, "Seed of the sample points")
-      ->capture_default_str();
   command->callback([chosen, &options] { run(*chosen, options); });
 }
 

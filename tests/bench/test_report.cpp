@@ -213,6 +213,7 @@ TEST_F(QuickReport, FramesAreThoseOfAWarmSolver) {
 }
 
 TEST_F(QuickReport, ThePageHasTheSameFigures) {
+  // ./dev test installs it; the figures that the page shows are tested without.
   const std::string with_python = "/usr/bin/python3 -c 'import matplotlib' >/dev/null 2>&1";
   if (std::system(with_python.c_str()) != 0) GTEST_SKIP() << "needs python3-matplotlib";
   std::filesystem::create_directory(folder() / "quick");

@@ -637,6 +637,7 @@ TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
 }
 
 TEST_F(CommandLine, TheShippedScenesAreWhatTheirScriptsMake) {
+  // ./dev test installs it; the scenes are shipped, so that nothing else needs it.
   if (std::system("python3 --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "needs python3";
   const std::string command =
       "python3 '" + kScenes + "make_cornell_box.py' '" + path("box.gltf") + "'";

@@ -65,6 +65,7 @@ Difference difference(const Image& a, const Image& b) {
 class ViewCommand : public CommandLine {
  protected:
   void SetUp() override {
+    // The viewer can be left out of a build; ./dev test leaves it in.
     if (run({"view", "--help"}).exit_code != kDone) {
       GTEST_SKIP() << "this build has no viewer (REBOUNCE_BUILD_VIEWER)";
     }
@@ -74,6 +75,7 @@ class ViewCommand : public CommandLine {
               kDone);
     const Outcome outcome =
         run({"view", file_, "--size", "16x16", "--screenshot", path("try.png")});
+    // ./dev test installs a software renderer; other machines may have none.
     if (outcome.err.find("no OpenGL 3.3 without a window") != std::string::npos) {
       GTEST_SKIP() << "no OpenGL here: " << outcome.err;
     }
