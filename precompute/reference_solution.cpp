@@ -1,70 +1,187 @@
 #include "rebounce/precompute/reference_solution.h"
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {
 
-constexpr int kMaxSweeps = 10000;
+using Double3 = ReferenceSolver::Double3;
+
+constexpr int kMaxSteps = 10000;
+
+/// kLights lights on one scene, solved together. A column of an array is a patch and holds all
+/// channels of the first light, then of the next.
+template <int kLights>
+class ConjugateGradients {
+ public:
+  using Lights = std::span<const std::vector<Float3>>;
+  static constexpr int kRows = kLights * kChannelCount;
+  using Field = Eigen::Array<double, kRows, Eigen::Dynamic>;
+
+  /// `lights`: kLights of them at most.
+  ConjugateGradients(const FormFactorRows& rows, const PatchTable& patches, Lights lights)
+      : rows_(rows),
+        area_(Eigen::Map<const Eigen::VectorXf>(patches.area.data(), rows.patch_count())
+                  .cast<double>()),
+        root_(kRows, rows.patch_count()),
+        m0_(Field::Zero(kRows, rows.patch_count())) {
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      for (int k = 0; k < kRows; ++k) {
+        const int light = k / kChannelCount, channel = k % kChannelCount;
+        root_(k, i) = std::sqrt(static_cast<double>(patches.reflectance[i][channel]));
+        if (light < std::ssize(lights)) m0_(k, i) = lights[light][i][channel];
+      }
+    }
+  }
+
+  /// Returns B.
+  Field solve(double residual) const {
+    const Totals allowed = residual * residual * per_light(product(m0_, m0_));
+    Field z = Field::Zero(kRows, m0_.cols());
+    for (int steps = 0; steps < kMaxSteps;) {
+      const Field b = m0_ + root_ * z;
+      const Field r = root_ * gather(b) - z;  // R r is the residual of B
+      if ((left_over(r) <= allowed).all()) return b;
+      descend(r, allowed, z, steps);
+    }
+    throw Error("the reference solution did not converge in " + std::to_string(kMaxSteps) +
+                " steps; a reflectance must be too close to 1");
+  }
+
+  /// F times `in`.
+  Field gather(const Field& in) const {
+    Field out(kRows, in.cols());
+#pragma omp parallel for schedule(dynamic, 64)
+    for (Eigen::Index i = 0; i < in.cols(); ++i) {
+      const auto columns = rows_.columns(i);
+      const auto factors = rows_.form_factors(i);
+      Eigen::Array<double, kRows, 1> sum = Eigen::Array<double, kRows, 1>::Zero();
+      for (std::size_t k = 0; k < columns.size(); ++k) {
+        sum += static_cast<double>(factors[k]) * in.col(columns[k]);
+      }
+      out.col(i) = sum;
+    }
+    return out;
+  }
+
+ private:
+  using Products = Eigen::Array<double, kRows, 1>;  ///< by light and channel
+  using Totals = Eigen::Array<double, kLights, 1>;  ///< by light
+
+  /// Moves `z`, the residual of which is `r`, until that is small enough by its own recursion
+  /// (M. R. Hestenes, E. Stiefel, 1952).
+  void descend(Field r, const Totals& allowed, Field& z, int& steps) const {
+    Field p = r;
+    Products rr = product(r, r);
+    do {
+      const Field q = p - root_ * gather(root_ * p);
+      const Products alpha = quotient(rr, product(p, q));
+      z += p.colwise() * alpha;
+      r -= q.colwise() * alpha;
+      const Products before = std::exchange(rr, product(r, r));
+      p = r + p.colwise() * quotient(rr, before);
+    } while (++steps < kMaxSteps && !(left_over(r) <= allowed).all());
+  }
+
+  Totals left_over(const Field& r) const {
+    const Field scaled = root_ * r;
+    return per_light(product(scaled, scaled));
+  }
+
+  /// The area-weighted inner products.
+  Products product(const Field& a, const Field& b) const {
+    const Eigen::Matrix<double, kRows, 1> sums = (a * b).matrix() * area_;
+    return sums.array();
+  }
+
+  static Totals per_light(const Products& products) {
+    return products.reshaped(kChannelCount, kLights).colwise().sum().transpose();
+  }
+
+  /// 0 where there is nothing to divide by: channels that are dark or solved.
+  static Products quotient(const Products& a, const Products& b) {
+    return (b > 0).select(a / b, 0);
+  }
+
+  const FormFactorRows& rows_;
+  Eigen::VectorXd area_;
+  Field root_, m0_;
+};
+
+enum class Quantity { kRadiosity, kIndirectIrradiance };
+
+/// Appends the solutions [n] of kLights lights at most.
+template <int kLights>
+void solve_together(const FormFactorRows& rows, const PatchTable& patches,
+                    std::span<const std::vector<Float3>> lights, double residual, Quantity quantity,
+                    std::vector<std::vector<Double3>>& solutions) {
+  const ConjugateGradients<kLights> solver(rows, patches, lights);
+  auto field = solver.solve(residual);
+  if (quantity == Quantity::kIndirectIrradiance) field = solver.gather(field);
+  for (std::size_t light = 0; light < lights.size(); ++light) {
+    std::vector<Double3>& solution = solutions.emplace_back(patches.size());
+    for (std::size_t i = 0; i < solution.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) solution[i][c] = field(light * kChannelCount + c, i);
+    }
+  }
+}
+
+std::vector<std::vector<Double3>> solve(const FormFactorRows& rows, const PatchTable& patches,
+                                        std::span<const std::vector<Float3>> lights,
+                                        double residual, Quantity quantity) {
+  std::vector<std::vector<Double3>> solutions;
+  while (solutions.size() < lights.size()) {
+    const auto left = lights.subspan(solutions.size());
+    if (left.size() == 1) {
+      solve_together<1>(rows, patches, left, residual, quantity, solutions);
+    } else {
+      solve_together<ReferenceSolver::kTogether>(
+          rows, patches, left.first(std::min<std::size_t>(ReferenceSolver::kTogether, left.size())),
+          residual, quantity, solutions);
+    }
+  }
+  return solutions;
+}
 
 }  // namespace
 
 ReferenceSolver::ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches)
     : patches_(patches), rows_(exchange, patches.area) {}
 
-ReferenceSolver::Double3 ReferenceSolver::gather_row(std::size_t row,
-                                                     const std::vector<Double3>& radiosity) const {
-  const auto columns = rows_.columns(row);
-  const auto factors = rows_.form_factors(row);
-  Double3 sum{0, 0, 0};
-  for (std::size_t k = 0; k < columns.size(); ++k) {
-    const Double3& b = radiosity[columns[k]];
-    const double f = factors[k];
-    for (int c = 0; c < kChannelCount; ++c) sum[c] += f * b[c];
-  }
-  return sum;
+std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_exitance,
+                                                double residual) const {
+  const std::vector<Float3> light(initial_exitance.begin(), initial_exitance.end());
+  return radiosities({&light, 1}, residual).front();
 }
 
-std::vector<ReferenceSolver::Double3> ReferenceSolver::radiosity(
-    std::span<const Float3> initial_exitance, double residual) const {
-  const std::size_t n = patches_.size();
-  std::vector<Double3> b(n);
-  double norm = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      b[i][c] = initial_exitance[i][c];
-      norm += patches_.area[i] * b[i][c] * b[i][c];
-    }
-  }
-  for (int sweep = 0; sweep < kMaxSweeps; ++sweep) {
-    // What a sweep changes a row by is that row's residual at the time.
-    double changed = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Double3 h = gather_row(i, b);
-      for (int c = 0; c < kChannelCount; ++c) {
-        const double next = initial_exitance[i][c] + patches_.reflectance[i][c] * h[c];
-        changed += patches_.area[i] * (next - b[i][c]) * (next - b[i][c]);
-        b[i][c] = next;
-      }
-    }
-    if (changed <= residual * residual * norm) return b;
-  }
-  throw Error("the reference solution did not converge in " + std::to_string(kMaxSweeps) +
-              " sweeps; a reflectance must be too close to 1");
+std::vector<std::vector<Double3>> ReferenceSolver::radiosities(
+    std::span<const std::vector<Float3>> initial_exitances, double residual) const {
+  return solve(rows_, patches_, initial_exitances, residual, Quantity::kRadiosity);
 }
 
 std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3> initial_exitance,
                                                          double residual) const {
-  const std::vector<Double3> b = radiosity(initial_exitance, residual);
-  std::vector<Float3> h(b.size());
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    const Double3 sum = gather_row(i, b);
-    for (int c = 0; c < kChannelCount; ++c) h[i][c] = static_cast<float>(sum[c]);
+  const std::vector<Float3> light(initial_exitance.begin(), initial_exitance.end());
+  return indirect_irradiances({&light, 1}, residual).front();
+}
+
+std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
+    std::span<const std::vector<Float3>> initial_exitances, double residual) const {
+  const auto solutions =
+      solve(rows_, patches_, initial_exitances, residual, Quantity::kIndirectIrradiance);
+  std::vector<std::vector<Float3>> result;
+  for (const std::vector<Double3>& h : solutions) {
+    std::vector<Float3>& rounded = result.emplace_back(h.size());
+    std::ranges::transform(h, rounded.begin(), [](const Double3& v) {
+      return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+    });
   }
-  return h;
+  return result;
 }
 
 }  // namespace rebounce

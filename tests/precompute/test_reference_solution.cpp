@@ -1,0 +1,124 @@
+// The truth that everything is measured against: that it solves its equation, in double precision,
+// whatever the reflectances, and that lights which are solved together do not see each other.
+
+#include "rebounce/precompute/reference_solution.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+#include <random>
+
+#include "rebounce/precompute/form_factors.h"
+#include "rebounce/transfer/error.h"
+#include "test_scenes.h"
+
+namespace rebounce {
+namespace {
+
+using Double3 = ReferenceSolver::Double3;
+
+constexpr std::uint32_t kSeed = 20261120;
+
+struct Room {
+  PatchTable patches;
+  ExchangeMatrix exchange;
+
+  /// Walls and a block; every fifth patch is black.
+  explicit Room(const Float3& reflectance) {
+    Scene scene = test::empty_scene(reflectance);
+    test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+    test::add_box(scene, {1, 0.5, 1}, {2, 1.2, 2.5}, false);
+    PatchModel model = make_patch_model(scene, {.patch_count = 300});
+    exchange = compute_form_factors(model, test::make_tracer(model)).exchange;
+    patches = std::move(model.patches);
+    for (std::size_t i = 0; i < patches.size(); i += 5) patches.reflectance[i] = {0, 0, 0};
+  }
+
+  /// The largest residual of any light's channel, relative to its light, straight from the matrix.
+  double residual(const std::vector<Float3>& light, const std::vector<Double3>& b) const {
+    const FormFactorRows rows(exchange, patches.area);
+    double left = 0, all = 0;
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) {
+        double h = 0;
+        for (std::size_t k = 0; k < rows.columns(i).size(); ++k) {
+          h += static_cast<double>(rows.form_factors(i)[k]) * b[rows.columns(i)[k]][c];
+        }
+        const double r = light[i][c] + patches.reflectance[i][c] * h - b[i][c];
+        left += patches.area[i] * r * r;
+        all += static_cast<double>(patches.area[i]) * light[i][c] * light[i][c];
+      }
+    }
+    return std::sqrt(left / all);
+  }
+
+  /// Lights of random strength, most patches dark; green is dark in every second one.
+  std::vector<std::vector<Float3>> lights(int count) const {
+    std::mt19937 random(kSeed);
+    std::uniform_real_distribution<float> uniform(0, 1);
+    std::vector<std::vector<Float3>> result(count, std::vector<Float3>(patches.size()));
+    for (int k = 0; k < count; ++k) {
+      for (Float3& m0 : result[k]) {
+        if (uniform(random) < 0.1F) m0 = {uniform(random), k % 2 * uniform(random), 1};
+      }
+    }
+    return result;
+  }
+};
+
+TEST(ReferenceSolution, SolvesTheEquationWhateverIsReflected) {
+  for (const Float3& reflectance :
+       {Float3{0.1F, 0.5F, 0.8F}, Float3{0.99F, 0.9F, 0}, Float3{0.9999F, 0.9999F, 0.9999F}}) {
+    const Room room(reflectance);
+    const auto light = room.lights(1).front();
+    for (const double residual : {1e-4, 1e-10, 1e-12}) {
+      const auto b = ReferenceSolver(room.exchange, room.patches).radiosity(light, residual);
+      EXPECT_LE(room.residual(light, b), 1.01 * residual) << reflectance[0];
+    }
+  }
+}
+
+TEST(ReferenceSolution, LightsTogetherAreThoseAlone) {
+  const Room room({0.7F, 0.5F, 0.9F});
+  const ReferenceSolver solver(room.exchange, room.patches);
+  std::vector<std::vector<Float3>> lights = room.lights(ReferenceSolver::kTogether + 3);
+  std::ranges::fill(lights[2], Float3{0, 0, 0});
+  const auto together = solver.radiosities(lights, 1e-12);
+  const auto gathered = solver.indirect_irradiances(lights, 1e-12);
+  ASSERT_EQ(together.size(), lights.size());
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    const auto alone = solver.radiosity(lights[k], 1e-12);
+    const auto h = solver.indirect_irradiance(lights[k], 1e-12);
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) {
+        ASSERT_NEAR(together[k][i][c], alone[i][c], 1e-9);
+        ASSERT_NEAR(gathered[k][i][c], h[i][c], 1e-5 * h[i][c]);
+        ASSERT_NEAR(alone[i][c], lights[k][i][c] + room.patches.reflectance[i][c] * h[i][c], 1e-5);
+      }
+    }
+  }
+}
+
+TEST(ReferenceSolution, SameBitsForAnyNumberOfThreads) {
+  const Room room({0.7F, 0.5F, 0.9F});
+  const ReferenceSolver solver(room.exchange, room.patches);
+  const auto lights = room.lights(4);
+  const int threads = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const auto one = solver.radiosities(lights);
+  omp_set_num_threads(3);
+  const auto three = solver.radiosities(lights);
+  omp_set_num_threads(threads);
+  EXPECT_EQ(one, three);
+}
+
+TEST(ReferenceSolution, WhatCannotConvergeIsRefused) {
+  Room room({0.5F, 0.5F, 0.5F});
+  const auto light = room.lights(1).front();
+  room.patches.reflectance.assign(room.patches.size(), {8, 8, 8});
+  EXPECT_THROW(ReferenceSolver(room.exchange, room.patches).radiosity(light), Error);
+}
+
+}  // namespace
+}  // namespace rebounce
