@@ -24,7 +24,7 @@ struct Form {
 
 /// Y in one form.
 struct StoredOperator {
-  std::string name;  ///< "dense f32", "hierarchical 0.5 % f16", "low rank 64", ...
+  std::string name;  ///< "dense f32", "hierarchical 0.5 % q16", "low rank 64", ...
   std::shared_ptr<const TransferOperator> transfer;
 };
 

@@ -14,7 +14,7 @@ struct LightCase {
   std::vector<Float3> before;       ///< M0 [n] in lx; empty before a cold start
   std::vector<Float3> after;        ///< M0 [n] in lx
   std::vector<Float3> reflectance;  ///< [n] that holds after the change
-  std::vector<Float3> truth;        ///< B [n] in lx: Gauss-Seidel in double precision to 1e-10
+  std::vector<Float3> truth;        ///< B [n] in lx: in double precision, to 1e-10
 
   bool cold() const { return before.empty(); }
 };

@@ -3,7 +3,7 @@
 namespace rebounce::bench {
 
 void ReportSettings::make_quick() {
-  operators = {{0.005, Precision::kF16}, {0.001, Precision::kF16}};
+  operators = {{0.005, Precision::kQ16}, {0.001, Precision::kQ16}};
   form_factor_tolerances = {0.0003, 0.001};
   ranks = {64};
   lamp_count = 2;
@@ -19,9 +19,9 @@ void ReportSettings::make_quick() {
 }
 
 void ReportSettings::make_large() {
-  operators = {{0.005, Precision::kF16},
-               {0.02, Precision::kF16},
-               {0.001, Precision::kF16},
+  operators = {{0.005, Precision::kQ16},
+               {0.02, Precision::kQ16},
+               {0.001, Precision::kQ16},
                {0.005, Precision::kQ8}};
   form_factor_tolerances = {0.0003, 0.001, 0.003};
   ranks = {256};

@@ -12,7 +12,7 @@ namespace rebounce::bench {
 /// A hierarchical operator that takes part.
 struct OperatorChoice {
   double tolerance = 0.005;  ///< as HierarchicalSettings has it
-  Precision precision = Precision::kF16;
+  Precision precision = Precision::kQ16;
 };
 
 /// What is measured on one scene with one number of patches. More of anything takes longer.
@@ -22,9 +22,9 @@ struct ReportSettings {
 
   /// Hierarchical operators; the first is the one that pictures, truth and refinement use.
   std::vector<OperatorChoice> operators = {
-      {0.005, Precision::kF16}, {0.02, Precision::kF16},   {0.002, Precision::kF16},
-      {0.001, Precision::kF16}, {0.0003, Precision::kF16}, {0.01, Precision::kQ8},
-      {0.005, Precision::kQ8},
+      {0.005, Precision::kQ16}, {0.02, Precision::kQ16},   {0.002, Precision::kQ16},
+      {0.001, Precision::kQ16}, {0.0003, Precision::kQ16}, {0.005, Precision::kF16},
+      {0.01, Precision::kQ8},
   };
   /// At which form factors are compressed; the first is what refinement has beside exact ones.
   std::vector<double> form_factor_tolerances = {0.0003, 0.001, 0.003, 0.01};
@@ -44,7 +44,7 @@ struct ReportSettings {
   std::vector<double> budgets = {250, 500, 1000, 2000};  ///< microseconds a frame
 
   /// From so many patches on, a scene is large.
-  static constexpr std::size_t kLarge = 8000;
+  static constexpr std::size_t kLarge = 3000;
 
   bool truth = true;  ///< compare with the path tracer
   reference::PatchComparisonSettings patch_comparison;

@@ -27,7 +27,7 @@ def median_spread(results):
 
 
 METHOD = """Errors are of the light that patches reflect after it came from other patches, B − M0: relative,
-area-weighted L2 over three channels, mean over {lamps} lamps, against Gauss-Seidel in double precision to 1e-10
+area-weighted L2 over three channels, mean over {lamps} lamps, against conjugate gradients in double precision to 1e-10
 on the exact form factors. The truth of the light paths is the dense inverse, which is within {dense:.0e} of that.
 
 Each side has its best form. The inverse: hierarchical at several tolerances, dense, or refined. Gauss-Seidel: forward or

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <random>
 
@@ -76,6 +77,35 @@ TEST(ReferenceSolution, SolvesTheEquationWhateverIsReflected) {
       const auto b = ReferenceSolver(room.exchange, room.patches).radiosity(light, residual);
       EXPECT_LE(room.residual(light, b), 1.01 * residual) << reflectance[0];
     }
+  }
+}
+
+TEST(ReferenceSolution, IsThatOfCholesky) {
+  const Room room({0.3F, 0.8F, 0.99F});
+  const auto n = static_cast<Eigen::Index>(room.patches.size());
+  const auto light = room.lights(1).front();
+  const auto b = ReferenceSolver(room.exchange, room.patches).radiosity(light, 1e-13);
+  for (int c = 0; c < kChannelCount; ++c) {
+    // A^1/2 (I - R F R) A^-1/2 with R = rho^1/2, which B = M0 + R z is solved by.
+    const FormFactorRows rows(room.exchange, room.patches.area);
+    Eigen::MatrixXd f = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd root(n), area(n), m0(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < rows.columns(i).size(); ++k) {
+        f(i, rows.columns(i)[k]) = rows.form_factors(i)[k];
+      }
+      root[i] = std::sqrt(static_cast<double>(room.patches.reflectance[i][c]));
+      area[i] = std::sqrt(static_cast<double>(room.patches.area[i]));
+      m0[i] = light[i][c];
+    }
+    const Eigen::MatrixXd g = area.asDiagonal() * f * area.cwiseInverse().asDiagonal();
+    const Eigen::MatrixXd system =
+        Eigen::MatrixXd::Identity(n, n) - root.asDiagonal() * g * root.asDiagonal();
+    const Eigen::VectorXd z = area.cwiseInverse().asDiagonal() *
+                              system.llt().solve(root.asDiagonal() * g * area.asDiagonal() * m0);
+    const Eigen::VectorXd truth = m0 + root.cwiseProduct(z);
+    // The two halves of F are rounded to floats apart, and Cholesky reads one of them.
+    for (Eigen::Index i = 0; i < n; ++i) ASSERT_NEAR(b[i][c], truth[i], 1e-6 * truth.maxCoeff());
   }
 }
 

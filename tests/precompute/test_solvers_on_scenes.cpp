@@ -14,6 +14,7 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/form_factor_blocks.h"
+#include "shared_folder.h"
 #include "test_scenes.h"
 
 namespace rebounce {
@@ -119,6 +120,19 @@ TEST_P(SolversOnScenes, ReachTheReference) {
     EXPECT_FALSE(result.diverged);
     EXPECT_LE(result.residual, 1e-6);
     EXPECT_LE(room->error(solver->radiosity(), m0), 1e-6) << result.sweeps;
+  }
+}
+
+TEST(SolversOnSponza, AllReachTheReference) {
+  const std::filesystem::path scene = test::shared_folder() / "scenes/15_sponza_crytek.glb";
+  REBOUNCE_NEED_SHARED(scene);
+  const Room room(import_gltf(scene, 1));
+  const std::vector<Float3> m0 = lamp_light(room.patches.size(), 5);
+  for (const NamedSolveMethod& named : kSolveMethods) {
+    const auto solver = room.solver(named.method);
+    const SolveResult result = solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
+    EXPECT_FALSE(result.diverged) << named.name;
+    EXPECT_LE(room.error(solver->radiosity(), m0), 1e-6) << named.name << " " << result.sweeps;
   }
 }
 
