@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rebounce/precompute/random_lights.h"
 #include "rebounce/transfer/area_norm.h"
 
 namespace rebounce {
@@ -10,10 +11,6 @@ namespace {
 
 // Lights that the matrix is read for at a time.
 constexpr std::size_t kBatch = 64;
-
-// A light of which less arrives anywhere, as a part of what its patches give off, is none: of a
-// lamp inside of a box, say, which only what has no front faces sees.
-constexpr double kDark = 1e-6;
 
 std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
   std::vector<float> workspace(transfer.workspace_size());
@@ -41,7 +38,7 @@ LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Fl
 void LitTruth::leave_out_dark() {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
-    if (area_norm(truths_[k], area_) <= kDark * area_norm(lights_[k], area_)) continue;
+    if (arrives_nowhere(truths_[k], lights_[k], area_)) continue;
     std::swap(lights_[kept], lights_[k]);
     std::swap(truths_[kept], truths_[k]);
     ++kept;

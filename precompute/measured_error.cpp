@@ -24,16 +24,15 @@ std::vector<double> errors_by_reference(const TransferData& data, const Referenc
   std::vector<Float3> indirect_irradiance(data.patches.size());
   std::vector<float> workspace(data.transfer->workspace_size());
   std::vector<double> errors;
-  while (errors.size() < lights.size()) {
-    if (progress && !progress(static_cast<double>(errors.size()) / lights.size())) {
-      throw Cancelled();
-    }
-    const auto left = std::span(lights).subspan(errors.size());
-    const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kTogether));
-    for (std::size_t k = 0; const std::vector<Float3>& truth :
-                            reference.indirect_irradiances(some, kReferenceResidual)) {
-      data.transfer->apply(some[k++], indirect_irradiance, workspace);
-      errors.push_back(relative_difference(indirect_irradiance, truth, data.patches.area));
+  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kTogether) {
+    if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
+    const auto some = std::span(lights).subspan(
+        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kTogether));
+    const auto truths = reference.indirect_irradiances(some, kReferenceResidual);
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      if (arrives_nowhere(truths[k], some[k], data.patches.area)) continue;
+      data.transfer->apply(some[k], indirect_irradiance, workspace);
+      errors.push_back(relative_difference(indirect_irradiance, truths[k], data.patches.area));
     }
   }
   return errors;

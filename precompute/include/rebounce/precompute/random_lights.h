@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -37,5 +38,11 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
 std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& data,
                                                           const RayTracer& tracer, LightKind kind,
                                                           int count, std::uint64_t seed);
+
+/// Whether less than a millionth of what a light's patches give off arrives anywhere: the light is
+/// none, of a lamp inside of a box, say, which only what has no front faces sees, and no error can
+/// be relative to it. All in lx, [n]; `area` in m².
+bool arrives_nowhere(std::span<const Float3> indirect_irradiance,
+                     std::span<const Float3> initial_exitance, std::span<const float> area);
 
 }  // namespace rebounce

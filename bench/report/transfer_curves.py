@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+"""Draws what bench_transfer has written: error against bytes, and against microseconds."""
+
+import argparse
+import csv
+import pathlib
+
+import plots
+
+plt = plots.plt
+
+# What is drawn as one line: kind, part of the form's name, colour and marker, label.
+LINES = (
+    ("dense inverse", "", "darkred", "s-", "dense f32"),
+    ("low rank", "", "tab:pink", "v-", "low rank"),
+    ("first bounce + low rank", "compressed", "tab:purple", "^-", "first bounce, F compressed, + low rank"),
+    ("inverse", "f32", "tab:orange", "o-", "hierarchical f32"),
+    ("inverse", "f16", "gold", "o-", "hierarchical f16"),
+    ("inverse", "q16", "tab:red", "o-", "hierarchical q16"),
+    ("inverse", "q8", "tab:brown", "o-", "hierarchical q8"),
+    ("gauss-seidel", "0.1 %", "tab:blue", ".--", "F at 0.1 %, 1 to 9 sweeps of Gauss-Seidel"),
+    ("gauss-seidel", "0.3 %", "tab:cyan", ".--", "F at 0.3 %, 1 to 9 sweeps of Gauss-Seidel"),
+)
+
+
+def draw(panel, rows, across):
+    for kind, part, color, style, label in LINES:
+        points = sorted(
+            (float(row[across]), float(row["error_mean"]))
+            for row in rows
+            if row["kind"] == kind and part in row["form"]
+        )
+        if points:
+            panel.loglog(*zip(*points), style, color=color, label=label)
+    panel.set_ylim(1e-5, 1)
+    panel.grid(True, which="major", alpha=0.3)
+    panel.set_ylabel("error, mean over point lights")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("csv", type=pathlib.Path)
+    parser.add_argument("picture", type=pathlib.Path)
+    options = parser.parse_args()
+    with options.csv.open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    cases = list(dict.fromkeys((row["scene"], row["patches"]) for row in rows))
+    figure, axes = plt.subplots(len(cases), 2, figsize=(11, 4 * len(cases)), squeeze=False)
+    for (scene, patches), (by_bytes, by_time) in zip(cases, axes):
+        of_case = [row for row in rows if (row["scene"], row["patches"]) == (scene, patches)]
+        draw(by_bytes, of_case, "bytes_per_patch")
+        draw(by_time, of_case, "microseconds")
+        by_bytes.set_title(f"{pathlib.Path(scene).stem}, {int(patches):,} patches", fontsize=9)
+        by_bytes.set_xlabel("bytes per patch, three channels")
+        by_time.set_xlabel("microseconds, one thread")
+    plots.put_legend(figure, *axes[0][0].get_legend_handles_labels())
+    plots.save(figure, options.picture)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,231 @@
+// Every way to keep the inverse, and iteration on compressed form factors beside them: bytes, error
+// over many lights, seconds to build, microseconds to apply and how far that is from merely reading
+// as many bytes. The curves of notes/operator.md are drawn from its CSV by transfer_curves.py.
+
+#include <omp.h>
+
+#include <algorithm>
+#include <numeric>
+#include <optional>
+
+#include "contenders.h"
+#include "method.h"
+#include "program.h"
+#include "read_buffer.h"
+#include "rebounce/precompute/random_lights.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/error.h"
+#include "timing.h"
+
+namespace rebounce::bench {
+namespace {
+
+constexpr int kLightCount = 64;  // of each kind that errors are taken over
+constexpr int kMostSweeps = 9;
+constexpr std::uint64_t kLightSeed = 77;  // no lights that an operator was fitted to
+
+struct TransferOptions {
+  std::vector<std::string> scenes;
+  std::vector<std::size_t> patch_counts = {1000, 4000};
+  CommonOptions common{.repeats = 21};
+};
+
+ReportSettings settings_for(std::size_t patch_count) {
+  ReportSettings settings;
+  settings.patch_count = patch_count;
+  settings.operators.clear();
+  for (const double tolerance : {0.005, 0.02, 0.01, 0.002, 0.001}) {
+    settings.operators.push_back({tolerance, Precision::kQ16});
+  }
+  for (const double tolerance : {0.02, 0.005, 0.001}) {
+    settings.operators.push_back({tolerance, Precision::kF16});
+    settings.operators.push_back({tolerance, Precision::kF32});
+  }
+  for (const double tolerance : {0.02, 0.01}) {
+    settings.operators.push_back({tolerance, Precision::kQ8});
+  }
+  settings.form_factor_tolerances = {0.001, 0.003};
+  settings.links = false;
+  return settings;
+}
+
+/// Lights of one kind, and the light in the patches that they lead to.
+struct Lights {
+  std::vector<std::vector<Float3>> initial_exitance, truth;  ///< [lights][n] in lx
+};
+
+struct Errors {
+  double mean = 0, max = 0;
+};
+
+/// One row: a product, or some sweeps of Gauss-Seidel.
+struct Entry {
+  std::string name, form{};
+  std::size_t bytes = 0;  ///< that a product or a sweep reads
+  std::optional<double> build_seconds{};
+  const TransferOperator* transfer = nullptr;  ///< null: it iterates
+  const FormFactorOperator* form_factors = nullptr;
+  int sweeps = 0;
+  std::unique_ptr<Method> method{};
+  std::unique_ptr<ReadBuffer> read{};
+};
+
+class TransferBenchmark {
+ public:
+  TransferBenchmark(const Contenders& contenders, const ReportSettings& settings)
+      : contenders_(contenders), patches_(contenders.data->patches) {
+    const ReferenceSolver reference(contenders.data->exchange, patches_);
+    for (const LightKind kind : {LightKind::kPoint, LightKind::kPatch}) {
+      lights_.push_back(draw(kind, reference));
+    }
+    for (const Contestant& contestant : list_contestants(contenders, settings)) add(contestant);
+  }
+
+  void run(const CommonOptions& options, Table& table) const {
+    const int threads = omp_get_max_threads();
+    std::vector<std::vector<Errors>> errors;
+    for (const Entry& entry : entries_) {
+      errors.emplace_back();
+      for (const Lights& lights : lights_) errors.back().push_back(errors_of(entry, lights));
+    }
+    omp_set_num_threads(1);
+    const std::vector<Timing> times = time(options.repeats);
+    omp_set_num_threads(threads);
+    for (std::size_t k = 0; k < entries_.size(); ++k) {
+      report(entries_[k], errors[k], times[2 * k], times[2 * k + 1], table);
+    }
+  }
+
+ private:
+  Lights draw(LightKind kind, const ReferenceSolver& reference) const {
+    Lights lights;
+    const auto drawn = random_initial_exitances(*contenders_.data, *contenders_.tracer, kind,
+                                                kLightCount, kLightSeed);
+    const auto truths = reference.indirect_irradiances(drawn);
+    for (std::size_t k = 0; k < drawn.size(); ++k) {
+      if (arrives_nowhere(truths[k], drawn[k], patches_.area)) continue;
+      lights.initial_exitance.push_back(drawn[k]);
+      lights.truth.push_back(truths[k]);
+    }
+    if (lights.truth.empty()) throw Error("no light arrives anywhere in this scene");
+    return lights;
+  }
+
+  void add(const Contestant& contestant) {
+    const bool compressed = contestant.form.starts_with("compressed");
+    if (contestant.product) {
+      const auto stored =
+          std::ranges::find(contenders_.operators, contestant.transfer, &StoredOperator::name);
+      add(contestant, 0).transfer = stored->transfer.get();
+    } else if (contestant.method == SolveMethod::kGaussSeidel && compressed) {
+      for (int sweeps = 1; sweeps <= kMostSweeps; ++sweeps) {
+        add(contestant, sweeps).form_factors = contenders_.form(contestant.form).get();
+      }
+    }
+  }
+
+  Entry& add(const Contestant& contestant, int sweeps) {
+    Entry& entry = entries_.emplace_back(Entry{.name = contestant.name,
+                                               .form = contestant.transfer + contestant.form,
+                                               .bytes = contestant.bytes,
+                                               .sweeps = sweeps,
+                                               .method = contestant.make(contenders_)});
+    entry.read = std::make_unique<ReadBuffer>(entry.bytes);
+    for (const Cost& cost : contenders_.costs) {
+      if (cost.phase == entry.form || cost.phase == "form factors " + entry.form) {
+        entry.build_seconds = cost.seconds;
+      }
+    }
+    return entry;
+  }
+
+  /// H [n] in lx as this entry has it.
+  std::vector<Float3> indirect_irradiance(const Entry& entry,
+                                          const std::vector<Float3>& light) const {
+    std::vector<Float3> result(light.size());
+    if (entry.transfer) {
+      std::vector<float> workspace(entry.transfer->workspace_size());
+      entry.transfer->apply(light, result, workspace);
+      return result;
+    }
+    entry.method->forget();
+    entry.method->run(light, entry.sweeps);
+    std::vector<float> workspace(entry.form_factors->workspace_size());
+    entry.form_factors->gather(entry.method->radiosity(), result, workspace);
+    return result;
+  }
+
+  Errors errors_of(const Entry& entry, const Lights& lights) const {
+    Errors errors;
+    for (std::size_t k = 0; k < lights.truth.size(); ++k) {
+      const double error = relative_difference(
+          indirect_irradiance(entry, lights.initial_exitance[k]), lights.truth[k], patches_.area);
+      errors.mean += error / static_cast<double>(lights.truth.size());
+      errors.max = std::max(errors.max, error);
+    }
+    return errors;
+  }
+
+  /// Two for each entry: reading its bytes, and its work.
+  std::vector<Timing> time(int repeats) const {
+    const std::vector<Float3>& light = lights_.front().initial_exitance.front();
+    std::vector<TimedCase> cases;
+    for (const Entry& entry : entries_) {
+      cases.push_back({.work = [&entry] { entry.read->read(); }});
+      cases.push_back({.work = [&entry, &light] { entry.method->run(light, entry.sweeps); },
+                       .prepare = [&entry] { entry.method->forget(); },
+                       .repeat_prepared = true});
+    }
+    return time_interleaved(cases, {.rounds = repeats});
+  }
+
+  void report(const Entry& entry, const std::vector<Errors>& errors, const Timing& read,
+              const Timing& work, Table& table) const {
+    const auto n = static_cast<double>(patches_.size());
+    const double read_seconds = read.median * std::max(entry.sweeps, 1);
+    table.add({contenders_.data->record.scene_name, patches_.size(), entry.name, entry.form,
+               entry.sweeps > 0 ? Table::Cell(entry.sweeps) : Table::Cell(),
+               static_cast<double>(entry.bytes) / n, errors[0].mean, errors[0].max, errors[1].mean,
+               errors[1].max,
+               entry.build_seconds ? Table::Cell(*entry.build_seconds) : Table::Cell(),
+               work.median * 1e6, work.spread, read_seconds / work.median});
+  }
+
+  const Contenders& contenders_;
+  const PatchTable& patches_;
+  std::vector<Lights> lights_;  ///< points, patches
+  std::vector<Entry> entries_;
+};
+
+void run(const TransferOptions& options) {
+  Table table({"scene", "patches", "kind", "form", "sweeps", "bytes_per_patch", "error_mean",
+               "error_max", "patch_light_error_mean", "patch_light_error_max", "build_seconds",
+               "microseconds", "spread", "of_read"});
+  for (const std::string& scene : options.scenes) {
+    for (const std::size_t patch_count : options.patch_counts) {
+      const ReportSettings settings = settings_for(patch_count);
+      const Contenders contenders =
+          build_contenders(scene, settings, [](std::string_view, double) { return true; });
+      TransferBenchmark(contenders, settings).run(options.common, table);
+    }
+  }
+  publish("transfer", table, options.common);
+}
+
+}  // namespace
+}  // namespace rebounce::bench
+
+int main(int argc, char** argv) {
+  rebounce::bench::TransferOptions options;
+  CLI::App app("Compares all kinds of operators by bytes, error and time, on one thread.",
+               "bench_transfer");
+  app.add_option("scenes", options.scenes, "Scenes: .glb or .gltf")->required();
+  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
+      ->check(CLI::Range(1, 1000000))
+      ->delimiter(',')
+      ->capture_default_str();
+  rebounce::bench::add_common_options(app, options.common);
+  return rebounce::bench::run_program(app, argc, argv, options.common,
+                                      [&] { rebounce::bench::run(options); });
+}
