@@ -112,6 +112,10 @@ TEST(LightProbes, TheFileKeepsThem) {
   EXPECT_EQ(a.position, b.position);
   EXPECT_EQ(a.valid, b.valid);
   EXPECT_EQ(a.sky, b.sky);
+  EXPECT_EQ(a.sky_cells.entry_begin, b.sky_cells.entry_begin);
+  EXPECT_EQ(a.sky_cells.entry_cell, b.sky_cells.entry_cell);
+  EXPECT_EQ(a.sky_cells.entry_weight, b.sky_cells.entry_weight);
+  EXPECT_FALSE(b.sky_cells.entry_cell.empty());  // the box is open in front
   EXPECT_EQ(a.entry_begin, b.entry_begin);
   EXPECT_EQ(a.entry_patch, b.entry_patch);
   EXPECT_EQ(a.entry_weight, b.entry_weight);
@@ -145,7 +149,7 @@ TEST(LightProbes, BehindWallsTheyAreNotValid) {
   LightProbes probes;
   const Float3 middle = data.probes.position[1 + 4 * (1 + 3 * 1)];
   probes.position = {middle, {middle[0], middle[1] - 10, middle[2]}};
-  trace_probes(data, tracer, {}, probes);
+  trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
   EXPECT_EQ(probes.valid[0], 1);
 }
 
@@ -155,10 +159,10 @@ TEST(LightProbes, SameBitsForAnyNumberOfThreads) {
   LightProbes probes = place_probes(data.mesh, {.grid = {3, 2, 2}});
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
-  trace_probes(data, tracer, {}, probes);
+  trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
   const auto one = probes.entry_weight;
   omp_set_num_threads(4);
-  trace_probes(data, tracer, {}, probes);
+  trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
   omp_set_num_threads(before);
   EXPECT_EQ(one, probes.entry_weight);
 }
@@ -170,8 +174,9 @@ TEST(LightProbes, SpacingAndLimits) {
   EXPECT_GE(probes.grid[0], 2U);
   test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "further apart");
   LightProbes few = place_probes(data.mesh, {.grid = {1, 1, 1}});
-  test::expect_error([&] { trace_probes(data, tracer_of(data), {.ray_count = 3}, few); },
-                     "64 rays");
+  test::expect_error(
+      [&] { trace_probes(data, data.mesh.triangle_patch, tracer_of(data), {.ray_count = 3}, few); },
+      "64 rays");
 }
 
 }  // namespace

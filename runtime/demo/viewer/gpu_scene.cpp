@@ -6,6 +6,7 @@
 
 #include "decoded_image.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "vertex_layout.h"
 
 namespace rebounce {
 namespace {
@@ -15,28 +16,6 @@ struct StaticVertex {
   Float3 position, normal, color;
   Float2 base_color_texcoord, emissive_texcoord;
 };
-
-enum Attribute : GLuint {
-  kPosition,
-  kNormal,
-  kColor,
-  kBaseColorTexcoord,
-  kEmissiveTexcoord,
-  kFirstFlight,
-  kBounced,
-};
-
-template <typename T>
-void fill(GLenum target, const GlBuffer& buffer, std::span<const T> values, GLenum usage) {
-  glBindBuffer(target, buffer.name());
-  glBufferData(target, static_cast<GLsizeiptr>(values.size_bytes()), values.data(), usage);
-}
-
-void point_to(Attribute attribute, int components, std::size_t stride, std::size_t offset) {
-  glEnableVertexAttribArray(attribute);
-  glVertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, static_cast<GLsizei>(stride),
-                        reinterpret_cast<const void*>(offset));  // NOLINT: OpenGL's interface
-}
 
 std::vector<StaticVertex> static_vertices(const DisplayMesh& mesh) {
   std::vector<StaticVertex> vertices(mesh.position.size());
@@ -186,6 +165,13 @@ void GpuScene::draw_materials(const GlProgram& program, Side side) const {
     program.set("emitted_luminance", to_glm(material.emitted_luminance));
     draw_range(range);
   }
+}
+
+void GpuScene::set_plain_material(const GlProgram& program, const Float3& emitted_luminance) const {
+  bind(0, GL_TEXTURE_2D, white_.name());
+  bind(1, GL_TEXTURE_2D, white_.name());
+  program.set("base_color", glm::vec3(1));
+  program.set("emitted_luminance", to_glm(emitted_luminance));
 }
 
 void GpuScene::draw_patches(const GlProgram& program, Side side) const {

@@ -32,6 +32,8 @@ class GpuScene {
   /// Draws every material in turn; binds its textures to units 0 (base colour) and 1 (emissive) and
   /// sets base_color and emitted_luminance.
   void draw_materials(const GlProgram& program, Side side) const;
+  /// Does the same for something without textures, white, that is about to be drawn.
+  void set_plain_material(const GlProgram& program, const Float3& emitted_luminance) const;
   /// Draws with the colours of patches at texture units 0 and 1; sets first_triangle.
   void draw_patches(const GlProgram& program, Side side) const;
   /// Draws the surface once, for shadows.

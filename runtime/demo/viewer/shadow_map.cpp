@@ -69,12 +69,13 @@ ShadowMap::ShadowMap(int cube_side, int plane_side)
   glBindTexture(GL_TEXTURE_2D, plane_.name());
   allocate(GL_TEXTURE_2D, 1);
   set_comparing(GL_TEXTURE_2D);
+  glSamplerParameteri(depth_sampler_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glSamplerParameteri(depth_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 }
 
-void ShadowMap::update(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
-                       const GlProgram& program) {
-  if (drawn_ && casts_alike(light, drawn_for_)) return;
-  smallest_offset_ = kOffsetPart * bounds.diagonal();
+void ShadowMap::update(const Light& light, const ShadowCasters& casters, const GlProgram& program) {
+  if (drawn_ && casters.version == drawn_version_ && casts_alike(light, drawn_for_)) return;
+  smallest_offset_ = kOffsetPart * casters.bounds.diagonal();
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
   glDrawBuffer(GL_NONE);
   glReadBuffer(GL_NONE);
@@ -85,16 +86,18 @@ void ShadowMap::update(const Light& light, const GpuScene& scene, const SceneBou
   glDisable(GL_BLEND);
   program.use();
   if (light.type == LightType::kDirectional) {
-    draw_plane(light, scene, bounds, program);
+    draw_plane(light, casters, program);
   } else {
-    draw_cube(light, scene, bounds, program);
+    draw_cube(light, casters, program);
   }
   drawn_ = true;
+  drawn_version_ = casters.version;
   drawn_for_ = light;
 }
 
-void ShadowMap::draw_cube(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
+void ShadowMap::draw_cube(const Light& light, const ShadowCasters& casters,
                           const GlProgram& program) {
+  const SceneBounds& bounds = casters.bounds;
   const bool first_cube = !drawn_ || drawn_for_.type == LightType::kDirectional;
   glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
   const glm::vec3 eye = to_glm(light.position);
@@ -111,12 +114,13 @@ void ShadowMap::draw_cube(const Light& light, const GpuScene& scene, const Scene
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, face.target, cube_.name(), 0);
     glClear(GL_DEPTH_BUFFER_BIT);
     program.set("clip_from_world", projection * glm::lookAt(eye, eye + face.forward, face.up));
-    scene.draw_surface();
+    casters.draw();
   }
 }
 
-void ShadowMap::draw_plane(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
+void ShadowMap::draw_plane(const Light& light, const ShadowCasters& casters,
                            const GlProgram& program) {
+  const SceneBounds& bounds = casters.bounds;
   glBindTexture(GL_TEXTURE_2D, plane_.name());
   if (!drawn_ || drawn_for_.type != LightType::kDirectional) allocate(GL_TEXTURE_2D, plane_side_);
   const glm::mat3 frame(frame_around(-to_dvec3(light.direction)));
@@ -136,7 +140,7 @@ void ShadowMap::draw_plane(const Light& light, const GpuScene& scene, const Scen
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, plane_.name(), 0);
   glClear(GL_DEPTH_BUFFER_BIT);
   program.set("clip_from_world", plane_from_world_);
-  scene.draw_surface();
+  casters.draw();
 }
 
 void ShadowMap::bind(const GlProgram& program) const {
@@ -144,7 +148,11 @@ void ShadowMap::bind(const GlProgram& program) const {
   glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
   glActiveTexture(GL_TEXTURE3);
   glBindTexture(GL_TEXTURE_2D, plane_.name());
+  glActiveTexture(GL_TEXTURE4);
+  glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
+  glBindSampler(4, depth_sampler_.name());
   program.set("cube_shadow", 2);
+  program.set("cube_depth", 4);
   program.set("plane_shadow", 3);
   program.set("plane_from_world", plane_from_world_);
   program.set("near_far", near_far_);

@@ -1,0 +1,233 @@
+#pragma once
+
+namespace rebounce::shaders {
+
+/// One lamp, added to what is there. Fall-off, range and cone as in light_sampling.cpp.
+///
+/// What arrives from a lamp with a surface is its closed form (sphere_form_factor.cpp,
+/// polygon_form_factor.cpp; discs are polygons of many corners), and how much of it is hidden is
+/// guessed from the shadow map of its middle: R. Fernando, "Percentage-closer soft shadows",
+/// SIGGRAPH 2005. What is found on the way says how wide the half shadow is; taps are places of the
+/// lamp, so that a long lamp has long half shadows, and are compared with the plane of the
+/// receiver, so that it does not shadow itself.
+inline constexpr const char* kLampFragment = R"(#version 330 core
+in vec3 world_position, shading_normal, color;
+in vec2 base_uv;
+uniform sampler2D base_color_texture;
+uniform vec3 base_color, eye;
+uniform float exposure_scale;
+uniform int lamp_type;  // 0 point, 1 spot, 2 directional, 3 sphere, 4 flat
+uniform vec3 lamp_position, lamp_direction, lamp_color;
+uniform float lamp_range, cos_inner, cos_outer;
+uniform float lamp_radius;                // sphere, metres
+uniform vec3 lamp_side, lamp_other_side;  // flat: from the middle to the rim
+uniform int lamp_corners;                 // flat: 4, or many for a disc
+uniform samplerCubeShadow cube_shadow;
+uniform samplerCube cube_depth;
+uniform sampler2DShadow plane_shadow;
+uniform mat4 plane_from_world;
+uniform vec2 near_far;
+uniform float texel;  // of the cube at unit distance; of the plane in metres
+uniform float smallest_offset;  // metres
+out vec4 result;
+
+const float kPi = 3.14159265;
+const int kTaps = 16;
+const float kRadius = 1.5;  // texels
+const int kSoftTaps = 48;
+const float kWidest = 3;  // half shadows, in lamps
+
+// Evenly over a disc (H. Vogel, 1979).
+vec2 tap(int k, int count) {
+  float angle = 2.39996323 * float(k);
+  return sqrt((float(k) + 0.5) / float(count)) * vec2(cos(angle), sin(angle));
+}
+
+float largest(vec3 v) { return max(max(abs(v.x), abs(v.y)), abs(v.z)); }
+
+// What the cube's depth is at `z` metres along an axis, and the other way round.
+float depth_at(float z) {
+  return 0.5 + 0.5 * (near_far.y + near_far.x - 2 * near_far.x * near_far.y / z) /
+                   (near_far.y - near_far.x);
+}
+float metres_at(float depth) {
+  return 2 * near_far.x * near_far.y /
+         (near_far.y + near_far.x - (2 * depth - 1) * (near_far.y - near_far.x));
+}
+
+mat2x3 across(vec3 way) {
+  vec3 side = normalize(cross(way, abs(way.y) < 0.9 * length(way) ? vec3(0, 1, 0) : vec3(1, 0, 0)));
+  return mat2x3(side, normalize(cross(side, way)));
+}
+
+// From the lamp to the receiver, off its surface by what a slanted texel and the taps around it
+// reach.
+vec3 lifted_way(vec3 point, vec3 geometric_normal) {
+  vec3 way = point - lamp_position;
+  return way + geometric_normal * (smallest_offset + (kRadius + 1) * texel * largest(way));
+}
+
+float cube_visibility(vec3 way) {
+  mat2x3 axes = across(way);
+  float spread = kRadius * texel * largest(way);
+  float sum = 0;
+  for (int k = 0; k < kTaps; ++k) {
+    vec3 to = way + axes * (spread * tap(k, kTaps));
+    sum += texture(cube_shadow, vec4(to, depth_at(largest(to))));
+  }
+  return sum / float(kTaps);
+}
+
+float plane_visibility(vec3 point, vec3 geometric_normal) {
+  vec3 off = point + geometric_normal * (smallest_offset + (kRadius + 1) * texel);
+  vec3 at = (plane_from_world * vec4(off, 1)).xyz * 0.5 + 0.5;
+  vec2 spread = kRadius / vec2(textureSize(plane_shadow, 0));
+  float sum = 0;
+  for (int k = 0; k < kTaps; ++k) {
+    sum += texture(plane_shadow, vec3(at.xy + spread * tap(k, kTaps), at.z));
+  }
+  return sum / float(kTaps);
+}
+
+// Place k on the lamp, from its middle: xyz in metres, w from 0 to 1 at the rim.
+vec4 place_on_lamp(int k, mat2x3 sphere_axes) {
+  vec2 at = tap(k, kSoftTaps);
+  if (lamp_type == 3) return vec4(sphere_axes * (lamp_radius * at), length(at));
+  if (lamp_corners > 4) return vec4(at.x * lamp_side + at.y * lamp_other_side, length(at));
+  at = 2 * fract(0.5 + float(k) * vec2(0.75487767, 0.56984029)) - 1;  // R2 (M. Roberts, 2018)
+  return vec4(at.x * lamp_side + at.y * lamp_other_side, largest(vec3(at, 0)));
+}
+
+// The way to where `to` meets the plane of the receiver, as a part of `to` and at most all of it.
+float part_to_plane(vec3 to, vec3 way, vec3 geometric_normal) {
+  float height = dot(geometric_normal, way), slope = dot(geometric_normal, to);
+  return slope < 0 && height < 0 ? min(1, height / slope) : 1;
+}
+
+// How many lamps wide the half shadow is; below 0 without one.
+float half_shadow(vec3 way, vec3 geometric_normal, mat2x3 axes) {
+  float sum = 0, found = 0;
+  for (int k = 0; k < kSoftTaps; ++k) {
+    vec4 place = kWidest * place_on_lamp(k, axes);
+    vec3 to = way + place.xyz;
+    float part = metres_at(texture(cube_depth, to).r) / largest(to);
+    // Near enough to the lamp to be between it and the receiver, and not the receiver itself.
+    if (part > part_to_plane(to, way, geometric_normal) - 2e-3 || place.w > 1 / part - 1) continue;
+    sum += part;
+    found += 1;
+  }
+  return found > 0 ? min(found / sum - 1, kWidest) : -1;
+}
+
+float soft_visibility(vec3 way, vec3 geometric_normal) {
+  mat2x3 axes = across(way);
+  float width = half_shadow(way, geometric_normal, axes);
+  if (width < 0) return cube_visibility(way);
+  float spread = kRadius * texel * largest(way);
+  float sum = 0;
+  for (int k = 0; k < kSoftTaps; ++k) {
+    vec3 to = way + width * place_on_lamp(k, axes).xyz + axes * (spread * tap(k, kSoftTaps));
+    to *= part_to_plane(to, way, geometric_normal);
+    sum += texture(cube_shadow, vec4(to, depth_at(largest(to))));
+  }
+  return sum / float(kSoftTaps);
+}
+
+// Howell's catalogue, B-43.
+float sphere_form_factor(vec3 to_center, vec3 normal) {
+  float sine_squared = lamp_radius * lamp_radius / dot(to_center, to_center);
+  float height = dot(to_center, normal);
+  if (sine_squared >= 1) return 1;
+  if (height <= -lamp_radius) return 0;
+  float cosine = height / length(to_center);
+  if (height >= lamp_radius) return sine_squared * cosine;
+  float sine = sqrt(max(1e-9, 1 - cosine * cosine));
+  float cotangent = sqrt(1 / sine_squared - 1);
+  float rim = sqrt(max(0, 1 - cosine * cosine / sine_squared));
+  float turn = acos(clamp(-cotangent * cosine / sine, -1, 1));
+  float lens = asin(clamp(sqrt(1 - sine_squared) / sine, -1, 1));
+  return max(0, 0.5 + (sine_squared * (cosine * turn - cotangent * rim) - lens) / kPi);
+}
+
+float edge_integral(vec3 a, vec3 b, vec3 normal) {
+  vec3 axis = cross(a, b);
+  float sine = length(axis);
+  return sine > 0 ? atan(sine, dot(a, b)) * dot(axis, normal) / sine : 0;
+}
+
+// Corner k, seen from the receiver. That of a disc are outside of it by what makes the areas equal.
+vec3 lamp_corner(int k, vec3 to_center) {
+  float step = 2 * kPi / float(lamp_corners), angle = (float(k) + 0.5) * step;
+  float reach = lamp_corners == 4 ? sqrt(2) : sqrt(step / sin(step));
+  return to_center + reach * (cos(angle) * lamp_side + sin(angle) * lamp_other_side);
+}
+
+// Lambert's formula, cut at the horizon.
+float flat_form_factor(vec3 to_center, vec3 normal) {
+  if (dot(to_center, lamp_direction) >= 0) return 0;  // from behind
+  float sum = 0;
+  bool cut = false;
+  vec3 rises = vec3(0), sets = vec3(0);
+  vec3 a = lamp_corner(lamp_corners - 1, to_center);
+  for (int k = 0; k < lamp_corners; ++k) {
+    vec3 b = lamp_corner(k, to_center);
+    float height_a = dot(a, normal), height_b = dot(b, normal);
+    vec3 horizon = mix(a, b, height_a / (height_a - height_b));
+    if (height_a >= 0 && height_b >= 0) sum += edge_integral(a, b, normal);
+    if (height_a < 0 && height_b >= 0) {
+      rises = horizon;
+      sum += edge_integral(rises, b, normal);
+    }
+    if (height_a >= 0 && height_b < 0) {
+      sets = horizon;
+      sum += edge_integral(a, sets, normal);
+      cut = true;
+    }
+    a = b;
+  }
+  if (cut) sum += edge_integral(sets, rises, normal);
+  return clamp(abs(sum) / (2 * kPi), 0, 1);
+}
+
+// Irradiance for luminance or intensity 1, where nothing is in between.
+float unshadowed(vec3 to_lamp, vec3 direction, vec3 normal, vec3 geometric_normal) {
+  if (lamp_type == 3) return kPi * sphere_form_factor(to_lamp, normal);
+  if (lamp_type == 4) return kPi * flat_form_factor(to_lamp, normal);
+  if (dot(geometric_normal, direction) <= 0) return 0;
+  float strength = max(0, dot(normal, direction));
+  if (lamp_type != 2) strength /= max(dot(to_lamp, to_lamp), 1e-12);
+  if (lamp_type == 1) {
+    float inside = (dot(-direction, lamp_direction) - cos_outer) / max(0.001, cos_inner - cos_outer);
+    inside = clamp(inside, 0, 1);
+    strength *= inside * inside;
+  }
+  return strength;
+}
+
+float range_window(float distance_squared) {
+  if (lamp_type == 2 || lamp_range <= 0) return 1;
+  float ratio = distance_squared / (lamp_range * lamp_range);
+  return clamp(1 - ratio * ratio, 0, 1);
+}
+
+void main() {
+  vec3 to_lamp = lamp_type == 2 ? -lamp_direction : lamp_position - world_position;
+  vec3 direction = to_lamp * inversesqrt(max(dot(to_lamp, to_lamp), 1e-12));
+  vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
+  if (dot(geometric_normal, eye - world_position) < 0) geometric_normal = -geometric_normal;
+  vec3 normal = normalize(shading_normal);
+  float strength = unshadowed(to_lamp, direction, normal, geometric_normal) *
+                   range_window(dot(to_lamp, to_lamp));
+  if (strength <= 0) discard;
+  if (lamp_type == 2) {
+    strength *= plane_visibility(world_position, geometric_normal);
+  } else {
+    vec3 way = lifted_way(world_position, geometric_normal);
+    strength *= lamp_type > 2 ? soft_visibility(way, geometric_normal) : cube_visibility(way);
+  }
+  vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
+  result = vec4(albedo * lamp_color * (strength * exposure_scale / kPi), 0);
+}
+)";
+
+}  // namespace rebounce::shaders
