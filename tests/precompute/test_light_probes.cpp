@@ -104,6 +104,40 @@ TEST(LightProbes, IrradianceIsThatOfABruteForceGather) {
   EXPECT_LE(lamp_error, 0.08);
 }
 
+TEST(LightProbes, WhatMovesThroughThemDoesNotPop) {
+  const auto data = std::make_shared<const TransferData>(cornell_box());
+  Engine engine(data);
+  engine.relight({}, {});
+  std::vector<ProbeLight> light(data->probes.size());
+  apply_probes(data->probes, engine.radiosity(), {}, light);
+  // The largest change of the irradiance in one of `steps` from wall to wall, between the blocks
+  // and over them, past probes that are within one.
+  const auto largest_change = [&](int steps) {
+    double largest = 0;
+    std::array<Float3, 6> before{};
+    for (int k = 0; k <= steps; ++k) {
+      const float t = static_cast<float>(k) / static_cast<float>(steps);
+      const Float3 place = {0.05F + 0.45F * t, 0.1F + 0.3F * t, 0.25F * t};
+      const ProbeLight found = gather_probe_light(data->probes, engine.radiosity(), {}, place);
+      EXPECT_GT(found[0][0], 0);
+      const ProbeLight same = interpolate_probes(data->probes, light, place);
+      for (std::size_t axis = 0; axis < 6; ++axis) {
+        Float3 normal{0, 0, 0};
+        normal[axis / 2] = axis % 2 == 0 ? 1.0F : -1.0F;
+        const Float3 irradiance = probe_irradiance(found, normal);
+        EXPECT_NEAR(irradiance[0], probe_irradiance(same, normal)[0], 1e-4 * found[0][0]);
+        if (k > 0) {
+          largest = std::max(largest, std::abs(double{irradiance[0]} - before[axis][0]));
+        }
+        before[axis] = irradiance;
+      }
+    }
+    return largest;
+  };
+  // A jump would stay as large as it is, however small the steps.
+  EXPECT_LE(largest_change(1600), 0.3 * largest_change(400));
+}
+
 TEST(LightProbes, TheFileKeepsThem) {
   const test::TemporaryFolder folder;
   save_transfer_file(folder / "probes.safetensors", cornell_box());

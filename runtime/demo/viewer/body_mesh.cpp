@@ -5,12 +5,14 @@
 #include <numbers>
 
 #include "rebounce/runtime/float3_glm.h"
+#include "sample_sequence.h"
 
 namespace rebounce {
 namespace {
 
 constexpr int kLongitudes = 96, kLatitudes = 48;
 constexpr int kRim = 96;  // corners of a disc
+constexpr float kGoldenAngle = 2.39996323F;
 constexpr float kPi = std::numbers::pi_v<float>;
 
 std::uint32_t next_vertex(const BodyMesh& mesh) {
@@ -65,6 +67,32 @@ std::array<Float3, 2> flat_lamp_axes(const Light& lamp) {
   const glm::vec3 other_side = glm::cross(axis, side);
   return {to_float3(side * (round ? lamp.radius : 0.5F * lamp.size[0])),
           to_float3(other_side * (round ? lamp.radius : 0.5F * lamp.size[1]))};
+}
+
+std::array<glm::vec3, kLampPlaceCount> places_on_lamp(const Light& lamp) {
+  std::array<glm::vec3, kLampPlaceCount> places;
+  const bool ball = lamp.type == LightType::kSphere;
+  const auto axes = ball ? std::array<Float3, 2>{} : flat_lamp_axes(lamp);
+  for (std::uint32_t k = 0; k < kLampPlaceCount; ++k) {
+    const float part = (static_cast<float>(k) + 0.5F) / kLampPlaceCount;
+    const float turn = kGoldenAngle * static_cast<float>(k);
+    const glm::vec2 around(std::cos(turn), std::sin(turn));
+    if (ball) {
+      const float height = 1 - 2 * part, r = std::sqrt(1 - height * height);
+      places[k] = lamp.radius * glm::vec3(r * around.x, height, r * around.y);
+      continue;
+    }
+    const glm::vec2 at = lamp.type == LightType::kDisc ? std::sqrt(part) * around
+                                                       : 2.0F * r2_point(k, glm::vec2(0.5F)) - 1.0F;
+    places[k] = at.x * to_glm(axes[0]) + at.y * to_glm(axes[1]);
+  }
+  return places;
+}
+
+float area_of_lamp(const Light& lamp) {
+  if (lamp.type == LightType::kRectangle) return lamp.size[0] * lamp.size[1];
+  const float disc = kPi * lamp.radius * lamp.radius;
+  return lamp.type == LightType::kSphere ? 4 * disc : disc;
 }
 
 void add_sphere(const Float3& center, float radius,

@@ -41,4 +41,11 @@ void add_lamp_surface(const Light& lamp, BodyMesh& mesh);
 /// disc, from its middle.
 std::array<Float3, 2> flat_lamp_axes(const Light& lamp);
 
+/// Places spread evenly over the surface of `lamp`, from its middle.
+inline constexpr std::size_t kLampPlaceCount = 16;
+std::array<glm::vec3, kLampPlaceCount> places_on_lamp(const Light& lamp);
+
+/// m², of what shines.
+float area_of_lamp(const Light& lamp);
+
 }  // namespace rebounce

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
 
 #include "lamp_shader.h"
 #include "rebounce/runtime/float3_glm.h"
@@ -16,10 +19,8 @@
 namespace rebounce {
 namespace {
 
-constexpr int kSamples = 4;         // per pixel
-constexpr int kCubeShadow = 1024;   // texels a side
-constexpr int kPlaneShadow = 4096;  // texels a side
-constexpr int kFlatLamp = 4;        // lamp_type of rectangles and discs, the first of them
+constexpr int kSamples = 4;   // per pixel
+constexpr int kFlatLamp = 4;  // lamp_type of rectangles and discs, the first of them
 constexpr int kDiscCorners = 24;
 constexpr float kNearPart = 2e-4F;  // of the scene's diagonal
 
@@ -105,7 +106,7 @@ void SceneRenderer::set_bodies(BodyMesh spheres, bool keeps_places, std::span<co
 
 void SceneRenderer::update_shadows(std::span<const Light> lights) {
   while (shadow_maps_.size() < lights.size()) {
-    shadow_maps_.push_back(std::make_unique<ShadowMap>(kCubeShadow, kPlaneShadow));
+    shadow_maps_.push_back(std::make_unique<ShadowMap>());
   }
   shadow_maps_.resize(lights.size());
   const ShadowCasters casters{scene_, spheres_, bounds_, spheres_version_};
@@ -234,6 +235,12 @@ void SceneRenderer::draw_lamp(const Light& light, const ShadowMap& shadow) {
 
 void SceneRenderer::set_lamp_surface(const Light& light) const {
   lamp_.set("lamp_radius", light.radius);
+  const auto places = places_on_lamp(light);
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    lamp_.set(("lamp_places[" + std::to_string(k) + "]").c_str(), places[k]);
+  }
+  lamp_.set("place_reach", std::sqrt(area_of_lamp(light) / (std::numbers::pi_v<float> *
+                                                            static_cast<float>(places.size()))));
   if (light.type == LightType::kSphere) return;
   const auto [side, other_side] = flat_lamp_axes(light);
   lamp_.set("lamp_side", to_glm(side));
