@@ -12,7 +12,7 @@ namespace rebounce::cli {
 namespace {
 
 constexpr float kPlace = 0.55F;   // of the way to what is ahead
-constexpr float kRadius = 0.06F;  // likewise
+constexpr float kRadius = 0.045F;  // likewise
 constexpr float kSwing = 0.3F;    // likewise, to either side
 constexpr float kProbeCount = 600;
 

@@ -237,6 +237,26 @@ TEST_F(ViewCommand, MovesLampsSmoothlyAlongAPath) {
   }
 }
 
+TEST_F(ViewCommand, ASphereDoesNotPopOnItsWay) {
+  // At even speed, past the blocks and through cells of probes of which some are within them.
+  const std::string motion = write("sphere.json", R"({"frames_per_second": 8, "spheres":
+      [{"radius": 0.05, "keys": [{"time": 0, "position": [0.1, 0.42, 0.0]},
+                                 {"time": 1, "position": [0.45, 0.36, 0.3]}]}]})");
+  summary_of({"view", file_, "--lights", kLights, "--size", "120x80", "--exposure", "-4", "--path",
+              motion, "--frames", "8", "--out", path("film")});
+  std::vector<double> change;
+  for (int k = 0; k < 7; ++k) {
+    const auto frame = [&](int n) {
+      return read_image(path("film/frame_0000" + std::to_string(n) + ".png"));
+    };
+    change.push_back(difference(frame(k), frame(k + 1)).mean);
+  }
+  const double largest = *std::ranges::max_element(change);
+  std::ranges::sort(change);
+  EXPECT_GT(change.front(), 0.02);
+  EXPECT_LT(largest, 2 * change[change.size() / 2]);
+}
+
 TEST_F(ViewCommand, RefusesPathsThatMakeNoSense) {
   const auto refused = [&](const std::string& text, const std::string& part) {
     const std::string motion = write("path.json", text);

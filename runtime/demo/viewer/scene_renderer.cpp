@@ -239,8 +239,11 @@ void SceneRenderer::set_lamp_surface(const Light& light) const {
   for (std::size_t k = 0; k < places.size(); ++k) {
     lamp_.set(("lamp_places[" + std::to_string(k) + "]").c_str(), places[k]);
   }
-  lamp_.set("place_reach", std::sqrt(area_of_lamp(light) / (std::numbers::pi_v<float> *
-                                                            static_cast<float>(places.size()))));
+  // Parts overlap, so that the edges of their shadows run into one another.
+  constexpr float kOverlap = 1.5F;
+  lamp_.set("place_reach",
+            kOverlap * std::sqrt(area_of_lamp(light) /
+                                 (std::numbers::pi_v<float> * static_cast<float>(places.size()))));
   if (light.type == LightType::kSphere) return;
   const auto [side, other_side] = flat_lamp_axes(light);
   lamp_.set("lamp_side", to_glm(side));
