@@ -11,9 +11,9 @@
 namespace rebounce::cli {
 namespace {
 
-constexpr float kPlace = 0.55F;   // of the way to what is ahead
-constexpr float kRadius = 0.045F;  // likewise
-constexpr float kSwing = 0.3F;    // likewise, to either side
+// Of the way through the scene to what is ahead.
+constexpr float kPlace = 0.5F, kSwing = 0.3F, kLargestRadius = 0.1F;
+constexpr float kApparentRadius = 0.07F;  // of the way from the camera
 constexpr float kProbeCount = 600;
 
 struct Box {
@@ -28,6 +28,17 @@ Box box_around(const DisplayMesh& mesh) {
     box.high = glm::max(box.high, to_glm(p));
   }
   return box;
+}
+
+/// Metres along the unit `direction` from `origin` to where the box begins and ends; as 0 and 0
+/// where the line misses it.
+std::array<float, 2> way_through(const Box& box, const glm::vec3& origin,
+                                 const glm::vec3& direction) {
+  const glm::vec3 a = (box.low - origin) / direction, b = (box.high - origin) / direction;
+  const glm::vec3 in = glm::min(a, b), out = glm::max(a, b);
+  const float begin = std::max({in.x, in.y, in.z, 0.0F}), end = std::min({out.x, out.y, out.z});
+  if (!(begin < end)) return {0, 0};
+  return {begin, end};
 }
 
 /// Metres that are free from `origin` along the unit `direction`, at most `most`.
@@ -45,17 +56,23 @@ float free_way(const RayTracer& tracer, const glm::vec3& origin, const glm::vec3
 ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const TransferData& data) {
   const Box box = box_around(data.mesh);
   const glm::vec3 eye = to_glm(camera.position), ahead = -to_glm(camera.backward);
-  const float far = glm::length(box.high - box.low);
-  const float way = free_way(tracer, eye, ahead, far);
-  const glm::vec3 middle = eye + kPlace * way * ahead;
-  ViewerSphere sphere{.position = to_float3(middle), .radius = kRadius * way};
-  const auto end = [&](const glm::vec3& side) {
-    const float room = free_way(tracer, middle, side, kSwing * way + sphere.radius);
+  const auto [begin, end] = way_through(box, eye, ahead);
+  // A camera that looks past the scene has the sphere as far away as the scene is large.
+  const float most = end > 0 ? end : glm::length(box.high - box.low);
+  const float way = free_way(tracer, eye, ahead, most) - begin;
+  const glm::vec3 middle = eye + (begin + kPlace * way) * ahead;
+  ViewerSphere sphere{
+      .position = to_float3(middle),
+      .radius = std::min(kLargestRadius * way, kApparentRadius * glm::distance(eye, middle))};
+  const auto turning_point = [&](const glm::vec3& side) {
+    const float inside = way_through(box, middle, side)[1];
+    const float room =
+        std::min(inside, free_way(tracer, middle, side, kSwing * way + sphere.radius));
     return to_float3(middle + std::max(0.0F, room - sphere.radius) * side);
   };
   sphere.motion = {.kind = LightMotion::Kind::kSwing, .period = 6};
-  sphere.motion.from = end(-to_glm(camera.right));
-  sphere.motion.to = end(to_glm(camera.right));
+  sphere.motion.from = turning_point(-to_glm(camera.right));
+  sphere.motion.to = turning_point(to_glm(camera.right));
   return sphere;
 }
 

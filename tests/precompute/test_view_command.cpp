@@ -134,6 +134,19 @@ TEST_F(ViewCommand, LampsWithASurfaceLookAsRenderDrawsThem) {
   }
 }
 
+TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {
+  const std::string lights = write("sky.lights.json", R"({"sky":
+      {"luminance": 300, "cie": 12, "sunDirection": [-1, -0.3, 0.4], "groundReflectance": 0.6}})");
+  const Words light = {"--lights", lights, "--exposure", "-8"};
+  Words words = {"render", file_, "--size", "240x160", "--quiet", "-o", path("render.png")};
+  words.insert(words.end(), light.begin(), light.end());
+  const Outcome outcome = run(words);
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image drawn = read_image(path("render.png"));
+  EXPECT_GT(drawn.mean(0), 20);
+  EXPECT_LT(difference(screenshot(light), drawn).mean, 2.0);
+}
+
 TEST_F(ViewCommand, ASphereTakesTheColourOfTheWallsThatItFaces) {
   const std::string still = write("still.json", R"({"spheres":
       [{"position": [0.278, 0.3, 0.1], "radius": 0.08, "color": [0.9, 0.9, 0.9]}]})");

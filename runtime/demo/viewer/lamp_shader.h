@@ -110,10 +110,11 @@ vec3 face_coordinates(vec3 to, int place) {
   return vec3(0.5 + 0.5 * at.xy / at.z, float(6 * place + face));
 }
 
-// The way to where `to` meets the plane of the receiver, as a part of `to` and at most all of it.
+// The way to where `to` meets the plane of the receiver, as a part of `to` and at most all of it. A
+// plane that is seen at a slant is not followed far: past its edges something else may be lit.
 float part_to_plane(vec3 to, vec3 way, vec3 geometric_normal) {
   float height = dot(geometric_normal, way), slope = dot(geometric_normal, to);
-  return slope < 0 && height < 0 ? min(1.0, height / slope) : 1.0;
+  return slope < 0 && height < 0 ? clamp(height / slope, 0.95, 1.0) : 1.0;
 }
 
 // How wide the half shadow of a place is at the receiver, metres.
@@ -163,7 +164,7 @@ float surface_visibility(vec3 point, vec3 normal, vec3 geometric_normal) {
   return all > 0 ? seen / all : 0.0;
 }
 
-// Howell's catalogue, B-43.
+// Howell's catalogue, B-43, with arcs as tangents: OpenGL's arc sines are coarse.
 float sphere_form_factor(vec3 to_center, vec3 normal) {
   float sine_squared = lamp_radius * lamp_radius / dot(to_center, to_center);
   float height = dot(to_center, normal);
@@ -171,12 +172,11 @@ float sphere_form_factor(vec3 to_center, vec3 normal) {
   if (height <= -lamp_radius) return 0.0;
   float cosine = height / length(to_center);
   if (height >= lamp_radius) return sine_squared * cosine;
-  float sine = sqrt(max(1e-9, 1 - cosine * cosine));
   float cotangent = sqrt(1 / sine_squared - 1);
   float rim = sqrt(max(0.0, 1 - cosine * cosine / sine_squared));
-  float turn = acos(clamp(-cotangent * cosine / sine, -1.0, 1.0));
-  float lens = asin(clamp(sqrt(1 - sine_squared) / sine, -1.0, 1.0));
-  return max(0.0, 0.5 + (sine_squared * (cosine * turn - cotangent * rim) - lens) / kPi);
+  float turn = atan(rim, -cotangent * cosine);
+  float lens = atan(sqrt(sine_squared) * rim, sqrt(1 - sine_squared));
+  return max(0.0, (sine_squared * (cosine * turn - cotangent * rim) + lens) / kPi);
 }
 
 float edge_integral(vec3 a, vec3 b, vec3 normal) {

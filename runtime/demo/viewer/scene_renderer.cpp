@@ -5,7 +5,6 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <numbers>
-#include <string>
 #include <utility>
 
 #include "lamp_shader.h"
@@ -14,6 +13,7 @@
 #include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 #include "shaders.h"
+#include "sky_shader.h"
 #include "tone_curve.h"
 
 namespace rebounce {
@@ -68,7 +68,8 @@ SceneRenderer::SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh)
       lamp_(shaders::kSceneVertex, shaders::kLampFragment),
       patch_(shaders::kSceneVertex, shaders::kPatchFragment),
       shadow_(shaders::kShadowVertex, shaders::kShadowFragment),
-      screen_(shaders::kScreenVertex, shaders::kScreenFragment) {
+      screen_(shaders::kScreenVertex, shaders::kScreenFragment),
+      sky_(shaders::kScreenVertex, shaders::kSkyFragment) {
   glEnable(GL_TEXTURE_CUBE_MAP_SEAMLESS);
 }
 
@@ -133,6 +134,7 @@ void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
   if (patches) {
     draw_patches(frame, view);
   } else {
+    draw_sky(frame);
     draw_light(frame, view);
   }
 
@@ -178,6 +180,27 @@ void SceneRenderer::for_each_side(const FrameSettings& frame, const Draw& draw) 
   glScissor(left, 0, width_ - left, height_);
   draw(Side::kSecond);
   glDisable(GL_SCISSOR_TEST);
+}
+
+void SceneRenderer::draw_sky(const FrameSettings& frame) const {
+  if (!frame.sky.distribution || frame.show == Show::kIndirect) return;
+  const Camera& camera = frame.camera;
+  const float half_height = std::tan(0.5F * camera.vertical_fov);
+  const glm::vec2 size(width_, height_);
+  sky_.use();
+  sky_.set("right", half_height * size.x / size.y * to_glm(camera.right));
+  sky_.set("up", half_height * to_glm(camera.up));
+  sky_.set("forward", -to_glm(camera.backward));
+  sky_.set("picture_size", size);
+  sky_.set("cell_part", std::span<const float>(*frame.sky.distribution));
+  sky_.set("sky_luminance", to_glm(sky_luminance_unit(frame.sky)) * std::exp2(frame.exposure));
+  sky_.set("brightest", kBrightestEmitter);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_CULL_FACE);
+  glBindVertexArray(empty_.name());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+  glEnable(GL_CULL_FACE);
 }
 
 void SceneRenderer::draw_light(const FrameSettings& frame, const glm::mat4& view) {
@@ -236,9 +259,7 @@ void SceneRenderer::draw_lamp(const Light& light, const ShadowMap& shadow) {
 void SceneRenderer::set_lamp_surface(const Light& light) const {
   lamp_.set("lamp_radius", light.radius);
   const auto places = places_on_lamp(light);
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    lamp_.set(("lamp_places[" + std::to_string(k) + "]").c_str(), places[k]);
-  }
+  lamp_.set("lamp_places", std::span<const glm::vec3>(places));
   // Parts overlap, so that the edges of their shadows run into one another.
   constexpr float kOverlap = 1.5F;
   lamp_.set("place_reach",

@@ -49,6 +49,7 @@ class SceneRenderer {
 
  private:
   void resize(int width, int height);
+  void draw_sky(const FrameSettings& frame) const;
   void draw_light(const FrameSettings& frame, const glm::mat4& view);
   void draw_lamp_surfaces() const;
   void draw_lamp(const Light& light, const ShadowMap& shadow);
@@ -63,7 +64,7 @@ class SceneRenderer {
   SceneBounds bounds_;
   GpuBodies spheres_, lamp_surfaces_;
   int spheres_version_ = 0;
-  GlProgram ambient_, lamp_, patch_, shadow_, screen_;
+  GlProgram ambient_, lamp_, patch_, shadow_, screen_, sky_;
   GlVertexArray empty_;
   std::vector<std::unique_ptr<ShadowMap>> shadow_maps_;
   int width_ = 0, height_ = 0;
