@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -145,6 +146,29 @@ TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {
   const Image drawn = read_image(path("render.png"));
   EXPECT_GT(drawn.mean(0), 20);
   EXPECT_LT(difference(screenshot(light), drawn).mean, 2.0);
+}
+
+TEST_F(ViewCommand, WhatIsMaskedAwayIsNotDrawn) {
+  std::ifstream scene(kScene);
+  json document = json::parse(scene);
+  json& red = document["materials"][2];
+  red["alphaMode"] = "MASK";
+  red["pbrMetallicRoughness"]["baseColorFactor"][3] = 0.2;
+  const std::string masked = write("masked.gltf", document.dump());
+  const Words light = {"--lights", kLights, "--exposure", "-4", "--size", "240x160", "--quiet"};
+  const auto draw = [&](Words words, const std::string& picture) {
+    words.insert(words.end(), light.begin(), light.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    return read_image(picture);
+  };
+  const std::string file = path("masked.safetensors");
+  ASSERT_EQ(run({"precompute", masked, "--patches", "120", "--quiet", "-o", file}).exit_code,
+            kDone);
+  const Image image = draw({"view", file, "--screenshot", path("masked.png")}, path("masked.png"));
+  const Image drawn = draw({"render", file, "-o", path("render.png")}, path("render.png"));
+  EXPECT_LT(difference(image, drawn).mean, 2.0);
+  EXPECT_GT(difference(image, screenshot({"--lights", kLights, "--exposure", "-4"})).mean, 5);
 }
 
 TEST_F(ViewCommand, ASphereTakesTheColourOfTheWallsThatItFaces) {

@@ -43,8 +43,9 @@ void GpuBodies::draw(const GlProgram& program, Side side) const {
   }
 }
 
-void GpuBodies::draw_surface() const {
+void GpuBodies::draw_surface(const GlProgram& program) const {
   if (parts_.empty()) return;
+  scene_.set_plain_material(program, {0, 0, 0});
   glBindVertexArray(vertex_arrays_.front().name());
   draw_triangles(parts_.front().begin, parts_.back().end);
 }

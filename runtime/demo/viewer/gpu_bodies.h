@@ -21,8 +21,8 @@ class GpuBodies {
 
   /// Draws every part, with the light of `side`, as GpuScene::draw_materials does.
   void draw(const GlProgram& program, Side side) const;
-  /// Draws all of it once, for shadows.
-  void draw_surface() const;
+  /// Draws all of it once, for shadows, as GpuScene::draw_surface does.
+  void draw_surface(const GlProgram& program) const;
 
  private:
   void draw_triangles(std::uint32_t begin, std::uint32_t end) const;

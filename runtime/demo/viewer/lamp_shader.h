@@ -15,6 +15,7 @@ in vec3 world_position, shading_normal, color;
 in vec2 base_uv;
 uniform sampler2D base_color_texture;
 uniform vec3 base_color, eye;
+uniform float base_alpha, alpha_cutoff;
 uniform float exposure_scale;
 uniform int lamp_type;  // 0 point, 1 spot, 2 directional, 3 sphere, 4 flat
 uniform vec3 lamp_position, lamp_direction, lamp_color;
@@ -241,6 +242,7 @@ float range_window(float distance_squared) {
 }
 
 void main() {
+  vec4 base = texture(base_color_texture, base_uv);
   vec3 to_lamp = lamp_type == 2 ? -lamp_direction : lamp_position - world_position;
   vec3 direction = to_lamp * inversesqrt(max(dot(to_lamp, to_lamp), 1e-12));
   vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
@@ -248,7 +250,7 @@ void main() {
   vec3 normal = normalize(shading_normal);
   float strength = unshadowed(to_lamp, direction, normal, geometric_normal) *
                    range_window(dot(to_lamp, to_lamp));
-  if (strength <= 0) discard;
+  if (strength <= 0 || base_alpha * base.a < alpha_cutoff) discard;
   if (lamp_type == 2) {
     strength *= plane_visibility(world_position, geometric_normal);
   } else if (lamp_type > 2) {
@@ -256,7 +258,7 @@ void main() {
   } else {
     strength *= cube_visibility(lifted_way(-to_lamp, geometric_normal));
   }
-  vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
+  vec3 albedo = base_color * color * base.rgb;
   result = vec4(albedo * lamp_color * (strength * exposure_scale / kPi), 0);
 }
 )";

@@ -36,10 +36,13 @@ in vec3 color, first_light, bounced_light;
 in vec2 base_uv, emissive_uv;
 uniform sampler2D base_color_texture, emissive_texture;
 uniform vec3 base_color, emitted_luminance;
+uniform float base_alpha, alpha_cutoff;
 uniform float first_part, bounced_part, exposure_scale;
 out vec4 result;
 void main() {
-  vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
+  vec4 base = texture(base_color_texture, base_uv);
+  if (base_alpha * base.a < alpha_cutoff) discard;
+  vec3 albedo = base_color * color * base.rgb;
   vec3 irradiance = first_part * first_light + bounced_part * bounced_light;
   vec3 emitted = first_part * emitted_luminance * texture(emissive_texture, emissive_uv).rgb *
                  exposure_scale;
@@ -72,12 +75,22 @@ void main() {
 
 inline constexpr const char* kShadowVertex = R"(#version 330 core
 layout(location = 0) in vec3 position;
+layout(location = 3) in vec2 base_color_texcoord;
 uniform mat4 clip_from_world;
-void main() { gl_Position = clip_from_world * vec4(position, 1); }
+out vec2 base_uv;
+void main() {
+  base_uv = base_color_texcoord;
+  gl_Position = clip_from_world * vec4(position, 1);
+}
 )";
 
 inline constexpr const char* kShadowFragment = R"(#version 330 core
-void main() {}
+in vec2 base_uv;
+uniform sampler2D base_color_texture;
+uniform float base_alpha, alpha_cutoff;
+void main() {
+  if (base_alpha * texture(base_color_texture, base_uv).a < alpha_cutoff) discard;
+}
 )";
 
 /// One triangle that covers the screen.

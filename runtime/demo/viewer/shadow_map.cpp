@@ -114,6 +114,7 @@ void ShadowMap::update(const Light& light, const ShadowCasters& casters, const G
   glDisable(GL_CULL_FACE);
   glDisable(GL_BLEND);
   program.use();
+  program.set("base_color_texture", 0);
   switch (kind_of(light)) {
     case MapKind::kPlane:
       draw_plane(light, casters, program);
@@ -141,7 +142,7 @@ void ShadowMap::draw_faces(const glm::vec3& eye, int side, const ShadowCasters& 
     attach(face);
     glClear(GL_DEPTH_BUFFER_BIT);
     program.set("clip_from_world", projection * glm::lookAt(eye, eye + face.forward, face.up));
-    casters.draw();
+    casters.draw(program);
   }
 }
 
@@ -200,7 +201,7 @@ void ShadowMap::draw_plane(const Light& light, const ShadowCasters& casters,
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, plane_.name(), 0);
   glClear(GL_DEPTH_BUFFER_BIT);
   program.set("clip_from_world", plane_from_world_);
-  casters.draw();
+  casters.draw(program);
 }
 
 void ShadowMap::bind(const GlProgram& program) const {

@@ -23,9 +23,9 @@ struct ShadowCasters {
   SceneBounds bounds;
   int version = 0;  ///< another one for other bodies, or where they have moved
 
-  void draw() const {
-    scene.draw_surface();
-    bodies.draw_surface();
+  void draw(const GlProgram& program) const {
+    scene.draw_surface(program);
+    bodies.draw_surface(program);
   }
 };
 
