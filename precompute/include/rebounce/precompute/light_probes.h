@@ -20,7 +20,7 @@ struct ProbeSettings {
 };
 
 /// The middles of the cells of a grid over the box around `mesh`. Throws Error where that is more
-/// than a million. `settings` asks for probes.
+/// than 65,536. `settings` asks for probes.
 LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings);
 
 /// Fills the map of `probes`, of which positions and grid are given, by rays spread evenly over the
