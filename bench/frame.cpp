@@ -11,6 +11,8 @@
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/probe_light.h"
+#include "rebounce/runtime/surface_light.h"
+#include "rebounce/runtime/texel_light.h"
 #include "rebounce/runtime/vertex_light.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "timing.h"
@@ -72,7 +74,14 @@ class FrameBenchmark {
       : options_(options),
         engine_(std::move(data)),
         vertices_(engine_.data().mesh.position.size()),
-        probes_(engine_.data().probes.size()) {}
+        probes_(engine_.data().probes.size()) {
+    const TransferData& scene = engine_.data();
+    texels_.resize(scene.lightmap.triangle.size());
+    if (!scene.surface_harmonics.empty()) {
+      surface_.resize(scene.patches.size());
+      surface_at_vertices_.resize(scene.mesh.position.size());
+    }
+  }
 
   void run(int threads, Table& table) {
     omp_set_num_threads(threads);
@@ -82,8 +91,7 @@ class FrameBenchmark {
     add("initial exitance", {}, [this] { engine_.compute_initial_exitance(); });
     add("product", {}, [this] { engine_.apply_transfer(); });
     add("radiosity", {}, [this] { engine_.compute_radiosity(); });
-    add("vertices", {}, [this] { to_vertices(); });
-    if (!probes_.empty()) add("probes", {}, [this] { to_probes(); });
+    add_outputs();
     const std::vector<Timing> timings = time_interleaved(cases_, {.rounds = options_.repeats});
     const std::string scene =
         std::filesystem::path(engine_.data().record.scene_name).stem().string();
@@ -118,15 +126,44 @@ class FrameBenchmark {
     });
   }
 
+  /// Those that the file has.
+  void add_outputs() {
+    add("vertices", {}, [this] { to_vertices(); });
+    if (!texels_.empty()) add("lightmap", {}, [this] { to_texels(); });
+    if (!surface_.empty()) add("bent normals", {}, [this] { to_surface(); });
+    if (probes_.empty()) return;
+    add("probes", {}, [this] { to_probes(); });
+    if (engine_.data().probes.grid[0] > 0) {
+      add("one point in the air", {}, [this] { to_point_in_air(); });
+    }
+  }
+
   void to_vertices() {
     reconstruct_at_vertices(engine_.data().mesh, engine_.indirect_irradiance(), vertices_);
   }
+  void to_texels() {
+    interpolate_at_texels(engine_.data().lightmap, engine_.data().mesh, vertices_, texels_);
+  }
+  void to_surface() {
+    apply_surface_harmonics(engine_.data().surface_harmonics, engine_.radiosity(), {}, surface_);
+    reconstruct_at_vertices(engine_.data().mesh, surface_, surface_at_vertices_);
+  }
   void to_probes() { apply_probes(engine_.data().probes, engine_.radiosity(), {}, probes_); }
+  void to_point_in_air() {
+    const LightProbes& probes = engine_.data().probes;
+    // In the middle of the grid, between eight probes.
+    const Float3 &a = probes.position.front(), &b = probes.position.back();
+    const Float3 middle = {(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2};
+    air_ = gather_probe_light(probes, engine_.radiosity(), {}, middle);
+  }
 
   const CommonOptions& options_;
   Engine engine_;
   std::vector<Float3> vertices_;
   std::vector<ProbeLight> probes_;
+  ProbeLight air_{};
+  std::vector<Float3> texels_;
+  std::vector<SurfaceLight> surface_, surface_at_vertices_;
   std::vector<std::pair<std::string, Table::Cell>> names_;
   std::vector<TimedCase> cases_;
 };
@@ -153,6 +190,9 @@ int main(int argc, char** argv) {
                  "Patches of each scene, about")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
+  app.add_option("--probes", options.settings.probes.spacing,
+                 "Light probes this many metres apart, of scenes that are built")
+      ->check(CLI::PositiveNumber);
   add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

@@ -353,13 +353,14 @@ class TransferBuild {
     if (settings_.probes.grid[0] > 0 || settings_.probes.spacing > 0) {
       data_.probes = clock_.run("probes", [&](const Progress& part) {
         LightProbes probes = place_probes(data_.mesh, settings_.probes);
-        trace_probes(data_, *tracer_, settings_.probes, probes, part);
+        trace_probes(data_, model_.shown_patch, *tracer_, settings_.probes, probes, part);
         return probes;
       });
     }
     if (settings_.surface_harmonics.ray_count > 0) {
       data_.surface_harmonics = clock_.run("surface harmonics", [&](const Progress& part) {
-        return trace_surface_harmonics(data_, *tracer_, settings_.surface_harmonics, part);
+        return trace_surface_harmonics(data_, model_.shown_patch, *tracer_,
+                                       settings_.surface_harmonics, part);
       });
     }
   }

@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/ray_tracer.h"
+#include "seen_patch.h"
 
 namespace rebounce {
 
@@ -25,19 +25,13 @@ struct EscapeScratch {
   std::vector<PatchPoint> points;
   std::vector<Ray> rays;
   std::vector<Hit> hits;
-  std::vector<Hit> near_hits;
-  std::vector<CoincidentSide> sides;
+  CoincidenceScratch coincidence;
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over its `triangles`. Where a ray meets a side without a patch in the place of one that has one
-/// (of copies that lie in one another, or of two that make up a sheet, it may meet either), that
-/// one was met.
+/// over its `triangles`; what they meet is what prefer_lit_side says.
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch);
-
-/// The patch whose light shows where `hit` is, kNone if none does.
-std::uint32_t patch_at(const PatchModel& model, const Hit& hit);
 
 }  // namespace rebounce

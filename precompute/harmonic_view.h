@@ -10,6 +10,8 @@
 
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/runtime/spherical_harmonics.h"
+#include "rebounce/transfer/error.h"
+#include "rebounce/transfer/sky_harmonics.h"
 #include "seen_patch.h"
 
 namespace rebounce {
@@ -19,45 +21,91 @@ template <std::size_t N>
 struct HarmonicView {
   using Weight = std::array<float, N>;
 
-  std::vector<std::pair<std::uint32_t, Weight>> entries;  ///< ascending patches
-  Weight sky{};
+  std::vector<std::pair<std::uint32_t, Weight>> patches;  ///< ascending
+  std::vector<std::pair<std::uint32_t, Weight>> cells;    ///< of the sky, ascending
+  Weight sky{};                                           ///< the sum of `cells`
 };
 
 /// Adds up what rays from one place have met.
 template <std::size_t N>
 class HarmonicViewer {
  public:
+  /// `shown_patch` is that of PatchModel; all three must outlive the object.
+  HarmonicViewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+                 const RayTracer& tracer)
+      : mesh_(mesh), shown_patch_(shown_patch), tracer_(tracer) {}
+
+  /// What `rays` meet, as prefer_lit_side has it.
+  void trace(std::span<const Ray> rays, std::span<Hit> hits) {
+    tracer_.intersect(rays, hits);
+    for (std::size_t k = 0; k < hits.size(); ++k) {
+      prefer_lit_side(mesh_, tracer_, rays[k], hits[k], coincidence_);
+    }
+  }
+
   /// `solid_angle` in sr is what each of the `rays` stands for, which met `hits`.
-  HarmonicView<N> sum_up(const DisplayMesh& mesh, std::span<const Ray> rays,
-                         std::span<const Hit> hits, float solid_angle) {
-    HarmonicView<N> view;
+  HarmonicView<N> sum_up(std::span<const Ray> rays, std::span<const Hit> hits, float solid_angle) {
     by_patch_.clear();
+    by_cell_.clear();
     for (std::uint32_t k = 0; k < hits.size(); ++k) {
       if (hits[k].triangle == kNone) {
-        add(view.sky, rays[k], solid_angle);
+        by_cell_.emplace_back(sky_cell(rays[k].direction), k);
         continue;
       }
-      const std::uint32_t patch = seen_patch(mesh, hits[k]);
+      const std::uint32_t patch = patch_at(mesh_, shown_patch_, hits[k]);
       if (patch != kNone) by_patch_.emplace_back(patch, k);
     }
-    std::ranges::sort(by_patch_);
-    for (const auto& [patch, k] : by_patch_) {
-      if (view.entries.empty() || view.entries.back().first != patch) {
-        view.entries.emplace_back(patch, typename HarmonicView<N>::Weight{});
-      }
-      // A diffuse patch of radiosity B has the luminance B / pi.
-      add(view.entries.back().second, rays[k], solid_angle / std::numbers::pi_v<float>);
+    HarmonicView<N> view;
+    // A diffuse patch of radiosity B has the luminance B / pi.
+    view.patches = sums(by_patch_, rays, solid_angle / std::numbers::pi_v<float>);
+    view.cells = sums(by_cell_, rays, solid_angle);
+    for (const auto& [cell, weight] : view.cells) {
+      for (std::size_t k = 0; k < N; ++k) view.sky[k] += weight[k];
     }
     return view;
   }
 
  private:
-  static void add(std::array<float, N>& sum, const Ray& ray, float factor) {
-    const Harmonics y = spherical_harmonics(ray.direction);
-    for (std::size_t k = 0; k < N; ++k) sum[k] += factor * y[k];
+  using Weight = typename HarmonicView<N>::Weight;
+  using Seen = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  // what, number of the ray
+
+  static std::vector<std::pair<std::uint32_t, Weight>> sums(Seen& seen, std::span<const Ray> rays,
+                                                            float factor) {
+    std::ranges::sort(seen);
+    std::vector<std::pair<std::uint32_t, Weight>> result;
+    for (const auto& [what, ray] : seen) {
+      if (result.empty() || result.back().first != what) result.emplace_back(what, Weight{});
+      const Harmonics y = spherical_harmonics(rays[ray].direction);
+      for (std::size_t k = 0; k < N; ++k) result.back().second[k] += factor * y[k];
+    }
+    return result;
   }
 
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> by_patch_;  ///< and number of the ray
+  const DisplayMesh& mesh_;
+  std::span<const std::uint32_t> shown_patch_;
+  const RayTracer& tracer_;
+  CoincidenceScratch coincidence_;
+  Seen by_patch_, by_cell_;
 };
+
+/// Appends the view of one more place to `map`, a LightProbes or SurfaceHarmonics. Throws Error
+/// with `too_much` if a file cannot number that many entries.
+template <std::size_t N, typename Map>
+void append_view(const HarmonicView<N>& view, const char* too_much, Map& map) {
+  map.sky.push_back(view.sky);
+  for (const auto& [patch, weight] : view.patches) {
+    map.entry_patch.push_back(patch);
+    map.entry_weight.push_back(weight);
+  }
+  for (const auto& [cell, weight] : view.cells) {
+    map.sky_cells.entry_cell.push_back(static_cast<std::uint8_t>(cell));
+    map.sky_cells.entry_weight.push_back(weight);
+  }
+  if (std::max(map.entry_patch.size(), map.sky_cells.entry_cell.size()) >= kNone) {
+    throw Error(too_much);
+  }
+  map.entry_begin.push_back(static_cast<std::uint32_t>(map.entry_patch.size()));
+  map.sky_cells.entry_begin.push_back(static_cast<std::uint32_t>(map.sky_cells.entry_cell.size()));
+}
 
 }  // namespace rebounce

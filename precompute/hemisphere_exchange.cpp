@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "escape.h"
+#include "seen_patch.h"
 
 namespace rebounce {
 namespace {
@@ -21,8 +21,7 @@ std::vector<MetPatch> count_met_patches(const PatchModel& model, std::span<const
   std::vector<std::uint32_t> patches;
   patches.reserve(hits.size());
   for (const Hit& hit : hits) {
-    if (hit.triangle == kNone) continue;
-    const std::uint32_t patch = patch_at(model, hit);
+    const std::uint32_t patch = patch_at(model.mesh, model.shown_patch, hit);
     if (patch != kNone) patches.push_back(patch);
   }
   std::ranges::sort(patches);

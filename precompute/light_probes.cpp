@@ -33,9 +33,10 @@ Float3 fibonacci_direction(int k, int count, double turn) {
 
 class Viewer {
  public:
-  Viewer(const DisplayMesh& mesh, const RayTracer& tracer, int ray_count)
+  Viewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+         const RayTracer& tracer, int ray_count)
       : mesh_(mesh),
-        tracer_(tracer),
+        viewer_(mesh, shown_patch, tracer),
         rays_(static_cast<std::size_t>(ray_count)),
         hits_(rays_.size()) {}
 
@@ -50,36 +51,28 @@ class Viewer {
       ray.t_near = 0;
       ray.t_far = std::numeric_limits<float>::infinity();
     }
-    tracer_.intersect(rays_, hits_);
+    viewer_.trace(rays_, hits_);
     const auto backs =
         std::ranges::count_if(hits_, [&](const Hit& hit) { return meets_back(mesh_, hit); });
     if (static_cast<double>(backs) > kLargestBackPart * static_cast<double>(hits_.size())) {
       return std::nullopt;
     }
-    return viewer_.sum_up(mesh_, rays_, hits_,
+    return viewer_.sum_up(rays_, hits_,
                           4 * std::numbers::pi_v<float> / static_cast<float>(rays_.size()));
   }
 
  private:
   const DisplayMesh& mesh_;
-  const RayTracer& tracer_;
+  HarmonicViewer<kHarmonicCount> viewer_;
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
-  HarmonicViewer<kHarmonicCount> viewer_;
 };
 
 void append(const std::optional<View>& seen, LightProbes& probes) {
-  const View& view = seen ? *seen : View();
   probes.valid.push_back(seen ? 1 : 0);
-  probes.sky.push_back(view.sky);
-  for (const auto& [patch, weight] : view.entries) {
-    probes.entry_patch.push_back(patch);
-    probes.entry_weight.push_back(weight);
-  }
-  if (probes.entry_patch.size() >= kNone) {
-    throw Error("the probes see too much for one file; ask for fewer of them or for fewer rays");
-  }
-  probes.entry_begin.push_back(static_cast<std::uint32_t>(probes.entry_patch.size()));
+  append_view(seen ? *seen : View(),
+              "the probes see too much for one file; ask for fewer of them or for fewer rays",
+              probes);
 }
 
 }  // namespace
@@ -119,14 +112,16 @@ LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings)
   return probes;
 }
 
-void trace_probes(const TransferData& data, const RayTracer& tracer, const ProbeSettings& settings,
-                  LightProbes& probes, const Progress& progress) {
+void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+                  const RayTracer& tracer, const ProbeSettings& settings, LightProbes& probes,
+                  const Progress& progress) {
   if (settings.ray_count < 64) throw Error("a probe needs at least 64 rays");
   probes.valid.clear();
   probes.sky.clear();
   probes.entry_begin = {0};
   probes.entry_patch.clear();
   probes.entry_weight.clear();
+  probes.sky_cells = {.entry_begin = {0}, .entry_cell = {}, .entry_weight = {}};
   probes.patch_count = data.patches.size();
   std::vector<std::optional<View>> views;
   for (std::size_t first = 0; first < probes.size(); first += kBatch) {
@@ -137,7 +132,7 @@ void trace_probes(const TransferData& data, const RayTracer& tracer, const Probe
     views.resize(count);
 #pragma omp parallel
     {
-      Viewer viewer(data.mesh, tracer, settings.ray_count);
+      Viewer viewer(data.mesh, shown_patch, tracer, settings.ray_count);
 #pragma omp for schedule(dynamic, 1)
       for (std::size_t k = 0; k < count; ++k) {
         views[k] = viewer.look_around(probes.position[first + k], first + k);

@@ -28,8 +28,10 @@ glm::dvec3 hemisphere_direction(const glm::dvec3& normal, const glm::dvec2& s) {
 
 class Viewer {
  public:
-  Viewer(const DisplayMesh& mesh, const RayTracer& tracer, const SurfaceHarmonicSettings& settings)
+  Viewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+         const RayTracer& tracer, const SurfaceHarmonicSettings& settings)
       : mesh_(mesh),
+        viewer_(mesh, shown_patch, tracer),
         tracer_(tracer),
         settings_(settings),
         points_(static_cast<std::size_t>(settings.ray_count)),
@@ -48,36 +50,26 @@ class Viewer {
       ray.t_near = 0;
       ray.t_far = std::numeric_limits<float>::infinity();
     }
-    tracer_.intersect(rays_, hits_);
-    return viewer_.sum_up(mesh_, rays_, hits_,
+    viewer_.trace(rays_, hits_);
+    return viewer_.sum_up(rays_, hits_,
                           2 * std::numbers::pi_v<float> / static_cast<float>(rays_.size()));
   }
 
  private:
   const DisplayMesh& mesh_;
+  HarmonicViewer<kLinearHarmonicCount> viewer_;
   const RayTracer& tracer_;
   const SurfaceHarmonicSettings& settings_;
   std::vector<PatchPoint> points_;
   std::vector<Ray> rays_;
   std::vector<Hit> hits_;
-  HarmonicViewer<kLinearHarmonicCount> viewer_;
 };
-
-void append(const View& view, SurfaceHarmonics& harmonics) {
-  harmonics.sky.push_back(view.sky);
-  for (const auto& [patch, weight] : view.entries) {
-    harmonics.entry_patch.push_back(patch);
-    harmonics.entry_weight.push_back(weight);
-  }
-  if (harmonics.entry_patch.size() >= kNone) {
-    throw Error("the patches see too much for one file; ask for fewer rays of each");
-  }
-  harmonics.entry_begin.push_back(static_cast<std::uint32_t>(harmonics.entry_patch.size()));
-}
 
 }  // namespace
 
-SurfaceHarmonics trace_surface_harmonics(const TransferData& data, const RayTracer& tracer,
+SurfaceHarmonics trace_surface_harmonics(const TransferData& data,
+                                         std::span<const std::uint32_t> shown_patch,
+                                         const RayTracer& tracer,
                                          const SurfaceHarmonicSettings& settings,
                                          const Progress& progress) {
   if (settings.ray_count < kFewestRays)
@@ -85,7 +77,7 @@ SurfaceHarmonics trace_surface_harmonics(const TransferData& data, const RayTrac
   const std::size_t n = data.patches.size();
   const PatchTriangles triangles(data.mesh.triangle_patch, n);
   SurfaceHarmonics harmonics;
-  harmonics.entry_begin = {0};
+  harmonics.entry_begin = harmonics.sky_cells.entry_begin = {0};
   std::vector<View> views;
   for (std::size_t first = 0; first < n; first += kBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(n))) {
@@ -95,13 +87,16 @@ SurfaceHarmonics trace_surface_harmonics(const TransferData& data, const RayTrac
     views.resize(count);
 #pragma omp parallel
     {
-      Viewer viewer(data.mesh, tracer, settings);
+      Viewer viewer(data.mesh, shown_patch, tracer, settings);
 #pragma omp for schedule(dynamic, 4)
       for (std::size_t k = 0; k < count; ++k) {
         views[k] = viewer.look_up(triangles[first + k], static_cast<std::uint32_t>(first + k));
       }
     }
-    for (const View& view : views) append(view, harmonics);
+    for (const View& view : views) {
+      append_view(view, "the patches see too much for one file; ask for fewer rays of each",
+                  harmonics);
+    }
   }
   return harmonics;
 }

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <string>
 
-#include "rebounce/runtime/sky_light.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/error.h"
+#include "seen_sky.h"
 
 namespace rebounce {
 namespace {
@@ -44,40 +44,12 @@ GridPlace place_in_row(float x, float first, float last, std::uint32_t count) {
   return {low, low + 1, at - static_cast<float>(low)};
 }
 
-void check_size(std::size_t size, std::size_t wanted, const char* name) {
-  if (size == wanted) return;
-  throw Error(std::string("probes: ") + name + " has " + std::to_string(size) +
-              " entries; it must have " + std::to_string(wanted));
-}
-
-}  // namespace
-
-void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
-                  std::span<ProbeLight> light) {
-  check_size(light.size(), probes.size(), "the result");
-  if (probes.size() == 0) return;
-  check_size(radiosity.size(), probes.patch_count, "the radiosity");
-  const Float3 open_sky = mean_sky_luminance(sky);
-#pragma omp parallel for schedule(static)
-  for (std::size_t p = 0; p < probes.size(); ++p) {
-    PlanarLight sum;
-    sum.add(probes.sky[p], open_sky);
-    for (std::uint32_t e = probes.entry_begin[p]; e < probes.entry_begin[p + 1]; ++e) {
-      sum.add(probes.entry_weight[e], radiosity[probes.entry_patch[e]]);
-    }
-    light[p] = sum.interleaved();
-  }
-}
-
-Float3 probe_irradiance(const ProbeLight& light, const Float3& normal) {
-  return irradiance_of(light, normal);
-}
-
-ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,
-                              const Float3& position) {
+/// Calls visit(probe, weight) for the valid ones of the eight probes around `position`, by
+/// trilinear weights; returns the sum of them, 0 if the probes are no grid.
+template <typename Visit>
+float for_each_probe_around(const LightProbes& probes, const Float3& position, const Visit& visit) {
   const auto [nx, ny, nz] = probes.grid;
-  ProbeLight sum{};
-  if (nx == 0 || light.size() != probes.size()) return sum;
+  if (nx == 0) return 0;
   const Float3& first = probes.position.front();
   const Float3& last = probes.position.back();
   std::array<GridPlace, 3> place;
@@ -96,14 +68,78 @@ ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLi
     const std::size_t probe = at[0] + std::size_t{nx} * (at[1] + std::size_t{ny} * at[2]);
     if (weight <= 0 || probes.valid[probe] == 0) continue;
     total += weight;
-    for (std::size_t k = 0; k < kHarmonicCount; ++k) {
-      for (std::size_t c = 0; c < kChannelCount; ++c) sum[k][c] += weight * light[probe][k][c];
-    }
+    visit(probe, weight);
   }
-  if (total <= 0) return sum;
-  for (Float3& coefficient : sum) {
-    for (float& x : coefficient) x /= total;
+  return total;
+}
+
+void add_scaled(ProbeLight& sum, const ProbeLight& light, float factor) {
+  for (std::size_t k = 0; k < kHarmonicCount; ++k) {
+    for (std::size_t c = 0; c < kChannelCount; ++c) sum[k][c] += factor * light[k][c];
   }
+}
+
+void divide(ProbeLight& light, float divisor) {
+  for (Float3& coefficient : light) {
+    for (float& x : coefficient) x /= divisor;
+  }
+}
+
+/// What probe `p` sees.
+ProbeLight light_of_probe(const LightProbes& probes, std::size_t p,
+                          std::span<const Float3> radiosity, const SeenSky<Harmonics>& sky) {
+  PlanarLight sum;
+  sum.add(sky.coefficients(p), sky.luminance());
+  for (std::uint32_t e = probes.entry_begin[p]; e < probes.entry_begin[p + 1]; ++e) {
+    sum.add(probes.entry_weight[e], radiosity[probes.entry_patch[e]]);
+  }
+  return sum.interleaved();
+}
+
+void check_size(std::size_t size, std::size_t wanted, const char* name) {
+  if (size == wanted) return;
+  throw Error(std::string("probes: ") + name + " has " + std::to_string(size) +
+              " entries; it must have " + std::to_string(wanted));
+}
+
+}  // namespace
+
+void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
+                  std::span<ProbeLight> light) {
+  check_size(light.size(), probes.size(), "the result");
+  if (probes.size() == 0) return;
+  check_size(radiosity.size(), probes.patch_count, "the radiosity");
+  const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
+#pragma omp parallel for schedule(static)
+  for (std::size_t p = 0; p < probes.size(); ++p) {
+    light[p] = light_of_probe(probes, p, radiosity, seen_sky);
+  }
+}
+
+Float3 probe_irradiance(const ProbeLight& light, const Float3& normal) {
+  return irradiance_of(light, normal);
+}
+
+ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,
+                              const Float3& position) {
+  ProbeLight sum{};
+  if (light.size() != probes.size()) return sum;
+  const float total = for_each_probe_around(probes, position, [&](std::size_t probe, float weight) {
+    add_scaled(sum, light[probe], weight);
+  });
+  if (total > 0) divide(sum, total);
+  return sum;
+}
+
+ProbeLight gather_probe_light(const LightProbes& probes, std::span<const Float3> radiosity,
+                              const Sky& sky, const Float3& position) {
+  check_size(radiosity.size(), probes.patch_count, "the radiosity");
+  const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
+  ProbeLight sum{};
+  const float total = for_each_probe_around(probes, position, [&](std::size_t probe, float weight) {
+    add_scaled(sum, light_of_probe(probes, probe, radiosity, seen_sky), weight);
+  });
+  if (total > 0) divide(sum, total);
   return sum;
 }
 

@@ -32,6 +32,10 @@ Float3 sky_luminance(const Sky& sky, const Float3& direction) {
   return scaled(sky, sky.distribution ? (*sky.distribution)[sky_cell(direction)] : 1.0F);
 }
 
+Float3 sky_luminance_unit(const Sky& sky) {
+  return scaled(sky, 1);
+}
+
 Float3 mean_sky_luminance(const Sky& sky) {
   if (!sky.distribution) return scaled(sky, 1);
   float sum = 0;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <string>
 
-#include "rebounce/runtime/sky_light.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/error.h"
+#include "seen_sky.h"
 
 namespace rebounce {
 namespace {
@@ -33,11 +33,11 @@ void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const 
   const std::size_t n = harmonics.sky.size();
   check_size(light.size(), n, "the result");
   check_size(radiosity.size(), n, "the radiosity");
-  const Float3 open_sky = mean_sky_luminance(sky);
+  const SeenSky seen_sky(harmonics.sky, harmonics.sky_cells, sky);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     SurfaceLight sum{};
-    add(sum, harmonics.sky[i], open_sky);
+    add(sum, seen_sky.coefficients(i), seen_sky.luminance());
     for (std::uint32_t e = harmonics.entry_begin[i]; e < harmonics.entry_begin[i + 1]; ++e) {
       add(sum, harmonics.entry_weight[e], radiosity[harmonics.entry_patch[e]]);
     }

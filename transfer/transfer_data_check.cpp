@@ -244,7 +244,26 @@ class Checker {
       index("probe.entry_patch", i, probes.entry_patch[i], data_.patches.size());
     }
     for (std::size_t i = 0; i < count; ++i) index("probe.valid", i, probes.valid[i], 2);
+    check_sky_harmonics({tensor::kProbeSkyBegin, "probe.sky_cell", "probe.sky_weight"}, count,
+                        probes.sky_cells);
     check_probe_grid();
+  }
+
+  struct SkyTensors {
+    const char *begin, *cell, *weight;
+  };
+
+  template <typename Weight>
+  void check_sky_harmonics(const SkyTensors& name, std::size_t places,
+                           const SkyHarmonics<Weight>& sky) const {
+    if (sky.empty()) return;
+    rows(name.begin, sky.entry_begin.size(), places + 1);
+    rows(name.weight, sky.entry_weight.size(), sky.entry_cell.size());
+    begins<std::uint32_t>(name.begin, sky.entry_begin, sky.entry_cell.size());
+    numbers(name.weight, sky.entry_weight, kFinite);
+    for (std::size_t i = 0; i < sky.entry_cell.size(); ++i) {
+      index(name.cell, i, sky.entry_cell[i], kSkyCellCount);
+    }
   }
 
   void check_probe_grid() const {
@@ -304,6 +323,9 @@ class Checker {
     for (std::size_t i = 0; i < entries; ++i) {
       index("surface_harmonics.entry_patch", i, light.entry_patch[i], n);
     }
+    check_sky_harmonics(
+        {tensor::kSurfaceSkyBegin, "surface_harmonics.sky_cell", "surface_harmonics.sky_weight"}, n,
+        light.sky_cells);
   }
 
   void check_exchange() const {

@@ -35,9 +35,11 @@ inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
 inline constexpr char kLinksPatch[] = "links.patch";
 inline constexpr char kProbePosition[] = "probe.position";
 inline constexpr char kProbeGrid[] = "probe.grid";
+inline constexpr char kProbeSkyBegin[] = "probe.sky_begin";
 inline constexpr char kLightmapSize[] = "lightmap.size";
 inline constexpr char kSkyBegin[] = "sky.entry_begin";
 inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
+inline constexpr char kSurfaceSkyBegin[] = "surface_harmonics.sky_begin";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
@@ -126,6 +128,13 @@ void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
 }
 
 template <typename Cells, typename Visit>
+void visit_tensors_of_probe_sky(Cells& cells, Visit&& visit) {
+  visit(tensor::kProbeSkyBegin, cells.entry_begin);
+  visit("probe.sky_cell", cells.entry_cell);
+  visit("probe.sky_weight", cells.entry_weight);
+}
+
+template <typename Cells, typename Visit>
 void visit_tensors_of_sky(Cells& cells, Visit&& visit) {
   visit(tensor::kSkyBegin, cells.entry_begin);
   visit("sky.entry_cell", cells.entry_cell);
@@ -138,6 +147,13 @@ void visit_tensors_of_surface_harmonics(Light& harmonics, Visit&& visit) {
   visit("surface_harmonics.entry_begin", harmonics.entry_begin);
   visit("surface_harmonics.entry_patch", harmonics.entry_patch);
   visit("surface_harmonics.entry_weight", harmonics.entry_weight);
+}
+
+template <typename Cells, typename Visit>
+void visit_tensors_of_surface_sky(Cells& cells, Visit&& visit) {
+  visit(tensor::kSurfaceSkyBegin, cells.entry_begin);
+  visit("surface_harmonics.sky_cell", cells.entry_cell);
+  visit("surface_harmonics.sky_weight", cells.entry_weight);
 }
 
 template <typename Map, typename Visit>

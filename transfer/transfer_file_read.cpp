@@ -351,9 +351,23 @@ std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
 void read_probes(const SafetensorsFile& file, TransferData& data) {
   if (!file.tensors().contains(tensor::kProbePosition)) return;
   visit_tensors_of_probes(data.probes, TensorReader(file));
+  if (file.tensors().contains(tensor::kProbeSkyBegin)) {
+    visit_tensors_of_probe_sky(data.probes.sky_cells, TensorReader(file));
+  }
   const auto grid = file.tensor<std::uint32_t>(tensor::kProbeGrid, {3});
   std::ranges::copy(grid, data.probes.grid.begin());
   data.probes.patch_count = data.patches.size();
+}
+
+/// A file without surface harmonics has no tensors of them.
+SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
+  SurfaceHarmonics harmonics;
+  if (!file.tensors().contains(tensor::kSurfaceSky)) return harmonics;
+  visit_tensors_of_surface_harmonics(harmonics, TensorReader(file));
+  if (file.tensors().contains(tensor::kSurfaceSkyBegin)) {
+    visit_tensors_of_surface_sky(harmonics.sky_cells, TensorReader(file));
+  }
+  return harmonics;
 }
 
 /// A file without a lightmap has no tensors of one.
@@ -386,9 +400,7 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   }
   read_probes(file, data);
   data.lightmap = read_lightmap(file);
-  if (file.tensors().contains(tensor::kSurfaceSky)) {
-    visit_tensors_of_surface_harmonics(data.surface_harmonics, TensorReader(file));
-  }
+  data.surface_harmonics = read_surface_harmonics(file);
   data.exchange = read_exchange(file);
   data.record = read_record(file);
   check_transfer_data(data, file.name());

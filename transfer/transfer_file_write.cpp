@@ -138,7 +138,15 @@ void collect_operator(const TransferOperator* transfer, TensorCollector& collect
 void collect_probes(const LightProbes& probes, TensorCollector& collector) {
   if (probes.size() == 0) return;
   visit_tensors_of_probes(probes, collector);
+  if (!probes.sky_cells.empty()) visit_tensors_of_probe_sky(probes.sky_cells, collector);
   collector.add<std::uint32_t>(tensor::kProbeGrid, {probes.grid.size()}, probes.grid);
+}
+
+/// Files without surface harmonics have no tensors of them.
+void collect_surface_harmonics(const SurfaceHarmonics& harmonics, TensorCollector& collector) {
+  if (harmonics.empty()) return;
+  visit_tensors_of_surface_harmonics(harmonics, collector);
+  if (!harmonics.sky_cells.empty()) visit_tensors_of_surface_sky(harmonics.sky_cells, collector);
 }
 
 /// Files without a lightmap have no tensors of one.
@@ -194,9 +202,7 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
   if (!data.sky_cells.empty()) visit_tensors_of_sky(data.sky_cells, collector);
   collect_probes(data.probes, collector);
   collect_lightmap(data.lightmap, collector);
-  if (!data.surface_harmonics.empty()) {
-    visit_tensors_of_surface_harmonics(data.surface_harmonics, collector);
-  }
+  collect_surface_harmonics(data.surface_harmonics, collector);
   collect_exchange(data.exchange, collector);
   if (!data.links.empty()) visit_tensors_of_links(data.links, collector);
   collect_operator(data.transfer.get(), collector);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "json_fields.h"
 #include "rebounce/transfer/error.h"
@@ -65,16 +66,29 @@ Field part_of(const Field& motion, const std::string& name) {
   return {part, motion.where + "." + name};
 }
 
-LightMotion read_motion(const Field& field, const Light& light) {
-  field.check_names({"light", "circle", "swing", "keys"});
+/// The motion that `field` names, of something at rest as `light` is; nothing if it names none.
+std::optional<LightMotion> read_motion(const Field& field, const Light& light) {
   const auto kinds =
       field.object.count("circle") + field.object.count("swing") + field.object.count("keys");
-  if (kinds != 1) {
+  if (kinds == 0) return std::nullopt;
+  if (kinds > 1) {
     throw Error(field.where + ": must have one of \"circle\", \"swing\" and \"keys\"");
   }
   if (field.object.contains("circle")) return read_circle(part_of(field, "circle"), light);
   if (field.object.contains("swing")) return read_swing(part_of(field, "swing"), light);
   return read_keys(field.object.at("keys"), field, light);
+}
+
+ViewerSphere read_sphere(const Field& field) {
+  field.check_names({"position", "radius", "color", "circle", "swing", "keys"});
+  ViewerSphere sphere;
+  sphere.position = field.triple("position", kAnyNumber, sphere.position);
+  sphere.radius = field.required_length("radius");
+  sphere.reflectance = field.triple("color", 0, sphere.reflectance);
+  Light at_rest;
+  at_rest.position = sphere.position;
+  if (const auto motion = read_motion(field, at_rest)) sphere.motion = *motion;
+  return sphere;
 }
 
 ViewerLight& light_of(const Field& field, std::vector<ViewerLight>& lights) {
@@ -87,18 +101,30 @@ ViewerLight& light_of(const Field& field, std::vector<ViewerLight>& lights) {
 
 }  // namespace
 
-float read_light_path(const std::filesystem::path& path, std::vector<ViewerLight>& lights) {
+float read_light_path(const std::filesystem::path& path, std::vector<ViewerLight>& lights,
+                      std::vector<ViewerSphere>& spheres) {
   const json document = read_json_object(path, "motions");
   const Field root{document, path.string()};
-  root.check_names({"frames_per_second", "motions"});
-  const json motions = document.value("motions", json::array());
-  if (!motions.is_array()) root.fail("motions", "an array");
-  for (std::size_t k = 0; k < motions.size(); ++k) {
-    const Field field{motions[k], fmt::format("{}: motion {}", path.string(), k)};
-    if (!motions[k].is_object()) throw Error(field.where + ": must be an object");
+  root.check_names({"frames_per_second", "motions", "spheres"});
+  const auto for_each = [&](const char* name, const char* item, const auto& take) {
+    const json list = document.value(name, json::array());
+    if (!list.is_array()) root.fail(name, "an array");
+    for (std::size_t k = 0; k < list.size(); ++k) {
+      const Field field{list[k], fmt::format("{}: {} {}", path.string(), item, k)};
+      if (!list[k].is_object()) throw Error(field.where + ": must be an object");
+      take(field);
+    }
+  };
+  for_each("motions", "motion", [&](const Field& field) {
+    field.check_names({"light", "circle", "swing", "keys"});
     ViewerLight& lamp = light_of(field, lights);
-    lamp.motion = read_motion(field, lamp.light);
-  }
+    const auto motion = read_motion(field, lamp.light);
+    if (!motion) {
+      throw Error(field.where + ": must have one of \"circle\", \"swing\" and \"keys\"");
+    }
+    lamp.motion = *motion;
+  });
+  for_each("spheres", "sphere", [&](const Field& field) { spheres.push_back(read_sphere(field)); });
   return positive(root, "frames_per_second", 30);
 }
 

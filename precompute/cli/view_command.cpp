@@ -9,10 +9,10 @@
 #include "light_file.h"
 #include "light_path_file.h"
 #include "method_names.h"
+#include "moving_sphere.h"
 #include "output_check.h"
 #include "picture_options.h"
 #include "rebounce/demo/key_light.h"
-#include "rebounce/demo/punctual_light.h"
 #include "rebounce/demo/viewer.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/engine.h"
@@ -27,7 +27,7 @@ struct ViewOptions {
   std::optional<float> exposure;
   std::string method = kTransferMethod, against;
   int sweeps = 1;
-  bool cold = false, panels = false;
+  bool cold = false, panels = false, sphere = false;
   std::string screenshot, path, out;
   int frames = 1;
 };
@@ -64,12 +64,13 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
   ViewerSetup setup;
   setup.title = "Rebounce: " + data->record.scene_name;
   std::tie(setup.width, setup.height) = parse_size(chosen.size);
-  // Shadow maps are of lamps without a surface.
-  for (const Light& light : lights.lights) {
-    setup.lights.push_back({.light = punctual_equivalent(light)});
-  }
+  for (const Light& light : lights.lights) setup.lights.push_back({.light = light});
   setup.sky = lights.sky;
   setup.camera = choose_camera(chosen.camera, engine);
+  if (chosen.sphere) {
+    setup.spheres.push_back(sphere_ahead(setup.camera, engine.tracer(), *data));
+  }
+  setup.make_probes = [data] { return make_probes_for_view(*data); };
   setup.show = parse_show(chosen.show);
   setup.exposure = chosen.exposure;
   setup.methods[0] = method_of(chosen.method, chosen);
@@ -133,7 +134,9 @@ void run(const ViewOptions& chosen, const CommonOptions& options) {
                         : load_lit_scene(chosen.file, chosen.lights, lights);
   ViewerSetup setup = make_setup(chosen, data);
   float frames_per_second = 30;
-  if (!chosen.path.empty()) frames_per_second = read_light_path(chosen.path, setup.lights);
+  if (!chosen.path.empty()) {
+    frames_per_second = read_light_path(chosen.path, setup.lights, setup.spheres);
+  }
   if (chosen.screenshot.empty() && chosen.out.empty()) {
     run_viewer(data, setup);
   } else {
@@ -148,7 +151,8 @@ void add_picture_options(CLI::App& command, ViewOptions& chosen) {
   screenshot->check([](const std::string& path) {
     return std::filesystem::path(path).extension() == ".png" ? "" : "must end in .png";
   });
-  command.add_option("--path", chosen.path, "How lamps move: a .json file (notes/viewer.md)");
+  command.add_option("--path", chosen.path,
+                     "How lamps and spheres move: a .json file (notes/viewer.md)");
   CLI::Option* out = command.add_option(
       "--out", chosen.out, "Write pictures frame_00000.png ... into this folder, without a window");
   out->excludes(screenshot);
@@ -185,6 +189,8 @@ void add_view_command(CLI::App& app, const CommonOptions& options) {
       ->capture_default_str();
   command->add_flag("--cold", chosen->cold,
                     "Iterative methods begin every frame anew, not from the one before");
+  command->add_flag("--sphere", chosen->sphere,
+                    "A sphere that moves in front of the camera, lit by light probes");
   add_picture_options(*command, *chosen);
   command->callback([chosen, &options] { run(*chosen, options); });
 }

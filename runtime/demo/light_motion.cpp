@@ -33,36 +33,47 @@ Float3 unit_or(const Float3& v, const Float3& otherwise) {
   return length > 1e-6F ? to_float3(to_glm(v) / length) : otherwise;
 }
 
-void follow_keys(Light& light, const std::vector<LightMotion::Key>& keys, float time) {
+// The keys before and after a time, and the part of the way between them.
+struct BetweenKeys {
+  const LightMotion::Key &a, &b;
+  float way;
+};
+
+BetweenKeys find_keys(const std::vector<LightMotion::Key>& keys, float time) {
   const float end = keys.back().time;
   if (end > 0) time = std::fmod(time, end);
   const auto next = std::ranges::upper_bound(keys, time, {}, &LightMotion::Key::time);
   const auto& b = next == keys.end() ? keys.back() : *next;
   const auto& a = next == keys.begin() ? b : *(next - 1);
-  const float way = b.time > a.time ? (time - a.time) / (b.time - a.time) : 0;
-  light.position = mixed(a.position, b.position, way);
-  light.direction = unit_or(mixed(a.direction, b.direction, way), light.direction);
-  light.color = mixed(a.color, b.color, way);
-  light.intensity = a.intensity + way * (b.intensity - a.intensity);
+  return {a, b, b.time > a.time ? (time - a.time) / (b.time - a.time) : 0};
 }
 
 }  // namespace
 
-Light moved(const Light& light, const LightMotion& motion, float time) {
-  Light now = light;
+Float3 moved(const Float3& position, const LightMotion& motion, float time) {
   switch (motion.kind) {
+    case LightMotion::Kind::kCircle:
+      return on_circle(motion, time);
+    case LightMotion::Kind::kSwing:
+      return on_swing(motion, time);
+    case LightMotion::Kind::kKeys: {
+      const auto [a, b, way] = find_keys(motion.keys, time);
+      return mixed(a.position, b.position, way);
+    }
     case LightMotion::Kind::kStill:
       break;
-    case LightMotion::Kind::kCircle:
-      now.position = on_circle(motion, time);
-      break;
-    case LightMotion::Kind::kSwing:
-      now.position = on_swing(motion, time);
-      break;
-    case LightMotion::Kind::kKeys:
-      follow_keys(now, motion.keys, time);
-      break;
   }
+  return position;
+}
+
+Light moved(const Light& light, const LightMotion& motion, float time) {
+  Light now = light;
+  now.position = moved(light.position, motion, time);
+  if (motion.kind != LightMotion::Kind::kKeys) return now;
+  const auto [a, b, way] = find_keys(motion.keys, time);
+  now.direction = unit_or(mixed(a.direction, b.direction, way), light.direction);
+  now.color = mixed(a.color, b.color, way);
+  now.intensity = a.intensity + way * (b.intensity - a.intensity);
   return now;
 }
 

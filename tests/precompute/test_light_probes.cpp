@@ -104,6 +104,40 @@ TEST(LightProbes, IrradianceIsThatOfABruteForceGather) {
   EXPECT_LE(lamp_error, 0.08);
 }
 
+TEST(LightProbes, WhatMovesThroughThemDoesNotPop) {
+  const auto data = std::make_shared<const TransferData>(cornell_box());
+  Engine engine(data);
+  engine.relight({}, {});
+  std::vector<ProbeLight> light(data->probes.size());
+  apply_probes(data->probes, engine.radiosity(), {}, light);
+  // The largest change of the irradiance in one of `steps` from wall to wall, between the blocks
+  // and over them, past probes that are within one.
+  const auto largest_change = [&](int steps) {
+    double largest = 0;
+    std::array<Float3, 6> before{};
+    for (int k = 0; k <= steps; ++k) {
+      const float t = static_cast<float>(k) / static_cast<float>(steps);
+      const Float3 place = {0.05F + 0.45F * t, 0.1F + 0.3F * t, 0.25F * t};
+      const ProbeLight found = gather_probe_light(data->probes, engine.radiosity(), {}, place);
+      EXPECT_GT(found[0][0], 0);
+      const ProbeLight same = interpolate_probes(data->probes, light, place);
+      for (std::size_t axis = 0; axis < 6; ++axis) {
+        Float3 normal{0, 0, 0};
+        normal[axis / 2] = axis % 2 == 0 ? 1.0F : -1.0F;
+        const Float3 irradiance = probe_irradiance(found, normal);
+        EXPECT_NEAR(irradiance[0], probe_irradiance(same, normal)[0], 1e-4 * found[0][0]);
+        if (k > 0) {
+          largest = std::max(largest, std::abs(double{irradiance[0]} - before[axis][0]));
+        }
+        before[axis] = irradiance;
+      }
+    }
+    return largest;
+  };
+  // A jump would stay as large as it is, however small the steps.
+  EXPECT_LE(largest_change(1600), 0.3 * largest_change(400));
+}
+
 TEST(LightProbes, TheFileKeepsThem) {
   const test::TemporaryFolder folder;
   save_transfer_file(folder / "probes.safetensors", cornell_box());
@@ -112,6 +146,10 @@ TEST(LightProbes, TheFileKeepsThem) {
   EXPECT_EQ(a.position, b.position);
   EXPECT_EQ(a.valid, b.valid);
   EXPECT_EQ(a.sky, b.sky);
+  EXPECT_EQ(a.sky_cells.entry_begin, b.sky_cells.entry_begin);
+  EXPECT_EQ(a.sky_cells.entry_cell, b.sky_cells.entry_cell);
+  EXPECT_EQ(a.sky_cells.entry_weight, b.sky_cells.entry_weight);
+  EXPECT_FALSE(b.sky_cells.entry_cell.empty());  // the box is open in front
   EXPECT_EQ(a.entry_begin, b.entry_begin);
   EXPECT_EQ(a.entry_patch, b.entry_patch);
   EXPECT_EQ(a.entry_weight, b.entry_weight);
@@ -145,7 +183,7 @@ TEST(LightProbes, BehindWallsTheyAreNotValid) {
   LightProbes probes;
   const Float3 middle = data.probes.position[1 + 4 * (1 + 3 * 1)];
   probes.position = {middle, {middle[0], middle[1] - 10, middle[2]}};
-  trace_probes(data, tracer, {}, probes);
+  trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
   EXPECT_EQ(probes.valid[0], 1);
 }
 
@@ -155,10 +193,10 @@ TEST(LightProbes, SameBitsForAnyNumberOfThreads) {
   LightProbes probes = place_probes(data.mesh, {.grid = {3, 2, 2}});
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
-  trace_probes(data, tracer, {}, probes);
+  trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
   const auto one = probes.entry_weight;
   omp_set_num_threads(4);
-  trace_probes(data, tracer, {}, probes);
+  trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
   omp_set_num_threads(before);
   EXPECT_EQ(one, probes.entry_weight);
 }
@@ -170,8 +208,9 @@ TEST(LightProbes, SpacingAndLimits) {
   EXPECT_GE(probes.grid[0], 2U);
   test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "further apart");
   LightProbes few = place_probes(data.mesh, {.grid = {1, 1, 1}});
-  test::expect_error([&] { trace_probes(data, tracer_of(data), {.ray_count = 3}, few); },
-                     "64 rays");
+  test::expect_error(
+      [&] { trace_probes(data, data.mesh.triangle_patch, tracer_of(data), {.ray_count = 3}, few); },
+      "64 rays");
 }
 
 }  // namespace

@@ -165,6 +165,9 @@ TEST(SurfaceHarmonics, TheFileKeepsThemAndAFrameAllocatesNothing) {
   const TransferData read = load_transfer_file(folder / "box.safetensors");
   const SurfaceHarmonics &a = cornell_box()->surface_harmonics, &b = read.surface_harmonics;
   EXPECT_EQ(a.sky, b.sky);
+  EXPECT_EQ(a.sky_cells.entry_begin, b.sky_cells.entry_begin);
+  EXPECT_EQ(a.sky_cells.entry_cell, b.sky_cells.entry_cell);
+  EXPECT_EQ(a.sky_cells.entry_weight, b.sky_cells.entry_weight);
   EXPECT_EQ(a.entry_begin, b.entry_begin);
   EXPECT_EQ(a.entry_patch, b.entry_patch);
   EXPECT_EQ(a.entry_weight, b.entry_weight);
@@ -184,13 +187,17 @@ TEST(SurfaceHarmonics, SameBitsForAnyNumberOfThreads) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
-  const SurfaceHarmonics one = trace_surface_harmonics(data, tracer, {.ray_count = 64});
+  const SurfaceHarmonics one =
+      trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64});
   omp_set_num_threads(4);
-  const SurfaceHarmonics four = trace_surface_harmonics(data, tracer, {.ray_count = 64});
+  const SurfaceHarmonics four =
+      trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64});
   omp_set_num_threads(before);
   EXPECT_EQ(one.entry_weight, four.entry_weight);
   EXPECT_EQ(one.sky, four.sky);
-  test::expect_error([&] { trace_surface_harmonics(data, tracer, {.ray_count = 3}); }, "16 rays");
+  test::expect_error(
+      [&] { trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 3}); },
+      "16 rays");
 }
 
 }  // namespace

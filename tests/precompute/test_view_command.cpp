@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -112,6 +113,104 @@ TEST_F(ViewCommand, LooksAsThePictureOfRender) {
   EXPECT_LT(difference(image, read_image(path("render.png"))).mean, 2.0);
 }
 
+TEST_F(ViewCommand, LampsWithASurfaceLookAsRenderDrawsThem) {
+  // The camera looks in from the front; the lamps hang above its view.
+  const std::string place = R"("position": [0.278, 0.53, 0.28], )";
+  const std::vector<std::string> lamps = {
+      R"({"type": "sphere", "radius": 0.015, "intensity": 30000, )" + place + R"("range": 0})",
+      R"({"type": "rectangle", "width": 0.2, "height": 0.1, "intensity": 1500, )" + place +
+          R"("direction": [0, -1, 0]})",
+      R"({"type": "disc", "radius": 0.08, "intensity": 1500, )" + place +
+          R"("direction": [0, -1, 0]})"};
+  for (const std::string& lamp : lamps) {
+    const std::string lights = write("area.lights.json", R"({"lights": [)" + lamp + "]}");
+    const Outcome outcome = run({"render", file_, "--lights", lights, "--size", "240x160",
+                                 "--quiet", "--exposure", "-7", "-o", path("render.png")});
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    const Image drawn = read_image(path("render.png"));
+    EXPECT_GT(drawn.mean(0), 20) << lamp;
+    const Image image = screenshot({"--lights", lights, "--exposure", "-7"});
+    // Half shadows are a guess; see the shader.
+    EXPECT_LT(difference(image, drawn).mean, 2.5) << lamp;
+  }
+}
+
+TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {
+  const std::string lights = write("sky.lights.json", R"({"sky":
+      {"luminance": 300, "cie": 12, "sunDirection": [-1, -0.3, 0.4], "groundReflectance": 0.6}})");
+  const Words light = {"--lights", lights, "--exposure", "-8"};
+  Words words = {"render", file_, "--size", "240x160", "--quiet", "-o", path("render.png")};
+  words.insert(words.end(), light.begin(), light.end());
+  const Outcome outcome = run(words);
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image drawn = read_image(path("render.png"));
+  EXPECT_GT(drawn.mean(0), 20);
+  EXPECT_LT(difference(screenshot(light), drawn).mean, 2.0);
+}
+
+TEST_F(ViewCommand, WhatIsMaskedAwayIsNotDrawn) {
+  std::ifstream scene(kScene);
+  json document = json::parse(scene);
+  json& red = document["materials"][2];
+  red["alphaMode"] = "MASK";
+  red["pbrMetallicRoughness"]["baseColorFactor"][3] = 0.2;
+  const std::string masked = write("masked.gltf", document.dump());
+  const Words light = {"--lights", kLights, "--exposure", "-4", "--size", "240x160", "--quiet"};
+  const auto draw = [&](Words words, const std::string& picture) {
+    words.insert(words.end(), light.begin(), light.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    return read_image(picture);
+  };
+  const std::string file = path("masked.safetensors");
+  ASSERT_EQ(run({"precompute", masked, "--patches", "120", "--quiet", "-o", file}).exit_code,
+            kDone);
+  const Image image = draw({"view", file, "--screenshot", path("masked.png")}, path("masked.png"));
+  const Image drawn = draw({"render", file, "-o", path("render.png")}, path("render.png"));
+  EXPECT_LT(difference(image, drawn).mean, 2.0);
+  EXPECT_GT(difference(image, screenshot({"--lights", kLights, "--exposure", "-4"})).mean, 5);
+}
+
+TEST_F(ViewCommand, ASphereTakesTheColourOfTheWallsThatItFaces) {
+  const std::string still = write("still.json", R"({"spheres":
+      [{"position": [0.278, 0.3, 0.1], "radius": 0.08, "color": [0.9, 0.9, 0.9]}]})");
+  const Words words = {"--lights", kLights, "--show", "indirect", "--exposure", "-3"};
+  const Image without = screenshot(words);
+  Words with = words;
+  with.insert(with.end(), {"--path", still});
+  const Image image = screenshot(with);
+  // By columns, of the pixels that the sphere changes.
+  std::vector<int> columns;
+  std::vector<double> redness;
+  for (int x = 0; x < image.width; ++x) {
+    double red = 0, green = 0;
+    for (int y = 0; y < image.height; ++y) {
+      const auto k = static_cast<std::size_t>(3 * (y * image.width + x));
+      if (image.rgb[k] == without.rgb[k] && image.rgb[k + 1] == without.rgb[k + 1]) continue;
+      red += image.rgb[k];
+      green += image.rgb[k + 1];
+    }
+    if (red + green == 0) continue;
+    columns.push_back(x);
+    redness.push_back(red / green);
+  }
+  ASSERT_GT(columns.size(), 20U);
+  const std::size_t quarter = columns.size() / 4;
+  // The left wall is red, the right one green.
+  EXPECT_GT(redness[quarter], 1.15 * redness[columns.size() - quarter]);
+}
+
+TEST_F(ViewCommand, ASphereCastsShadowsAndCanBeLeftOut) {
+  const Words words = {"--lights", kLights, "--show", "direct", "--exposure", "-4"};
+  const Image without = screenshot(words);
+  Words with = words;
+  with.push_back("--sphere");
+  EXPECT_GT(difference(screenshot(with), without).mean, 0.5);
+  Words panels = with;
+  panels.push_back("--panels");
+  EXPECT_GT(difference(screenshot(panels), without).mean, 5);
+}
+
 TEST_F(ViewCommand, AddsUpDirectAndBouncedLight) {
   const Words common = {"--lights", kScenes + "spot_on_red_wall.lights.json", "--exposure", "-5"};
   const auto show = [&](const std::string& what) {
@@ -175,6 +274,26 @@ TEST_F(ViewCommand, MovesLampsSmoothlyAlongAPath) {
   }
 }
 
+TEST_F(ViewCommand, ASphereDoesNotPopOnItsWay) {
+  // At even speed, past the blocks and through cells of probes of which some are within them.
+  const std::string motion = write("sphere.json", R"({"frames_per_second": 8, "spheres":
+      [{"radius": 0.05, "keys": [{"time": 0, "position": [0.1, 0.42, 0.0]},
+                                 {"time": 1, "position": [0.45, 0.36, 0.3]}]}]})");
+  summary_of({"view", file_, "--lights", kLights, "--size", "120x80", "--exposure", "-4", "--path",
+              motion, "--frames", "8", "--out", path("film")});
+  std::vector<double> change;
+  for (int k = 0; k < 7; ++k) {
+    const auto frame = [&](int n) {
+      return read_image(path("film/frame_0000" + std::to_string(n) + ".png"));
+    };
+    change.push_back(difference(frame(k), frame(k + 1)).mean);
+  }
+  const double largest = *std::ranges::max_element(change);
+  std::ranges::sort(change);
+  EXPECT_GT(change.front(), 0.02);
+  EXPECT_LT(largest, 2 * change[change.size() / 2]);
+}
+
 TEST_F(ViewCommand, RefusesPathsThatMakeNoSense) {
   const auto refused = [&](const std::string& text, const std::string& part) {
     const std::string motion = write("path.json", text);
@@ -193,6 +312,10 @@ TEST_F(ViewCommand, RefusesPathsThatMakeNoSense) {
   refused(R"({"motions": [{"keys": []}]})", "keys");
   refused(R"({"motions": [{"keys": [{"time": 2}, {"time": 1}]}]})", "key 1: \"time\"");
   refused(R"({"frames_per_second": 0})", "frames_per_second");
+  refused(R"({"spheres": {}})", "spheres");
+  refused(R"({"spheres": [{"position": [0, 1, 0]}]})", "sphere 0: \"radius\"");
+  refused(R"({"spheres": [{"radius": 1, "circle": {}, "swing": {}}]})", "must have one of");
+  refused(R"({"spheres": [{"radius": 1, "light": 0}]})", "unknown field");
 }
 
 TEST_F(ViewCommand, SaysInOneLineThatThereIsNoDisplay) {

@@ -536,6 +536,7 @@ LightProbes sample_probes() {
   probes.entry_begin = {0, 3, 3};
   probes.entry_patch = {0, 1, 2};
   probes.entry_weight = {Harmonics{1}, Harmonics{0, -1}, Harmonics{2}};
+  probes.sky_cells = {{0, 2, 2}, {0, 145}, {Harmonics{1}, Harmonics{2}}};
   probes.grid = {2, 1, 1};
   return probes;
 }
@@ -560,6 +561,13 @@ TEST(TransferFile, RefusesImpossibleProbes) {
       {"probe.entry_patch: entry 1 is 3", probes([](auto& p) { p.entry_patch[1] = 3; })},
       {"probe.entry_weight", probes([](auto& p) { p.entry_weight[2][0] = kNan; })},
       {"probe.entry_weight", probes([](auto& p) { p.entry_weight.pop_back(); })},
+      {"probe.sky_begin: 2 rows, not 3",
+       probes([](auto& p) { p.sky_cells.entry_begin.pop_back(); })},
+      {"probe.sky_begin: descends", probes([](auto& p) { p.sky_cells.entry_begin[1] = 3; })},
+      {"probe.sky_cell: entry 1 is 146", probes([](auto& p) { p.sky_cells.entry_cell[1] = 146; })},
+      {"probe.sky_weight: 1 rows, not 2",
+       probes([](auto& p) { p.sky_cells.entry_weight.pop_back(); })},
+      {"probe.sky_weight", probes([](auto& p) { p.sky_cells.entry_weight[0][3] = kNan; })},
       {"probe.grid", probes([](auto& p) {
          p.grid = {1, 1, 1};
        })},
@@ -653,12 +661,19 @@ TEST(TransferFile, RefusesImpossibleSurfaceHarmonics) {
       light.entry_begin = {0, 2, 2, 3};
       light.entry_patch = {1, 2, 0};
       light.entry_weight.assign(3, LinearHarmonics{1});
+      light.sky_cells = {{0, 0, 1, 1}, {7}, {LinearHarmonics{1}}};
       change(light);
     };
   };
   expect_refused({
       {"surface_harmonics.sky: 2 rows, not 3", harmonics([](auto& h) { h.sky.pop_back(); })},
       {"surface_harmonics.sky", harmonics([](auto& h) { h.sky[1][3] = kNan; })},
+      {"surface_harmonics.sky_begin: 3 rows, not 4",
+       harmonics([](auto& h) { h.sky_cells.entry_begin.pop_back(); })},
+      {"surface_harmonics.sky_cell: entry 0 is 200",
+       harmonics([](auto& h) { h.sky_cells.entry_cell[0] = 200; })},
+      {"surface_harmonics.sky_weight",
+       harmonics([](auto& h) { h.sky_cells.entry_weight[0][0] = kInfinity; })},
       {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin.pop_back(); })},
       {"surface_harmonics.entry_begin", harmonics([](auto& h) { h.entry_begin[1] = 4; })},
       {"surface_harmonics.entry_weight: 3 rows",

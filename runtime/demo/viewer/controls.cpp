@@ -59,15 +59,46 @@ Light light_now(const ViewerState& state, const ViewerLight& lamp) {
   return moved(lamp.light, lamp.motion, state.time);
 }
 
+bool shines_one_way(const Light& light) {
+  return light.type == LightType::kSpot || light.type == LightType::kRectangle ||
+         light.type == LightType::kDisc;
+}
+
+void shift_all(Float3& position, LightMotion& motion, const glm::vec3& shift) {
+  const auto move = [&](Float3& point) { point = to_float3(to_glm(point) + shift); };
+  move(position);
+  move(motion.center);
+  move(motion.from);
+  move(motion.to);
+  for (LightMotion::Key& key : motion.keys) move(key.position);
+}
+
+// By how much the mouse has moved something at `place`: in the plane of the view, or with Shift
+// away from the camera and back.
+glm::vec3 dragged(const Camera& camera, const Float3& place) {
+  const ImGuiIO& io = ImGui::GetIO();
+  const float metres = metres_per_pixel(camera, depth_of(camera, to_glm(place)));
+  const glm::vec3 upwards = io.KeyShift ? -to_glm(camera.backward) : to_glm(camera.up);
+  return metres * (io.MouseDelta.x * to_glm(camera.right) - io.MouseDelta.y * upwards);
+}
+
+// Metres along the unit `direction` from `eye` to a sphere; infinite if it is missed.
+float distance_to(const ViewerSphere& sphere, const glm::vec3& eye, const glm::vec3& direction) {
+  const glm::vec3 to_center = to_glm(sphere.position) - eye;
+  const float along = glm::dot(to_center, direction);
+  const float half = sphere.radius * sphere.radius + along * along - glm::dot(to_center, to_center);
+  if (half < 0 || along <= 0) return std::numeric_limits<float>::infinity();
+  return along - std::sqrt(half);
+}
+
 }  // namespace
 
 void shift_lamp(ViewerLight& lamp, const glm::vec3& shift) {
-  const auto move = [&](Float3& point) { point = to_float3(to_glm(point) + shift); };
-  move(lamp.light.position);
-  move(lamp.motion.center);
-  move(lamp.motion.from);
-  move(lamp.motion.to);
-  for (LightMotion::Key& key : lamp.motion.keys) move(key.position);
+  shift_all(lamp.light.position, lamp.motion, shift);
+}
+
+void shift_sphere(ViewerSphere& sphere, const glm::vec3& shift) {
+  shift_all(sphere.position, sphere.motion, shift);
 }
 
 void Controls::update(ViewerState& state) {
@@ -88,6 +119,7 @@ void Controls::press_keys(ViewerState& state) const {
   if (ImGui::IsKeyPressed(GLFW_KEY_SPACE, false)) state.playing = !state.playing;
   if (ImGui::IsKeyPressed(GLFW_KEY_TAB, false)) state.shows_panels = !state.shows_panels;
   if (ImGui::IsKeyPressed(GLFW_KEY_F, false)) state.is_split = !state.is_split;
+  if (ImGui::IsKeyPressed(GLFW_KEY_B, false)) state.shows_spheres = !state.shows_spheres;
   if (ImGui::IsKeyPressed(GLFW_KEY_X, false)) state.wants_exposure = true;
 }
 
@@ -119,49 +151,80 @@ std::optional<std::size_t> Controls::lamp_under_mouse(const ViewerState& state) 
   return nearest;
 }
 
-float Controls::distance_ahead(const FlyCamera& camera) const {
-  const std::array ray = {Ray{.origin = to_float3(camera.position()),
+float Controls::distance_along(const glm::vec3& origin, const glm::vec3& direction) const {
+  const std::array ray = {Ray{.origin = to_float3(origin),
                               .t_near = 0,
-                              .direction = to_float3(camera.forward()),
+                              .direction = to_float3(direction),
                               .t_far = std::numeric_limits<float>::infinity()}};
   std::array<Hit, 1> hit;
   scene_.engine().tracer().intersect(ray, hit);
   return hit[0].triangle == kNone ? 0.5F * bounds_.diagonal() : hit[0].t;
 }
 
+std::optional<std::size_t> Controls::sphere_under_mouse(const ViewerState& state) const {
+  const Camera camera = state.camera.camera();
+  const ImVec2 mouse = ImGui::GetIO().MousePos;
+  const glm::vec2 off =
+      (glm::vec2(mouse.x, mouse.y) - 0.5F * screen_size()) * metres_per_pixel(camera, 1);
+  const glm::vec3 eye = to_glm(camera.position);
+  const glm::vec3 direction = glm::normalize(off.x * to_glm(camera.right) -
+                                             off.y * to_glm(camera.up) - to_glm(camera.backward));
+  std::optional<std::size_t> nearest;
+  float least = distance_along(eye, direction);
+  for (std::size_t k = 0; k < state.spheres.size(); ++k) {
+    ViewerSphere sphere = state.spheres[k];
+    if (!sphere.on || !state.shows_spheres) continue;
+    sphere.position = moved(sphere.position, sphere.motion, state.time);
+    const float distance = distance_to(sphere, eye, direction);
+    if (distance >= least) continue;
+    least = distance;
+    nearest = k;
+  }
+  return nearest;
+}
+
 void Controls::drag_lamp(ViewerState& state) const {
   ViewerLight& lamp = state.lights[state.selected];
-  const Camera camera = state.camera.camera();
-  const float depth = depth_of(camera, to_glm(light_now(state, lamp).position));
-  const ImGuiIO& io = ImGui::GetIO();
-  const float metres = metres_per_pixel(camera, depth);
-  // With Shift away from the camera and back, else in the plane of the view.
-  const glm::vec3 upwards = io.KeyShift ? -to_glm(camera.backward) : to_glm(camera.up);
-  shift_lamp(lamp, metres * (io.MouseDelta.x * to_glm(camera.right) - io.MouseDelta.y * upwards));
+  shift_lamp(lamp, dragged(state.camera.camera(), light_now(state, lamp).position));
+}
+
+void Controls::drag_sphere(ViewerState& state) const {
+  ViewerSphere& sphere = state.spheres[state.selected_sphere];
+  shift_sphere(sphere,
+               dragged(state.camera.camera(), moved(sphere.position, sphere.motion, state.time)));
+}
+
+void Controls::take_hold(ViewerState& state) {
+  const auto lamp = lamp_under_mouse(state);
+  const auto sphere = lamp ? std::nullopt : sphere_under_mouse(state);
+  dragging_lamp_ = lamp.has_value();
+  dragging_sphere_ = sphere.has_value();
+  turning_ = !dragging_lamp_ && !dragging_sphere_;
+  if (lamp) state.selected = *lamp;
+  if (sphere) state.selected_sphere = *sphere;
 }
 
 void Controls::steer(ViewerState& state) {
   const ImGuiIO& io = ImGui::GetIO();
   if (!io.WantCaptureMouse) {
-    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) {
-      const auto lamp = lamp_under_mouse(state);
-      dragging_lamp_ = lamp.has_value();
-      turning_ = !dragging_lamp_;
-      if (lamp) state.selected = *lamp;
-    }
+    if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) take_hold(state);
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Right)) {
       orbiting_ = true;
       orbit_target_ =
-          state.camera.position() + distance_ahead(state.camera) * state.camera.forward();
+          state.camera.position() +
+          distance_along(state.camera.position(), state.camera.forward()) * state.camera.forward();
     }
     if (io.MouseWheel != 0) {
       state.camera.move({0, 0, 0.05F * io.MouseWheel * bounds_.diagonal()});
     }
   }
-  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) dragging_lamp_ = turning_ = false;
+  if (!ImGui::IsMouseDown(ImGuiMouseButton_Left)) {
+    dragging_lamp_ = dragging_sphere_ = turning_ = false;
+  }
   if (!ImGui::IsMouseDown(ImGuiMouseButton_Right)) orbiting_ = false;
   const float left = kTurnPerPixel * io.MouseDelta.x, up = kTurnPerPixel * io.MouseDelta.y;
   if (dragging_lamp_ && state.selected < state.lights.size()) drag_lamp(state);
+  if (dragging_sphere_ && state.selected_sphere < state.spheres.size()) drag_sphere(state);
   if (turning_) state.camera.turn(left, up);
   if (orbiting_) state.camera.orbit(orbit_target_, -left, -up);
 }
@@ -179,7 +242,7 @@ void Controls::draw_handles(const ViewerState& state) const {
     list->AddCircle(place, kHandleRadius, IM_COL32(20, 20, 20, 255), 0, 3);
     list->AddCircle(place, kHandleRadius + 1,
                     selected ? IM_COL32(255, 170, 40, 255) : IM_COL32(240, 240, 240, 255), 0, 2);
-    if (light.type != LightType::kSpot) continue;
+    if (!shines_one_way(light)) continue;
     const glm::vec3 tip =
         to_glm(light.position) + 0.08F * bounds_.diagonal() * to_glm(light.direction);
     if (const auto end = to_screen(camera, tip)) {

@@ -9,7 +9,8 @@
 
 namespace rebounce {
 
-/// Mouse and keys, apart from the panels: steers the camera and drags lamps, whose handles it draws
+/// Mouse and keys, apart from the panels: steers the camera and drags spheres and lamps, whose
+/// handles it draws
 /// over the picture. Works on ImGui's input of the current frame.
 class Controls {
  public:
@@ -25,16 +26,22 @@ class Controls {
   void fly(ViewerState& state) const;
   void press_keys(ViewerState& state) const;
   void drag_lamp(ViewerState& state) const;
+  void drag_sphere(ViewerState& state) const;
+  void take_hold(ViewerState& state);
   std::optional<std::size_t> lamp_under_mouse(const ViewerState& state) const;
-  float distance_ahead(const FlyCamera& camera) const;
+  std::optional<std::size_t> sphere_under_mouse(const ViewerState& state) const;
+  float distance_along(const glm::vec3& origin, const glm::vec3& direction) const;
 
   const LitScene& scene_;
   const SceneBounds& bounds_;
-  bool dragging_lamp_ = false, turning_ = false, orbiting_ = false;
+  bool dragging_lamp_ = false, dragging_sphere_ = false, turning_ = false, orbiting_ = false;
   glm::vec3 orbit_target_{0};
 };
 
 /// Moves a lamp and the way it moves on by `shift` metres.
 void shift_lamp(ViewerLight& lamp, const glm::vec3& shift);
+
+/// The same with a sphere.
+void shift_sphere(ViewerSphere& sphere, const glm::vec3& shift);
 
 }  // namespace rebounce

@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "color_map.h"
+#include "rebounce/demo/punctual_light.h"
 
 namespace rebounce {
 namespace {
@@ -18,10 +19,22 @@ double microseconds_of(const Work& work) {
   return time.count();
 }
 
+// Lamps as the picture draws them, where a luminaire shines alike in all directions.
+std::vector<Light> without_profiles(std::vector<Light> lights) {
+  for (Light& light : lights) {
+    if (light.profile) light = punctual_equivalent(light);
+  }
+  return lights;
+}
+
+bool has_same_place(const ViewerSphere& a, const ViewerSphere& b) {
+  return a.position == b.position && a.radius == b.radius;
+}
+
 }  // namespace
 
 FrameDrawer::FrameDrawer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup)
-    : lit_(data, setup.reference), gpu_(*data), renderer_(gpu_, data->mesh) {}
+    : lit_(data, setup.reference, setup.make_probes), gpu_(*data), renderer_(gpu_, data->mesh) {}
 
 void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebuffer) {
   const std::vector<Light> lights = state.lights_now();
@@ -31,14 +44,21 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
     state.wants_exposure = false;
   }
   if (state.show == Show::kError) compare(state);
-  times_.upload = microseconds_of([&] { upload(state); });
-  times_.shadows = microseconds_of([&] { renderer_.update_shadows(lights); });
+  const std::vector<Light> lamps = without_profiles(lights);
+  times_.upload = microseconds_of([&] {
+    upload(state);
+    std::vector<ViewerSphere> spheres = state.spheres_now();
+    renderer_.set_bodies(make_spheres(spheres, state),
+                         std::ranges::equal(spheres, spheres_, has_same_place), lamps);
+    spheres_ = std::move(spheres);
+  });
+  times_.shadows = microseconds_of([&] { renderer_.update_shadows(lamps); });
   FrameSettings frame{.width = width,
                       .height = height,
                       .camera = state.camera.camera(),
                       .show = state.show,
                       .exposure = state.exposure,
-                      .lights = lights,
+                      .lights = lamps,
                       .sky = state.sky};
   if (state.is_split) frame.split = state.split;
   times_.draw = microseconds_of([&] { renderer_.draw(frame, framebuffer); });
@@ -59,6 +79,22 @@ void FrameDrawer::upload(const ViewerState& state) {
   gpu_.upload_first_flight(lit_.first_flight_at_vertices(state.sky));
   gpu_.upload_bounced(Side::kFirst, lit_.bounced_at_vertices(Side::kFirst));
   if (state.is_split) gpu_.upload_bounced(Side::kSecond, lit_.bounced_at_vertices(Side::kSecond));
+}
+
+BodyMesh FrameDrawer::make_spheres(std::span<const ViewerSphere> spheres,
+                                   const ViewerState& state) {
+  BodyMesh mesh;
+  for (const ViewerSphere& sphere : spheres) {
+    const LightInAir light = lit_.light_in_air(sphere.position, state.sky, state.is_split);
+    const auto shade = [&](const Float3& normal) {
+      return BodyVertex{.color = sphere.reflectance,
+                        .first_flight = probe_irradiance(light.first_flight, normal),
+                        .bounced = {probe_irradiance(light.bounced[0], normal),
+                                    probe_irradiance(light.bounced[1], normal)}};
+    };
+    add_sphere(sphere.position, sphere.radius, shade, mesh);
+  }
+  return mesh;
 }
 
 void FrameDrawer::compare(const ViewerState& state) {

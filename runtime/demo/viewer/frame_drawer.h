@@ -2,6 +2,7 @@
 
 #include <array>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "gpu_scene.h"
@@ -29,12 +30,14 @@ class FrameDrawer {
  private:
   void upload(const ViewerState& state);
   void compare(const ViewerState& state);
+  BodyMesh make_spheres(std::span<const ViewerSphere> spheres, const ViewerState& state);
   void upload_errors();
 
   LitScene lit_;
   GpuScene gpu_;
   SceneRenderer renderer_;
   StageTimes times_;
+  std::vector<ViewerSphere> spheres_;                       // of the last frame
   std::array<std::vector<float>, kSideCount> patch_error_;  // empty: not shown
   float error_top_ = 0;                                     // at the top of the colour map
 };

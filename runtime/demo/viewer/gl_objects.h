@@ -48,10 +48,16 @@ struct GlRenderbufferTraits {
   static void remove(const GLuint* name) { glDeleteRenderbuffers(1, name); }
 };
 
+struct GlSamplerTraits {
+  static void generate(GLuint* name) { glGenSamplers(1, name); }
+  static void remove(const GLuint* name) { glDeleteSamplers(1, name); }
+};
+
 using GlBuffer = GlObject<GlBufferTraits>;
 using GlTexture = GlObject<GlTextureTraits>;
 using GlVertexArray = GlObject<GlVertexArrayTraits>;
 using GlFramebuffer = GlObject<GlFramebufferTraits>;
+using GlSampler = GlObject<GlSamplerTraits>;
 using GlRenderbuffer = GlObject<GlRenderbufferTraits>;
 
 }  // namespace rebounce

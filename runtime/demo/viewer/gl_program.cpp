@@ -70,6 +70,14 @@ void GlProgram::set(const char* uniform, const glm::vec2& value) const {
 void GlProgram::set(const char* uniform, const glm::vec3& value) const {
   glUniform3fv(glGetUniformLocation(name_, uniform), 1, glm::value_ptr(value));
 }
+void GlProgram::set(const char* uniform, std::span<const float> values) const {
+  glUniform1fv(glGetUniformLocation(name_, uniform), static_cast<GLsizei>(values.size()),
+               values.data());
+}
+void GlProgram::set(const char* uniform, std::span<const glm::vec3> values) const {
+  glUniform3fv(glGetUniformLocation(name_, uniform), static_cast<GLsizei>(values.size()),
+               glm::value_ptr(values.front()));
+}
 void GlProgram::set(const char* uniform, const glm::mat4& value) const {
   glUniformMatrix4fv(glGetUniformLocation(name_, uniform), 1, GL_FALSE, glm::value_ptr(value));
 }

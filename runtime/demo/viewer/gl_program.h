@@ -1,6 +1,7 @@
 #pragma once
 
 #include <glm/glm.hpp>
+#include <span>
 
 #include "gl_objects.h"
 
@@ -23,6 +24,8 @@ class GlProgram {
   void set(const char* uniform, const glm::vec2& value) const;
   void set(const char* uniform, const glm::vec3& value) const;
   void set(const char* uniform, const glm::mat4& value) const;
+  void set(const char* uniform, std::span<const float> values) const;
+  void set(const char* uniform, std::span<const glm::vec3> values) const;
 
  private:
   GLuint name_ = 0;

@@ -6,6 +6,7 @@
 
 #include "decoded_image.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "vertex_layout.h"
 
 namespace rebounce {
 namespace {
@@ -15,28 +16,6 @@ struct StaticVertex {
   Float3 position, normal, color;
   Float2 base_color_texcoord, emissive_texcoord;
 };
-
-enum Attribute : GLuint {
-  kPosition,
-  kNormal,
-  kColor,
-  kBaseColorTexcoord,
-  kEmissiveTexcoord,
-  kFirstFlight,
-  kBounced,
-};
-
-template <typename T>
-void fill(GLenum target, const GlBuffer& buffer, std::span<const T> values, GLenum usage) {
-  glBindBuffer(target, buffer.name());
-  glBufferData(target, static_cast<GLsizeiptr>(values.size_bytes()), values.data(), usage);
-}
-
-void point_to(Attribute attribute, int components, std::size_t stride, std::size_t offset) {
-  glEnableVertexAttribArray(attribute);
-  glVertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, static_cast<GLsizei>(stride),
-                        reinterpret_cast<const void*>(offset));  // NOLINT: OpenGL's interface
-}
 
 std::vector<StaticVertex> static_vertices(const DisplayMesh& mesh) {
   std::vector<StaticVertex> vertices(mesh.position.size());
@@ -52,11 +31,26 @@ GLint wrap_code(TextureWrap wrap) {
   return wrap == TextureWrap::kMirroredRepeat ? GL_MIRRORED_REPEAT : GL_REPEAT;
 }
 
+std::vector<std::uint8_t> with_alpha(const DecodedImage& image) {
+  std::vector<std::uint8_t> texels;
+  texels.reserve(4 * image.alpha.size());
+  for (std::size_t k = 0; k < image.alpha.size(); ++k) {
+    const std::uint8_t* rgb = &image.rgb[3 * k];
+    texels.insert(texels.end(), {rgb[0], rgb[1], rgb[2], image.alpha[k]});
+  }
+  return texels;
+}
+
 void upload_image(const GlTexture& texture, const DecodedImage& image) {
   glBindTexture(GL_TEXTURE_2D, texture.name());
   glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8, image.width, image.height, 0, GL_RGB, GL_UNSIGNED_BYTE,
-               image.rgb.data());
+  if (image.alpha.empty()) {
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8, image.width, image.height, 0, GL_RGB, GL_UNSIGNED_BYTE,
+                 image.rgb.data());
+  } else {
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_SRGB8_ALPHA8, image.width, image.height, 0, GL_RGBA,
+                 GL_UNSIGNED_BYTE, with_alpha(image).data());
+  }
   glGenerateMipmap(GL_TEXTURE_2D);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_LINEAR);
@@ -65,6 +59,30 @@ void upload_image(const GlTexture& texture, const DecodedImage& image) {
 void attach_table(const GlTexture& texture, GLenum format, const GlBuffer& buffer) {
   glBindTexture(GL_TEXTURE_BUFFER, texture.name());
   glTexBuffer(GL_TEXTURE_BUFFER, format, buffer.name());
+}
+
+// What shaders discard: where the texture's alpha times base_alpha is below alpha_cutoff.
+struct AlphaTest {
+  float base_alpha, alpha_cutoff;
+  bool operator==(const AlphaTest&) const = default;
+
+  void set(const GlProgram& program) const {
+    program.set("base_alpha", base_alpha);
+    program.set("alpha_cutoff", alpha_cutoff);
+  }
+};
+
+constexpr AlphaTest kAllThere{1, -1}, kNotThere{0, 1};
+
+// As DisplaySurface::opacity, but that half of the light is as good as all of it.
+AlphaTest alpha_test(const Material& material) {
+  const bool emits = material.emitted_luminance != Float3{0, 0, 0};
+  const float solid = emits ? 1 : 1 - material.transmission;
+  constexpr float kHalf = 0.5F;
+  if (material.alpha_mode == AlphaMode::kBlend) return {material.base_alpha * solid, kHalf};
+  if (solid < kHalf) return kNotThere;
+  if (material.alpha_mode == AlphaMode::kOpaque) return kAllThere;
+  return {material.base_alpha, material.alpha_cutoff};
 }
 
 void bind(int unit, GLenum target, GLuint texture) {
@@ -86,6 +104,7 @@ GpuScene::GpuScene(const TransferData& data) : data_(data) {
     attach_table(patch_color_textures_[k], GL_RGBA32F, patch_colors_[k]);
   }
   sort_triangles();
+  sort_surface();
   make_vertex_arrays();
   load_textures();
 }
@@ -105,10 +124,29 @@ void GpuScene::sort_triangles() {
     patches.push_back(mesh.triangle_patch[order[k]]);
   }
   fill<Uint3>(GL_ARRAY_BUFFER, sorted_indices_, triangles, GL_STATIC_DRAW);
-  fill<Uint3>(GL_ARRAY_BUFFER, surface_indices_,
-              std::span(mesh.triangle).first(mesh.surface_count()), GL_STATIC_DRAW);
   fill<std::uint32_t>(GL_TEXTURE_BUFFER, triangle_patches_, patches, GL_STATIC_DRAW);
   attach_table(triangle_patch_texture_, GL_R32UI, triangle_patches_);
+}
+
+/// What is there all over comes first, as one range.
+void GpuScene::sort_surface() {
+  const DisplayMesh& mesh = data_.mesh;
+  const auto group = [&](std::uint32_t t) {
+    const std::uint32_t material = mesh.triangle_material[t];
+    return alpha_test(data_.materials[material]) == kAllThere ? 0 : material + 1;
+  };
+  std::vector<std::uint32_t> order(mesh.surface_count());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::stable_sort(order, {}, group);
+  std::vector<Uint3> triangles;
+  for (std::uint32_t k = 0; k < order.size(); ++k) {
+    if (k == 0 || group(order[k]) != group(order[k - 1])) {
+      surface_ranges_.push_back({mesh.triangle_material[order[k]], k, k});
+    }
+    surface_ranges_.back().end = k + 1;
+    triangles.push_back(mesh.triangle[order[k]]);
+  }
+  fill<Uint3>(GL_ARRAY_BUFFER, surface_indices_, triangles, GL_STATIC_DRAW);
 }
 
 void GpuScene::make_vertex_arrays() {
@@ -130,6 +168,8 @@ void GpuScene::make_vertex_arrays() {
   glBindVertexArray(surface_array_.name());
   glBindBuffer(GL_ARRAY_BUFFER, static_vertices_.name());
   point_to(kPosition, 3, sizeof(StaticVertex), offsetof(StaticVertex, position));
+  point_to(kBaseColorTexcoord, 2, sizeof(StaticVertex),
+           offsetof(StaticVertex, base_color_texcoord));
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, surface_indices_.name());
   glBindVertexArray(0);
 }
@@ -184,8 +224,17 @@ void GpuScene::draw_materials(const GlProgram& program, Side side) const {
     bind(1, GL_TEXTURE_2D, texture_name(material.emissive_texture));
     program.set("base_color", to_glm(material.base_color));
     program.set("emitted_luminance", to_glm(material.emitted_luminance));
+    alpha_test(material).set(program);
     draw_range(range);
   }
+}
+
+void GpuScene::set_plain_material(const GlProgram& program, const Float3& emitted_luminance) const {
+  bind(0, GL_TEXTURE_2D, white_.name());
+  bind(1, GL_TEXTURE_2D, white_.name());
+  program.set("base_color", glm::vec3(1));
+  program.set("emitted_luminance", to_glm(emitted_luminance));
+  kAllThere.set(program);
 }
 
 void GpuScene::draw_patches(const GlProgram& program, Side side) const {
@@ -198,10 +247,14 @@ void GpuScene::draw_patches(const GlProgram& program, Side side) const {
   }
 }
 
-void GpuScene::draw_surface() const {
+void GpuScene::draw_surface(const GlProgram& program) const {
   glBindVertexArray(surface_array_.name());
-  glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(3 * data_.mesh.surface_count()),
-                 GL_UNSIGNED_INT, nullptr);
+  for (const Range& range : surface_ranges_) {
+    const Material& material = data_.materials[range.material];
+    bind(0, GL_TEXTURE_2D, texture_name(material.base_color_texture));
+    alpha_test(material).set(program);
+    draw_range(range);
+  }
 }
 
 }  // namespace rebounce

@@ -30,12 +30,16 @@ class GpuScene {
   void upload_patch_colors(Side side, std::span<const glm::vec3> color);
 
   /// Draws every material in turn; binds its textures to units 0 (base colour) and 1 (emissive) and
-  /// sets base_color and emitted_luminance.
+  /// sets base_color, emitted_luminance, base_alpha and alpha_cutoff: where a texture's alpha times
+  /// base_alpha is below alpha_cutoff nothing is there.
   void draw_materials(const GlProgram& program, Side side) const;
+  /// Does the same for something without textures, white, that is about to be drawn.
+  void set_plain_material(const GlProgram& program, const Float3& emitted_luminance) const;
   /// Draws with the colours of patches at texture units 0 and 1; sets first_triangle.
   void draw_patches(const GlProgram& program, Side side) const;
-  /// Draws the surface once, for shadows.
-  void draw_surface() const;
+  /// Draws the surface once, for shadows; binds base colours to unit 0 and sets base_alpha and
+  /// alpha_cutoff.
+  void draw_surface(const GlProgram& program) const;
 
  private:
   // Triangles of one material.
@@ -45,13 +49,14 @@ class GpuScene {
   };
 
   void sort_triangles();
+  void sort_surface();
   void make_vertex_arrays();
   void load_textures();
   GLuint texture_name(std::uint32_t texture) const;
   void draw_range(const Range& range) const;
 
   const TransferData& data_;
-  std::vector<Range> ranges_;
+  std::vector<Range> ranges_, surface_ranges_;
   GlBuffer static_vertices_, sorted_indices_, surface_indices_, first_flight_;
   std::array<GlBuffer, kSideCount> bounced_;
   std::array<GlVertexArray, kSideCount> vertex_arrays_;

@@ -14,14 +14,17 @@
 
 namespace rebounce {
 
-LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference)
+LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference,
+                   MakeProbes make_probes)
     : data_(std::move(data)),
       engine_(data_),
       emitted_(irradiance_from_emitters(*data_)),
       solver_{IndirectSolver(*data_), IndirectSolver(*data_)},
       pictures_(*data_, engine_.tracer()),
-      reference_(std::move(reference)) {
+      reference_(std::move(reference)),
+      make_probes_(std::move(make_probes)) {
   for (auto& values : indirect_) values.resize(data_->patches.size());
+  for (auto& values : reflected_) values.resize(data_->patches.size());
 }
 
 void LitScene::relight(std::span<const Light> lights, const Sky& sky,
@@ -37,7 +40,29 @@ void LitScene::relight(std::span<const Light> lights, const Sky& sky,
     if (solver.method() != methods[side]) solver.choose(methods[side]);
     std::ranges::copy(solver.solve(engine_.initial_exitance()), indirect_[side].begin());
     times.solve[side] = solver.microseconds();
+    for (std::size_t i = 0; i < indirect_[side].size(); ++i) {
+      const glm::vec3 irradiance =
+          to_glm(engine_.direct_irradiance()[i]) + to_glm(indirect_[side][i]);
+      reflected_[side][i] = to_float3(to_glm(data_->patches.reflectance[i]) * irradiance);
+    }
   }
+}
+
+const LightProbes& LitScene::probes() {
+  if (data_->probes.size() > 0 || !make_probes_) return data_->probes;
+  if (!own_probes_) own_probes_ = make_probes_();
+  return *own_probes_;
+}
+
+LightInAir LitScene::light_in_air(const Float3& position, const Sky& sky, bool both) {
+  LightInAir light;
+  const LightProbes& around = probes();
+  if (around.size() == 0) return light;
+  light.first_flight = gather_probe_light(around, data_->patches.emitted_exitance, sky, position);
+  for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {
+    light.bounced[side] = gather_probe_light(around, reflected_[side], {}, position);
+  }
+  return light;
 }
 
 std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const {

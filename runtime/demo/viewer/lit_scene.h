@@ -4,6 +4,7 @@
 #include <functional>
 #include <glm/glm.hpp>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,16 +12,25 @@
 #include "rebounce/demo/indirect_solver.h"
 #include "rebounce/demo/viewer.h"
 #include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/probe_light.h"
 
 namespace rebounce {
+
+/// What arrives at a point in the air.
+struct LightInAir {
+  ProbeLight first_flight{};  ///< from sky and emitters
+  std::array<ProbeLight, kSideCount> bounced{};
+};
 
 /// The light of a frame on the patches, by two methods.
 class LitScene {
  public:
   using Reference = decltype(ViewerSetup::reference);
 
-  /// `data` must have an operator. `reference` may be empty.
-  LitScene(std::shared_ptr<const TransferData> data, Reference reference);
+  using MakeProbes = decltype(ViewerSetup::make_probes);
+
+  /// `data` must have an operator. `reference` and `make_probes` may be empty.
+  LitScene(std::shared_ptr<const TransferData> data, Reference reference, MakeProbes make_probes);
 
   /// Finds direct light, and indirect light by `methods`; the second only if `both`. Sets
   /// `times.direct` and `times.solve`.
@@ -33,6 +43,10 @@ class LitScene {
   /// Values at the vertices [v] in lx: sky and emitters; what has bounced.
   std::vector<glm::vec3> first_flight_at_vertices(const Sky& sky) const;
   std::vector<glm::vec3> bounced_at_vertices(Side side) const;
+
+  /// What the probes around `position` see of the last frame but for lamps; the second side's only
+  /// if `both`. Finds probes first where the file has none.
+  LightInAir light_in_air(const Float3& position, const Sky& sky, bool both);
 
   /// Compares a side with the reference solution for the same direct light, which is found anew
   /// where that has changed. Returns |H - reference| of each patch as a part of the reference's
@@ -51,15 +65,19 @@ class LitScene {
 
  private:
   static std::size_t index(Side side) { return static_cast<std::size_t>(side); }
+  const LightProbes& probes();
 
   std::shared_ptr<const TransferData> data_;
   Engine engine_;
   std::vector<Float3> emitted_;  // F M_e, lx
   std::array<IndirectSolver, kSideCount> solver_;
   std::array<std::vector<Float3>, kSideCount> indirect_;
+  std::array<std::vector<Float3>, kSideCount> reflected_;  // B - M_e, lx
   std::array<double, kSideCount> error_ = {};
   PictureRenderer pictures_;
   Reference reference_;
+  MakeProbes make_probes_;
+  std::optional<LightProbes> own_probes_;                        // of a file without
   std::vector<Float3> reference_exitance_, reference_indirect_;  // what it was last found for
 };
 

@@ -11,11 +11,13 @@
 
 #include "controls.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/light_sampling.h"
 
 namespace rebounce {
 namespace {
 
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
+constexpr float kStepPart = 0.005F;  // of the scene's size, that a pixel of dragging moves
 constexpr const char* kTransferName = "transfer (one product)";
 constexpr const char* kHierarchicalName = "hierarchical (links)";
 
@@ -73,14 +75,50 @@ void time_row(const char* stage, double microseconds) {
   ImGui::Text("%8.2f ms", microseconds / 1000);
 }
 
-void edit_type(Light& light) {
+// Candela of a lamp of intensity 1, straight ahead.
+float candela_of_unit(const Light& light) {
+  const float disc = std::numbers::pi_v<float> * light.radius * light.radius;
+  if (light.type == LightType::kRectangle) return light.size[0] * light.size[1];
+  return is_area_light(light.type) ? disc : 1;
+}
+
+const char* unit_of_intensity(const Light& light) {
+  if (is_area_light(light.type)) return "%.1f cd/m2";
+  return light.type == LightType::kDirectional ? "%.1f lx" : "%.1f cd";
+}
+
+// `size` is that of the scene, metres.
+void edit_type(Light& light, float size) {
   int type = static_cast<int>(light.type);
-  if (!ImGui::Combo("type", &type, "point\0spot\0directional\0")) return;
+  if (!ImGui::Combo("type", &type, "point\0spot\0directional\0sphere\0rectangle\0disc\0")) return;
   const bool was_far = light.type == LightType::kDirectional;
+  const float candela = light.intensity * candela_of_unit(light);
   light.type = static_cast<LightType>(type);
+  if (light.radius <= 0) light.radius = 0.02F * size;
+  if (light.size[0] <= 0 || light.size[1] <= 0) light.size = {0.06F * size, 0.04F * size};
+  light.intensity = candela / candela_of_unit(light);
   const bool is_far = light.type == LightType::kDirectional;
   // Candela are not lux: begin with what is bright indoors.
-  if (was_far != is_far) light.intensity = is_far ? 1000 : 100;
+  if (was_far != is_far) light.intensity = is_far ? 1000 : 100 / candela_of_unit(light);
+}
+
+void edit_size(Light& light, float step) {
+  constexpr float kSmallest = 1e-3F, kLargest = 1e4F;
+  if (light.type == LightType::kRectangle) {
+    ImGui::DragFloat2("size", light.size.data(), step, kSmallest, kLargest, "%.2f m",
+                      ImGuiSliderFlags_AlwaysClamp);
+    ImGui::DragFloat3("first side", light.tangent.data(), 0.01F, -1, 1, "%.2f");
+  } else if (is_area_light(light.type)) {
+    ImGui::DragFloat("radius", &light.radius, step, kSmallest, kLargest, "%.2f m",
+                     ImGuiSliderFlags_AlwaysClamp);
+  }
+}
+
+// A rectangle's first side is not to lie along its direction.
+void keep_first_side_across(Light& light) {
+  const glm::vec3 direction = to_glm(light.direction), tangent = to_glm(light.tangent);
+  if (glm::length(glm::cross(direction, tangent)) > 1e-2F * glm::length(tangent)) return;
+  light.tangent = std::abs(direction.x) < 0.9F ? Float3{1, 0, 0} : Float3{0, 0, 1};
 }
 
 void edit_direction(Light& light) {
@@ -103,55 +141,79 @@ void edit_cone(Light& light) {
   light.inner_cone_angle = std::min(inner, outer - 0.5F) * kDegree;
 }
 
-// A motion around where the lamp is.
-void begin_motion(ViewerLight& lamp, LightMotion::Kind kind, float size) {
-  lamp.motion.kind = kind;
-  lamp.motion.center = lamp.motion.from = lamp.motion.to = lamp.light.position;
-  lamp.motion.radius = size;
-  lamp.motion.from[0] -= size;
-  lamp.motion.to[0] += size;
+// A motion around where something is.
+void begin_motion(const Float3& position, LightMotion::Kind kind, float size, LightMotion& motion) {
+  motion.kind = kind;
+  motion.center = motion.from = motion.to = position;
+  motion.radius = size;
+  motion.from[0] -= size;
+  motion.to[0] += size;
 }
 
-void edit_motion(ViewerLight& lamp, float step) {
-  if (lamp.motion.kind == LightMotion::Kind::kKeys) {
+void edit_motion(const Float3& position, LightMotion& motion, float step) {
+  if (motion.kind == LightMotion::Kind::kKeys) {
     ImGui::TextUnformatted("moves by its light path");
     return;
   }
-  int kind = static_cast<int>(lamp.motion.kind);
+  int kind = static_cast<int>(motion.kind);
   if (ImGui::Combo("motion", &kind, "still\0circle\0swing\0")) {
-    begin_motion(lamp, static_cast<LightMotion::Kind>(kind), 20 * step);
+    begin_motion(position, static_cast<LightMotion::Kind>(kind), 20 * step, motion);
   }
-  if (lamp.motion.kind == LightMotion::Kind::kStill) return;
-  ImGui::DragFloat("period", &lamp.motion.period, 0.05F, 0.1F, 600, "%.1f s",
+  if (motion.kind == LightMotion::Kind::kStill) return;
+  ImGui::DragFloat("period", &motion.period, 0.05F, 0.1F, 600, "%.1f s",
                    ImGuiSliderFlags_AlwaysClamp);
-  if (lamp.motion.kind == LightMotion::Kind::kCircle) {
-    ImGui::DragFloat3("centre", lamp.motion.center.data(), step, 0, 0, "%.2f");
-    ImGui::DragFloat("radius", &lamp.motion.radius, step, 0, 1e6F, "%.2f m",
+  if (motion.kind == LightMotion::Kind::kCircle) {
+    ImGui::DragFloat3("centre", motion.center.data(), step, 0, 0, "%.2f");
+    ImGui::DragFloat("circle", &motion.radius, step, 0, 1e6F, "%.2f m",
                      ImGuiSliderFlags_AlwaysClamp);
   } else {
-    ImGui::DragFloat3("from", lamp.motion.from.data(), step, 0, 0, "%.2f");
-    ImGui::DragFloat3("to", lamp.motion.to.data(), step, 0, 0, "%.2f");
+    ImGui::DragFloat3("from", motion.from.data(), step, 0, 0, "%.2f");
+    ImGui::DragFloat3("to", motion.to.data(), step, 0, 0, "%.2f");
   }
 }
 
-void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float step) {
+// `size` is that of the scene, metres.
+void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size) {
   Light& light = lamp.light;
+  const float step = kStepPart * size;
   ImGui::Checkbox("on", &lamp.on);
-  edit_type(light);
+  edit_type(light, size);
   const bool is_far = light.type == LightType::kDirectional;
   ImGui::ColorEdit3("colour", light.color.data(), ImGuiColorEditFlags_Float);
   ImGui::DragFloat("intensity", &light.intensity, 0.01F * std::max(light.intensity, 0.1F), 0, 1e9F,
-                   is_far ? "%.1f lx" : "%.1f cd",
+                   unit_of_intensity(light),
                    ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoRoundToFormat);
+  edit_size(light, 0.2F * step);
   if (!is_far && lamp.motion.kind == LightMotion::Kind::kStill) {
     ImGui::DragFloat3("position", light.position.data(), step, 0, 0, "%.2f");
   }
-  if (light.type != LightType::kPoint) {
+  if (light.type != LightType::kPoint && light.type != LightType::kSphere) {
     edit_direction(light);
     if (ImGui::Button("Shine where I look")) light.direction = to_float3(camera.forward());
   }
+  keep_first_side_across(light);
   if (light.type == LightType::kSpot) edit_cone(light);
-  if (!is_far) edit_motion(lamp, step);
+  if (!is_far) edit_motion(light.position, lamp.motion, step);
+}
+
+void edit_sphere(ViewerSphere& sphere, float size) {
+  const float step = kStepPart * size;
+  ImGui::Checkbox("there", &sphere.on);
+  ImGui::ColorEdit3("reflects", sphere.reflectance.data(), ImGuiColorEditFlags_Float);
+  ImGui::DragFloat("radius", &sphere.radius, 0.2F * step, 1e-3F, 1e4F, "%.2f m",
+                   ImGuiSliderFlags_AlwaysClamp);
+  if (sphere.motion.kind == LightMotion::Kind::kStill) {
+    ImGui::DragFloat3("position", sphere.position.data(), step, 0, 0, "%.2f");
+  }
+  edit_motion(sphere.position, sphere.motion, step);
+}
+
+// Lines of a list to choose from.
+void list_line(std::size_t k, const std::string& name, std::size_t& selected) {
+  ImGui::PushID(static_cast<int>(k));
+  const std::string label = std::to_string(k) + (name.empty() ? "" : ": " + name);
+  if (ImGui::Selectable(label.c_str(), k == selected)) selected = k;
+  ImGui::PopID();
 }
 
 ViewerLight lamp_ahead(const FlyCamera& camera, float size) {
@@ -188,6 +250,7 @@ void Panels::draw(ViewerState& state, const FrameDrawer& frame) {
     draw_methods(state, frame);
     draw_times(state);
     draw_lights(state, frame);
+    draw_spheres(state, frame);
     ImGui::PopItemWidth();
   }
   ImGui::End();
@@ -245,11 +308,7 @@ void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
   const float size = frame.bounds().diagonal();
   ImGui::Checkbox("play motions", &state.playing);
   for (std::size_t k = 0; k < state.lights.size(); ++k) {
-    ImGui::PushID(static_cast<int>(k));
-    const std::string& name = state.lights[k].light.name;
-    const std::string label = std::to_string(k) + (name.empty() ? "" : ": " + name);
-    if (ImGui::Selectable(label.c_str(), k == state.selected)) state.selected = k;
-    ImGui::PopID();
+    list_line(k, state.lights[k].light.name, state.selected);
   }
   if (ImGui::Button("Add")) {
     state.lights.push_back(lamp_ahead(state.camera, size));
@@ -259,7 +318,7 @@ void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
     ImGui::SameLine();
     const bool remove = ImGui::Button("Remove");
     ImGui::Separator();
-    edit_lamp(state.lights[state.selected], state.camera, 0.005F * size);
+    edit_lamp(state.lights[state.selected], state.camera, size);
     if (remove) {
       state.lights.erase(state.lights.begin() + static_cast<std::ptrdiff_t>(state.selected));
     }
@@ -268,6 +327,31 @@ void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
   ImGui::ColorEdit3("sky", state.sky.color.data(), ImGuiColorEditFlags_Float);
   ImGui::DragFloat("luminance", &state.sky.luminance, 0.01F * std::max(state.sky.luminance, 1.0F),
                    0, 1e6F, "%.1f cd/m2", ImGuiSliderFlags_AlwaysClamp);
+}
+
+void Panels::draw_spheres(ViewerState& state, const FrameDrawer& frame) const {
+  if (!ImGui::CollapsingHeader("Moving spheres")) return;
+  const float size = frame.bounds().diagonal();
+  ImGui::PushID("spheres");
+  ImGui::Checkbox("show spheres", &state.shows_spheres);
+  for (std::size_t k = 0; k < state.spheres.size(); ++k) list_line(k, "", state.selected_sphere);
+  if (ImGui::Button("Add")) {
+    ViewerSphere sphere{.radius = 0.03F * size};
+    sphere.position = to_float3(state.camera.position() + 0.25F * size * state.camera.forward());
+    state.spheres.push_back(sphere);
+    state.selected_sphere = state.spheres.size() - 1;
+  }
+  if (state.selected_sphere < state.spheres.size()) {
+    ImGui::SameLine();
+    const bool remove = ImGui::Button("Remove");
+    ImGui::Separator();
+    edit_sphere(state.spheres[state.selected_sphere], size);
+    if (remove) {
+      state.spheres.erase(state.spheres.begin() +
+                          static_cast<std::ptrdiff_t>(state.selected_sphere));
+    }
+  }
+  ImGui::PopID();
 }
 
 }  // namespace rebounce

@@ -16,6 +16,7 @@ class Panels {
   void draw_methods(ViewerState& state, const FrameDrawer& frame) const;
   void draw_times(const ViewerState& state) const;
   void draw_lights(ViewerState& state, const FrameDrawer& frame) const;
+  void draw_spheres(ViewerState& state, const FrameDrawer& frame) const;
 
   StageTimes smoothed_;
   int frame_ = 0;

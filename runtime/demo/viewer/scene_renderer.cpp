@@ -4,19 +4,24 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
+#include <numbers>
+#include <utility>
 
+#include "lamp_shader.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 #include "shaders.h"
+#include "sky_shader.h"
 #include "tone_curve.h"
 
 namespace rebounce {
 namespace {
 
-constexpr int kSamples = 4;         // per pixel
-constexpr int kCubeShadow = 1024;   // texels a side
-constexpr int kPlaneShadow = 4096;  // texels a side
+constexpr int kSamples = 4;   // per pixel
+constexpr int kFlatLamp = 4;  // lamp_type of rectangles and discs, the first of them
+constexpr int kDiscCorners = 24;
 constexpr float kNearPart = 2e-4F;  // of the scene's diagonal
 
 void check_complete() {
@@ -57,11 +62,14 @@ glm::mat4 view_of(const Camera& camera, float aspect, const SceneBounds& bounds)
 SceneRenderer::SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh)
     : scene_(scene),
       bounds_(bounds_of(mesh)),
+      spheres_(scene),
+      lamp_surfaces_(scene),
       ambient_(shaders::kSceneVertex, shaders::kAmbientFragment),
       lamp_(shaders::kSceneVertex, shaders::kLampFragment),
       patch_(shaders::kSceneVertex, shaders::kPatchFragment),
       shadow_(shaders::kShadowVertex, shaders::kShadowFragment),
-      screen_(shaders::kScreenVertex, shaders::kScreenFragment) {
+      screen_(shaders::kScreenVertex, shaders::kScreenFragment),
+      sky_(shaders::kScreenVertex, shaders::kSkyFragment) {
   glEnable(GL_TEXTURE_CUBE_MAP_SEAMLESS);
 }
 
@@ -89,13 +97,22 @@ void SceneRenderer::resize(int width, int height) {
   check_complete();
 }
 
+void SceneRenderer::set_bodies(BodyMesh spheres, bool keeps_places, std::span<const Light> lamps) {
+  if (!keeps_places) ++spheres_version_;
+  spheres_.upload(std::move(spheres));
+  BodyMesh surfaces;
+  for (const Light& lamp : lamps) add_lamp_surface(lamp, surfaces);
+  lamp_surfaces_.upload(std::move(surfaces));
+}
+
 void SceneRenderer::update_shadows(std::span<const Light> lights) {
   while (shadow_maps_.size() < lights.size()) {
-    shadow_maps_.push_back(std::make_unique<ShadowMap>(kCubeShadow, kPlaneShadow));
+    shadow_maps_.push_back(std::make_unique<ShadowMap>());
   }
   shadow_maps_.resize(lights.size());
+  const ShadowCasters casters{scene_, spheres_, bounds_, spheres_version_};
   for (std::size_t k = 0; k < lights.size(); ++k) {
-    shadow_maps_[k]->update(lights[k], scene_, bounds_, shadow_);
+    shadow_maps_[k]->update(lights[k], casters, shadow_);
   }
 }
 
@@ -117,6 +134,7 @@ void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
   if (patches) {
     draw_patches(frame, view);
   } else {
+    draw_sky(frame);
     draw_light(frame, view);
   }
 
@@ -164,6 +182,27 @@ void SceneRenderer::for_each_side(const FrameSettings& frame, const Draw& draw) 
   glDisable(GL_SCISSOR_TEST);
 }
 
+void SceneRenderer::draw_sky(const FrameSettings& frame) const {
+  if (!frame.sky.distribution || frame.show == Show::kIndirect) return;
+  const Camera& camera = frame.camera;
+  const float half_height = std::tan(0.5F * camera.vertical_fov);
+  const glm::vec2 size(width_, height_);
+  sky_.use();
+  sky_.set("right", half_height * size.x / size.y * to_glm(camera.right));
+  sky_.set("up", half_height * to_glm(camera.up));
+  sky_.set("forward", -to_glm(camera.backward));
+  sky_.set("picture_size", size);
+  sky_.set("cell_part", std::span<const float>(*frame.sky.distribution));
+  sky_.set("sky_luminance", to_glm(sky_luminance_unit(frame.sky)) * std::exp2(frame.exposure));
+  sky_.set("brightest", kBrightestEmitter);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_CULL_FACE);
+  glBindVertexArray(empty_.name());
+  glDrawArrays(GL_TRIANGLES, 0, 3);
+  glEnable(GL_DEPTH_TEST);
+  glEnable(GL_CULL_FACE);
+}
+
 void SceneRenderer::draw_light(const FrameSettings& frame, const glm::mat4& view) {
   ambient_.use();
   ambient_.set("clip_from_world", view);
@@ -172,8 +211,12 @@ void SceneRenderer::draw_light(const FrameSettings& frame, const glm::mat4& view
   ambient_.set("bounced_part", frame.show == Show::kDirect ? 0.0F : 1.0F);
   ambient_.set("base_color_texture", 0);
   ambient_.set("emissive_texture", 1);
-  for_each_side(frame, [&](Side side) { scene_.draw_materials(ambient_, side); });
+  for_each_side(frame, [&](Side side) {
+    scene_.draw_materials(ambient_, side);
+    spheres_.draw(ambient_, side);
+  });
   if (frame.show == Show::kIndirect) return;
+  draw_lamp_surfaces();
 
   glEnable(GL_BLEND);
   glBlendFunc(GL_ONE, GL_ONE);
@@ -191,16 +234,42 @@ void SceneRenderer::draw_light(const FrameSettings& frame, const glm::mat4& view
   glDepthMask(GL_TRUE);
 }
 
+void SceneRenderer::draw_lamp_surfaces() const {
+  // They may lie flush with a ceiling.
+  glEnable(GL_POLYGON_OFFSET_FILL);
+  glPolygonOffset(-2, -16);
+  lamp_surfaces_.draw(ambient_, Side::kFirst);
+  glDisable(GL_POLYGON_OFFSET_FILL);
+}
+
 void SceneRenderer::draw_lamp(const Light& light, const ShadowMap& shadow) {
   shadow.bind(lamp_);
-  lamp_.set("lamp_type", static_cast<int>(light.type));
+  lamp_.set("lamp_type", std::min(static_cast<int>(light.type), kFlatLamp));
   lamp_.set("lamp_position", to_glm(light.position));
   lamp_.set("lamp_direction", to_glm(light.direction));
   lamp_.set("lamp_color", to_glm(light.color) * light.intensity);
   lamp_.set("lamp_range", light.range);
   lamp_.set("cos_inner", std::cos(light.inner_cone_angle));
   lamp_.set("cos_outer", std::cos(light.outer_cone_angle));
+  if (is_area_light(light.type)) set_lamp_surface(light);
   scene_.draw_materials(lamp_, Side::kFirst);
+  spheres_.draw(lamp_, Side::kFirst);
+}
+
+void SceneRenderer::set_lamp_surface(const Light& light) const {
+  lamp_.set("lamp_radius", light.radius);
+  const auto places = places_on_lamp(light);
+  lamp_.set("lamp_places", std::span<const glm::vec3>(places));
+  // Parts overlap, so that the edges of their shadows run into one another.
+  constexpr float kOverlap = 1.5F;
+  lamp_.set("place_reach",
+            kOverlap * std::sqrt(area_of_lamp(light) /
+                                 (std::numbers::pi_v<float> * static_cast<float>(places.size()))));
+  if (light.type == LightType::kSphere) return;
+  const auto [side, other_side] = flat_lamp_axes(light);
+  lamp_.set("lamp_side", to_glm(side));
+  lamp_.set("lamp_other_side", to_glm(other_side));
+  lamp_.set("lamp_corners", light.type == LightType::kRectangle ? 4 : kDiscCorners);
 }
 
 void SceneRenderer::draw_patches(const FrameSettings& frame, const glm::mat4& view) {

@@ -8,6 +8,7 @@
 
 #include "gl_objects.h"
 #include "gl_program.h"
+#include "gpu_bodies.h"
 #include "gpu_scene.h"
 #include "rebounce/demo/image_file.h"
 #include "rebounce/demo/picture.h"
@@ -34,6 +35,10 @@ class SceneRenderer {
   /// `scene` must outlive the renderer.
   SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh);
 
+  /// What moves through the scene in the next frames: `spheres`, which cast shadows, unless
+  /// `keeps_places` as where they were; and lamps.
+  void set_bodies(BodyMesh spheres, bool keeps_places, std::span<const Light> lamps);
+
   /// Brings the shadow maps up to date: one for each light.
   void update_shadows(std::span<const Light> lights);
 
@@ -44,8 +49,11 @@ class SceneRenderer {
 
  private:
   void resize(int width, int height);
+  void draw_sky(const FrameSettings& frame) const;
   void draw_light(const FrameSettings& frame, const glm::mat4& view);
+  void draw_lamp_surfaces() const;
   void draw_lamp(const Light& light, const ShadowMap& shadow);
+  void set_lamp_surface(const Light& light) const;
   void draw_patches(const FrameSettings& frame, const glm::mat4& view);
   int split_column(const FrameSettings& frame) const;
   void draw_divider(int column) const;
@@ -54,7 +62,9 @@ class SceneRenderer {
 
   const GpuScene& scene_;
   SceneBounds bounds_;
-  GlProgram ambient_, lamp_, patch_, shadow_, screen_;
+  GpuBodies spheres_, lamp_surfaces_;
+  int spheres_version_ = 0;
+  GlProgram ambient_, lamp_, patch_, shadow_, screen_, sky_;
   GlVertexArray empty_;
   std::vector<std::unique_ptr<ShadowMap>> shadow_maps_;
   int width_ = 0, height_ = 0;

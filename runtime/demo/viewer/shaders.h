@@ -36,10 +36,13 @@ in vec3 color, first_light, bounced_light;
 in vec2 base_uv, emissive_uv;
 uniform sampler2D base_color_texture, emissive_texture;
 uniform vec3 base_color, emitted_luminance;
+uniform float base_alpha, alpha_cutoff;
 uniform float first_part, bounced_part, exposure_scale;
 out vec4 result;
 void main() {
-  vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
+  vec4 base = texture(base_color_texture, base_uv);
+  if (base_alpha * base.a < alpha_cutoff) discard;
+  vec3 albedo = base_color * color * base.rgb;
   vec3 irradiance = first_part * first_light + bounced_part * bounced_light;
   vec3 emitted = first_part * emitted_luminance * texture(emissive_texture, emissive_uv).rgb *
                  exposure_scale;
@@ -47,91 +50,6 @@ void main() {
   float peak = max(max(emitted.r, emitted.g), emitted.b);
   if (peak > 2) emitted *= 2 / peak;
   result = vec4(albedo * max(irradiance, 0) * (exposure_scale / 3.14159265) + emitted, 1);
-}
-)";
-
-/// One lamp, added to what is there. Fall-off, range and cone as in light_sampling.cpp.
-inline constexpr const char* kLampFragment = R"(#version 330 core
-in vec3 world_position, shading_normal, color;
-in vec2 base_uv;
-uniform sampler2D base_color_texture;
-uniform vec3 base_color, eye;
-uniform float exposure_scale;
-uniform int lamp_type;  // 0 point, 1 spot, 2 directional
-uniform vec3 lamp_position, lamp_direction, lamp_color;
-uniform float lamp_range, cos_inner, cos_outer;
-uniform samplerCubeShadow cube_shadow;
-uniform sampler2DShadow plane_shadow;
-uniform mat4 plane_from_world;
-uniform vec2 near_far;
-uniform float texel;  // of the cube at unit distance; of the plane in metres
-uniform float smallest_offset;  // metres
-out vec4 result;
-
-const int kTaps = 16;
-const float kRadius = 1.5;  // texels
-
-// Evenly over a disc (H. Vogel, 1979).
-vec2 tap(int k) {
-  float angle = 2.39996323 * float(k);
-  return sqrt((float(k) + 0.5) / float(kTaps)) * vec2(cos(angle), sin(angle));
-}
-
-float cube_visibility(vec3 point, vec3 geometric_normal) {
-  vec3 way = point - lamp_position;
-  float along = max(max(abs(way.x), abs(way.y)), abs(way.z));
-  // Off the surface by what a slanted texel and the taps around it reach.
-  way += geometric_normal * (smallest_offset + (kRadius + 1) * texel * along);
-  vec3 side = normalize(cross(way, abs(way.y) < 0.9 * length(way) ? vec3(0, 1, 0) : vec3(1, 0, 0)));
-  vec3 up = normalize(cross(side, way));
-  float spread = kRadius * texel * along;
-  float sum = 0;
-  for (int k = 0; k < kTaps; ++k) {
-    vec2 shift = spread * tap(k);
-    vec3 to = way + shift.x * side + shift.y * up;
-    float z = max(max(abs(to.x), abs(to.y)), abs(to.z));
-    float depth = (near_far.y + near_far.x - 2 * near_far.x * near_far.y / z) /
-                  (near_far.y - near_far.x);
-    sum += texture(cube_shadow, vec4(to, 0.5 * depth + 0.5));
-  }
-  return sum / float(kTaps);
-}
-
-float plane_visibility(vec3 point, vec3 geometric_normal) {
-  vec3 off = point + geometric_normal * (smallest_offset + (kRadius + 1) * texel);
-  vec3 at = (plane_from_world * vec4(off, 1)).xyz * 0.5 + 0.5;
-  vec2 spread = kRadius / vec2(textureSize(plane_shadow, 0));
-  float sum = 0;
-  for (int k = 0; k < kTaps; ++k) sum += texture(plane_shadow, vec3(at.xy + spread * tap(k), at.z));
-  return sum / float(kTaps);
-}
-
-void main() {
-  vec3 to_lamp = lamp_type == 2 ? -lamp_direction : lamp_position - world_position;
-  float distance_squared = dot(to_lamp, to_lamp);
-  vec3 direction = to_lamp * inversesqrt(max(distance_squared, 1e-12));
-  vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
-  if (dot(geometric_normal, eye - world_position) < 0) geometric_normal = -geometric_normal;
-  float cosine = max(0, dot(normalize(shading_normal), direction));
-  if (dot(geometric_normal, direction) <= 0) cosine = 0;
-  float strength = cosine;
-  if (lamp_type != 2) {
-    strength /= max(distance_squared, 1e-12);
-    if (lamp_range > 0) {
-      float ratio = distance_squared / (lamp_range * lamp_range);
-      strength *= clamp(1 - ratio * ratio, 0, 1);
-    }
-  }
-  if (lamp_type == 1) {
-    float inside = (dot(-direction, lamp_direction) - cos_outer) / max(0.001, cos_inner - cos_outer);
-    inside = clamp(inside, 0, 1);
-    strength *= inside * inside;
-  }
-  if (strength <= 0) discard;
-  strength *= lamp_type == 2 ? plane_visibility(world_position, geometric_normal)
-                             : cube_visibility(world_position, geometric_normal);
-  vec3 albedo = base_color * color * texture(base_color_texture, base_uv).rgb;
-  result = vec4(albedo * lamp_color * (strength * exposure_scale / 3.14159265), 0);
 }
 )";
 
@@ -157,12 +75,22 @@ void main() {
 
 inline constexpr const char* kShadowVertex = R"(#version 330 core
 layout(location = 0) in vec3 position;
+layout(location = 3) in vec2 base_color_texcoord;
 uniform mat4 clip_from_world;
-void main() { gl_Position = clip_from_world * vec4(position, 1); }
+out vec2 base_uv;
+void main() {
+  base_uv = base_color_texcoord;
+  gl_Position = clip_from_world * vec4(position, 1);
+}
 )";
 
 inline constexpr const char* kShadowFragment = R"(#version 330 core
-void main() {}
+in vec2 base_uv;
+uniform sampler2D base_color_texture;
+uniform float base_alpha, alpha_cutoff;
+void main() {
+  if (base_alpha * texture(base_color_texture, base_uv).a < alpha_cutoff) discard;
+}
 )";
 
 /// One triangle that covers the screen.

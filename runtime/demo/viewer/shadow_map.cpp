@@ -5,11 +5,16 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 
+#include "body_mesh.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
 namespace {
+
+// Texels a side.
+constexpr int kCubeSide = 1024, kPlaneSide = 4096, kPlaceSide = 512;
 
 // Of the scene's diagonal: nearer than this nothing casts a shadow, as a lamp's own housing.
 constexpr float kNearPart = 1e-3F;
@@ -44,9 +49,31 @@ void allocate(GLenum target, int side) {
                nullptr);
 }
 
+void allocate_layers(int side, int count) {
+  glTexImage3D(GL_TEXTURE_2D_ARRAY, 0, GL_DEPTH_COMPONENT32F, side, side, count, 0,
+               GL_DEPTH_COMPONENT, GL_FLOAT, nullptr);
+}
+
+/// Which of the maps a light takes.
+enum class MapKind : std::uint8_t { kCube, kPlane, kPlaces };
+
+MapKind kind_of(const Light& light) {
+  if (is_area_light(light.type)) return MapKind::kPlaces;
+  return light.type == LightType::kDirectional ? MapKind::kPlane : MapKind::kCube;
+}
+
 bool casts_alike(const Light& a, const Light& b) {
   if (a.type != b.type) return false;
-  return a.type == LightType::kDirectional ? a.direction == b.direction : a.position == b.position;
+  switch (kind_of(a)) {
+    case MapKind::kPlane:
+      return a.direction == b.direction;
+    case MapKind::kCube:
+      return a.position == b.position;
+    case MapKind::kPlaces:
+      break;
+  }
+  return a.position == b.position && a.direction == b.direction && a.tangent == b.tangent &&
+         a.radius == b.radius && a.size == b.size;
 }
 
 std::array<glm::vec3, 8> corners_of(const SceneBounds& bounds) {
@@ -61,20 +88,23 @@ std::array<glm::vec3, 8> corners_of(const SceneBounds& bounds) {
 
 }  // namespace
 
-ShadowMap::ShadowMap(int cube_side, int plane_side)
-    : cube_side_(cube_side), plane_side_(plane_side) {
+ShadowMap::ShadowMap() {
   glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
   for (const CubeFace& face : kFaces) allocate(face.target, 1);
   set_comparing(GL_TEXTURE_CUBE_MAP);
   glBindTexture(GL_TEXTURE_2D, plane_.name());
   allocate(GL_TEXTURE_2D, 1);
   set_comparing(GL_TEXTURE_2D);
+  glBindTexture(GL_TEXTURE_2D_ARRAY, places_.name());
+  allocate_layers(1, 1);
+  set_comparing(GL_TEXTURE_2D_ARRAY);
+  glSamplerParameteri(depth_sampler_.name(), GL_TEXTURE_MIN_FILTER, GL_NEAREST);
+  glSamplerParameteri(depth_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 }
 
-void ShadowMap::update(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
-                       const GlProgram& program) {
-  if (drawn_ && casts_alike(light, drawn_for_)) return;
-  smallest_offset_ = kOffsetPart * bounds.diagonal();
+void ShadowMap::update(const Light& light, const ShadowCasters& casters, const GlProgram& program) {
+  if (drawn_ && casters.version == drawn_version_ && casts_alike(light, drawn_for_)) return;
+  smallest_offset_ = kOffsetPart * casters.bounds.diagonal();
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
   glDrawBuffer(GL_NONE);
   glReadBuffer(GL_NONE);
@@ -84,41 +114,77 @@ void ShadowMap::update(const Light& light, const GpuScene& scene, const SceneBou
   glDisable(GL_CULL_FACE);
   glDisable(GL_BLEND);
   program.use();
-  if (light.type == LightType::kDirectional) {
-    draw_plane(light, scene, bounds, program);
-  } else {
-    draw_cube(light, scene, bounds, program);
+  program.set("base_color_texture", 0);
+  switch (kind_of(light)) {
+    case MapKind::kPlane:
+      draw_plane(light, casters, program);
+      break;
+    case MapKind::kCube:
+      draw_cube(light, casters, program);
+      break;
+    case MapKind::kPlaces:
+      draw_places(light, casters, program);
+      break;
   }
   drawn_ = true;
+  drawn_version_ = casters.version;
   drawn_for_ = light;
 }
 
-void ShadowMap::draw_cube(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
-                          const GlProgram& program) {
-  const bool first_cube = !drawn_ || drawn_for_.type == LightType::kDirectional;
-  glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
-  const glm::vec3 eye = to_glm(light.position);
-  const glm::vec3 centre = 0.5F * (bounds.low + bounds.high);
-  near_far_ = {kNearPart * bounds.diagonal(), bounds.diagonal() + glm::distance(eye, centre)};
-  texel_ = 2.0F / static_cast<float>(cube_side_);
+template <typename Attach>
+void ShadowMap::draw_faces(const glm::vec3& eye, int side, const ShadowCasters& casters,
+                           const GlProgram& program, const Attach& attach) {
+  texel_ = 2.0F / static_cast<float>(side);
   const glm::mat4 projection =
       glm::perspective(glm::radians(90.0F), 1.0F, near_far_.x, near_far_.y);
-  glViewport(0, 0, cube_side_, cube_side_);
+  glViewport(0, 0, side, side);
   for (const CubeFace& face : kFaces) {
-    if (first_cube) allocate(face.target, cube_side_);
-  }
-  for (const CubeFace& face : kFaces) {
-    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, face.target, cube_.name(), 0);
+    attach(face);
     glClear(GL_DEPTH_BUFFER_BIT);
     program.set("clip_from_world", projection * glm::lookAt(eye, eye + face.forward, face.up));
-    scene.draw_surface();
+    casters.draw(program);
   }
 }
 
-void ShadowMap::draw_plane(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
+void ShadowMap::set_reach(const glm::vec3& eye, const SceneBounds& bounds) {
+  const glm::vec3 centre = 0.5F * (bounds.low + bounds.high);
+  near_far_ = {kNearPart * bounds.diagonal(), bounds.diagonal() + glm::distance(eye, centre)};
+}
+
+void ShadowMap::draw_cube(const Light& light, const ShadowCasters& casters,
+                          const GlProgram& program) {
+  glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
+  if (!drawn_ || kind_of(drawn_for_) != MapKind::kCube) {
+    for (const CubeFace& face : kFaces) allocate(face.target, kCubeSide);
+  }
+  const glm::vec3 eye = to_glm(light.position);
+  set_reach(eye, casters.bounds);
+  draw_faces(eye, kCubeSide, casters, program, [&](const CubeFace& face) {
+    glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, face.target, cube_.name(), 0);
+  });
+}
+
+void ShadowMap::draw_places(const Light& light, const ShadowCasters& casters,
+                            const GlProgram& program) {
+  constexpr int kFaceCount = static_cast<int>(kFaces.size());
+  glBindTexture(GL_TEXTURE_2D_ARRAY, places_.name());
+  if (!drawn_ || kind_of(drawn_for_) != MapKind::kPlaces) {
+    allocate_layers(kPlaceSide, kFaceCount * static_cast<int>(kLampPlaceCount));
+  }
+  set_reach(to_glm(light.position), casters.bounds);
+  int layer = 0;
+  for (const glm::vec3& place : places_on_lamp(light)) {
+    draw_faces(to_glm(light.position) + place, kPlaceSide, casters, program, [&](const CubeFace&) {
+      glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, places_.name(), 0, layer++);
+    });
+  }
+}
+
+void ShadowMap::draw_plane(const Light& light, const ShadowCasters& casters,
                            const GlProgram& program) {
+  const SceneBounds& bounds = casters.bounds;
   glBindTexture(GL_TEXTURE_2D, plane_.name());
-  if (!drawn_ || drawn_for_.type != LightType::kDirectional) allocate(GL_TEXTURE_2D, plane_side_);
+  if (!drawn_ || kind_of(drawn_for_) != MapKind::kPlane) allocate(GL_TEXTURE_2D, kPlaneSide);
   const glm::mat3 frame(frame_around(-to_dvec3(light.direction)));
   const glm::mat3 plane_axes = glm::transpose(frame);
   glm::vec3 low(std::numeric_limits<float>::max()), high(-low);
@@ -130,13 +196,12 @@ void ShadowMap::draw_plane(const Light& light, const GpuScene& scene, const Scen
   plane_from_world_ = glm::ortho(low.x - margin, high.x + margin, low.y - margin, high.y + margin,
                                  -high.z - margin, -low.z + margin) *
                       glm::mat4(plane_axes);
-  texel_ =
-      (std::max(high.x - low.x, high.y - low.y) + 2 * margin) / static_cast<float>(plane_side_);
-  glViewport(0, 0, plane_side_, plane_side_);
+  texel_ = (std::max(high.x - low.x, high.y - low.y) + 2 * margin) / static_cast<float>(kPlaneSide);
+  glViewport(0, 0, kPlaneSide, kPlaneSide);
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, plane_.name(), 0);
   glClear(GL_DEPTH_BUFFER_BIT);
   program.set("clip_from_world", plane_from_world_);
-  scene.draw_surface();
+  casters.draw(program);
 }
 
 void ShadowMap::bind(const GlProgram& program) const {
@@ -144,7 +209,14 @@ void ShadowMap::bind(const GlProgram& program) const {
   glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
   glActiveTexture(GL_TEXTURE3);
   glBindTexture(GL_TEXTURE_2D, plane_.name());
+  glActiveTexture(GL_TEXTURE4);
+  glBindTexture(GL_TEXTURE_2D_ARRAY, places_.name());
+  glActiveTexture(GL_TEXTURE5);
+  glBindTexture(GL_TEXTURE_2D_ARRAY, places_.name());
+  glBindSampler(5, depth_sampler_.name());
   program.set("cube_shadow", 2);
+  program.set("place_shadow", 4);
+  program.set("place_depth", 5);
   program.set("plane_shadow", 3);
   program.set("plane_from_world", plane_from_world_);
   program.set("near_far", near_far_);

@@ -4,6 +4,7 @@
 
 #include "gl_objects.h"
 #include "gl_program.h"
+#include "gpu_bodies.h"
 #include "gpu_scene.h"
 #include "rebounce/transfer/scene_description.h"
 
@@ -15,32 +16,49 @@ struct SceneBounds {
   float diagonal() const { return glm::length(high - low); }
 };
 
+/// What casts shadows: the scene, and what moves through it.
+struct ShadowCasters {
+  const GpuScene& scene;
+  const GpuBodies& bodies;
+  SceneBounds bounds;
+  int version = 0;  ///< another one for other bodies, or where they have moved
+
+  void draw(const GlProgram& program) const {
+    scene.draw_surface(program);
+    bodies.draw_surface(program);
+  }
+};
+
 /// What one lamp sees: a cube of depths around a point or spot light, one plane for a directional
-/// one. Drawn anew only when the lamp has moved.
+/// one, cubes around all of its places (body_mesh.h) for one with a surface. Drawn anew only when
+/// the lamp or a caster has moved.
 class ShadowMap {
  public:
   /// Makes the map fit `light`; `program` draws depths.
-  void update(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
-              const GlProgram& program);
+  void update(const Light& light, const ShadowCasters& casters, const GlProgram& program);
 
-  /// Binds the map to texture units 2 (cube) and 3 (plane) and sets the uniforms of
-  /// shaders::kLampFragment that say how to look it up.
+  /// Binds the map to texture units 2 (cube), 3 (plane), 4 and 5 (places) and sets the
+  /// uniforms of shaders::kLampFragment that say how to look it up.
   void bind(const GlProgram& program) const;
 
-  /// Allocates; `cube_side` and `plane_side` in texels.
-  ShadowMap(int cube_side, int plane_side);
+  ShadowMap();
 
  private:
-  void draw_cube(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
-                 const GlProgram& program);
-  void draw_plane(const Light& light, const GpuScene& scene, const SceneBounds& bounds,
-                  const GlProgram& program);
+  void draw_places(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+  /// Draws what is seen from `eye`; attach(face) makes a face the target.
+  template <typename Attach>
+  void draw_faces(const glm::vec3& eye, int side, const ShadowCasters& casters,
+                  const GlProgram& program, const Attach& attach);
+  void set_reach(const glm::vec3& eye, const SceneBounds& bounds);
+  void draw_cube(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+  void draw_plane(const Light& light, const ShadowCasters& casters, const GlProgram& program);
 
-  int cube_side_, plane_side_;
-  GlTexture cube_, plane_;
+  GlTexture cube_, plane_, places_;
+  GlSampler depth_sampler_;
   GlFramebuffer framebuffer_;
   bool drawn_ = false;
   Light drawn_for_;
+  int drawn_version_ = 0;  // of the casters
   glm::mat4 plane_from_world_{1};
   glm::vec2 near_far_{0.01F, 1};
   float texel_ = 0, smallest_offset_ = 0;

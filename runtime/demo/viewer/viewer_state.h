@@ -9,6 +9,7 @@ namespace rebounce {
 struct ViewerState {
   explicit ViewerState(const ViewerSetup& setup)
       : lights(setup.lights),
+        spheres(setup.spheres),
         sky(setup.sky),
         camera(setup.camera),
         show(setup.show),
@@ -25,7 +26,19 @@ struct ViewerState {
     return now;
   }
 
+  /// The spheres that are shown, where they are now.
+  std::vector<ViewerSphere> spheres_now() const {
+    std::vector<ViewerSphere> now;
+    for (const ViewerSphere& sphere : spheres) {
+      if (!sphere.on || !shows_spheres) continue;
+      now.push_back(sphere);
+      now.back().position = moved(sphere.position, sphere.motion, time);
+    }
+    return now;
+  }
+
   std::vector<ViewerLight> lights;
+  std::vector<ViewerSphere> spheres;
   Sky sky;
   FlyCamera camera;
   Show show;
@@ -37,7 +50,9 @@ struct ViewerState {
   bool playing = true;
   bool wants_exposure = false;  ///< find the exposure anew
   bool shows_panels = true;
+  bool shows_spheres = true;
   std::size_t selected = 0;  ///< lamp
+  std::size_t selected_sphere = 0;
 };
 
 }  // namespace rebounce

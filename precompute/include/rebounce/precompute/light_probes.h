@@ -2,6 +2,7 @@
 
 // Where light probes are, and what they see.
 
+#include <cstdint>
 #include <span>
 
 #include "rebounce/precompute/progress.h"
@@ -19,15 +20,16 @@ struct ProbeSettings {
 };
 
 /// The middles of the cells of a grid over the box around `mesh`. Throws Error where that is more
-/// than a million. `settings` asks for probes.
+/// than 65,536. `settings` asks for probes.
 LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings);
 
 /// Fills the map of `probes`, of which positions and grid are given, by rays spread evenly over the
 /// sphere. A probe of whose rays more than a quarter meet the backs of one-sided surfaces is not
 /// valid, as one within a wall does (Z. Majercik et al., "Dynamic diffuse global illumination with
-/// ray-traced irradiance fields", 2019, whose test it is). `tracer` holds the surface of data.mesh.
-/// Throws Cancelled.
-void trace_probes(const TransferData& data, const RayTracer& tracer, const ProbeSettings& settings,
-                  LightProbes& probes, const Progress& progress = {});
+/// ray-traced irradiance fields", 2019, whose test it is). `shown_patch` [t] is that of PatchModel,
+/// `tracer` holds the surface of data.mesh. Throws Cancelled.
+void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+                  const RayTracer& tracer, const ProbeSettings& settings, LightProbes& probes,
+                  const Progress& progress = {});
 
 }  // namespace rebounce

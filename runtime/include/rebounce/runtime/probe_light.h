@@ -13,9 +13,9 @@ namespace rebounce {
 using ProbeLight = std::array<Float3, kHarmonicCount>;
 
 /// Writes the light that arrives at each probe [p] from patches of `radiosity` [n] in lx and from
-/// `sky`, which is taken for uniform (mean_sky_luminance); that of lamps is not in it. Probes that
-/// are not valid get none. Neither allocates nor locks; the same bits for any number of OpenMP
-/// threads. Throws Error if a size is wrong.
+/// `sky`, by its cells where the probes know them, else as its mean; that of lamps is not in it.
+/// Probes that are not valid get none. Neither allocates nor locks; the same bits for any number of
+/// OpenMP threads. Throws Error if a size is wrong.
 void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
                   std::span<ProbeLight> light);
 
@@ -28,5 +28,10 @@ Float3 probe_irradiance(const ProbeLight& light, const Float3& normal);
 /// eight is valid, or if the probes are no grid.
 ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,
                               const Float3& position);
+
+/// The same for a few points, without apply_probes: gathers at no more than the eight probes around
+/// `position`. Arguments and errors are those of apply_probes.
+ProbeLight gather_probe_light(const LightProbes& probes, std::span<const Float3> radiosity,
+                              const Sky& sky, const Float3& position);
 
 }  // namespace rebounce

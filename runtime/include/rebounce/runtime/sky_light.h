@@ -12,6 +12,9 @@ Float3 sky_irradiance(const TransferData& data, const Sky& sky, std::size_t patc
 /// The luminance of `sky` in the unit `direction`, cd/m².
 Float3 sky_luminance(const Sky& sky, const Float3& direction);
 
+/// What the luminances of the cells of `sky` are parts of, cd/m².
+Float3 sky_luminance_unit(const Sky& sky);
+
 /// The mean luminance of `sky` above the horizon, cd/m².
 Float3 mean_sky_luminance(const Sky& sky);
 

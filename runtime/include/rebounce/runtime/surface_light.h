@@ -13,9 +13,9 @@ namespace rebounce {
 using SurfaceLight = std::array<Float3, kLinearHarmonicCount>;
 
 /// Writes the light that arrives at each patch [n] from patches of `radiosity` [n] in lx and from
-/// `sky`, which is taken for uniform (mean_sky_luminance); that of lamps is not in it. Neither
-/// allocates nor locks; the same bits for any number of OpenMP threads. Throws Error if a size is
-/// wrong.
+/// `sky`, by its cells where the harmonics know them, else as its mean; that of lamps is not in it.
+/// Neither allocates nor locks; the same bits for any number of OpenMP threads. Throws Error if a
+/// size is wrong.
 void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const Float3> radiosity,
                              const Sky& sky, std::span<SurfaceLight> light);
 

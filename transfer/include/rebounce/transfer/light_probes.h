@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "rebounce/transfer/sky_harmonics.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
@@ -16,9 +17,10 @@ using Harmonics = std::array<float, kHarmonicCount>;
 /// Points in the air, and for each the linear map from the radiosity of the patches to the
 /// incoming radiance there, as coefficients of spherical harmonics.
 struct LightProbes {
-  std::vector<Float3> position;     ///< [p] metres
-  std::vector<std::uint8_t> valid;  ///< [p] 0: within a wall or behind surfaces, without entries
-  std::vector<Harmonics> sky;       ///< [p] of a sky of luminance 1
+  std::vector<Float3> position;       ///< [p] metres
+  std::vector<std::uint8_t> valid;    ///< [p] 0: within a wall or behind surfaces, without entries
+  std::vector<Harmonics> sky;         ///< [p] of a sky of luminance 1
+  SkyHarmonics<Harmonics> sky_cells;  ///< [p] may be empty: then the sky is taken for uniform
   /// What probe k sees of patches is [entry_begin[k], entry_begin[k + 1]): with radiosity B in lx
   /// the coefficients are the sum of entry_weight x B[entry_patch], in cd/m².
   std::vector<std::uint32_t> entry_begin = {0};  ///< [p + 1]

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "rebounce/transfer/sky_harmonics.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
@@ -17,7 +18,8 @@ using LinearHarmonics = std::array<float, kLinearHarmonicCount>;
 /// radiosity of the patches to the radiance over its hemisphere (the mean over its area), as
 /// spherical harmonics in the world's axes.
 struct SurfaceHarmonics {
-  std::vector<LinearHarmonics> sky;  ///< [n] of a sky of luminance 1
+  std::vector<LinearHarmonics> sky;         ///< [n] of a sky of luminance 1
+  SkyHarmonics<LinearHarmonics> sky_cells;  ///< [n] may be empty: then the sky is taken for uniform
   /// What patch i sees is [entry_begin[i], entry_begin[i + 1]): with radiosity B in lx the
   /// coefficients are the sum of entry_weight x B[entry_patch], in cd/m².
   std::vector<std::uint32_t> entry_begin;  ///< [n + 1]

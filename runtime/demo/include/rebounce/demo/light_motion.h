@@ -7,7 +7,7 @@
 
 namespace rebounce {
 
-/// How a lamp moves by itself.
+/// How a lamp, or a sphere that it lights, moves by itself.
 struct LightMotion {
   enum class Kind : std::uint8_t {
     kStill,
@@ -34,6 +34,9 @@ struct LightMotion {
   Float3 to{0, 0, 0};       ///< swing, metres
   std::vector<Key> keys{};  ///< keys, by ascending time; not empty
 };
+
+/// Where something that rests at `position` is `time` seconds after the motion began. `time` >= 0.
+Float3 moved(const Float3& position, const LightMotion& motion, float time);
 
 /// `light` as it is `time` seconds after the motion began. `time` >= 0.
 Light moved(const Light& light, const LightMotion& motion, float time);

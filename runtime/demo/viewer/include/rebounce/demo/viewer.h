@@ -23,12 +23,23 @@ struct ViewerLight {
   bool on = true;
 };
 
+/// A sphere that moves through the scene, lit by the light probes, and by lamps with shadows. Light
+/// that it reflects or holds off does not go into the radiosity of the patches.
+struct ViewerSphere {
+  Float3 position{0, 0, 0};  ///< metres, the middle
+  float radius = 0.1F;       ///< metres, > 0
+  Float3 reflectance{0.7F, 0.7F, 0.7F};
+  LightMotion motion{};
+  bool on = true;
+};
+
 /// What the viewer begins with; all of it can be changed in its panels.
 struct ViewerSetup {
   std::string title = "Rebounce";
   int width = 1280;  ///< pixels
   int height = 800;  ///< pixels
   std::vector<ViewerLight> lights{};
+  std::vector<ViewerSphere> spheres{};
   Sky sky{};
   Camera camera;
   Show show = Show::kRadiosity;
@@ -41,6 +52,9 @@ struct ViewerSetup {
   /// Gives the exact indirect irradiance [n] in lx for an initial exitance [n] in lx; without it
   /// there is no error to show.
   std::function<std::vector<Float3>(std::span<const Float3>)> reference{};
+  /// Finds light probes for a file that has none, when the first sphere needs them; without it such
+  /// spheres are lit by lamps alone.
+  std::function<LightProbes()> make_probes{};
 };
 
 /// Microseconds that the stages of a frame took.

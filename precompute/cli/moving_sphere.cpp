@@ -1,0 +1,91 @@
+#include "moving_sphere.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "rebounce/precompute/light_probes.h"
+#include "rebounce/runtime/float3_glm.h"
+
+namespace rebounce::cli {
+namespace {
+
+// Of the way through the scene to what is ahead.
+constexpr float kPlace = 0.5F, kSwing = 0.3F, kLargestRadius = 0.1F;
+constexpr float kApparentRadius = 0.07F;  // of the way from the camera
+constexpr float kProbeCount = 600;
+
+struct Box {
+  glm::vec3 low, high;
+};
+
+Box box_around(const DisplayMesh& mesh) {
+  Box box{glm::vec3(std::numeric_limits<float>::max()),
+          glm::vec3(std::numeric_limits<float>::lowest())};
+  for (const Float3& p : mesh.position) {
+    box.low = glm::min(box.low, to_glm(p));
+    box.high = glm::max(box.high, to_glm(p));
+  }
+  return box;
+}
+
+/// Metres along the unit `direction` from `origin` to where the box begins and ends; as 0 and 0
+/// where the line misses it.
+std::array<float, 2> way_through(const Box& box, const glm::vec3& origin,
+                                 const glm::vec3& direction) {
+  const glm::vec3 a = (box.low - origin) / direction, b = (box.high - origin) / direction;
+  const glm::vec3 in = glm::min(a, b), out = glm::max(a, b);
+  const float begin = std::max({in.x, in.y, in.z, 0.0F}), end = std::min({out.x, out.y, out.z});
+  if (!(begin < end)) return {0, 0};
+  return {begin, end};
+}
+
+/// Metres that are free from `origin` along the unit `direction`, at most `most`.
+float free_way(const RayTracer& tracer, const glm::vec3& origin, const glm::vec3& direction,
+               float most) {
+  const std::array ray = {Ray{
+      .origin = to_float3(origin), .t_near = 0, .direction = to_float3(direction), .t_far = most}};
+  std::array<Hit, 1> hit;
+  tracer.intersect(ray, hit);
+  return hit[0].triangle == kNone ? most : hit[0].t;
+}
+
+}  // namespace
+
+ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const TransferData& data) {
+  const Box box = box_around(data.mesh);
+  const glm::vec3 eye = to_glm(camera.position), ahead = -to_glm(camera.backward);
+  const auto [begin, end] = way_through(box, eye, ahead);
+  // A camera that looks past the scene has the sphere as far away as the scene is large.
+  const float most = end > 0 ? end : glm::length(box.high - box.low);
+  const float way = free_way(tracer, eye, ahead, most) - begin;
+  const glm::vec3 middle = eye + (begin + kPlace * way) * ahead;
+  ViewerSphere sphere{
+      .position = to_float3(middle),
+      .radius = std::min(kLargestRadius * way, kApparentRadius * glm::distance(eye, middle))};
+  const auto turning_point = [&](const glm::vec3& side) {
+    const float inside = way_through(box, middle, side)[1];
+    const float room =
+        std::min(inside, free_way(tracer, middle, side, kSwing * way + sphere.radius));
+    return to_float3(middle + std::max(0.0F, room - sphere.radius) * side);
+  };
+  sphere.motion = {.kind = LightMotion::Kind::kSwing, .period = 6};
+  sphere.motion.from = turning_point(-to_glm(camera.right));
+  sphere.motion.to = turning_point(to_glm(camera.right));
+  return sphere;
+}
+
+LightProbes make_probes_for_view(const TransferData& data) {
+  const Box box = box_around(data.mesh);
+  const glm::vec3 extent = box.high - box.low;
+  // A scene that is flat still has probes no closer than this.
+  const float least = glm::length(extent) / 32;
+  ProbeSettings settings;
+  settings.spacing = std::max(std::cbrt(extent.x * extent.y * extent.z / kProbeCount), least);
+  LightProbes probes = place_probes(data.mesh, settings);
+  trace_probes(data, data.mesh.triangle_patch, make_surface_tracer(data.mesh), settings, probes);
+  return probes;
+}
+
+}  // namespace rebounce::cli

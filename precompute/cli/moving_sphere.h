@@ -1,0 +1,15 @@
+#pragma once
+
+#include "rebounce/demo/viewer.h"
+#include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce::cli {
+
+/// A sphere that swings from side to side in front of `camera`, as far as there is room.
+ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const TransferData& data);
+
+/// Light probes for a file that has none: a few hundred of them in a grid over the scene.
+LightProbes make_probes_for_view(const TransferData& data);
+
+}  // namespace rebounce::cli

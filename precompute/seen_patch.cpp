@@ -1,0 +1,52 @@
+#include "seen_patch.h"
+
+#include "rebounce/runtime/float3_glm.h"
+
+namespace rebounce {
+namespace {
+
+std::uint32_t side_of(const DisplayMesh& mesh, std::uint32_t triangle, bool front) {
+  return front ? triangle : mesh.back_triangle[triangle];
+}
+
+/// Unit, on the side that was hit.
+glm::dvec3 normal_at(const DisplayMesh& mesh, const Hit& hit) {
+  const auto corner = [&](int k) {
+    return to_dvec3(mesh.position[mesh.triangle[hit.triangle][k]]);
+  };
+  const glm::dvec3 normal =
+      glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+  return hit.front ? normal : -normal;
+}
+
+}  // namespace
+
+bool meets_back(const DisplayMesh& mesh, const Hit& hit) {
+  return hit.triangle != kNone && !hit.front && mesh.back_triangle[hit.triangle] == kNone;
+}
+
+std::uint32_t patch_at(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+                       const Hit& hit) {
+  if (hit.triangle == kNone || meets_back(mesh, hit)) return kNone;
+  return shown_patch[side_of(mesh, hit.triangle, hit.front)];
+}
+
+void prefer_lit_side(const DisplayMesh& mesh, const RayTracer& tracer, const Ray& ray, Hit& hit,
+                     CoincidenceScratch& scratch) {
+  if (hit.triangle == kNone || patch_at(mesh, mesh.triangle_patch, hit) != kNone) return;
+  const glm::dvec3 point =
+      to_dvec3(ray.origin) + static_cast<double>(hit.t) * to_dvec3(ray.direction);
+  find_coincident_sides(
+      tracer, to_float3(point), to_float3(normal_at(mesh, hit)), hit.triangle,
+      [&](std::uint32_t t) { return mesh.back_triangle[t] != kNone; }, scratch.hits, scratch.sides);
+  std::uint32_t least = kNone;
+  for (const CoincidentSide& side : scratch.sides) {
+    const std::uint32_t shown = side_of(mesh, side.triangle, side.front);
+    if (!side.same_way || mesh.triangle_patch[shown] >= least) continue;
+    least = mesh.triangle_patch[shown];
+    hit.triangle = side.triangle;
+    hit.front = side.front;
+  }
+}
+
+}  // namespace rebounce

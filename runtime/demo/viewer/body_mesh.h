@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "gpu_scene.h"
+#include "rebounce/transfer/scene_description.h"
+
+namespace rebounce {
+
+/// A vertex of what is not part of the scene: colour and light are linear, light in lx.
+struct BodyVertex {
+  Float3 position{}, normal{}, color{};
+  Float3 first_flight{};  ///< sky and emitters
+  std::array<Float3, kSideCount> bounced{};
+};
+
+/// The triangles of one body.
+struct BodyPart {
+  std::uint32_t begin = 0, end = 0;
+  Float3 emitted_luminance{0, 0, 0};  ///< cd/m²
+};
+
+/// Spheres that are lit, and the surfaces of lamps, as triangles.
+struct BodyMesh {
+  std::vector<BodyVertex> vertex;
+  std::vector<Uint3> triangle;
+  std::vector<BodyPart> part;
+};
+
+/// Adds a sphere; `shade`(unit normal) is all of a vertex but its place and normal.
+void add_sphere(const Float3& center, float radius,
+                const std::function<BodyVertex(const Float3& normal)>& shade, BodyMesh& mesh);
+
+/// Adds the surface of `lamp` as something that shines; nothing if it has none.
+void add_lamp_surface(const Light& lamp, BodyMesh& mesh);
+
+/// The middle of a rectangle's first side and of its other one, or two perpendicular radii of a
+/// disc, from its middle.
+std::array<Float3, 2> flat_lamp_axes(const Light& lamp);
+
+/// Places spread evenly over the surface of `lamp`, from its middle.
+inline constexpr std::size_t kLampPlaceCount = 16;
+std::array<glm::vec3, kLampPlaceCount> places_on_lamp(const Light& lamp);
+
+/// m², of what shines.
+float area_of_lamp(const Light& lamp);
+
+}  // namespace rebounce

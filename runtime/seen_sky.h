@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "rebounce/runtime/sky_light.h"
+#include "rebounce/transfer/scene_description.h"
+#include "rebounce/transfer/sky_harmonics.h"
+
+namespace rebounce {
+
+/// What places see of one sky, as spherical harmonics: the cells of `sky` weighted by its
+/// distribution, or, where it is uniform or the cells are not known, `uniform` for its mean.
+template <typename Weight>
+class SeenSky {
+ public:
+  SeenSky(const std::vector<Weight>& uniform, const SkyHarmonics<Weight>& cells, const Sky& sky)
+      : uniform_(uniform),
+        cells_(cells),
+        distribution_(cells.empty() ? nullptr : sky.distribution.get()),
+        luminance_(distribution_ != nullptr ? sky_luminance_unit(sky) : mean_sky_luminance(sky)) {}
+
+  /// cd/m², which the coefficients are to be multiplied by.
+  const Float3& luminance() const { return luminance_; }
+
+  Weight coefficients(std::size_t place) const {
+    if (distribution_ == nullptr) return uniform_[place];
+    Weight sum{};
+    for (auto e = cells_.entry_begin[place]; e < cells_.entry_begin[place + 1]; ++e) {
+      const float part = (*distribution_)[cells_.entry_cell[e]];
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += part * cells_.entry_weight[e][k];
+    }
+    return sum;
+  }
+
+ private:
+  const std::vector<Weight>& uniform_;
+  const SkyHarmonics<Weight>& cells_;
+  const SkyDistribution* distribution_;
+  Float3 luminance_;
+};
+
+}  // namespace rebounce
