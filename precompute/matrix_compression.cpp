@@ -60,13 +60,14 @@ class Compression {
       : matrix_(matrix),
         truth_(matrix, with_uniform(patches.size(), shaping)),
         tree_(build_cluster_tree(patches, kLeafSize)),
+        background_(background_light(matrix, tree_)),
         sample_(truth_.normalised_lights(tree_.patch,
                                          HierarchicalOperator::position_count(patches.size()))) {
     sample_.col(0) *= std::sqrt(kUniformShare * static_cast<double>(sample_.cols()));
   }
 
   HierarchicalOperator::Storage at(double price, const Progress& progress) const {
-    const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_);
+    const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_, background_);
     return BlockTreeCompressor(matrix_, tree_, weights).compress(price, progress);
   }
 
@@ -85,6 +86,7 @@ class Compression {
   const SymmetricMatrix& matrix_;
   LitTruth truth_;
   ClusterTree tree_;
+  Eigen::VectorXd background_;
   Eigen::MatrixXd sample_;
 };
 
