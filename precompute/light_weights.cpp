@@ -21,11 +21,13 @@ constexpr Index kDirectionCount = 8;
 
 // The part of the mean energy of the sample at one position that is taken for the variance of
 // lights in any direction. Measured: notes/operator.md.
-constexpr double kBackground = 0.1;
+constexpr double kBackground = 1;
 
-// Light of which less arrives than this part of the usual energy counts no more than such light:
-// what is left of it is rounding.
-constexpr double kLeastEnergy = 1e-7;
+// The background grows with this power of what the light of a patch lacks to the usual energy, and
+// no further below kLeastEnergy of that. With 1/2 the errors of all single patches would count
+// alike; rows and columns are both weighed, which is too much of it where both are dark. Measured:
+// notes/operator.md.
+constexpr double kDarkPower = 0.4, kLeastEnergy = 1e-6;
 
 // Rows and columns of the matrix that are looked at together.
 constexpr std::size_t kTile = 256;
@@ -114,7 +116,7 @@ VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree
   const double usual = *middle;
   if (usual == 0) return background;
   background.head(energy.size()) =
-      (usual / energy.array().max(kLeastEnergy * usual).min(usual)).sqrt();
+      (usual / energy.array().max(kLeastEnergy * usual).min(usual)).pow(kDarkPower);
   return background;
 }
 

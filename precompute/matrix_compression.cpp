@@ -19,7 +19,7 @@ constexpr std::uint32_t kLeafSize = 32;
 // The search for the price ends with an error between these parts of the tolerance: other lights
 // than those that it sees may do a little worse.
 constexpr int kMostRounds = 8;
-constexpr double kLeast = 0.65, kAim = 0.72, kMost = 0.8;
+constexpr double kLeast = 0.72, kAim = 0.76, kMost = 0.8;
 
 // The largest error may be this many times the tolerance: gates of 0.5 % and 1.5 %.
 constexpr double kLargestOverMean = 3;
