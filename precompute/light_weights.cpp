@@ -21,7 +21,16 @@ constexpr Index kDirectionCount = 8;
 
 // The part of the mean energy of the sample at one position that is taken for the variance of
 // lights in any direction. Measured: notes/operator.md.
-constexpr double kBackground = 0.1;
+constexpr double kBackground = 1;
+
+// The background grows with this power of what the light of a patch lacks to the usual energy, and
+// no further below kLeastEnergy of that. With 1/2 the errors of all single patches would count
+// alike; rows and columns are both weighed, which is too much of it where both are dark. Measured:
+// notes/operator.md.
+constexpr double kDarkPower = 0.4, kLeastEnergy = 1e-6;
+
+// Rows and columns of the matrix that are looked at together.
+constexpr std::size_t kTile = 256;
 
 struct Principal {
   MatrixXd directions;
@@ -49,14 +58,42 @@ Principal principal_directions(const MatrixXd& sample) {
   return result;
 }
 
+/// Positions [begin, begin + kTile) that hold a patch.
+std::span<const std::uint32_t> tile_of(const ClusterTree& tree, std::size_t begin) {
+  return std::span(tree.patch).subspan(begin, std::min(kTile, tree.patch.size() - begin));
+}
+
+/// What arrives of the light of each patch alone: the squared norms of the columns, of all channels
+/// together, [n] by position.
+VectorXd energies_of_patches(const SymmetricMatrix& matrix, const ClusterTree& tree) {
+  const std::size_t n = tree.patch.size();
+  VectorXd energy = VectorXd::Zero(static_cast<Index>(n));
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t column = 0; column < n; column += kTile) {
+    const auto columns = tile_of(tree, column);
+    for (std::size_t row = 0; row < n; row += kTile) {
+      const auto rows = tile_of(tree, row);
+      Eigen::MatrixXf entries(rows.size(), columns.size());
+      for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) {
+        matrix.entries(m, rows, columns, entries);
+        energy.segment(static_cast<Index>(column), entries.cols()) +=
+            entries.cast<double>().colwise().squaredNorm().transpose();
+      }
+    }
+  }
+  return energy;
+}
+
 }  // namespace
 
 void ClusterWeight::put_left(Eigen::Ref<MatrixXd> matrix) const {
+  matrix = background_.asDiagonal() * matrix;
   const MatrixXd part = strength_.asDiagonal() * (directions_.transpose() * matrix);
   matrix.noalias() += directions_ * part;
 }
 
 void ClusterWeight::put_right(Eigen::Ref<MatrixXd> matrix) const {
+  matrix = matrix * background_.asDiagonal();
   const MatrixXd part = (matrix * directions_) * strength_.asDiagonal();
   matrix.noalias() += part * directions_.transpose();
 }
@@ -65,25 +102,44 @@ void ClusterWeight::take_away(MatrixXd& basis) const {
   const VectorXd inverse = (strength_.array() / (1 + strength_.array())).matrix();
   const MatrixXd part = inverse.asDiagonal() * (directions_.transpose() * basis);
   basis.noalias() -= directions_ * part;
+  basis = background_.cwiseInverse().asDiagonal() * basis;
 }
 
-std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const MatrixXd& sample) {
+VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree) {
+  const auto positions =
+      static_cast<Index>(HierarchicalOperator::position_count(tree.patch.size()));
+  VectorXd background = VectorXd::Ones(positions);
+  const VectorXd energy = energies_of_patches(matrix, tree);
+  std::vector<double> sorted(energy.begin(), energy.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  const double usual = *middle;
+  if (usual == 0) return background;
+  background.head(energy.size()) =
+      (usual / energy.array().max(kLeastEnergy * usual).min(usual)).pow(kDarkPower);
+  return background;
+}
+
+std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const MatrixXd& sample,
+                                                const VectorXd& background) {
+  const MatrixXd relative = background.cwiseInverse().asDiagonal() * sample;
   // Lights without any indirect light leave nothing to weigh.
-  const double background =
-      std::max(kBackground * sample.squaredNorm() / static_cast<double>(sample.rows()),
+  const double variance =
+      std::max(kBackground * relative.squaredNorm() / static_cast<double>(relative.rows()),
                std::numeric_limits<double>::min());
   const SingleThreadedBlas single_threaded;
   std::vector<Principal> principal(tree.clusters.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < tree.clusters.size(); ++k) {
     const Cluster& cluster = tree.clusters[k];
-    principal[k] = principal_directions(sample.middleRows(cluster.begin, cluster.count));
+    principal[k] = principal_directions(relative.middleRows(cluster.begin, cluster.count));
   }
   std::vector<ClusterWeight> weights;
   weights.reserve(principal.size());
-  for (Principal& p : principal) {
-    VectorXd strength = (1 + p.energies.array() / background).sqrt() - 1;
-    weights.emplace_back(std::move(p.directions), std::move(strength));
+  for (std::size_t k = 0; k < principal.size(); ++k) {
+    VectorXd strength = (1 + principal[k].energies.array() / variance).sqrt() - 1;
+    weights.emplace_back(background.segment(tree.clusters[k].begin, tree.clusters[k].count),
+                         std::move(principal[k].directions), std::move(strength));
   }
   return weights;
 }

@@ -19,7 +19,7 @@ constexpr std::uint32_t kLeafSize = 32;
 // The search for the price ends with an error between these parts of the tolerance: other lights
 // than those that it sees may do a little worse.
 constexpr int kMostRounds = 8;
-constexpr double kLeast = 0.65, kAim = 0.72, kMost = 0.8;
+constexpr double kLeast = 0.72, kAim = 0.76, kMost = 0.8;
 
 // The largest error may be this many times the tolerance: gates of 0.5 % and 1.5 %.
 constexpr double kLargestOverMean = 3;
@@ -60,13 +60,14 @@ class Compression {
       : matrix_(matrix),
         truth_(matrix, with_uniform(patches.size(), shaping)),
         tree_(build_cluster_tree(patches, kLeafSize)),
+        background_(background_light(matrix, tree_)),
         sample_(truth_.normalised_lights(tree_.patch,
                                          HierarchicalOperator::position_count(patches.size()))) {
     sample_.col(0) *= std::sqrt(kUniformShare * static_cast<double>(sample_.cols()));
   }
 
   HierarchicalOperator::Storage at(double price, const Progress& progress) const {
-    const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_);
+    const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_, background_);
     return BlockTreeCompressor(matrix_, tree_, weights).compress(price, progress);
   }
 
@@ -85,6 +86,7 @@ class Compression {
   const SymmetricMatrix& matrix_;
   LitTruth truth_;
   ClusterTree tree_;
+  Eigen::VectorXd background_;
   Eigen::MatrixXd sample_;
 };
 

@@ -17,6 +17,13 @@ constexpr double kLongestStep = 6.9;
 // Of a bracket, at least this part is cut off by a step inside.
 constexpr double kMargin = 0.1;
 
+// Errors, in the logarithm, that differ by this much more or less than their prices explain are not
+// of the same curve.
+constexpr double kUneven = 0.1;
+
+// Trials that are forgotten for it; after that, the curve itself must jump.
+constexpr std::size_t kMostForgotten = 4;
+
 // Prices this close together, in the logarithm, give the same operator or nearly so.
 constexpr double kNarrow = 0.02;
 
@@ -26,6 +33,9 @@ void PriceSearch::report(double error) {
   done_ = error >= wanted_.least && error <= wanted_.most;
   const Trial trial{std::log(price_),
                     std::log(std::max(error, std::numeric_limits<double>::min()))};
+  if (forgotten_ < kMostForgotten) {
+    forgotten_ += std::erase_if(trials_, [&](const Trial& old) { return contradicts(trial, old); });
+  }
   const auto place = std::ranges::upper_bound(trials_, trial.price, {}, &Trial::price);
   trials_.insert(place, trial);
 
@@ -41,6 +51,12 @@ void PriceSearch::report(double error) {
     done_ = done_ || high->price - low.price < kNarrow;
     price_ = std::exp(inside(low, *high));
   }
+}
+
+bool PriceSearch::contradicts(const Trial& trial, const Trial& old) {
+  const double step = trial.price - old.price;
+  const double rise = step > 0 ? trial.error - old.error : old.error - trial.error;
+  return rise < -kUneven || rise > kMostSlope * std::abs(step) + kUneven;
 }
 
 double PriceSearch::inside(const Trial& low, const Trial& high) const {

@@ -8,7 +8,9 @@ namespace rebounce {
 ///
 /// Works on the logarithms of both, where the error is nearly a straight line: outwards along the
 /// line through the nearest two trials until the wanted error lies between two of them, then by the
-/// secant between those (regula falsi, kept off the ends of the bracket).
+/// secant between those (regula falsi, kept off the ends of the bracket). The curve may change from
+/// one trial to the next, as weights that follow the errors make it: older trials that no curve
+/// through the newest could have given are forgotten.
 class PriceSearch {
  public:
   /// Errors in [least, most] are good, and `aim` between them is steered for.
@@ -32,12 +34,14 @@ class PriceSearch {
     double price, error;  ///< their logarithms
   };
 
+  static bool contradicts(const Trial& trial, const Trial& old);
   double inside(const Trial& low, const Trial& high) const;
   double outside(const Trial& nearest) const;
 
   double price_;
   Range wanted_;
   std::vector<Trial> trials_;  ///< by price, ascending
+  std::size_t forgotten_ = 0;
   bool done_ = false;
 };
 

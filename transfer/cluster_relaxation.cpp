@@ -70,13 +70,14 @@ class ClusterRelaxation final : public Relaxation {
  public:
   ClusterRelaxation(const HierarchicalOperator::Storage& exchange, const BasisKernels<Basis>& bases,
                     CoreKernel<Value> multiply_cores, const Basis* basis_values,
-                    const Value* core_values)
+                    const Value* core_values, float basis_scale)
       : exchange_(exchange),
         bases_(bases),
         multiply_cores_(multiply_cores),
         basis_values_(basis_values),
         core_values_(core_values),
         value_scale_(product_scale(exchange.precision)),
+        dense_scale_(basis_scale * basis_scale),
         plan_(exchange),
         light_(positions()),
         reflectance_(positions()),
@@ -229,7 +230,7 @@ class ClusterRelaxation final : public Relaxation {
   void add_arrived(std::size_t coefficient, std::size_t count, Planes& to, std::size_t begin) {
     for (int c = 0; c < kChannelCount; ++c) {
       for (std::size_t k = 0; k < count; ++k) {
-        to.at(c, begin + k) += arrived_.at(c, coefficient + k);
+        to.at(c, begin + k) += dense_scale_ * arrived_.at(c, coefficient + k);
       }
     }
   }
@@ -305,7 +306,7 @@ class ClusterRelaxation final : public Relaxation {
     double changed_squared = 0;
     for (int c = 0; c < kChannelCount; ++c) {
       float& x = radiosity_.at(c, position);
-      const float received = received_.at(c, position) + arrived_.at(c, inside);
+      const float received = received_.at(c, position) + dense_scale_ * arrived_.at(c, inside);
       const float next = light_.at(c, position) + reflectance_.at(c, position) * received;
       const double change = static_cast<double>(next) - x;
       changed_squared += change * change;
@@ -321,6 +322,7 @@ class ClusterRelaxation final : public Relaxation {
   const Basis* basis_values_;
   const Value* core_values_;
   float value_scale_;  ///< what a product with stored values is to be multiplied by
+  float dense_scale_;  ///< of one with dense entries, which other light meets in both bases
   ClusterSweepPlan plan_;
   Planes light_, reflectance_, radiosity_;  ///< A^1/2 M0, rho x value_scale, A^1/2 B
   Planes lower_, upper_, received_;         ///< L x, L^T x, and both and D x
@@ -335,22 +337,24 @@ std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::
   const BlockKernelSet& kernels = block_kernels();
   const std::uint64_t first_core = HierarchicalLayout(exchange).basis_value_count;
   const auto make = [&](const auto& bases, const auto& cores, const auto* basis_values,
-                        const auto* core_values) -> std::unique_ptr<Relaxation> {
+                        const auto* core_values, float basis_scale) -> std::unique_ptr<Relaxation> {
     return std::make_unique<ClusterRelaxation<std::remove_cvref_t<decltype(*basis_values)>,
                                               std::remove_cvref_t<decltype(*core_values)>>>(
-        exchange, bases, cores, basis_values, core_values);
+        exchange, bases, cores, basis_values, core_values, basis_scale);
   };
   const std::uint16_t* const f16 = exchange.values_f16.data();
   const float* const f32 = exchange.values_f32.data();
   switch (exchange.precision) {
     case Precision::kF16:
-      return make(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core);
+      return make(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core, 1);
     case Precision::kF32:
-      return make(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core);
+      return make(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core, 1);
     case Precision::kQ16:
-      break;  // refused by CompressedFormFactors
+      return make(kernels.bases_q16, kernels.cores_f16, exchange.bases_q16.data(), f16,
+                  HierarchicalOperator::kShortScale);
     case Precision::kQ8:
-      return make(kernels.bases_q8, kernels.cores_f16, exchange.bases_q8.data(), f16);
+      return make(kernels.bases_q8, kernels.cores_f16, exchange.bases_q8.data(), f16,
+                  HierarchicalOperator::kByteScale);
   }
   return nullptr;
 }

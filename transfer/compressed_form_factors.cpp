@@ -11,9 +11,6 @@ CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalO
   for (const std::uint32_t matrix : exchange_->storage().channel_matrix) {
     if (matrix != 0) throw Error("compressed form factors: the channels have different matrices");
   }
-  if (exchange_->storage().precision == Precision::kQ16) {
-    throw Error("compressed form factors: sweeps do not take bases in 16 bits; use f16, f32 or q8");
-  }
 }
 
 void CompressedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,

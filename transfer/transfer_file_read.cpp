@@ -341,9 +341,6 @@ std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
   if (exchange->storage().matrix_count != 1) {
     refuse(file, std::string("tensor ") + names.channel_matrix + ": more than one matrix");
   }
-  if (exchange->storage().precision == Precision::kQ16) {
-    refuse(file, std::string("tensor ") + names.bases + ": not for form factors in 16 bits");
-  }
   return exchange;
 }
 

@@ -66,6 +66,16 @@ TEST(PriceSearch, StopsAtAJumpThatHasNoGoodError) {
   EXPECT_LT(found.rounds, 40);
 }
 
+TEST(PriceSearch, ForgetsWhatTheWeightsBeforeGave) {
+  // The first trial errs ten times as much as it would with the weights of all later ones.
+  int round = 0;
+  const auto error = [&](double price) { return (round++ == 0 ? 10 : 1) * std::sqrt(price); };
+  for (const double first : {0.01, 0.5, 20.0}) {
+    round = 0;
+    expect_good(search(first, error), 5);
+  }
+}
+
 TEST(PriceSearch, LeavesAnErrorOfNothing) {
   expect_good(search(1e-9, [](double price) { return price < 1e-3 ? 0 : std::sqrt(price); }), 10);
 }
