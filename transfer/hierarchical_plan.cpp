@@ -8,7 +8,7 @@ namespace {
 constexpr std::uint32_t kAlignment = HierarchicalOperator::kAlignment;
 
 // Parts of a phase: enough for the threads of a desktop to share it evenly.
-constexpr std::uint64_t kPartCount = 32;
+constexpr std::uint64_t kPartCount = 16;
 
 /// Bounds of kPartCount runs of entries of about equal total weight.
 template <typename Entry, typename Weight>
@@ -187,10 +187,40 @@ class Planner {
     return weight;
   }
 
-  void add_arrivals() {
-    const std::vector<std::uint64_t> weight = arrival_weights();
-    const std::vector<std::uint32_t> bounds =
+  /// Ranks of the clusters that end in two where the positions are cut before each run.
+  std::vector<std::uint64_t> cut_ranks() const {
+    std::vector<std::uint64_t> ranks(wanted_.run_count());
+    for (const Layout::Cluster& cluster : layout_.clusters) {
+      for (std::uint32_t k = kAlignment; k < cluster.size; k += kAlignment) {
+        ranks[(cluster.begin + k) / kAlignment] += cluster.rank;
+      }
+    }
+    return ranks;
+  }
+
+  /// Runs at which the arrivals begin and end: shares of about equal work, moved to where the least
+  /// is cut, as coefficients are prepared anew in each part of a cluster.
+  std::vector<std::uint32_t> arrival_bounds() const {
+    const std::vector<std::uint64_t> weight = arrival_weights(), cut = cut_ranks();
+    std::vector<std::uint32_t> bounds =
         share_out(weight, [](std::uint64_t run_weight) { return run_weight; });
+    for (std::size_t k = 1; k + 1 < bounds.size(); ++k) {
+      const std::uint32_t first = std::max(bounds[k - 1] + 1, bounds[k] - reach(bounds, k, k - 1));
+      const std::uint32_t last = bounds[k] + reach(bounds, k + 1, k);
+      const auto least = std::min_element(cut.begin() + first, cut.begin() + last + 1);
+      bounds[k] = static_cast<std::uint32_t>(least - cut.begin());
+    }
+    return bounds;
+  }
+
+  /// How far a bound may move.
+  static std::uint32_t reach(const std::vector<std::uint32_t>& bounds, std::size_t end,
+                             std::size_t begin) {
+    return (bounds[end] - bounds[begin]) / 2;
+  }
+
+  void add_arrivals() {
+    const std::vector<std::uint32_t> bounds = arrival_bounds();
     std::uint32_t target = 0;
     for (std::size_t k = 0; k + 1 < bounds.size(); ++k) {
       Plan::Arrival arrival{};
