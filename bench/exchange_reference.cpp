@@ -54,12 +54,13 @@ class ReferenceBuilder {
 #pragma omp parallel
     {
       EscapeScratch scratch;
+      MetPatchCounter counter;
 #pragma omp for schedule(dynamic, 4)
       for (std::uint32_t i = 0; i < n_; ++i) {
         for (int round = 0; round < factor_; ++round) {
           measure_escape(model_, patch_triangles_[i], i, tracer_, rays_each_, kFirstSeed + round,
                          scratch);
-          for (const MetPatch& met : count_met_patches(model_, scratch.hits)) {
+          for (const MetPatch& met : counter.count(model_, scratch.hits)) {
             count_[i * n_ + met.patch] += met.count;
             half_[round % 2][i] += met.count * radiosity_[met.patch];
           }

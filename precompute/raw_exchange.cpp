@@ -54,6 +54,7 @@ class RawExchangeBuilder {
     std::vector<Ray> rays;
     std::vector<float> transmitted;  ///< of each ray
     EscapeScratch escape;
+    MetPatchCounter counter;
   };
 
   /// Runs `work` for every patch on all threads; throws Cancelled if asked to. `part` says which
@@ -87,7 +88,7 @@ class RawExchangeBuilder {
         [&](std::uint32_t i, Scratch& scratch) {
           escape[i] = measure_escape(model_, patch_triangles_[i], i, tracer_,
                                      settings_.hemisphere_rays, settings_.seed, scratch.escape);
-          met[i] = count_met_patches(model_, scratch.escape.hits);
+          met[i] = scratch.counter.count(model_, scratch.escape.hits);
         },
         [](double done) { return 0.2 * done; });
     hemisphere_.emplace(met, geometry_.areas(), settings_.hemisphere_rays);

@@ -1,6 +1,5 @@
 #include "shadow_rays.h"
 
-#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
@@ -22,11 +21,6 @@ std::pair<const PatchPoint*, const PatchPoint*> ShadowRays::ray_ends(std::uint32
   const std::uint32_t b =
       (first + 19 * k % kBlock + 7 * round + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
   return {&geometry_.points(i)[a], &geometry_.points(j)[b]};
-}
-
-double ShadowRays::kernel(const PatchPoint& x, const PatchPoint& y) {
-  return point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
-                      to_dvec3(y.normal));
 }
 
 void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
@@ -53,7 +47,7 @@ std::size_t ShadowRays::make_corner_rays(std::uint32_t i, std::uint32_t j,
   for (std::uint32_t k = 0; k < kCornerRays && made < rays.size(); ++k) {
     const PatchPoint &x = geometry_.points(i)[geometry_.outermost_points(i)[k % 3]],
                      &y = geometry_.points(j)[geometry_.outermost_points(j)[(k + k / 3) % 3]];
-    if (kernel(x, y) > 0) rays[made++] = ray_between(x, y);
+    if (faces(x, y)) rays[made++] = ray_between(x, y);
   }
   return made;
 }
@@ -63,7 +57,7 @@ void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray>
   std::size_t made = 0;
   for (std::uint32_t k = 0; k < kCandidateCount && made < rays.size(); ++k) {
     const auto [x, y] = ray_ends(i, j, k, hash);
-    if (kernel(*x, *y) <= 0) continue;
+    if (!faces(*x, *y)) continue;
     Ray& ray = rays[made++];
     ray = ray_between(*x, *y);
     ray.id = k;

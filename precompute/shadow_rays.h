@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rebounce/precompute/patch_geometry.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
@@ -110,7 +111,16 @@ class ShadowRays {
   /// One that stands for none and is never occluded.
   static Ray void_ray();
 
-  static double kernel(const PatchPoint& x, const PatchPoint& y);
+  static double kernel(const PatchPoint& x, const PatchPoint& y) {
+    return point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
+                        to_dvec3(y.normal));
+  }
+
+  /// True if the kernel is above 0.
+  static bool faces(const PatchPoint& x, const PatchPoint& y) {
+    const glm::vec3 d = to_glm(y.position) - to_glm(x.position);
+    return glm::dot(to_glm(x.normal), d) > 0 && glm::dot(to_glm(y.normal), d) < 0;
+  }
 
  private:
   // Pairs of points that are looked at for rays, at most.
