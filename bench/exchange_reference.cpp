@@ -94,17 +94,16 @@ class ReferenceBuilder {
   void trace_pairs() {
     std::vector<std::vector<PooledPair>> rows(n_);
     const int rounds = std::max(1, factor_ * FormFactorSettings().full_rays / kRays);
+    const PatchGeometry geometry(model_, tracer_);
     for (int round = 0; round < rounds; ++round) {
-      const std::uint64_t seed = kFirstSeed + round;
-      const PatchGeometry geometry(model_, tracer_, seed);
-      const ShadowRays shadow_rays(geometry, seed, kKernelTolerance);
+      const ShadowRays shadow_rays(geometry, kFirstSeed + round, kKernelTolerance);
 #pragma omp parallel for schedule(dynamic, 4)
       for (std::uint32_t i = 0; i < n_; ++i) {
         if (round == 0) rows[i] = facing_pairs(shadow_rays, i);
         trace_row(shadow_rays, i, rows[i]);
       }
-      if (round + 1 == rounds) fill(geometry, rows);
     }
+    fill(geometry, rows);
   }
 
   std::vector<PooledPair> facing_pairs(const ShadowRays& shadow_rays, std::uint32_t i) const {
@@ -128,7 +127,7 @@ class ReferenceBuilder {
       if (pair.is_settled()) continue;
       shadow_rays.make_rays(i, {{pair.patch, pair.unoccluded}}, kRays, rays);
       tracer_.transmittance(rays, PassageDetail::kTriangle, transmitted);
-      shadow_rays.add(i, pair.patch, rays, transmitted, pair.estimate);
+      ShadowRays::add(rays, transmitted, pair.estimate);
     }
   }
 

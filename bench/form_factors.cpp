@@ -119,7 +119,7 @@ void measure_sphere(int longitudes, Report& report) {
   test::add_ball(scene, longitudes, longitudes / 2, true);
   const PatchModel model = make_patch_model(scene, {.patch_count = scene.triangle.size()});
   const RayTracer tracer = make_surface_tracer(model.mesh);
-  const PatchGeometry geometry(model, tracer, 1);
+  const PatchGeometry geometry(model, tracer);
   const std::size_t n = model.patches.size();
   double total = 0;
   for (const float area : model.patches.area) total += area;

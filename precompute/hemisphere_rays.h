@@ -27,15 +27,10 @@ inline float small_cosine(float angle) {
   return 1 + a * (-0.5F + a * (1.0F / 24 + a * (-1.0F / 720 + a * (1.0F / 40320))));
 }
 
-/// Sample k of directions, in [0, 1)². Its steps are other irrational ones than those of r2_point,
-/// so that points and directions do not march together.
-inline glm::dvec2 direction_sample(const glm::dvec2& shift, std::uint32_t k) {
-  return glm::fract(shift + (k + 0.5) * glm::dvec2(0.41421356237, 0.73205080757));
-}
-
-/// The points of direction_sample, one after the other.
-inline PointSequence direction_sequence(const glm::dvec2& shift, std::uint32_t first = 0) {
-  return {shift, {0.41421356237, 0.73205080757}, first};
+/// Samples of directions, in [0, 1)². Their steps are other irrational ones than those of
+/// r2_sequence, so that points and directions do not march together.
+inline PointSequence direction_sequence(const glm::dvec2& shift) {
+  return {shift, {0.41421356237, 0.73205080757}};
 }
 
 /// square_to_cosine_hemisphere in single precision, for many.
@@ -79,11 +74,11 @@ inline Ray make_free_ray(const PatchPoint& point, const glm::vec3& direction,
 /// a low-discrepancy sequence shifted by `direction_shift`.
 inline void make_hemisphere_rays(std::span<const PatchPoint> points, const RayTracer& tracer,
                                  const glm::dvec2& direction_shift, std::span<Ray> rays) {
-  PointSequence directions = direction_sequence(direction_shift);
+  const PointSequence directions = direction_sequence(direction_shift);
   NormalFrame frame;
-  for (std::size_t k = 0; k < rays.size(); ++k) {
+  for (std::uint32_t k = 0; k < rays.size(); ++k) {
     rays[k] = make_free_ray(
-        points[k], frame.turn(points[k].normal, to_cosine_direction(directions.next())), tracer);
+        points[k], frame.turn(points[k].normal, to_cosine_direction(directions[k])), tracer);
   }
 }
 
@@ -94,14 +89,15 @@ inline void make_hemisphere_rays(const std::array<glm::dvec3, 3>& triangle,
                                  std::uint64_t seed, std::span<Ray> rays, std::uint32_t first = 0) {
   const glm::dvec2 point_shift = unit_square(mix_bits(seed));
   const glm::dvec2 direction_shift = unit_square(mix_bits(seed + 1));
-  PointSequence directions = direction_sequence(direction_shift, first);
+  const PointSequence points = r2_sequence(point_shift);
+  const PointSequence directions = direction_sequence(direction_shift);
   NormalFrame frame;
   for (std::uint32_t k = 0; k < rays.size(); ++k) {
-    const glm::dvec2 b = square_to_triangle(r2_point(first + k, point_shift));
+    const glm::dvec2 b = square_to_triangle(points[first + k]);
     const glm::dvec3 origin = (1 - b.x - b.y) * triangle[0] + b.x * triangle[1] + b.y * triangle[2];
     const PatchPoint point{to_float3(origin), to_float3(normal)};
-    rays[k] = make_free_ray(point, frame.turn(point.normal, to_cosine_direction(directions.next())),
-                            tracer);
+    rays[k] = make_free_ray(
+        point, frame.turn(point.normal, to_cosine_direction(directions[first + k])), tracer);
   }
 }
 

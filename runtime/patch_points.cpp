@@ -1,8 +1,5 @@
 #include "rebounce/runtime/patch_points.h"
 
-#include <algorithm>
-
-#include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
@@ -22,82 +19,51 @@ PatchTriangles::PatchTriangles(std::span<const std::uint32_t> triangle_patch,
   }
 }
 
-namespace {
+PatchSurface::PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles) {
+  for (const std::uint32_t t : triangles) add(mesh, t);
+}
 
-/// A triangle that points may lie on.
-struct Ground {
-  glm::dvec3 corner, first_edge, second_edge;
-  Float3 normal;
-  int map_level;  ///< of its opacity map
-};
+void PatchSurface::add(const DisplayMesh& mesh, std::uint32_t triangle) {
+  const auto corner = [&](int k) { return to_dvec3(mesh.position[mesh.triangle[triangle][k]]); };
+  const glm::dvec3 a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
+  const glm::dvec3 cross = glm::cross(ab, ac);
+  const std::span<const std::uint8_t> map = mesh.opacity.of_triangle(triangle);
+  add_places(map, glm::length(cross));
+  grounds_.push_back({a, ab, ac, to_float3(glm::normalize(cross)), opacity_map_level(map.size())});
+}
 
-/// What points may lie on: an opaque triangle, or a micro-triangle of one with a map.
-struct Place {
-  std::uint32_t ground;
-  std::uint32_t micro_triangle;
-};
-
-/// What of some triangles stops light, to choose points from.
-class Grounds {
- public:
-  Grounds(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles) {
-    for (const std::uint32_t t : triangles) add(mesh, t);
+/// Each as likely as it stops light.
+void PatchSurface::add_places(std::span<const std::uint8_t> map, double area) {
+  const auto ground = static_cast<std::uint32_t>(grounds_.size());
+  if (map.empty()) {
+    places_.push_back({ground, 0});
+    choice_.add(area);
   }
-
-  bool is_empty() const { return choice_.total() <= 0; }
-
-  PatchPoint at(const glm::dvec2& square) const {
-    const auto [index, rest] = choice_.choose(square.x);
-    const auto [number, micro_triangle] = places_[index];
-    const Ground& ground = grounds_[number];
-    const glm::dvec2 b = square_to_triangle({rest, square.y});
-    TrianglePlace place{b.x, b.y};
-    if (ground.map_level > 0)
-      place = place_in_micro_triangle(ground.map_level, micro_triangle, place);
-    return {to_float3(ground.corner + place.u * ground.first_edge + place.v * ground.second_edge),
-            ground.normal};
+  for (std::uint32_t k = 0; k < map.size(); ++k) {
+    places_.push_back({ground, k});
+    choice_.add(area * map[k] / (OpacityMaps::kOpaque * static_cast<double>(map.size())));
   }
+}
 
- private:
-  void add(const DisplayMesh& mesh, std::uint32_t triangle) {
-    const auto corner = [&](int k) { return to_dvec3(mesh.position[mesh.triangle[triangle][k]]); };
-    const glm::dvec3 a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
-    const glm::dvec3 cross = glm::cross(ab, ac);
-    const std::span<const std::uint8_t> map = mesh.opacity.of_triangle(triangle);
-    add_places(map, glm::length(cross));
-    grounds_.push_back(
-        {a, ab, ac, to_float3(glm::normalize(cross)), opacity_map_level(map.size())});
+PatchPoint PatchSurface::at(const glm::dvec2& square) const {
+  if (!(choice_.total() > 0)) return {};
+  const auto [index, rest] = choice_.choose(square.x);
+  const auto [number, micro_triangle] = places_[index];
+  const Ground& ground = grounds_[number];
+  const glm::dvec2 b = square_to_triangle({rest, square.y});
+  TrianglePlace place{b.x, b.y};
+  if (ground.map_level > 0) {
+    place = place_in_micro_triangle(ground.map_level, micro_triangle, place);
   }
-
-  /// Each as likely as it stops light.
-  void add_places(std::span<const std::uint8_t> map, double area) {
-    const auto ground = static_cast<std::uint32_t>(grounds_.size());
-    if (map.empty()) {
-      places_.push_back({ground, 0});
-      choice_.add(area);
-    }
-    for (std::uint32_t k = 0; k < map.size(); ++k) {
-      places_.push_back({ground, k});
-      choice_.add(area * map[k] / (OpacityMaps::kOpaque * static_cast<double>(map.size())));
-    }
-  }
-
-  std::vector<Ground> grounds_;
-  std::vector<Place> places_;
-  CumulativeChoice choice_;
-};
-
-}  // namespace
+  return {to_float3(ground.corner + place.u * ground.first_edge + place.v * ground.second_edge),
+          ground.normal};
+}
 
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                    const glm::dvec2& shift, std::span<PatchPoint> points) {
-  const Grounds grounds(mesh, triangles);
-  if (grounds.is_empty()) {
-    std::ranges::fill(points, PatchPoint{});
-    return;
-  }
-  PointSequence sequence = r2_sequence(shift);
-  for (PatchPoint& point : points) point = grounds.at(sequence.next());
+  const PatchSurface surface(mesh, triangles);
+  const PointSequence sequence = r2_sequence(shift);
+  for (std::uint32_t k = 0; k < points.size(); ++k) points[k] = surface.at(sequence[k]);
 }
 
 }  // namespace rebounce

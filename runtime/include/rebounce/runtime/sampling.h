@@ -24,30 +24,17 @@ inline glm::dvec2 unit_square(std::uint64_t bits) {
           static_cast<double>(bits & 0xFFFFFFFFULL) * 0x1p-32};
 }
 
-/// The plastic number.
-inline constexpr double kR2Base = 1.32471795724474602596;
-
-/// Point k of the R2 sequence (M. Roberts 2018, after the plastic number), shifted by `shift`
-/// modulo 1. Every prefix is well spread over [0, 1)^2.
-inline glm::dvec2 r2_point(std::uint32_t k, const glm::dvec2& shift) {
-  return glm::fract(shift + (k + 0.5) * glm::dvec2(1.0 / kR2Base, 1.0 / (kR2Base * kR2Base)));
-}
-
-/// The points fract(shift + (k + 1/2) step), k = 0, 1, ... of [0, 1)^2, one after the other: an
-/// addition each, in fixed point, where wrapping costs nothing.
+/// The points fract(shift + (k + 1/2) step) of [0, 1)^2, in fixed point, where wrapping costs
+/// nothing.
 class PointSequence {
  public:
-  /// `shift` and `step` in [0, 1)^2; the first point is number `first`.
-  PointSequence(const glm::dvec2& shift, const glm::dvec2& step, std::uint32_t first = 0)
+  /// `shift` and `step` in [0, 1)^2.
+  PointSequence(const glm::dvec2& shift, const glm::dvec2& step)
       : step_{to_fixed(step.x), to_fixed(step.y)},
-        place_{to_fixed(shift.x) + step_[0] / 2 + first * step_[0],
-               to_fixed(shift.y) + step_[1] / 2 + first * step_[1]} {}
+        first_{to_fixed(shift.x) + step_[0] / 2, to_fixed(shift.y) + step_[1] / 2} {}
 
-  glm::dvec2 next() {
-    const glm::dvec2 point(to_double(place_[0]), to_double(place_[1]));
-    place_[0] += step_[0];
-    place_[1] += step_[1];
-    return point;
+  glm::dvec2 operator[](std::uint32_t k) const {
+    return {to_double(first_[0] + k * step_[0]), to_double(first_[1] + k * step_[1])};
   }
 
  private:
@@ -57,12 +44,19 @@ class PointSequence {
     return static_cast<double>(static_cast<std::int64_t>(x >> 11)) * 0x1p-53;
   }
 
-  std::array<std::uint64_t, 2> step_, place_;  ///< in units of 2^-64
+  std::array<std::uint64_t, 2> step_, first_;  ///< in units of 2^-64
 };
 
-/// The points of r2_point, one after the other.
+/// The points of the R2 sequence (M. Roberts 2018, after the plastic number), shifted by `shift`
+/// modulo 1. Any that follow each other are well spread over [0, 1)^2.
 inline PointSequence r2_sequence(const glm::dvec2& shift) {
-  return {shift, {1.0 / kR2Base, 1.0 / (kR2Base * kR2Base)}};
+  constexpr double kG = 1.32471795724474602596;
+  return {shift, {1.0 / kG, 1.0 / (kG * kG)}};
+}
+
+/// Point k of it.
+inline glm::dvec2 r2_point(std::uint32_t k, const glm::dvec2& shift) {
+  return r2_sequence(shift)[k];
 }
 
 /// Barycentric weights (of the second and third vertex), uniform over the triangle: the
