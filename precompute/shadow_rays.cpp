@@ -32,7 +32,7 @@ std::size_t ShadowRays::make_corner_rays(std::uint32_t i, std::uint32_t j,
   for (std::uint32_t k = 0; k < kCornerRays && made < rays.size(); ++k) {
     const PatchPoint &x = geometry_.outermost_points(i)[k % 3],
                      &y = geometry_.outermost_points(j)[(k + k / 3) % 3];
-    if (faces(x, y)) rays[made++] = ray_between(x, y);
+    if (kernel(x, y) > 0) rays[made++] = ray_between(x, y);
   }
   return made;
 }
@@ -48,7 +48,7 @@ void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray>
   for (std::uint32_t k = 0; k < kCandidates * rays.size() && made < rays.size(); ++k) {
     const PatchPoint x = geometry_.point(i, from[k]),
                      y = geometry_.point(j, to[k / kBlock * kBlock + 19 * k % kBlock]);
-    const auto weight = static_cast<float>(kernel(x, y));
+    const float weight = kernel(x, y);
     if (!(weight > 0)) continue;
     Ray& ray = rays[made++];
     ray = ray_between(x, y);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -111,15 +112,14 @@ class ShadowRays {
   /// One that stands for none and is never occluded.
   static Ray void_ray();
 
-  static double kernel(const PatchPoint& x, const PatchPoint& y) {
-    return point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
-                        to_dvec3(y.normal));
-  }
-
-  /// True if the kernel is above 0.
-  static bool faces(const PatchPoint& x, const PatchPoint& y) {
+  /// The kernel between two points as point_kernel() has it, 1/m²; 0 if they do not face each
+  /// other.
+  static float kernel(const PatchPoint& x, const PatchPoint& y) {
     const glm::vec3 d = to_glm(y.position) - to_glm(x.position);
-    return glm::dot(to_glm(x.normal), d) > 0 && glm::dot(to_glm(y.normal), d) < 0;
+    const float cx = glm::dot(to_glm(x.normal), d), cy = -glm::dot(to_glm(y.normal), d);
+    if (!(cx > 0 && cy > 0)) return 0;
+    const float inverse = 1 / glm::dot(d, d);
+    return cx * inverse * (cy * inverse) * std::numbers::inv_pi_v<float>;
   }
 
  private:

@@ -45,7 +45,7 @@ void PatchSurface::add_places(std::span<const std::uint8_t> map, double area) {
   }
 }
 
-PatchPoint PatchSurface::at(const glm::dvec2& square) const {
+PatchPoint PatchSurface::at_chosen_place(const glm::dvec2& square) const {
   if (!(choice_.total() > 0)) return {};
   const auto [index, rest] = choice_.choose(square.x);
   const auto [number, micro_triangle] = places_[index];
@@ -55,8 +55,7 @@ PatchPoint PatchSurface::at(const glm::dvec2& square) const {
   if (ground.map_level > 0) {
     place = place_in_micro_triangle(ground.map_level, micro_triangle, place);
   }
-  return {to_float3(ground.corner + place.u * ground.first_edge + place.v * ground.second_edge),
-          ground.normal};
+  return ground.at({place.u, place.v});
 }
 
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
