@@ -54,12 +54,13 @@ class ReferenceBuilder {
 #pragma omp parallel
     {
       EscapeScratch scratch;
+      MetPatchCounter counter;
 #pragma omp for schedule(dynamic, 4)
       for (std::uint32_t i = 0; i < n_; ++i) {
         for (int round = 0; round < factor_; ++round) {
           measure_escape(model_, patch_triangles_[i], i, tracer_, rays_each_, kFirstSeed + round,
                          scratch);
-          for (const MetPatch& met : count_met_patches(model_, scratch.hits)) {
+          for (const MetPatch& met : counter.count(model_, scratch.hits)) {
             count_[i * n_ + met.patch] += met.count;
             half_[round % 2][i] += met.count * radiosity_[met.patch];
           }
@@ -93,17 +94,16 @@ class ReferenceBuilder {
   void trace_pairs() {
     std::vector<std::vector<PooledPair>> rows(n_);
     const int rounds = std::max(1, factor_ * FormFactorSettings().full_rays / kRays);
+    const PatchGeometry geometry(model_, tracer_);
     for (int round = 0; round < rounds; ++round) {
-      const std::uint64_t seed = kFirstSeed + round;
-      const PatchGeometry geometry(model_, tracer_, seed);
-      const ShadowRays shadow_rays(geometry, seed, kKernelTolerance);
+      const ShadowRays shadow_rays(geometry, kFirstSeed + round, kKernelTolerance);
 #pragma omp parallel for schedule(dynamic, 4)
       for (std::uint32_t i = 0; i < n_; ++i) {
         if (round == 0) rows[i] = facing_pairs(shadow_rays, i);
         trace_row(shadow_rays, i, rows[i]);
       }
-      if (round + 1 == rounds) fill(geometry, rows);
     }
+    fill(geometry, rows);
   }
 
   std::vector<PooledPair> facing_pairs(const ShadowRays& shadow_rays, std::uint32_t i) const {
@@ -127,7 +127,7 @@ class ReferenceBuilder {
       if (pair.is_settled()) continue;
       shadow_rays.make_rays(i, {{pair.patch, pair.unoccluded}}, kRays, rays);
       tracer_.transmittance(rays, PassageDetail::kTriangle, transmitted);
-      shadow_rays.add(i, pair.patch, rays, transmitted, pair.estimate);
+      ShadowRays::add(rays, transmitted, pair.estimate);
     }
   }
 

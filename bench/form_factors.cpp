@@ -9,10 +9,12 @@
 
 #include "exchange_error.h"
 #include "exchange_reference.h"
+#include "form_factor_scaling.h"
 #include "form_factor_sums.h"
 #include "known_form_factors.h"
 #include "program.h"
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_geometry.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "stage_speed.h"
@@ -26,6 +28,8 @@ struct Options {
   std::size_t patch_count = 1000;
   int reference_factor = 100;
   double ray_limit = 2e6;
+  std::vector<std::size_t> scaling_patches = {4000, 16000, 64000};
+  double link_epsilon = kLinkEpsilon;
   std::string part = "all";
   CommonOptions common{.repeats = 5};
 };
@@ -115,7 +119,7 @@ void measure_sphere(int longitudes, Report& report) {
   test::add_ball(scene, longitudes, longitudes / 2, true);
   const PatchModel model = make_patch_model(scene, {.patch_count = scene.triangle.size()});
   const RayTracer tracer = make_surface_tracer(model.mesh);
-  const PatchGeometry geometry(model, tracer, 1);
+  const PatchGeometry geometry(model, tracer);
   const std::size_t n = model.patches.size();
   double total = 0;
   for (const float area : model.patches.area) total += area;
@@ -235,6 +239,31 @@ class SceneBench {
   RayTracer tracer_;
 };
 
+/// From some patches to many, with links; the exponent is over the whole range.
+void measure_growth(const std::string& scene, const Options& options, LinkedForm form,
+                    Report& report) {
+  const std::string name = std::filesystem::path(scene).stem().string();
+  const char* what = form == LinkedForm::kLinks ? "links" : "pairs";
+  std::vector<ScalingSample> samples;
+  for (const std::size_t count : options.scaling_patches) {
+    const ScalingSample s = measure_scaling(scene, count, options.link_epsilon, form);
+    const auto add = [&](const std::string& measure, double value, double asked = 0) {
+      report.at_most(name, s.patch_count, what, measure, value, asked);
+    };
+    add("processor seconds of F", s.processor_seconds);
+    add("seconds of F", s.wall_seconds);
+    add("rays per patch", static_cast<double>(s.ray_count) / static_cast<double>(s.patch_count));
+    add("entries per patch",
+        static_cast<double>(s.entry_count) / static_cast<double>(s.patch_count));
+    add("peak memory, GiB", s.peak_bytes / 0x1p30, 12);
+    samples.push_back(s);
+  }
+  if (samples.size() < 2) return;
+  report.at_most(name, samples.back().patch_count, what,
+                 "exponent from " + std::to_string(samples.front().patch_count) + " patches",
+                 scaling_exponent(samples.front(), samples.back()), 1.35);
+}
+
 void run(const Options& options) {
   Report report;
   const bool all = options.part == "all";
@@ -245,6 +274,11 @@ void run(const Options& options) {
     for (const int longitudes : {16, 32}) measure_sphere(longitudes, report);
   }
   for (const std::string& scene : options.scenes) {
+    if (options.part == "growth-of-links")
+      measure_growth(scene, options, LinkedForm::kLinks, report);
+    if (options.part == "growth-of-pairs")
+      measure_growth(scene, options, LinkedForm::kPairs, report);
+    if (options.part.starts_with("growth")) continue;
     SceneBench bench(scene, options, report);
     if (all || options.part == "convergence") bench.measure_convergence();
     if (all || options.part == "speed") bench.measure_speed();
@@ -272,8 +306,14 @@ int main(int argc, char** argv) {
   app.add_option("--ray-limit", options.ray_limit, "Rays that lie ready for bare Embree at most")
       ->check(CLI::Range(1e3, 1e9))
       ->capture_default_str();
-  app.add_option("--part", options.part, "What to measure; the last two for each scene")
-      ->check(CLI::IsMember({"all", "closed-forms", "convergence", "speed"}))
+  app.add_option("--growth-patches", options.scaling_patches, "Patches of the parts growth-of-...")
+      ->capture_default_str();
+  app.add_option("--link-epsilon", options.link_epsilon, "Error of a link, likewise")
+      ->capture_default_str();
+  app.add_option("--part", options.part,
+                 "What to measure; all but closed-forms for each scene; all: without growth")
+      ->check(CLI::IsMember(
+          {"all", "closed-forms", "convergence", "speed", "growth-of-links", "growth-of-pairs"}))
       ->capture_default_str();
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] { run(options); });

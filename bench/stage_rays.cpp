@@ -17,7 +17,7 @@ std::uint64_t hidden_among(std::span<const Ray> rays) {
 StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
                           const FormFactorSettings& settings, std::uint32_t row_step) {
   const PatchTriangles patch_triangles(model.mesh.triangle_patch, model.patches.size());
-  const PatchGeometry geometry(model, tracer, settings.seed);
+  const PatchGeometry geometry(model, tracer);
   const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
   StageRays result;
   std::vector<FacingPatch> facing, mixed;

@@ -33,7 +33,7 @@ struct StageSpeed::Impl {
        std::uint32_t step)
       : tracer(ray_tracer),
         row_step(step),
-        geometry(model, tracer, settings.seed),
+        geometry(model, tracer),
         shadow_rays(geometry, settings.seed, settings.kernel_tolerance),
         rays(make_stage_rays(model, tracer, settings, row_step)),
         embree(model.mesh, rays) {}

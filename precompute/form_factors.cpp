@@ -21,7 +21,7 @@ class FormFactorAssembly {
         tracer_(tracer),
         settings_(settings),
         progress_(progress),
-        geometry_(model, tracer, settings.seed),
+        geometry_(model, tracer),
         shadow_rays_(geometry_, settings.seed, settings.kernel_tolerance) {}
 
   FormFactors run() const {

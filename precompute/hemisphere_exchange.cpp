@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "seen_patch.h"
 
@@ -17,19 +18,17 @@ double variance_of_count(double expected) {
 
 }  // namespace
 
-std::vector<MetPatch> count_met_patches(const PatchModel& model, std::span<const Hit> hits) {
-  std::vector<std::uint32_t> patches;
-  patches.reserve(hits.size());
+std::vector<MetPatch> MetPatchCounter::count(const PatchModel& model, std::span<const Hit> hits) {
+  count_.resize(model.patches.size(), 0);
   for (const Hit& hit : hits) {
     const std::uint32_t patch = patch_at(model.mesh, model.shown_patch, hit);
-    if (patch != kNone) patches.push_back(patch);
+    if (patch != kNone && count_[patch]++ == 0) met_.push_back(patch);
   }
-  std::ranges::sort(patches);
+  std::ranges::sort(met_);
   std::vector<MetPatch> met;
-  for (const std::uint32_t patch : patches) {
-    if (met.empty() || met.back().patch != patch) met.push_back({patch, 0});
-    ++met.back().count;
-  }
+  met.reserve(met_.size());
+  for (const std::uint32_t patch : met_) met.push_back({patch, std::exchange(count_[patch], 0)});
+  met_.clear();
   return met;
 }
 

@@ -15,9 +15,17 @@ struct MetPatch {
   std::uint32_t count;
 };
 
-/// Counts what the `hits` of one patch's hemisphere rays say, by patch in ascending order. A side
-/// that another covers stands for that one; rays that met a side without a patch are left out.
-std::vector<MetPatch> count_met_patches(const PatchModel& model, std::span<const Hit> hits);
+/// Counts what the hemisphere rays of one patch after another met; for one thread.
+class MetPatchCounter {
+ public:
+  /// What the `hits` of one patch's rays say, by patch in ascending order. A side that another
+  /// covers stands for that one; rays that met a side without a patch are left out.
+  std::vector<MetPatch> count(const PatchModel& model, std::span<const Hit> hits);
+
+ private:
+  std::vector<std::uint32_t> count_;  ///< [n] all 0 between calls
+  std::vector<std::uint32_t> met_;    ///< those that are not
+};
 
 /// What pairs of patches exchange as hemisphere rays have it: a Monte Carlo estimate without bias,
 /// visibility and all bends of the patches included, and rows that add up. Coarse for what is far

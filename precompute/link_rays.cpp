@@ -8,8 +8,6 @@
 namespace rebounce {
 namespace {
 
-constexpr std::uint32_t kPoints = ShadowRays::kPointCount;
-
 // As many rays are needed to say that two nodes do not see each other at all.
 constexpr int kEnoughRays = 6;
 
@@ -30,8 +28,7 @@ LinkRays::Visibility LinkRays::trace_patches(std::uint32_t i, std::uint32_t j, i
   const auto agreement = ShadowRays::agreement(scratch.rays, scratch.transmitted);
   if (agreement == ShadowRays::Agreement::kClear) return {.part = 1};
   if (agreement == ShadowRays::Agreement::kHidden) return {.part = 0};
-  const ShadowRays::Visibility visible =
-      shadow_rays_.visibility(i, j, scratch.rays, scratch.transmitted);
+  const ShadowRays::Visibility visible = ShadowRays::visibility(scratch.rays, scratch.transmitted);
   return {.part = visible.part, .variance = visible.variance, .mixed = true};
 }
 
@@ -66,20 +63,22 @@ LinkRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int
   const std::uint64_t hash =
       mix_bits(seed_ * 0x9E3779B9ULL + ((static_cast<std::uint64_t>(a) << 32) | b));
   const glm::dvec2 shift = unit_square(mix_bits(hash));
-  const auto first = static_cast<std::uint32_t>(hash % kPoints);
+  const auto first = static_cast<int>(hash % kMostRays);
+  const PointSequence from = r2_sequence(unit_square(hash)),
+                      to = r2_sequence(unit_square(mix_bits(hash + 1)));
   scratch.rays.resize(count);
   std::array<double, kMostRays> weight;
   std::array<int, kMostRays> children;  // which pair of them a ray joins
   for (int k = 0; k < count; ++k) {
     // Strata of equal area of one node against those of the other, in steps of 19.
-    const int other = (19 * k + static_cast<int>(first)) % count;
+    const int other = (19 * k + first) % count;
     const double along_a = (k + shift.x) / count, along_b = (other + shift.y) / count;
     const std::uint32_t i = tree_.patch_at(tree_[a], along_a),
                         j = tree_.patch_at(tree_[b], along_b);
     children[k] =
         2 * (along_a < first_part(tree_[a]) ? 0 : 1) + (along_b < first_part(tree_[b]) ? 0 : 1);
-    const PatchPoint &x = shadow_rays_.geometry().points(i)[(first + k) % kPoints],
-                     &y = shadow_rays_.geometry().points(j)[(first + 7 * k) % kPoints];
+    const PatchPoint x = shadow_rays_.geometry().point(i, from[k]),
+                     y = shadow_rays_.geometry().point(j, to[7 * k]);
     weight[k] = ShadowRays::kernel(x, y);
     // Between points that do not face each other there is no light to hide.
     scratch.rays[k] = weight[k] > 0 ? ShadowRays::ray_between(x, y) : ShadowRays::void_ray();

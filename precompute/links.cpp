@@ -36,7 +36,7 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
   if (!weight.empty() && weight.size() != model.patches.size()) {
     throw Error("links: weights and patches differ in number");
   }
-  const PatchGeometry geometry(model, tracer, settings.seed);
+  const PatchGeometry geometry(model, tracer);
   const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
   const RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
   LinkBuild build;

@@ -7,7 +7,6 @@
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/polygon_form_factor.h"
-#include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
 namespace {
@@ -230,30 +229,38 @@ double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t 
   return sum;
 }
 
-/// The number of the point for which `measure`(position) is largest.
-template <typename Measure>
-std::uint8_t find_farthest(std::span<const PatchPoint> points, const Measure& measure) {
-  std::size_t farthest = 0;
-  double most = -1;
-  for (std::size_t k = 0; k < points.size(); ++k) {
-    const double distance = measure(to_dvec3(points[k].position));
-    if (distance <= most) continue;
-    most = distance;
-    farthest = k;
+// Where the outermost points lie between the centroid and a corner of a triangle.
+constexpr double kBesideCorner = 0.94;
+
+/// The points beside the corners of all `triangles`.
+std::vector<PatchPoint> corner_points(std::span<const FlatTriangle> triangles) {
+  std::vector<PatchPoint> points;
+  for (const FlatTriangle& t : triangles) {
+    for (const glm::dvec3& v : t.vertex) {
+      points.push_back({to_float3(glm::mix(t.centroid, v, kBesideCorner)), to_float3(t.normal)});
+    }
   }
-  return static_cast<std::uint8_t>(farthest);
+  return points;
 }
 
-std::array<std::uint8_t, 3> find_outermost(std::span<const PatchPoint> points,
-                                           const glm::dvec3& centre) {
-  const auto at = [&](std::uint8_t k) { return to_dvec3(points[k].position); };
-  const std::uint8_t a =
+/// The point for which `measure`(position) is largest.
+template <typename Measure>
+PatchPoint find_farthest(std::span<const PatchPoint> points, const Measure& measure) {
+  return *std::ranges::max_element(
+      points, {}, [&](const PatchPoint& p) { return measure(to_dvec3(p.position)); });
+}
+
+std::array<PatchPoint, 3> find_outermost(std::span<const PatchPoint> points,
+                                         const glm::dvec3& centre) {
+  const PatchPoint first =
       find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, centre); });
-  const std::uint8_t b =
-      find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, at(a)); });
-  const std::uint8_t c = find_farthest(
-      points, [&](const glm::dvec3& p) { return glm::length(glm::cross(p - at(a), p - at(b))); });
-  return {a, b, c};
+  const glm::dvec3 a = to_dvec3(first.position);
+  const PatchPoint second =
+      find_farthest(points, [&](const glm::dvec3& p) { return glm::distance(p, a); });
+  const glm::dvec3 b = to_dvec3(second.position);
+  const PatchPoint third = find_farthest(
+      points, [&](const glm::dvec3& p) { return glm::length(glm::cross(p - a, p - b)); });
+  return {first, second, third};
 }
 
 /// The sum of the radii by the distance: the larger, the nearer.
@@ -278,7 +285,8 @@ bool PatchBounds::may_face(const glm::dvec3& point, double sphere_radius) const 
   return along * cone_cosine + across * cone_sine + radius + sphere_radius > 0;
 }
 
-PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed) {
+PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer)
+    : offset_(tracer.offset_distance()) {
   const PatchTriangles patches(model.mesh.triangle_patch, model.patches.size());
   const std::size_t n = patches.patch_count();
   begin_.push_back(0);
@@ -294,7 +302,7 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
   }
   area_.resize(n);
   bounds_.resize(n);
-  points_.resize(n * kPointCount);
+  surface_.resize(n);
   outermost_.resize(n);
   parts_.resize(n * kPartStride);
   fragments_.resize(n);
@@ -303,10 +311,9 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer, s
   for (std::size_t i = 0; i < n; ++i) {
     for (const FlatTriangle& t : triangles(i)) area_[i] += t.stopping_area();
     bounds_[i] = bounds_of(triangles(i));
-    const std::span<PatchPoint> points(&points_[i * kPointCount], kPointCount);
-    spread_points(model.mesh, patches[i], unit_square(mix_bits(seed ^ mix_bits(i))), points);
-    for (PatchPoint& p : points) p.position = tracer.offset_point(p.position, p.normal);
-    outermost_[i] = find_outermost(points, bounds_[i].centre);
+    surface_[i] = PatchSurface(model.mesh, patches[i]);
+    outermost_[i] = find_outermost(corner_points(triangles(i)), bounds_[i].centre);
+    for (PatchPoint& p : outermost_[i]) p.position = tracer.offset_point(p.position, p.normal);
     add_parts(i);
   }
 }

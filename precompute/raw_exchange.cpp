@@ -14,8 +14,20 @@
 namespace rebounce {
 namespace {
 
-// Deviations by which the count of hemisphere rays must be off to have a pair looked at again.
-constexpr double kContradiction = 4;
+// Deviations by which the count of hemisphere rays must be off to have a clear pair looked at
+// again, and to be believed more than all of its rays.
+constexpr double kDoubt = 2, kContradiction = 4;
+
+// A partly hidden pair that exchanges more than this part of what either patch sends out gets so
+// many times the rays: what its rays miss is seen in the sums of rows.
+constexpr double kLargePart = 7e-4;
+constexpr int kLargeFactor = 4;
+
+// A row whose sum is off its target by more than this (and three deviations), with as many rays as
+// the default or more, is traced again with so many times the probe rays: they miss some of what is
+// partly covered.
+constexpr double kRowSumTolerance = 1e-3;
+constexpr int kDefaultRays = 64, kRefinedProbes = 4;
 
 class RawExchangeBuilder {
  public:
@@ -40,7 +52,7 @@ class RawExchangeBuilder {
                    [&](double done) { return 0.2 + 0.6 * triangle(done); });
     const std::vector<RowTarget> target = row_targets(escape, settings_.hemisphere_rays);
     const std::vector<bool> doubtful =
-        find_doubtful_rows(row_sums(rows, geometry_.areas()), target);
+        find_doubtful_rows(row_sums(rows, geometry_.areas()), target, row_sum_tolerance());
     for_each_patch(
         [&](std::uint32_t i, Scratch& scratch) { refine_row(i, doubtful, scratch, rows[i]); },
         [&](double done) { return 0.8 + 0.2 * triangle(done); });
@@ -50,10 +62,11 @@ class RawExchangeBuilder {
 
  private:
   struct Scratch {
-    std::vector<FacingPatch> facing, mixed;
+    std::vector<FacingPatch> facing, mixed, large_mixed;
     std::vector<Ray> rays;
     std::vector<float> transmitted;  ///< of each ray
     EscapeScratch escape;
+    MetPatchCounter counter;
   };
 
   /// Runs `work` for every patch on all threads; throws Cancelled if asked to. `part` says which
@@ -87,7 +100,7 @@ class RawExchangeBuilder {
         [&](std::uint32_t i, Scratch& scratch) {
           escape[i] = measure_escape(model_, patch_triangles_[i], i, tracer_,
                                      settings_.hemisphere_rays, settings_.seed, scratch.escape);
-          met[i] = count_met_patches(model_, scratch.escape.hits);
+          met[i] = scratch.counter.count(model_, scratch.escape.hits);
         },
         [](double done) { return 0.2 * done; });
     hemisphere_.emplace(met, geometry_.areas(), settings_.hemisphere_rays);
@@ -95,72 +108,96 @@ class RawExchangeBuilder {
   }
 
   void compute_row(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
-    const auto is_fine = [&](std::uint32_t j) { return !is_coarse_pair(geometry_, i, j); };
-    shadow_rays_.find_facing(i, scratch.facing, is_fine);
-    shadow_rays_.make_probe_rays(i, scratch.facing, settings_.probe_rays, scratch.rays);
+    append_fine(
+        i, settings_.probe_rays, [](std::uint32_t) { return true; }, scratch, row);
+    append_coarse(i, row);
+    std::ranges::sort(row, {}, &ExchangeEntry::column);
+  }
+
+  /// Adds the pairs (i, j) that are not coarse and `wanted`(j), of which `probe` rays each say
+  /// whether they need more.
+  template <typename Wanted>
+  void append_fine(std::uint32_t i, std::size_t probe, const Wanted& wanted, Scratch& scratch,
+                   std::vector<ExchangeEntry>& row) {
+    shadow_rays_.find_facing(i, scratch.facing, [&](std::uint32_t j) {
+      return wanted(j) && !is_coarse_pair(geometry_, i, j);
+    });
+    shadow_rays_.make_probe_rays(i, scratch.facing, static_cast<int>(probe), scratch.rays);
     trace(scratch);
     scratch.mixed.clear();
-    const auto probe = static_cast<std::size_t>(settings_.probe_rays);
+    scratch.large_mixed.clear();
     for (std::size_t p = 0; p < scratch.facing.size(); ++p) {
       const FacingPatch& pair = scratch.facing[p];
       const auto agreement =
           ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe),
                                 std::span(scratch.transmitted).subspan(p * probe, probe));
-      if (agreement == ShadowRays::Agreement::kMixed || is_contradicted(i, pair, agreement)) {
-        scratch.mixed.push_back(pair);
+      if (agreement == ShadowRays::Agreement::kMixed ||
+          is_contradicted(i, pair, agreement, kDoubt)) {
+        (is_large(i, pair) ? scratch.large_mixed : scratch.mixed).push_back(pair);
       } else if (agreement == ShadowRays::Agreement::kClear) {
         append_clear(pair, row);
       }
     }
-    append_mixed(i, scratch, row);
-    append_coarse(i, row);
-    std::ranges::sort(row, {}, &ExchangeEntry::column);
+    append_mixed(i, scratch.mixed, settings_.full_rays, scratch, row);
+    append_mixed(i, scratch.large_mixed, kLargeFactor * settings_.full_rays, scratch, row);
     pair_count_ += scratch.facing.size();
-    ray_count_ += scratch.facing.size() * settings_.probe_rays;
+    ray_count_ += scratch.facing.size() * probe;
   }
 
-  /// True if hemisphere rays say otherwise than the few rays of a pair that agree.
-  bool is_contradicted(std::uint32_t i, const FacingPatch& pair,
-                       ShadowRays::Agreement agreement) const {
+  bool is_large(std::uint32_t i, const FacingPatch& pair) const {
+    return pair.unoccluded > kLargePart * std::min(geometry_.area(i), geometry_.area(pair.patch));
+  }
+
+  /// Fewer rays than the default leave noise that more of them would only trade for time.
+  double row_sum_tolerance() const {
+    return kRowSumTolerance *
+           std::max(1.0, static_cast<double>(kDefaultRays) / settings_.full_rays);
+  }
+
+  /// True if hemisphere rays say otherwise than the rays of a pair that agree: by so many
+  /// `deviations` if these call it clear.
+  bool is_contradicted(std::uint32_t i, const FacingPatch& pair, ShadowRays::Agreement agreement,
+                       double deviations) const {
     const double count = hemisphere_->find(i, pair.patch).count;
     if (agreement == ShadowRays::Agreement::kHidden) return count > 0;
     const double expected = hemisphere_->expected_count(i, pair.patch, pair.unoccluded);
     // As random rays would deviate: more than they do, but of many thousand pairs none may be lost
     // to chance whose kernel is exact.
-    return std::abs(count - expected) > kContradiction * std::sqrt(expected + 1);
+    return std::abs(count - expected) > deviations * std::sqrt(expected + 1);
   }
 
-  /// Traces all rays of the pairs of row i that have a doubtful patch and are not near, and
-  /// replaces their entries.
+  /// Looks at the fine pairs of row i that have a doubtful patch with more probe rays, and replaces
+  /// their entries.
   void refine_row(std::uint32_t i, const std::vector<bool>& doubtful, Scratch& scratch,
                   std::vector<ExchangeEntry>& row) {
-    const auto is_doubtful = [&](std::uint32_t j) {
-      return (doubtful[i] || doubtful[j]) && !is_coarse_pair(geometry_, i, j);
-    };
-    std::erase_if(row, [&](const ExchangeEntry& entry) { return is_doubtful(entry.column); });
-    shadow_rays_.find_facing(i, scratch.mixed, is_doubtful);
-    append_mixed(i, scratch, row);
+    const auto is_doubtful = [&](std::uint32_t j) { return doubtful[i] || doubtful[j]; };
+    std::erase_if(row, [&](const ExchangeEntry& entry) {
+      return is_doubtful(entry.column) && !is_coarse_pair(geometry_, i, entry.column);
+    });
+    append_fine(i, static_cast<std::size_t>(kRefinedProbes) * settings_.probe_rays, is_doubtful,
+                scratch, row);
     std::ranges::sort(row, {}, &ExchangeEntry::column);
   }
 
-  /// Traces all rays of scratch.mixed and adds what gets through to the row: the mean of what
+  /// Traces `full` rays for each of `pairs` and adds what gets through to row i: the mean of what
   /// shadow rays and hemisphere rays say, weighted by the inverse of their variances.
-  void append_mixed(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
-    const int full = settings_.full_rays;
-    shadow_rays_.make_rays(i, scratch.mixed, full, scratch.rays);
+  void append_mixed(std::uint32_t i, const std::vector<FacingPatch>& pairs, int full,
+                    Scratch& scratch, std::vector<ExchangeEntry>& row) {
+    shadow_rays_.make_rays(i, pairs, full, scratch.rays);
     trace(scratch);
-    for (std::size_t p = 0; p < scratch.mixed.size(); ++p) {
-      const FacingPatch& pair = scratch.mixed[p];
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+      const FacingPatch& pair = pairs[p];
       const ShadowRays::Visibility visible =
-          shadow_rays_.visibility(i, pair.patch, std::span(scratch.rays).subspan(p * full, full),
-                                  std::span(scratch.transmitted).subspan(p * full, full));
-      if (visible.part == 1 && !is_contradicted(i, pair, ShadowRays::Agreement::kClear)) {
+          ShadowRays::visibility(std::span(scratch.rays).subspan(p * full, full),
+                                 std::span(scratch.transmitted).subspan(p * full, full));
+      if (visible.part == 1 &&
+          !is_contradicted(i, pair, ShadowRays::Agreement::kClear, kContradiction)) {
         append_clear(pair, row);
       } else {
         append_mean(i, pair, visible, row);
       }
     }
-    ray_count_ += scratch.mixed.size() * full;
+    ray_count_ += pairs.size() * full;
   }
 
   /// Adds the mean of `visible` and of the hemisphere rays. The variances are those of one and the

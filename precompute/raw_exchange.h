@@ -28,11 +28,11 @@ struct RawExchange {
 /// - 1. Hemisphere rays of every patch say what escapes, and which patches see each other.
 /// - 2. A pair with a good kernel gets a few shadow rays. If they agree with each other and with
 /// the
-///   hemisphere rays, that is the answer; else it gets all of its rays, and if those do not agree
-///   either the mean of what they and the hemisphere rays say, weighted by the inverse of their
-///   variances.
+///   hemisphere rays, that is the answer; else it gets all of its rays, the more the more it
+///   exchanges, and if those do not agree either the mean of what they and the hemisphere rays say,
+///   weighted by the inverse of their variances.
 /// - 3. A near pair of many triangles is taken from the hemisphere rays alone.
-/// - 4. Rows whose sum is off its target get all rays for every pair.
+/// - 4. Rows whose sum is off its target get more probe rays for every pair.
 ///
 /// Rows are shared out among OpenMP threads; the bits do not depend on how many. Throws Cancelled
 /// when `progress` says so.

@@ -3,15 +3,6 @@
 #include <cmath>
 
 namespace rebounce {
-namespace {
-
-// A row whose sum is off its target by more than this (and three deviations) is traced again: it is
-// partly covered, and probe rays miss what little of it is seen. Rows of patches of many triangles
-// are off by as much as their kernel is coarse, which more rays do not mend.
-constexpr double kRowSumTolerance = 0.005, kCoarseRowSumTolerance = 0.005;
-
-}  // namespace
-
 std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count) {
   std::vector<RowTarget> target;
   target.reserve(escape.size());
@@ -28,15 +19,15 @@ std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count
   return target;
 }
 
-bool is_doubtful_row(double sum, const RowTarget& target) {
-  return std::abs(sum - target.sum) > kRowSumTolerance + 3 * target.deviation;
+bool is_doubtful_row(double sum, const RowTarget& target, double tolerance) {
+  return std::abs(sum - target.sum) > tolerance + 3 * target.deviation;
 }
 
-std::vector<bool> find_doubtful_rows(std::span<const double> sum,
-                                     std::span<const RowTarget> target) {
+std::vector<bool> find_doubtful_rows(std::span<const double> sum, std::span<const RowTarget> target,
+                                     double tolerance) {
   std::vector<bool> doubtful(sum.size());
   for (std::size_t i = 0; i < sum.size(); ++i) {
-    doubtful[i] = is_doubtful_row(sum[i], target[i]);
+    doubtful[i] = is_doubtful_row(sum[i], target[i], tolerance);
   }
   return doubtful;
 }

@@ -1,32 +1,11 @@
 #include "shadow_rays.h"
 
-#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
 
 std::uint64_t ShadowRays::pair_hash(std::uint32_t i, std::uint32_t j) const {
   return mix_bits(seed_ * 0x9E3779B9ULL + ((static_cast<std::uint64_t>(i) << 32) | j));
-}
-
-/// The points that ray k of the pair (i, j) joins. Both walk the patches' point sets from starts of
-/// the pair's own; the second, in each block of 64, by steps of 19, so that every prefix covers all
-/// four dimensions.
-std::pair<const PatchPoint*, const PatchPoint*> ShadowRays::ray_ends(std::uint32_t i,
-                                                                     std::uint32_t j,
-                                                                     std::uint32_t k,
-                                                                     std::uint64_t hash) const {
-  constexpr std::uint32_t kBlock = 64;
-  const std::uint32_t first = k / kBlock * kBlock, round = k / kPointCount;
-  const std::uint32_t a = (k + static_cast<std::uint32_t>(hash)) % kPointCount;
-  const std::uint32_t b =
-      (first + 19 * k % kBlock + 7 * round + static_cast<std::uint32_t>(hash >> 32)) % kPointCount;
-  return {&geometry_.points(i)[a], &geometry_.points(j)[b]};
-}
-
-double ShadowRays::kernel(const PatchPoint& x, const PatchPoint& y) {
-  return point_kernel(to_dvec3(x.position), to_dvec3(x.normal), to_dvec3(y.position),
-                      to_dvec3(y.normal));
 }
 
 void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
@@ -51,22 +30,29 @@ std::size_t ShadowRays::make_corner_rays(std::uint32_t i, std::uint32_t j,
                                          std::span<Ray> rays) const {
   std::size_t made = 0;
   for (std::uint32_t k = 0; k < kCornerRays && made < rays.size(); ++k) {
-    const PatchPoint &x = geometry_.points(i)[geometry_.outermost_points(i)[k % 3]],
-                     &y = geometry_.points(j)[geometry_.outermost_points(j)[(k + k / 3) % 3]];
+    const PatchPoint &x = geometry_.outermost_points(i)[k % 3],
+                     &y = geometry_.outermost_points(j)[(k + k / 3) % 3];
     if (kernel(x, y) > 0) rays[made++] = ray_between(x, y);
   }
   return made;
 }
 
+/// Between points of sequences of the pair's own; those of the second patch, in each block of 64,
+/// by steps of 19, so that every prefix covers all four dimensions.
 void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const {
+  constexpr std::uint32_t kBlock = 64, kCandidates = 4;  // for each ray
   const std::uint64_t hash = pair_hash(i, j);
+  const PointSequence from = r2_sequence(unit_square(hash)),
+                      to = r2_sequence(unit_square(mix_bits(hash)));
   std::size_t made = 0;
-  for (std::uint32_t k = 0; k < kCandidateCount && made < rays.size(); ++k) {
-    const auto [x, y] = ray_ends(i, j, k, hash);
-    if (kernel(*x, *y) <= 0) continue;
+  for (std::uint32_t k = 0; k < kCandidates * rays.size() && made < rays.size(); ++k) {
+    const PatchPoint x = geometry_.point(i, from[k]),
+                     y = geometry_.point(j, to[k / kBlock * kBlock + 19 * k % kBlock]);
+    const float weight = kernel(x, y);
+    if (!(weight > 0)) continue;
     Ray& ray = rays[made++];
-    ray = ray_between(*x, *y);
-    ray.id = k;
+    ray = ray_between(x, y);
+    ray.id = std::bit_cast<std::uint32_t>(weight);
   }
   for (Ray& ray : rays.subspan(made)) ray = void_ray();
 }
@@ -101,22 +87,18 @@ ShadowRays::Agreement ShadowRays::agreement(std::span<const Ray> rays,
   return all_clear ? Agreement::kClear : Agreement::kMixed;
 }
 
-ShadowRays::Visibility ShadowRays::visibility(std::uint32_t i, std::uint32_t j,
-                                              std::span<const Ray> rays,
-                                              std::span<const float> transmitted) const {
+ShadowRays::Visibility ShadowRays::visibility(std::span<const Ray> rays,
+                                              std::span<const float> transmitted) {
   VisibilityEstimate estimate;
-  add(i, j, rays, transmitted, estimate);
+  add(rays, transmitted, estimate);
   if (estimate.is_empty()) return {0, 1, 0};
   return {estimate.part(), estimate.variance(), estimate.effective_count()};
 }
 
-void ShadowRays::add(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
-                     std::span<const float> transmitted, VisibilityEstimate& estimate) const {
-  const std::uint64_t hash = pair_hash(i, j);
+void ShadowRays::add(std::span<const Ray> rays, std::span<const float> transmitted,
+                     VisibilityEstimate& estimate) {
   for (std::size_t k = 0; k < rays.size(); ++k) {
-    if (is_void(rays[k])) continue;
-    const auto [x, y] = ray_ends(i, j, rays[k].id, hash);
-    estimate.add(kernel(*x, *y), transmitted[k]);
+    if (!is_void(rays[k])) estimate.add(ray_weight(rays[k]), transmitted[k]);
   }
 }
 

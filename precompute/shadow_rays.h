@@ -1,12 +1,14 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <numbers>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "rebounce/precompute/patch_geometry.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
@@ -46,11 +48,8 @@ class VisibilityEstimate {
 /// pair's exchange gets through. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
-  static constexpr std::uint32_t kPointCount = PatchGeometry::kPointCount;
-
-  /// The most rays that a pair can have. Rays between points that do not face each other are not
-  /// made: they carry no light.
-  static constexpr std::uint32_t kMostRays = kPointCount;
+  /// The most rays that a pair can be asked to have.
+  static constexpr std::uint32_t kMostRays = 256;
 
   /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
   /// `kernel_tolerance` is that of unoccluded_exchange_area().
@@ -71,8 +70,9 @@ class ShadowRays {
   template <typename Wanted>
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
-  /// Writes to `rays` `count` <= kMostRays untraced rays for each pair of patch i, one pair after
-  /// the other; where a pair has fewer the rest are never occluded and void (is_void).
+  /// Writes to `rays` `count` untraced rays for each pair of patch i, one pair after the other,
+  /// each with its weight (ray_weight). Rays between points that do not face each other carry no
+  /// light and are not made; where a pair has fewer the rest are never occluded and void (is_void).
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
 
@@ -95,14 +95,16 @@ class ShadowRays {
     double ray_count;  ///< rays of equal weight that would tell as much
   };
 
-  /// What the `rays` of the pair (i, j) and their transmittances `transmitted` say of it: each is
-  /// weighted by the kernel between its ends.
-  Visibility visibility(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
-                        std::span<const float> transmitted) const;
+  /// What the `rays` of a pair that make_rays made and their transmittances `transmitted` say of
+  /// it.
+  static Visibility visibility(std::span<const Ray> rays, std::span<const float> transmitted);
 
   /// Adds the same rays to what is known of the pair.
-  void add(std::uint32_t i, std::uint32_t j, std::span<const Ray> rays,
-           std::span<const float> transmitted, VisibilityEstimate& estimate) const;
+  static void add(std::span<const Ray> rays, std::span<const float> transmitted,
+                  VisibilityEstimate& estimate);
+
+  /// The kernel between the ends of a ray that make_rays made.
+  static double ray_weight(const Ray& ray) { return std::bit_cast<float>(ray.id); }
 
   /// A ray from `x` to `y`.
   static Ray ray_between(const PatchPoint& x, const PatchPoint& y);
@@ -110,18 +112,20 @@ class ShadowRays {
   /// One that stands for none and is never occluded.
   static Ray void_ray();
 
-  static double kernel(const PatchPoint& x, const PatchPoint& y);
+  /// The kernel between two points as point_kernel() has it, 1/m²; 0 if they do not face each
+  /// other.
+  static float kernel(const PatchPoint& x, const PatchPoint& y) {
+    const glm::vec3 d = to_glm(y.position) - to_glm(x.position);
+    const float cx = glm::dot(to_glm(x.normal), d), cy = -glm::dot(to_glm(y.normal), d);
+    if (!(cx > 0 && cy > 0)) return 0;
+    const float inverse = 1 / glm::dot(d, d);
+    return cx * inverse * (cy * inverse) * std::numbers::inv_pi_v<float>;
+  }
 
  private:
-  // Pairs of points that are looked at for rays, at most.
-  static constexpr std::uint32_t kCandidateCount = 4 * kPointCount;
-
   std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
   void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
   std::size_t make_corner_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
-  std::pair<const PatchPoint*, const PatchPoint*> ray_ends(std::uint32_t i, std::uint32_t j,
-                                                           std::uint32_t k,
-                                                           std::uint64_t hash) const;
 
   const PatchGeometry& geometry_;
   std::uint64_t seed_;

@@ -41,12 +41,12 @@ class Viewer {
   View look_up(std::span<const std::uint32_t> triangles, std::uint32_t patch) {
     const std::uint64_t bits = mix_bits(settings_.seed ^ mix_bits(patch));
     spread_points(mesh_, triangles, unit_square(bits), points_);
-    const glm::dvec2 shift = unit_square(mix_bits(bits));
+    const PointSequence directions = direction_sequence(unit_square(mix_bits(bits)));
     for (std::uint32_t k = 0; k < rays_.size(); ++k) {
       const auto& [position, normal] = points_[k];
       Ray& ray = rays_[k] = Ray{};
       ray.origin = tracer_.offset_point(position, normal);
-      ray.direction = to_float3(hemisphere_direction(to_dvec3(normal), direction_sample(shift, k)));
+      ray.direction = to_float3(hemisphere_direction(to_dvec3(normal), directions[k]));
       ray.t_near = 0;
       ray.t_far = std::numeric_limits<float>::infinity();
     }

@@ -1,8 +1,5 @@
 #include "rebounce/runtime/patch_points.h"
 
-#include <algorithm>
-
-#include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
@@ -22,58 +19,50 @@ PatchTriangles::PatchTriangles(std::span<const std::uint32_t> triangle_patch,
   }
 }
 
-namespace {
+PatchSurface::PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles) {
+  for (const std::uint32_t t : triangles) add(mesh, t);
+}
 
-/// What points may lie on: an opaque triangle, or a micro-triangle of one with a map.
-struct Place {
-  std::uint32_t triangle;
-  std::uint32_t micro_triangle;
-};
+void PatchSurface::add(const DisplayMesh& mesh, std::uint32_t triangle) {
+  const auto corner = [&](int k) { return to_dvec3(mesh.position[mesh.triangle[triangle][k]]); };
+  const glm::dvec3 a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
+  const glm::dvec3 cross = glm::cross(ab, ac);
+  const std::span<const std::uint8_t> map = mesh.opacity.of_triangle(triangle);
+  add_places(map, glm::length(cross));
+  grounds_.push_back({a, ab, ac, to_float3(glm::normalize(cross)), opacity_map_level(map.size())});
+}
 
-/// The places of `triangle`, whose area is `area`, each as likely as it stops light.
-void add_places(const OpacityMaps& opacity, std::uint32_t triangle, double area,
-                std::vector<Place>& places, CumulativeChoice& choice) {
-  const std::span<const std::uint8_t> map = opacity.of_triangle(triangle);
+/// Each as likely as it stops light.
+void PatchSurface::add_places(std::span<const std::uint8_t> map, double area) {
+  const auto ground = static_cast<std::uint32_t>(grounds_.size());
   if (map.empty()) {
-    places.push_back({triangle, 0});
-    choice.add(area);
+    places_.push_back({ground, 0});
+    choice_.add(area);
   }
   for (std::uint32_t k = 0; k < map.size(); ++k) {
-    places.push_back({triangle, k});
-    choice.add(area * map[k] / (OpacityMaps::kOpaque * static_cast<double>(map.size())));
+    places_.push_back({ground, k});
+    choice_.add(area * map[k] / (OpacityMaps::kOpaque * static_cast<double>(map.size())));
   }
 }
 
-}  // namespace
+PatchPoint PatchSurface::at_chosen_place(const glm::dvec2& square) const {
+  if (!(choice_.total() > 0)) return {};
+  const auto [index, rest] = choice_.choose(square.x);
+  const auto [number, micro_triangle] = places_[index];
+  const Ground& ground = grounds_[number];
+  const glm::dvec2 b = square_to_triangle({rest, square.y});
+  TrianglePlace place{b.x, b.y};
+  if (ground.map_level > 0) {
+    place = place_in_micro_triangle(ground.map_level, micro_triangle, place);
+  }
+  return ground.at({place.u, place.v});
+}
 
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                    const glm::dvec2& shift, std::span<PatchPoint> points) {
-  const auto corner = [&](std::uint32_t t, int k) {
-    return to_dvec3(mesh.position[mesh.triangle[t][k]]);
-  };
-  const auto cross = [&](std::uint32_t t) {
-    return glm::cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
-  };
-  std::vector<Place> places;
-  CumulativeChoice choice;
-  for (const std::uint32_t t : triangles) {
-    add_places(mesh.opacity, t, glm::length(cross(t)), places, choice);
-  }
-  if (choice.total() <= 0) {
-    std::ranges::fill(points, PatchPoint{});
-    return;
-  }
-  for (std::uint32_t k = 0; k < points.size(); ++k) {
-    const glm::dvec2 square = r2_point(k, shift);
-    const auto [index, rest] = choice.choose(square.x);
-    const auto [t, micro_triangle] = places[index];
-    const glm::dvec2 b = square_to_triangle({rest, square.y});
-    const auto [u, v] = place_in_micro_triangle(
-        opacity_map_level(mesh.opacity.of_triangle(t).size()), micro_triangle, {b.x, b.y});
-    const glm::dvec3 a = corner(t, 0);
-    const glm::dvec3 position = a + u * (corner(t, 1) - a) + v * (corner(t, 2) - a);
-    points[k] = {to_float3(position), to_float3(glm::normalize(cross(t)))};
-  }
+  const PatchSurface surface(mesh, triangles);
+  const PointSequence sequence = r2_sequence(shift);
+  for (std::uint32_t k = 0; k < points.size(); ++k) points[k] = surface.at(sequence[k]);
 }
 
 }  // namespace rebounce

@@ -49,6 +49,16 @@ TEST(FormFactors, EmptyRoomIsClosedBeforeAnyCorrection) {
   for (const float sky : f.sky_visibility) EXPECT_NEAR(sky, 0, 1e-6);
 }
 
+TEST(FormFactors, RowsBesideHoveringBlocksAddUpBeforeAnyCorrection) {
+  // What pokes in between the corners of two patches, and penumbrae in the slot under a block.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  test::add_box(scene, {1, 0.3, 1}, {2, 1.2, 2.5}, false);
+  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
+  const FormFactors f = form_factors_of(make_patch_model(scene, {.patch_count = 1000}));
+  EXPECT_LT(f.closure.row_sum_error_before, 1.2e-3);
+}
+
 TEST(FormFactors, FurnishedRoomIsClosed) {
   const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 1200});
   const FormFactors f = form_factors_of(model);

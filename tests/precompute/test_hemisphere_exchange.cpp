@@ -19,9 +19,10 @@ std::vector<std::vector<MetPatch>> met_by_all(const PatchModel& model) {
   const PatchTriangles triangles(model.mesh.triangle_patch, model.patches.size());
   std::vector<std::vector<MetPatch>> met;
   EscapeScratch scratch;
+  MetPatchCounter counter;
   for (std::uint32_t i = 0; i < model.patches.size(); ++i) {
     measure_escape(model, triangles[i], i, tracer, kRays, 1, scratch);
-    met.push_back(count_met_patches(model, scratch.hits));
+    met.push_back(counter.count(model, scratch.hits));
   }
   return met;
 }

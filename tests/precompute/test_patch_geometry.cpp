@@ -22,7 +22,7 @@ PatchModel model_by_material(Scene scene, std::size_t element_count) {
 }
 
 PatchGeometry geometry_of(const PatchModel& model) {
-  return {model, test::make_tracer(model), 1};
+  return {model, test::make_tracer(model)};
 }
 
 Scene two_squares(double distance, double tilt) {

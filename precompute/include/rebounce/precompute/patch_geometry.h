@@ -42,15 +42,11 @@ struct PatchPart {
 /// The shapes of all patches. Immutable, usable from any number of threads.
 class PatchGeometry {
  public:
-  /// Sample points per patch; a power of two. More than a pair has rays, so that the pairs of a
-  /// patch have different ones and their errors do not add up in its row.
-  static constexpr std::uint32_t kPointCount = 256;
-
   /// Parts that a patch is cut into at most: two to the power of levels.
   static constexpr int kPartLevels = 5;
 
-  /// `tracer` holds the scene; points are moved off its surface. `seed` shifts them.
-  PatchGeometry(const PatchModel& model, const RayTracer& tracer, std::uint64_t seed);
+  /// `tracer` holds the scene; points are moved off its surface.
+  PatchGeometry(const PatchModel& model, const RayTracer& tracer);
 
   std::size_t patch_count() const { return bounds_.size(); }
   double area(std::size_t patch) const { return area_[patch]; }  ///< of what stops light
@@ -62,14 +58,15 @@ class PatchGeometry {
     return {triangle_.data() + begin_[patch], triangle_.data() + begin_[patch + 1]};
   }
 
-  /// kPointCount points spread over it evenly, any that follow each other too, moved off the
-  /// surface.
-  std::span<const PatchPoint> points(std::size_t patch) const {
-    return {points_.data() + patch * kPointCount, kPointCount};
+  /// The point of its surface that `square` in [0, 1)^2 maps to (PatchSurface), moved off it.
+  PatchPoint point(std::size_t patch, const glm::dvec2& square) const {
+    PatchPoint point = surface_[patch].at(square);
+    for (int axis = 0; axis < 3; ++axis) point.position[axis] += offset_ * point.normal[axis];
+    return point;
   }
 
-  /// Three of the points, by their numbers, that span about the largest triangle.
-  std::span<const std::uint8_t, 3> outermost_points(std::size_t patch) const {
+  /// Three points beside corners that span about the largest triangle, moved off the surface.
+  std::span<const PatchPoint, 3> outermost_points(std::size_t patch) const {
     return outermost_[patch];
   }
 
@@ -100,11 +97,12 @@ class PatchGeometry {
   std::vector<FlatTriangle> triangle_;  ///< those of patch i at [begin_[i], begin_[i + 1])
   std::vector<double> area_;            ///< [n] m²
   std::vector<PatchBounds> bounds_;     ///< [n]
-  std::vector<PatchPoint> points_;      ///< [n][kPointCount]
-  std::vector<std::array<std::uint8_t, 3>> outermost_;  ///< [n]
-  std::vector<Fragments> fragments_;                    ///< [n]
-  std::vector<std::uint8_t> flat_level_;                ///< [n]
-  std::vector<PatchPart> parts_;                        ///< [n][all levels, the coarsest first]
+  std::vector<PatchSurface> surface_;   ///< [n]
+  float offset_;                        ///< of points, metres
+  std::vector<std::array<PatchPoint, 3>> outermost_;  ///< [n]
+  std::vector<Fragments> fragments_;                  ///< [n]
+  std::vector<std::uint8_t> flat_level_;              ///< [n]
+  std::vector<PatchPart> parts_;                      ///< [n][all levels, the coarsest first]
 };
 
 /// True for a pair (i, j) so near to each other that the few points of shadow rays cannot stand for

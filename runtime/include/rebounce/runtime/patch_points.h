@@ -7,6 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/runtime/cumulative_choice.h"
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -34,10 +37,48 @@ struct PatchPoint {
   Float3 normal{0, 0, 0};    ///< unit, of the flat triangle
 };
 
-/// Writes points spread evenly by area over what of `triangles` of `mesh` stops light: the R2
-/// sequence, shifted by `shift`, whose first coordinate also chooses the triangle, or the
-/// micro-triangle of its opacity map, whose order keeps neighbours together. Every prefix is well
-/// spread. Where the triangles stop nothing the points have no normal.
+/// What of a patch stops light, to take points from.
+class PatchSurface {
+ public:
+  PatchSurface() = default;
+  PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles);
+
+  /// Maps [0, 1)^2 to it, evenly by area: the first coordinate also chooses the triangle, or the
+  /// micro-triangle of its opacity map, whose order keeps neighbours together. A point without
+  /// normal where nothing stops light.
+  PatchPoint at(const glm::dvec2& square) const {
+    // Most patches are one triangle, and points are made by the million.
+    if (places_.size() == 1 && choice_.total() > 0)
+      return grounds_[0].at(square_to_triangle(square));
+    return at_chosen_place(square);
+  }
+
+ private:
+  struct Ground {
+    glm::dvec3 corner, first_edge, second_edge;
+    Float3 normal;
+    int map_level;  ///< of its opacity map
+
+    PatchPoint at(const glm::dvec2& b) const {  ///< weights of the second and third vertex
+      return {to_float3(corner + b.x * first_edge + b.y * second_edge), normal};
+    }
+  };
+  struct Place {  ///< an opaque triangle, or a micro-triangle of one with a map
+    std::uint32_t ground;
+    std::uint32_t micro_triangle;
+  };
+
+  PatchPoint at_chosen_place(const glm::dvec2& square) const;
+  void add(const DisplayMesh& mesh, std::uint32_t triangle);
+  void add_places(std::span<const std::uint8_t> map, double area);
+
+  std::vector<Ground> grounds_;  ///< its triangles
+  std::vector<Place> places_;
+  CumulativeChoice choice_;  ///< of places
+};
+
+/// Writes points spread evenly by area over what of `triangles` of `mesh` stops light
+/// (PatchSurface): the R2 sequence, shifted by `shift`. Every prefix is well spread.
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                    const glm::dvec2& shift, std::span<PatchPoint> points);
 

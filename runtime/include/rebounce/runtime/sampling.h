@@ -2,6 +2,8 @@
 
 // Low-discrepancy points and the maps from the unit square to triangles and hemispheres.
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -23,24 +25,45 @@ inline glm::dvec2 unit_square(std::uint64_t bits) {
           static_cast<double>(bits & 0xFFFFFFFFULL) * 0x1p-32};
 }
 
-/// Point k of the R2 sequence (M. Roberts 2018, after the plastic number), shifted by `shift`
-/// modulo 1. Every prefix is well spread over [0, 1)^2.
-inline glm::dvec2 r2_point(std::uint32_t k, const glm::dvec2& shift) {
+/// The points fract(shift + (k + 1/2) step) of [0, 1)^2, in fixed point, where wrapping costs
+/// nothing.
+class PointSequence {
+ public:
+  /// `shift` and `step` in [0, 1)^2.
+  PointSequence(const glm::dvec2& shift, const glm::dvec2& step)
+      : step_{to_fixed(step.x), to_fixed(step.y)},
+        first_{to_fixed(shift.x) + step_[0] / 2, to_fixed(shift.y) + step_[1] / 2} {}
+
+  glm::dvec2 operator[](std::uint32_t k) const {
+    return {to_double(first_[0] + k * step_[0]), to_double(first_[1] + k * step_[1])};
+  }
+
+ private:
+  static std::uint64_t to_fixed(double x) { return static_cast<std::uint64_t>(x * 0x1p63) << 1; }
+  static double to_double(std::uint64_t x) {
+    // The signed conversion is one instruction.
+    return static_cast<double>(static_cast<std::int64_t>(x >> 11)) * 0x1p-53;
+  }
+
+  std::array<std::uint64_t, 2> step_, first_;  ///< in units of 2^-64
+};
+
+/// The points of the R2 sequence (M. Roberts 2018, after the plastic number), shifted by `shift`
+/// modulo 1. Any that follow each other are well spread over [0, 1)^2.
+inline PointSequence r2_sequence(const glm::dvec2& shift) {
   constexpr double kG = 1.32471795724474602596;
-  return glm::fract(shift + (k + 0.5) * glm::dvec2(1.0 / kG, 1.0 / (kG * kG)));
+  return {shift, {1.0 / kG, 1.0 / (kG * kG)}};
+}
+
+/// Point k of it.
+inline glm::dvec2 r2_point(std::uint32_t k, const glm::dvec2& shift) {
+  return r2_sequence(shift)[k];
 }
 
 /// Barycentric weights (of the second and third vertex), uniform over the triangle: the
 /// low-distortion map of E. Heitz, "A low-distortion map between triangle and square", 2019.
-inline glm::dvec2 square_to_triangle(glm::dvec2 s) {
-  if (s.y > s.x) {
-    s.x *= 0.5;
-    s.y -= s.x;
-  } else {
-    s.y *= 0.5;
-    s.x -= s.y;
-  }
-  return s;
+inline glm::dvec2 square_to_triangle(const glm::dvec2& s) {
+  return s - 0.5 * std::min(s.x, s.y);  // without a branch, which would be mispredicted
 }
 
 /// A direction around +Z with density cos / pi, by Shirley and Chiu's concentric map (1997).
