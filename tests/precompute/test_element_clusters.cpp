@@ -149,6 +149,27 @@ TEST(ElementClusters, WhatHidesItselfDoesNotMakePatchesGrow) {
   EXPECT_LT(std::ranges::max(patch_lengths(model)), 4.01 * size);
 }
 
+TEST(ElementClusters, FragmentsDoNotTakeThePatches) {
+  // Tubes and leaves in each other: thousands of pieces that do not see each other.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 4}, true);
+  std::mt19937 engine(7);
+  const auto number = [&] { return engine() * 0x1p-32 - 0.5; };
+  for (int k = 0; k < 600; ++k) {
+    const glm::dvec3 p = glm::dvec3(2, 1, 2) + glm::dvec3(number(), number(), number());
+    const glm::dvec3 half(0.01 + 0.01 * number(), 0.3 + 0.2 * number(), 0.02 + 0.02 * number());
+    test::add_box(scene, p - half, p + half, false);
+  }
+  const PatchModel model = make_patch_model(scene, {.patch_count = 500});
+  EXPECT_NEAR(static_cast<double>(model.patches.size()), 500, 50);
+  double area = 0;
+  for (const float a : model.patches.area) area += a;
+  const auto fragments =
+      std::ranges::count_if(model.patches.area, [&](float a) { return a < area / 500 / 64; });
+  EXPECT_LE(fragments, 25);
+  EXPECT_LT(std::ranges::max(model.patches.area), 8 * area / 500);
+}
+
 TEST(ElementClusters, ManyElementsMakeTheSamePatchesOnAnyNumberOfThreads) {
   Scene scene = test::empty_scene();
   test::add_box(scene, {0, 0, 0}, {5, 3, 4}, true);
