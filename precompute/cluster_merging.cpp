@@ -202,6 +202,7 @@ bool ClusterMerging::is_in_sight(std::uint32_t a, std::uint32_t b) const {
 /// What a triangle between clusters a and b is to them. What is small hides nothing.
 ClusterMerging::Sight ClusterMerging::what_is_at(std::uint32_t triangle, std::uint32_t a,
                                                  std::uint32_t b) const {
+  if (triangle >= scene_.elements_of.size()) return Sight::kWall;
   bool small = true, lit = false;
   for (const std::uint32_t e : scene_.elements_of[triangle]) {
     if (e == kNone) continue;

@@ -63,7 +63,8 @@ struct MergingLimits {
 struct MergingScene {
   const Elements& elements;
   const RayTracer& tracer;
-  std::vector<std::array<std::uint32_t, 2>> elements_of;  ///< of each surface triangle, or kNone
+  std::vector<std::array<std::uint32_t, 2>>
+      elements_of;                  ///< [surface triangle, up to the last with any] or kNone
   std::vector<float> piece_length;  ///< metres: the connected piece of the mesh of each element
 };
 
