@@ -141,6 +141,8 @@ const char* name(OperatorKind kind) {
       return "low-rank";
     case OperatorKind::kFirstBounce:
       return "first-bounce";
+    case OperatorKind::kNoOperator:
+      return "none";
     case OperatorKind::kAutomatic:
     case OperatorKind::kDense:
       break;
@@ -273,14 +275,6 @@ Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
   return std::move(placed.lightmap);
 }
 
-// The scene of a file, with what is plainly seen from behind made double-sided.
-Scene import_usable(const std::filesystem::path& path, double scale) {
-  Scene scene = import_gltf(path, scale);
-  const RayTracer tracer(scene.position, scene.triangle);
-  make_double_sided(scene, find_inside_out(scene, tracer));
-  return scene;
-}
-
 /// The offline stage, a step at a time, each with what the steps before have left.
 class TransferBuild {
  public:
@@ -367,6 +361,7 @@ class TransferBuild {
 
   /// Makes the operator, and measures how far off it is.
   void make_operator() {
+    if (decided_.operator_kind == OperatorKind::kNoOperator) return;
     const bool compressed = decided_.operator_kind != OperatorKind::kDense;
     const Precision dense_precision = compressed ? Precision::kF32 : *decided_.precision;
     const auto dense = clock_.run("operator", [&](const Progress& part) {
@@ -413,6 +408,13 @@ class TransferBuild {
 };
 
 }  // namespace
+
+Scene import_usable(const std::filesystem::path& path, double scale) {
+  Scene scene = import_gltf(path, scale);
+  const RayTracer tracer(scene.position, scene.triangle);
+  make_double_sided(scene, find_inside_out(scene, tracer));
+  return scene;
+}
 
 TransferData build_transfer_data(const std::filesystem::path& scene_path,
                                  const BuildSettings& settings, BuildReport& report,

@@ -31,6 +31,11 @@ void choose_witnesses(const Elements& elements, const Cluster& a, const Cluster&
   std::copy_n(all.begin(), count, whole.witness.begin());
 }
 
+/// What the square of a distance between the features of two counts, m².
+double joint_weight(const Cluster& a, const Cluster& b) {
+  return a.area * b.area / (a.area + b.area);
+}
+
 }  // namespace
 
 Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
@@ -72,7 +77,7 @@ double merging_cost(const Cluster& a, const Cluster& b) {
     const double d = a.sum[k] / a.area - b.sum[k] / b.area;
     distance_squared += d * d;
   }
-  return a.area * b.area / (a.area + b.area) * distance_squared;
+  return joint_weight(a, b) * distance_squared;
 }
 
 ClusterMerging::ClusterMerging(const MergingScene& scene, std::vector<Cluster> clusters,
@@ -92,7 +97,7 @@ ClusterMerging::ClusterMerging(const MergingScene& scene, std::vector<Cluster> c
 
 void ClusterMerging::queue(std::uint32_t a, std::uint32_t b) {
   const double cost = merging_cost(clusters_[a], clusters_[b]);
-  if (cost <= limits_.cost) queue_.push({cost, a, b});
+  if (cost <= limits_.cost) queue_.push({cost, a, b, false});
 }
 
 void ClusterMerging::connect(const Pairs& pairs) {
@@ -105,20 +110,21 @@ void ClusterMerging::connect(const Pairs& pairs) {
 }
 
 void ClusterMerging::connect_in_sight(const Pairs& pairs) {
-  std::vector<std::uint8_t> in_sight(pairs.size());
+  std::vector<std::uint8_t> joins(pairs.size());
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const Cluster &a = clusters_[pairs[k].first], &b = clusters_[pairs[k].second];
     if (merging_cost(a, b) > limits_.cost) continue;
-    const bool free =
-        joint_length(a, b) <= limits_.detail || is_in_sight(pairs[k].first, pairs[k].second);
-    in_sight[k] = free ? 1 : 0;
+    const bool may = joint_length(a, b) <= limits_.detail ||
+                     std::min(a.area, b.area) <= limits_.fragment ||
+                     is_in_sight(pairs[k].first, pairs[k].second);
+    joins[k] = may ? 1 : 0;
   }
-  Pairs seen;
+  Pairs joined;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    if (in_sight[k] != 0) seen.push_back(pairs[k]);
+    if (joins[k] != 0) joined.push_back(pairs[k]);
   }
-  connect(seen);
+  connect(joined);
 }
 
 void ClusterMerging::queue_neighbours() {
@@ -133,22 +139,36 @@ void ClusterMerging::merge_cheapest(std::size_t count, const Watch& watch) {
   while (alive_ > count && !queue_.empty()) {
     const Candidate pair = queue_.top();
     queue_.pop();
-    if (!is_alive(pair.a) || !is_alive(pair.b) || !may_merge(pair.a, pair.b)) continue;
+    if (!is_alive(pair.a) || !is_alive(pair.b)) continue;
+    if (joint_length(clusters_[pair.a], clusters_[pair.b]) > limits_.largest) continue;
+    if (!pair.is_final) {
+      const double more = cost_of_walls(pair.a, pair.b);
+      if (more > 0) {
+        if (pair.cost + more <= limits_.cost) queue_.push({pair.cost + more, pair.a, pair.b, true});
+        continue;
+      }
+    }
     merge(pair);
     if (watch && alive_ % kWatchInterval == 0) watch(alive_);
   }
 }
 
-bool ClusterMerging::may_merge(std::uint32_t a, std::uint32_t b) const {
+/// What the walls between two add to merging_cost().
+double ClusterMerging::cost_of_walls(std::uint32_t a, std::uint32_t b) const {
+  return hidden_part(a, b) * limits_.wall * limits_.wall * joint_weight(clusters_[a], clusters_[b]);
+}
+
+/// The part of the view between two that is blocked, 0 if most is free.
+double ClusterMerging::hidden_part(std::uint32_t a, std::uint32_t b) const {
   const double length = joint_length(clusters_[a], clusters_[b]);
-  if (length > limits_.largest) return false;
-  if (length <= limits_.detail) return true;
+  if (length <= limits_.detail) return 0;
   const SightCount lines = look_between(a, b);
-  if (2 * lines.free > lines.count) return true;
   const float piece = std::max(scene_.piece_length[clusters_[a].witness[0]],
                                scene_.piece_length[clusters_[b].witness[0]]);
-  return 2 * (lines.free + lines.blocked_by_itself) > lines.count && length <= limits_.small &&
-         piece <= kSmallPiece * limits_.small;
+  const bool may_hide_itself = length <= limits_.small && piece <= kSmallPiece * limits_.small;
+  const std::size_t free = lines.free + (may_hide_itself ? lines.blocked_by_itself : 0);
+  if (2 * free > lines.count) return 0;
+  return 1 - static_cast<double>(free) / static_cast<double>(lines.count);
 }
 
 /// Looks along the lines between all witnesses of both, until most are free.
@@ -182,6 +202,7 @@ bool ClusterMerging::is_in_sight(std::uint32_t a, std::uint32_t b) const {
 /// What a triangle between clusters a and b is to them. What is small hides nothing.
 ClusterMerging::Sight ClusterMerging::what_is_at(std::uint32_t triangle, std::uint32_t a,
                                                  std::uint32_t b) const {
+  if (triangle >= scene_.elements_of.size()) return Sight::kWall;
   bool small = true, lit = false;
   for (const std::uint32_t e : scene_.elements_of[triangle]) {
     if (e == kNone) continue;

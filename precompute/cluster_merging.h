@@ -48,12 +48,14 @@ double joint_length(const Cluster& a, const Cluster& b);
 /// criterion, in m² of area x m² of distance between features.
 double merging_cost(const Cluster& a, const Cluster& b);
 
-/// What clusters may merge: see merge_elements(). Lengths are in metres.
+/// What clusters may merge, and what it costs: see merge_elements(). Lengths are in metres.
 struct MergingLimits {
-  double detail;   ///< longer ones must not merge through what stands between them
-  double small;    ///< longer ones must not merge around themselves
-  double largest;  ///< patch that may be made
-  double thing;    ///< pieces of the mesh that are longer hide what is behind them
+  double detail;    ///< pairs that are no longer together merge through what stands between them
+  double small;     ///< longer ones must not merge around themselves
+  double largest;   ///< patch that may be made
+  double thing;     ///< pieces of the mesh that are longer hide what is behind them
+  double fragment;  ///< m²: a smaller cluster may join what it does not see
+  double wall;      ///< what stands between a pair weighs like this distance
   double cost = std::numeric_limits<double>::infinity();  ///< the most that a merging may cost
 };
 
@@ -61,7 +63,8 @@ struct MergingLimits {
 struct MergingScene {
   const Elements& elements;
   const RayTracer& tracer;
-  std::vector<std::array<std::uint32_t, 2>> elements_of;  ///< of each surface triangle, or kNone
+  std::vector<std::array<std::uint32_t, 2>>
+      elements_of;                  ///< [surface triangle, up to the last with any] or kNone
   std::vector<float> piece_length;  ///< metres: the connected piece of the mesh of each element
 };
 
@@ -87,7 +90,7 @@ class ClusterMerging {
   /// Makes neighbours of pairs of clusters, unless only one of them emits.
   void connect(const Pairs& pairs);
 
-  /// The same for those that are detail or have nothing between them.
+  /// The same for those that are detail, or one of them a fragment, or have nothing between them.
   void connect_in_sight(const Pairs& pairs);
 
   /// Gives neighbours that were refused another chance.
@@ -108,6 +111,7 @@ class ClusterMerging {
   struct Candidate {
     double cost;
     std::uint32_t a, b;
+    bool is_final;                                  ///< what stands between is in the cost
     bool operator<(const Candidate& other) const {  // the cheapest is the greatest
       if (cost != other.cost) return cost > other.cost;
       return std::pair(a, b) > std::pair(other.a, other.b);
@@ -122,7 +126,8 @@ class ClusterMerging {
 
   void queue(std::uint32_t a, std::uint32_t b);
   bool is_alive(std::uint32_t c) const { return merged_into_[c] == kNone; }
-  bool may_merge(std::uint32_t a, std::uint32_t b) const;
+  double cost_of_walls(std::uint32_t a, std::uint32_t b) const;
+  double hidden_part(std::uint32_t a, std::uint32_t b) const;
   SightCount look_between(std::uint32_t a, std::uint32_t b) const;
   bool is_in_sight(std::uint32_t a, std::uint32_t b) const;
   Sight what_is_at(std::uint32_t triangle, std::uint32_t a, std::uint32_t b) const;

@@ -30,9 +30,13 @@ constexpr double kLongest = 4;
 // itself; hides nothing.
 constexpr double kDetail = 1.0 / 16, kSmall = 0.5, kThing = 0.5;
 
+// A cluster of this part of the mean area may join neighbours that it does not see. To lie on two
+// sides of a wall costs like being this many mean sizes apart: patches may be half as long, so that
+// what matters is kept apart, and fragments, of which hidden places have thousands, are not.
+constexpr double kFragment = 1.0 / 16, kWall = 8;
+
 // Where there are still too many patches, rounds in which those that lie near each other become
-// neighbours, and what counts as detail and as small doubles. In the last of them patches may be
-// twice as long each time.
+// neighbours. In the last of them patches may be twice as long each time.
 constexpr int kRounds = 8, kRoundsOfLength = 6;
 
 // The part of the progress that is for blocks.
@@ -45,8 +49,12 @@ class ElementMerging {
     const double area = std::accumulate(elements.area.begin(), elements.area.end(), 0.0);
     size_ = settings.patch_count > 0 ? std::sqrt(area / static_cast<double>(settings.patch_count))
                                      : settings.largest;
-    limits_ = {
-        .detail = kDetail * size_, .small = kSmall * size_, .largest = 0, .thing = kThing * size_};
+    limits_ = {.detail = kDetail * size_,
+               .small = kSmall * size_,
+               .largest = 0,
+               .thing = kThing * size_,
+               .fragment = kFragment * size_ * size_,
+               .wall = kWall * size_};
     set_largest(kLongest * size_);
     scene_.elements_of.assign(1 + *std::ranges::max_element(elements.triangle), {kNone, kNone});
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
@@ -139,8 +147,6 @@ class ElementMerging {
   }
 
   void start_round(int round, ClusterMerging& merging) {
-    limits_.detail *= 2;
-    limits_.small *= 2;
     if (round >= kRoundsOfLength)
       set_largest(kLongest * size_ * std::exp2(round - kRoundsOfLength + 1));
     merging.set_limits(limits_);

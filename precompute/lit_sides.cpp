@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 
+#include "enclosed_sides.h"
 #include "hemisphere_rays.h"
 #include "progress_part.h"
 
@@ -204,7 +205,9 @@ class LitSides {
 
 std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer,
                                           const Progress& progress) {
-  return LitSides(scene, tracer).find(progress);
+  std::vector<TriangleSides> sides = LitSides(scene, tracer).find(progress);
+  bury_enclosed_sides(scene, tracer, sides);
+  return sides;
 }
 
 }  // namespace rebounce

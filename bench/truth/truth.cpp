@@ -18,9 +18,9 @@
 #include "rebounce/demo/picture.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/csv_writer.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/lit_sides.h"
-#include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/direct_lighting.h"
+#include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "reference/compare.h"
@@ -32,7 +32,7 @@ namespace {
 constexpr int kBadInput = 1, kUsage = 2;
 
 struct Options {
-  std::string scene, lights, csv, error_picture;
+  std::string scene, lights, csv, patch_csv, error_picture;
   std::vector<std::size_t> patch_counts{1000, 4000};
   bool key_light = false;
   std::size_t point_count = 20000;
@@ -47,6 +47,13 @@ struct Row {
   reference::RelativeError patch_means, reconstruction;
 };
 
+/// One number of patches: its form factors, and their light.
+struct Solution {
+  TransferData data;
+  RayTracer tracer;  ///< the surface of data.mesh
+  std::vector<Float3> indirect_irradiance;
+};
+
 /// The scene, its light, and the path tracer's truth at points of it: the same for every number of
 /// patches.
 class TruthBench {
@@ -54,7 +61,7 @@ class TruthBench {
   TruthBench(const Options& options, cli::ProgressBar& bar)
       : options_(options),
         bar_(bar),
-        scene_(import_gltf(options.scene)),
+        scene_(import_usable(options.scene, 1)),
         tracer_(reference::make_scene_tracer(scene_)),
         sides_(find_lit_sides(scene_, tracer_)) {
     choose_lights();
@@ -65,18 +72,19 @@ class TruthBench {
                                        options.patch_comparison.seed, progress("truth at points"));
   }
 
-  Row run(std::size_t patch_count, const std::string& error_picture) {
-    const auto data = build(patch_count);
-    Engine engine(data, {.points_per_patch = options_.direct_points});
-    engine.relight(setup_.lights, setup_.sky);
+  Row run(std::size_t patch_count, bool last) {
+    const Solution solution = solve(patch_count);
+    const bool draws = last && !options_.error_picture.empty();
     reference::PatchComparisonSettings settings = options_.patch_comparison;
-    if (!error_picture.empty()) settings.patch_count = 0;  // a picture shows them all
-    const reference::PatchComparison patches = reference::compare_patch_means(
-        *data, engine.indirect_irradiance(), lit_scene(), settings, progress("truth on patches"));
-    if (!error_picture.empty()) draw_error(engine, patches, error_picture);
-    return {data->patches.size(), patches.relative,
-            reference::compare_reconstruction(*data, engine.tracer(), engine.indirect_irradiance(),
-                                              points_, truth_)};
+    if (draws) settings.patch_count = 0;  // a picture shows them all
+    const reference::PatchComparison patches =
+        reference::compare_patch_means(solution.data, solution.indirect_irradiance, lit_scene(),
+                                       settings, progress("truth on patches"));
+    if (draws) draw_error(solution, patches, options_.error_picture);
+    if (last && !options_.patch_csv.empty()) write_patches(solution, patches, options_.patch_csv);
+    return {solution.data.patches.size(), patches.relative,
+            reference::compare_reconstruction(solution.data, solution.tracer,
+                                              solution.indirect_irradiance, points_, truth_)};
   }
 
  private:
@@ -102,19 +110,46 @@ class TruthBench {
     }
   }
 
-  std::shared_ptr<const TransferData> build(std::size_t patch_count) {
+  /// Solves with the form factors themselves: an operator adds its own error, and many patches
+  /// take long to invert.
+  Solution solve(std::size_t patch_count) {
     BuildSettings settings;
     settings.subdivision.patch_count = patch_count;
+    settings.operator_kind = OperatorKind::kNoOperator;
     BuildReport report;
-    return std::make_shared<const TransferData>(build_transfer_data(
+    TransferData data = build_transfer_data(
         options_.scene, settings, report,
-        [this](std::string_view phase, double part) { return bar_.update(phase, part); }));
+        [this](std::string_view phase, double part) { return bar_.update(phase, part); });
+    RayTracer tracer = make_surface_tracer(data.mesh);
+    std::vector<Float3> indirect = indirect_irradiance(data, tracer);
+    return {std::move(data), std::move(tracer), std::move(indirect)};
+  }
+
+  std::vector<Float3> indirect_irradiance(const TransferData& data, const RayTracer& tracer) const {
+    const PatchTable& patches = data.patches;
+    std::vector<Float3> exitance(patches.size()), radiosity(patches.size());
+    DirectLighting(data, tracer, {.points_per_patch = options_.direct_points})
+        .compute(setup_.lights, setup_.sky, exitance);
+    for (std::size_t i = 0; i < exitance.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) {
+        exitance[i][c] =
+            patches.reflectance[i][c] * exitance[i][c] + patches.emitted_exitance[i][c];
+      }
+    }
+    const auto form_factors = make_form_factors(kMethod, data.exchange, patches.area);
+    const SolveResult result = solve_radiosity(
+        kMethod, *form_factors, {patches.area, patches.reflectance}, exitance, {}, radiosity);
+    if (!result.converged) throw Error(options_.scene + ": the solver did not converge");
+    std::vector<Float3> indirect(patches.size());
+    std::vector<float> workspace(form_factors->workspace_size());
+    form_factors->gather(radiosity, indirect, workspace);
+    return indirect;
   }
 
   /// |H - truth| of each patch, as a part of the truth's root mean square.
-  static std::vector<float> patch_errors(const Engine& engine,
+  static std::vector<float> patch_errors(const Solution& solution,
                                          const reference::PatchComparison& patches) {
-    const TransferData& data = engine.data();
+    const TransferData& data = solution.data;
     double area = 0;
     std::vector<Float3> truth(data.patches.size(), Float3{0, 0, 0});
     for (std::size_t k = 0; k < patches.patch.size(); ++k) {
@@ -124,7 +159,7 @@ class TruthBench {
     const double rms = area_norm(truth, data.patches.area) / std::sqrt(area);
     std::vector<float> error(data.patches.size(), 0.0F);
     for (const std::uint32_t i : patches.patch) {
-      const Float3& value = engine.indirect_irradiance()[i];
+      const Float3& value = solution.indirect_irradiance[i];
       const double difference =
           std::hypot(value[0] - truth[i][0], value[1] - truth[i][1], value[2] - truth[i][2]);
       if (rms > 0) error[i] = static_cast<float>(difference / rms);
@@ -132,18 +167,61 @@ class TruthBench {
     return error;
   }
 
-  static void draw_error(const Engine& engine, const reference::PatchComparison& patches,
+  static void draw_error(const Solution& solution, const reference::PatchComparison& patches,
                          const std::string& path) {
-    const TransferData& data = engine.data();
-    const std::vector<float> error = patch_errors(engine, patches);
+    const TransferData& data = solution.data;
+    const std::vector<float> error = patch_errors(solution, patches);
     PictureSettings settings;
     settings.show = Show::kError;
     settings.camera =
-        data.cameras.empty() ? fit_camera(data, engine.tracer()) : data.cameras.front();
+        data.cameras.empty() ? fit_camera(data, solution.tracer) : data.cameras.front();
     PictureLight light;
     light.error = error;
-    write_png(path, tone_map(render_picture(data, engine.tracer(), light, settings)));
+    write_png(path, tone_map(render_picture(data, solution.tracer, light, settings)));
   }
+
+  /// A row for each patch that was compared.
+  static void write_patches(const Solution& solution, const reference::PatchComparison& patches,
+                            const std::string& path) {
+    const PatchTable& table = solution.data.patches;
+    std::vector<float> values;
+    for (std::size_t k = 0; k < patches.patch.size(); ++k) {
+      const std::uint32_t i = patches.patch[k];
+      values.push_back(static_cast<float>(i));
+      values.push_back(table.area[i]);
+      values.push_back(static_cast<float>(patches.weight[k]));
+      for (const Float3& v :
+           {table.centroid[i], table.normal[i], table.reflectance[i],
+            solution.indirect_irradiance[i], patches.truth[k], patches.standard_error[k]}) {
+        values.insert(values.end(), v.begin(), v.end());
+      }
+    }
+    const CsvColumns columns{{"patch",
+                              "area",
+                              "weight",
+                              "x",
+                              "y",
+                              "z",
+                              "normal_x",
+                              "normal_y",
+                              "normal_z",
+                              "reflectance_r",
+                              "reflectance_g",
+                              "reflectance_b",
+                              "h_r",
+                              "h_g",
+                              "h_b",
+                              "truth_r",
+                              "truth_g",
+                              "truth_b",
+                              "noise_r",
+                              "noise_g",
+                              "noise_b"},
+                             values};
+    write_csv(path, {&columns, 1});
+  }
+
+  static constexpr SolveMethod kMethod = SolveMethod::kConjugateGradient;
 
   const Options& options_;
   cli::ProgressBar& bar_;
@@ -191,7 +269,7 @@ void run(const Options& options) {
                "count", "error", "noise", "count", "left out");
     for (const std::size_t patch_count : options.patch_counts) {
       const bool last = patch_count == options.patch_counts.back();
-      rows.push_back(bench.run(patch_count, last ? options.error_picture : ""));
+      rows.push_back(bench.run(patch_count, last));
       print_row(rows.back());
       std::fflush(stdout);
     }
@@ -230,6 +308,8 @@ void add_options(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--seed", patches.seed, "Of all that is random")->capture_default_str();
   app.add_option("--csv", options.csv, "Table to write");
+  app.add_option("--patch-csv", options.patch_csv,
+                 "Table to write of the compared patches, for the last number of patches");
   app.add_option("--error-picture", options.error_picture,
                  "Picture (.png) of where the patch means err, for the last number of patches");
   app.add_option_function<int>(

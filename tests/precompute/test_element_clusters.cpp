@@ -149,6 +149,51 @@ TEST(ElementClusters, WhatHidesItselfDoesNotMakePatchesGrow) {
   EXPECT_LT(std::ranges::max(patch_lengths(model)), 4.01 * size);
 }
 
+TEST(ElementClusters, TheLastTrianglesMayHaveNoElements) {
+  // A wall across the room, which comes last and of which no side is asked for.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 4}, true);
+  subdivide(scene, std::vector<std::uint8_t>(scene.triangle.size(), 1), {.patch_count = 300});
+  Elements elements;
+  elements.position = scene.position;
+  elements.resize(scene.triangle.size());
+  for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
+    const auto [a, b, c] = scene.triangle[t];
+    const glm::dvec3 p = to_dvec3(scene.position[a]);
+    const glm::dvec3 cross =
+        glm::cross(to_dvec3(scene.position[b]) - p, to_dvec3(scene.position[c]) - p);
+    elements.triangle[t] = t;
+    elements.corner[t] = scene.triangle[t];
+    elements.normal[t] = to_float3(glm::normalize(cross));
+    elements.area[t] = static_cast<float>(0.5 * glm::length(cross));
+  }
+  const std::vector<glm::dvec3> wall = {{2, 0, 0}, {2, 0, 4}, {2, 3, 4}, {2, 3, 0}};
+  test::add_polygon(scene, wall);
+  const RayTracer tracer(scene.position, scene.triangle);
+  EXPECT_EQ(merge_elements(elements, tracer, {.patch_count = 20}).patch_count, 20U);
+}
+
+TEST(ElementClusters, FragmentsDoNotTakeThePatches) {
+  // Tubes and leaves in each other: thousands of pieces that do not see each other.
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 4}, true);
+  std::mt19937 engine(7);
+  const auto number = [&] { return engine() * 0x1p-32 - 0.5; };
+  for (int k = 0; k < 600; ++k) {
+    const glm::dvec3 p = glm::dvec3(2, 1, 2) + glm::dvec3(number(), number(), number());
+    const glm::dvec3 half(0.01 + 0.01 * number(), 0.3 + 0.2 * number(), 0.02 + 0.02 * number());
+    test::add_box(scene, p - half, p + half, false);
+  }
+  const PatchModel model = make_patch_model(scene, {.patch_count = 500});
+  EXPECT_NEAR(static_cast<double>(model.patches.size()), 500, 50);
+  double area = 0;
+  for (const float a : model.patches.area) area += a;
+  const auto fragments =
+      std::ranges::count_if(model.patches.area, [&](float a) { return a < area / 500 / 64; });
+  EXPECT_LE(fragments, 25);
+  EXPECT_LT(std::ranges::max(model.patches.area), 8 * area / 500);
+}
+
 TEST(ElementClusters, ManyElementsMakeTheSamePatchesOnAnyNumberOfThreads) {
   Scene scene = test::empty_scene();
   test::add_box(scene, {0, 0, 0}, {5, 3, 4}, true);

@@ -15,6 +15,7 @@
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/light_probes.h"
 #include "rebounce/precompute/lightmap.h"
+#include "rebounce/precompute/scene.h"
 #include "rebounce/precompute/subdivision.h"
 #include "rebounce/precompute/surface_harmonics.h"
 #include "rebounce/transfer/dense_operator.h"
@@ -28,6 +29,7 @@ enum class OperatorKind : std::uint8_t {
   kHierarchical,
   kLowRank,      ///< one rank for the whole scene: low_rank_operator.h
   kFirstBounce,  ///< the same after a first bounce through F
+  kNoOperator,   ///< nothing is made or checked: for who solves with the form factors
 };
 
 /// Up to this many patches the dense operator, which is exact to rounding, is small enough to have
@@ -88,6 +90,10 @@ using BuildProgress = std::function<bool(std::string_view phase, double fraction
 
 /// Called once patches are known and before form factors are begun.
 using EstimateListener = std::function<void(const CostEstimate&)>;
+
+/// The scene of a file as the offline stage takes it: pieces that are plainly seen from behind are
+/// double-sided (find_inside_out). Throws Error as import_gltf does.
+Scene import_usable(const std::filesystem::path& path, double scale);
 
 /// Runs the offline stage. Throws Error if the scene cannot be used or what it needs is over the
 /// memory limit (before the expensive part), Cancelled if asked to stop.

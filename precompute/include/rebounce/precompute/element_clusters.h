@@ -55,12 +55,13 @@ struct ClusterSettings {
 /// (leaves, slats); and once none of those is left, patches that lie near each other. Emitting and
 /// other elements are never merged.
 ///
-/// The leak test, so that no patch lies on two sides of a wall or in two rooms: lines of sight are
-/// drawn between the elements of both, and a pair with a piece of mesh between it that is longer
-/// than half of a mean patch is not merged. Where it is its own surface that stands between (the
-/// two faces of a wall, the far side of a table's leg) only what is small may merge. What is far
-/// smaller than a patch merges without the test. Where all that leaves too many patches, what
-/// counts as small grows; patches grow longer only last.
+/// The leak test keeps patches from lying on two sides of a wall or in two rooms: lines of sight
+/// are drawn between the elements of both of a pair, and where most are blocked by a piece of mesh
+/// that is longer than half of a mean patch, merging costs as if the two were eight mean patches
+/// apart, times the area at stake. So fragments join others through walls before what is open
+/// grows, and larger ones hardly ever do. Small pairs may hide themselves (the far side of a
+/// table's leg) at no cost, and what is far smaller than a patch merges without the test. No patch
+/// is longer than four mean ones, unless there would be too many.
 ///
 /// Where there are many more elements than patches they are first merged in blocks of neighbours,
 /// on all threads, to clusters that are far smaller than patches.

@@ -14,7 +14,7 @@ enum class SideKind : std::uint8_t {
   kLit,      ///< it has a patch
   kUnlit,    ///< it sees nothing that lights it, or is the back of a one-sided triangle
   kCovered,  ///< another triangle that faces the same way lies in the same place, and has the patch
-  kBuried,   ///< it lies inside of something solid: all around are backs of one-sided surfaces
+  kBuried,   ///< it lies inside of something solid, or of a closed shell
   kOpening,  ///< light passes through it as if nothing were there
 };
 
@@ -38,8 +38,10 @@ struct TriangleSides {
 ///   each is lit.
 /// - A side that sees nothing but backs of one-sided surfaces, all of them near (a sixteenth of the
 ///   scene's diagonal), is inside of something: a leg of a table in the wall. Backs absorb what
-///   meets them, so leaving it out changes nothing but for lamps that hang in there. Surfaces that
-///   are double-sided have no inside, and nothing is buried in them.
+///   meets them, so leaving it out changes nothing but for lamps that hang in there.
+/// - So is a side inside of a closed double-sided shell that is no room, such as a cushion: what it
+///   exchanges light with is as hidden as it is. Cracks that let a few hundredths out do not count,
+///   and neither does what is closed around something that emits.
 /// - Of copies that lie in one another (z-fighting) only one can be seen, and shadow rays between
 ///   points cannot tell which: a side that is covered all over by others gives way to them.
 ///

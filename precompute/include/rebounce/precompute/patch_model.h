@@ -32,7 +32,7 @@ struct PatchModel {
   std::size_t unlit_side_count = 0;      ///< sides of display triangles that see nothing: no patch
   std::size_t covered_side_count = 0;  ///< sides that lie in another surface: no patch of their own
   std::size_t opening_side_count = 0;  ///< sides that stop no light: no patch
-  std::size_t buried_side_count = 0;   ///< sides inside of something solid: no patch
+  std::size_t buried_side_count = 0;   ///< sides inside of solids and shells: no patch
   std::vector<std::string> warnings;
 };
 

@@ -1,0 +1,121 @@
+// Insides of closed double-sided shells.
+
+#include <gtest/gtest.h>
+
+#include "rebounce/precompute/lit_sides.h"
+#include "rebounce/precompute/patch_model.h"
+#include "rebounce/precompute/subdivision.h"
+#include "test_scenes.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::uint32_t kRoom = 0, kShell = 1, kLamp = 2;
+const glm::dvec3 kLow(2, 0.5, 1.5), kHigh(3, 1.0, 2.0);  // of the shell
+
+/// A room of one-sided walls; material kShell is double-sided, kLamp emits.
+Scene room() {
+  Scene scene = test::empty_scene();
+  scene.materials.resize(3, scene.materials[0]);
+  scene.materials[kShell].double_sided = true;
+  scene.materials[kLamp].emitted_luminance = {100, 100, 100};
+  test::add_box(scene, {0, 0, 0}, {5, 3, 4}, true, kRoom);
+  return scene;
+}
+
+void refine(Scene& scene, std::size_t count) {
+  subdivide(scene, std::vector<std::uint8_t>(scene.triangle.size(), 1), {.patch_count = count});
+}
+
+/// How many of the inner and the outer sides of the shell are lit and how many are buried.
+struct ShellSides {
+  int lit_inside = 0, lit_outside = 0, buried_inside = 0, buried_outside = 0;
+};
+
+ShellSides sides_of_shell(const Scene& scene) {
+  const std::vector<TriangleSides> sides =
+      find_lit_sides(scene, RayTracer(scene.position, scene.triangle));
+  ShellSides count;
+  for (std::uint32_t t = 0; t < sides.size(); ++t) {
+    if (scene.triangle_material[t] != kShell) continue;
+    count.lit_outside += sides[t].front == SideKind::kLit ? 1 : 0;
+    count.buried_outside += sides[t].front == SideKind::kBuried ? 1 : 0;
+    count.lit_inside += sides[t].back == SideKind::kLit ? 1 : 0;
+    count.buried_inside += sides[t].back == SideKind::kBuried ? 1 : 0;
+  }
+  return count;
+}
+
+TEST(EnclosedSides, TheInsideOfAClosedShellIsBuried) {
+  Scene scene = room();
+  test::add_box(scene, kLow, kHigh, false, kShell);
+  refine(scene, 2000);
+  const ShellSides count = sides_of_shell(scene);
+  EXPECT_EQ(count.lit_inside, 0);
+  EXPECT_EQ(count.buried_outside, 0);
+  EXPECT_EQ(count.buried_inside, count.lit_outside);
+}
+
+TEST(EnclosedSides, ShellsThatPassThroughEachOtherAreInsideToo) {
+  Scene scene = room();
+  test::add_box(scene, kLow, kHigh, false, kShell);
+  test::add_box(scene, kLow + glm::dvec3(0.613, 0.207, 0.118), kHigh + glm::dvec3(0.4, 0.3, -0.1),
+                false, kShell);
+  refine(scene, 40000);
+  const ShellSides count = sides_of_shell(scene);
+  // A triangle that another passes through sees both in and out, and what is beside it sees it.
+  EXPECT_LT(count.lit_inside, count.buried_inside / 4);
+  EXPECT_GT(count.buried_inside, count.lit_outside / 2);
+}
+
+TEST(EnclosedSides, AnOpenBoxIsLit) {
+  Scene scene = room();
+  test::add_box(scene, kLow, kHigh, false, kShell);
+  scene.triangle.resize(scene.triangle.size() - 2);  // without the face +z
+  scene.triangle_material.resize(scene.triangle.size());
+  refine(scene, 2000);
+  const ShellSides count = sides_of_shell(scene);
+  EXPECT_EQ(count.buried_inside, 0);
+  EXPECT_EQ(count.lit_inside, count.lit_outside);
+}
+
+TEST(EnclosedSides, ALanternIsLit) {
+  Scene scene = room();
+  test::add_box(scene, kLow, kHigh, false, kShell);
+  const glm::dvec3 middle = (kLow + kHigh) / 2.0, half(0.1);
+  test::add_box(scene, middle - half, middle + half, false, kLamp);
+  refine(scene, 2000);
+  EXPECT_EQ(sides_of_shell(scene).buried_inside, 0);
+}
+
+TEST(EnclosedSides, AClosedRoomOfDoubleSidedWallsIsLit) {
+  Scene scene = room();
+  test::add_box(scene, {10, 0, 0}, {12, 2.5, 2}, false, kShell);
+  refine(scene, 2000);
+  EXPECT_EQ(sides_of_shell(scene).buried_inside, 0);
+}
+
+TEST(EnclosedSides, NoPatchHoldsTheInsideAndTheOutsideOfAShell) {
+  // An open box, so that both have patches, of triangles far smaller than they are.
+  Scene box = room();
+  test::add_box(box, kLow, kHigh, false, kShell);
+  box.triangle.resize(box.triangle.size() - 2);
+  box.triangle_material.resize(box.triangle.size());
+  refine(box, 8000);
+  for (const std::size_t wanted : {700U, 2000U}) {
+    const PatchModel model = make_patch_model(box, {.patch_count = wanted});
+    const DisplayMesh& mesh = model.mesh;
+    std::vector<std::uint8_t> has_front(model.patches.size(), 0), has_back(has_front);
+    for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
+      if (mesh.triangle_material[t] != kShell) continue;
+      has_front[mesh.triangle_patch[t]] = 1;
+      has_back[mesh.triangle_patch[mesh.back_triangle[t]]] = 1;
+    }
+    for (std::size_t i = 0; i < has_front.size(); ++i) {
+      EXPECT_FALSE(has_front[i] != 0 && has_back[i] != 0) << "patch " << i << " of " << wanted;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rebounce
