@@ -9,7 +9,7 @@ namespace {
 
 using Vector = std::vector<double>;
 
-constexpr int kPassCount = 3;        // clamped entries leave a rest, which the next pass shares out
+constexpr int kPassCount = 8;        // entries at their bounds leave a rest for the next pass
 constexpr int kMaxIterations = 500;  // of conjugate gradients; some 20 to 60 are usual
 constexpr double kResidual = 1e-11;  // relative; row sums are wanted to 1e-6
 constexpr float kLeastPart = 0.5F, kGreatestPart = 1.5F;
@@ -118,19 +118,19 @@ ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
         std::max(report.row_sum_error_before, std::abs(sum[i] - target[i].sum));
   }
 
-  const NormalEquations equations(rows, area, target);
   Vector rest(rows.size());
   for (int pass = 0; pass < kPassCount; ++pass) {
     for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = area[i] * (target[i].sum - sum[i]);
-    const Vector multiplier = equations.solve(rest);
+    const Vector multiplier = NormalEquations(rows, area, target).solve(rest);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (std::size_t k = 0; k < rows[i].size(); ++k) {
         ExchangeEntry& entry = rows[i][k];
         const double both = multiplier[i] + (entry.column == i ? 0 : multiplier[entry.column]);
         const double wanted = entry.exchange_area + entry.variance() * both;
-        entry.exchange_area =
-            std::clamp(static_cast<float>(wanted), kLeastPart * original[i][k],
-                       std::max(kGreatestPart * original[i][k], entry.unoccluded_area));
+        const float least = kLeastPart * original[i][k];
+        const float most = std::max(kGreatestPart * original[i][k], entry.unoccluded_area);
+        entry.exchange_area = std::clamp(static_cast<float>(wanted), least, most);
+        if (wanted < least || wanted > most) entry.visibility_variance = 0;  // gives way no further
       }
     }
     sum = row_sums(rows, area);

@@ -39,7 +39,8 @@ std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> a
 /// direct-exchange areas in zonal analysis", 1986, with two differences. The weights are variances
 /// that we know, so that pairs in penumbrae give way and fully visible ones stay; and targets that
 /// are themselves measured (rows that escape in part) pull only as hard as they are certain.
-/// Entries stay within half of what they were.
+/// Entries stay within half of what they were; those that would not are held there, their variance
+/// made 0, and the others share out what is left.
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
                               std::span<const RowTarget> target);
 
