@@ -2,15 +2,12 @@
 #define EIGEN_DONT_PARALLELIZE
 #include "block_tree.h"
 
-#include <omp.h>
-
 #include <Eigen/QR>
 #include <algorithm>
-#include <atomic>
 #include <optional>
 
 #include "block_compression.h"
-#include "rebounce/transfer/error.h"
+#include "rebounce/precompute/parallel_progress.h"
 #include "single_threaded_blas.h"
 
 namespace rebounce {
@@ -245,17 +242,15 @@ HierarchicalOperator::Storage BlockTreeCompressor::compress(double price,
                                                             const Progress& progress) const {
   const SingleThreadedBlas single_threaded;
   std::vector<Part> parts(pieces_.size());
-  std::atomic<std::size_t> done = 0;
-  std::atomic<bool> stop = false;
+  ParallelProgress loop(progress, pieces_.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < pieces_.size(); ++k) {
-    if (stop) continue;
+    if (loop.stopped()) continue;
     parts[k] = PieceCompressor(matrix_, tree_, weights_, price, pieces_[k].row, pieces_[k].column)
                    .compress();
-    const double fraction = static_cast<double>(++done) / static_cast<double>(pieces_.size());
-    if (progress && omp_get_thread_num() == 0 && !progress(fraction)) stop = true;
+    loop.advance();
   }
-  if (stop || (progress && !progress(1))) throw Cancelled();
+  loop.finish();
 
   Part whole;
   for (Part& part : parts) whole.append(std::move(part));

@@ -1,11 +1,8 @@
 #include "link_expansion.h"
 
-#include <omp.h>
-
 #include <algorithm>
-#include <atomic>
 
-#include "rebounce/transfer/error.h"
+#include "rebounce/precompute/parallel_progress.h"
 
 namespace rebounce {
 namespace {
@@ -20,17 +17,15 @@ class LinkExpansion {
 
   ExchangeRows run(const Progress& progress) const {
     ExchangeRows rows(tree_.patches().size());
-    std::atomic<bool> stop = false;
-    std::atomic<std::size_t> done = 0;
+    ParallelProgress loop(progress, rows.size());
     const auto nodes = tree_.nodes();
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::uint32_t k = 0; k < nodes.size(); ++k) {
-      if (stop || !nodes[k].is_leaf()) continue;
+      if (loop.stopped() || !nodes[k].is_leaf()) continue;
       expand_row(k, rows[tree_.leaf_patch(nodes[k])]);
-      const double part = static_cast<double>(++done) / static_cast<double>(rows.size());
-      if (progress && omp_get_thread_num() == 0 && !progress(part)) stop = true;
+      loop.advance();
     }
-    if (stop) throw Cancelled();
+    loop.finish();
     return rows;
   }
 

@@ -1,14 +1,12 @@
 #include "raw_exchange.h"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <optional>
 
 #include "hemisphere_exchange.h"
-#include "rebounce/transfer/error.h"
+#include "rebounce/precompute/parallel_progress.h"
 #include "row_targets.h"
 
 namespace rebounce {
@@ -74,22 +72,19 @@ class RawExchangeBuilder {
   template <typename Work, typename Part>
   void for_each_patch(const Work& work, const Part& part) {
     const std::size_t n = geometry_.patch_count();
-    std::atomic<bool> stop = false;
-    std::atomic<std::size_t> rows_done = 0;
+    const Progress whole = [&](double done) { return !progress_ || progress_(part(done)); };
+    ParallelProgress loop(whole, n);
 #pragma omp parallel
     {
       Scratch scratch;
 #pragma omp for schedule(dynamic, 4)
       for (std::size_t i = 0; i < n; ++i) {
-        if (stop) continue;
+        if (loop.stopped()) continue;
         work(static_cast<std::uint32_t>(i), scratch);
-        const std::size_t done = ++rows_done;
-        if (progress_ && omp_get_thread_num() == 0) {
-          if (!progress_(part(static_cast<double>(done) / static_cast<double>(n)))) stop = true;
-        }
+        loop.advance();
       }
     }
-    if (stop) throw Cancelled();
+    loop.finish();
   }
 
   std::vector<Escape> trace_hemispheres() {

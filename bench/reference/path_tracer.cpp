@@ -5,16 +5,14 @@
 
 #include "reference/path_tracer.h"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
 #include "rebounce/precompute/opacity_sampling.h"
+#include "rebounce/precompute/parallel_progress.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/sky_light.h"
@@ -281,24 +279,19 @@ class Measurement {
   IrradianceEstimate run(const Progress& progress) {
     const std::size_t blocks = (points_.size() + points_per_block_ - 1) / points_per_block_;
     if (progress && !progress(0)) throw Cancelled();
-    std::atomic<bool> stop = false;
-    std::atomic<std::size_t> blocks_done = 0;
+    ParallelProgress loop(progress, blocks);
 #pragma omp parallel
     {
       Scratch scratch;
 #pragma omp for schedule(dynamic, 1)
       for (std::size_t b = 0; b < blocks; ++b) {
-        if (stop) continue;
+        if (loop.stopped()) continue;
         measure_block(b * points_per_block_, std::min(points_.size(), (b + 1) * points_per_block_),
                       scratch);
-        const std::size_t done = ++blocks_done;
-        if (progress && omp_get_thread_num() == 0 &&
-            !progress(static_cast<double>(done) / static_cast<double>(blocks))) {
-          stop = true;
-        }
+        loop.advance();
       }
     }
-    if (stop) throw Cancelled();
+    loop.finish();
     return std::move(estimate_);
   }
 

@@ -21,8 +21,9 @@ void ReportSettings::make_quick() {
 void ReportSettings::make_large() {
   operators = {{0.005, Precision::kQ16},
                {0.02, Precision::kQ16},
+               {0.002, Precision::kQ16},
                {0.001, Precision::kQ16},
-               {0.005, Precision::kQ8}};
+               {0.0003, Precision::kQ16}};
   form_factor_tolerances = {0.0003, 0.001, 0.003};
   ranks = {256};
   lamp_count = 2;

@@ -138,7 +138,7 @@ void run(const ViewOptions& chosen, const CommonOptions& options) {
     frames_per_second = read_light_path(chosen.path, setup.lights, setup.spheres);
   }
   if (chosen.screenshot.empty() && chosen.out.empty()) {
-    run_viewer(data, setup);
+    run_viewer(data, setup, [] { return !interrupted(); });
   } else {
     write_pictures(chosen, data, setup, frames_per_second, options);
   }

@@ -75,13 +75,14 @@ ViewerState begin(const ViewerSetup& setup) {
 
 }  // namespace
 
-void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup) {
+void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup,
+                const std::function<bool()>& keep_open) {
   Window window(setup.width, setup.height, setup.title);
   FrameDrawer drawer(data, setup);
   Controls controls(drawer.scene(), drawer.bounds());
   Panels panels;
   ViewerState state = begin(setup);
-  while (window.begin_frame()) {
+  while (keep_open() && window.begin_frame()) {
     controls.update(state);
     if (state.playing) state.time += ImGui::GetIO().DeltaTime;
     // A window that is minimised has no pixels.

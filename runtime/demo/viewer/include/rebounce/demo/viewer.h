@@ -66,9 +66,10 @@ struct StageTimes {
   double draw = 0;                   ///< the picture
 };
 
-/// Opens a window and returns when it is closed. Throws Error if there is no display or no OpenGL
-/// 3.3.
-void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup);
+/// Opens a window and returns when it is closed, or when `keep_open`, which is asked before every
+/// frame, says no. Throws Error if there is no display or no OpenGL 3.3.
+void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup,
+                const std::function<bool()>& keep_open);
 
 /// Draws the same pictures without a window or display, at `frame_count` times that are 1 /
 /// `frames_per_second` apart, the first at 0; each goes to `take` with its number. Returns the
