@@ -32,7 +32,7 @@ def draw(panel, rows, across):
         )
         if points:
             panel.loglog(*zip(*points), style, color=color, label=label)
-    panel.set_ylim(1e-5, 1)
+    panel.set_ylim(2e-8, 1)
     panel.grid(True, which="major", alpha=0.3)
     panel.set_ylabel("error, mean over point lights")
 
