@@ -30,10 +30,7 @@ struct Room {
   std::shared_ptr<const TransferOperator> transfer;
 
   explicit Room(const Float3& reflectance) {
-    Scene scene = test::empty_scene(reflectance);
-    test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-    test::add_box(scene, {1, 0.5, 1}, {2, 1.2, 2.5}, false);
-    PatchModel model = make_patch_model(scene, {.patch_count = 300});
+    PatchModel model = make_patch_model(test::room_with_block(reflectance), {.patch_count = 300});
     exchange = compute_form_factors(model, test::make_tracer(model)).exchange;
     patches = std::move(model.patches);
     form_factors = std::make_unique<ExchangeBlocks>(exchange, patches.area);

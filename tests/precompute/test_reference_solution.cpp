@@ -27,10 +27,7 @@ struct Room {
 
   /// Walls and a block; every fifth patch is black.
   explicit Room(const Float3& reflectance) {
-    Scene scene = test::empty_scene(reflectance);
-    test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-    test::add_box(scene, {1, 0.5, 1}, {2, 1.2, 2.5}, false);
-    PatchModel model = make_patch_model(scene, {.patch_count = 300});
+    PatchModel model = make_patch_model(test::room_with_block(reflectance), {.patch_count = 300});
     exchange = compute_form_factors(model, test::make_tracer(model)).exchange;
     patches = std::move(model.patches);
     for (std::size_t i = 0; i < patches.size(); i += 5) patches.reflectance[i] = {0, 0, 0};

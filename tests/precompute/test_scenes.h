@@ -99,4 +99,12 @@ inline std::uint32_t material_of(const PatchModel& model, std::size_t patch) {
   return model.mesh.triangle_material[found - model.mesh.triangle_patch.begin()];
 }
 
+/// A room of 4 x 3 x 5 m in which a block hangs, all of one material.
+inline Scene room_with_block(const Float3& reflectance) {
+  Scene scene = empty_scene(reflectance);
+  add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  add_box(scene, {1, 0.5, 1}, {2, 1.2, 2.5}, false);
+  return scene;
+}
+
 }  // namespace rebounce::test

@@ -70,20 +70,13 @@ Scene furnished_room() {
   return scene;
 }
 
-Scene bright_room() {
-  Scene scene = test::empty_scene({0.9F, 0.9F, 0.9F});
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-  test::add_box(scene, {1, 0.5, 1}, {2, 1.2, 2.5}, false);
-  return scene;
-}
-
 const Room& furnished() {
   static const Room room(furnished_room());
   return room;
 }
 
 const Room& bright() {
-  static const Room room(bright_room());
+  static const Room room(test::room_with_block({0.9F, 0.9F, 0.9F}));
   return room;
 }
 
