@@ -2,6 +2,7 @@
 #define EIGEN_DONT_PARALLELIZE
 #include "symmetric_matrix.h"
 
+#include <algorithm>
 #include <cassert>
 #include <cmath>
 
@@ -87,20 +88,33 @@ void FormFactorMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::ui
   }
 }
 
+// Rows are spread out to full length, some at a time: most patches of a room see each other, and a
+// product of full matrices is many times faster than gathering entry by entry.
 MatrixXf FormFactorMatrix::multiply(std::uint32_t /*matrix*/, const MatrixXf& x) const {
-  const RowMajorMatrixXf by_patch = x;
-  RowMajorMatrixXf result(x.rows(), x.cols());
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t i = 0; i < root_area_.size(); ++i) {
-    const auto seen = rows_.columns(i);
-    const auto form_factor = rows_.form_factors(i);
-    Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(x.cols());
-    for (std::size_t k = 0; k < seen.size(); ++k) {
-      sum += form_factor[k] / root_area_[seen[k]] * by_patch.row(seen[k]).cast<double>();
+  const SingleThreadedBlas single_threaded;
+  const Index n = x.rows(), strips = (n + kTile - 1) / kTile;
+  MatrixXf result(n, x.cols());
+#pragma omp parallel
+  {
+    RowMajorMatrixXf strip(kTile, n);
+#pragma omp for schedule(dynamic, 1)
+    for (Index s = 0; s < strips; ++s) {
+      const Index first = s * kTile, count = std::min(kTile, n - first);
+      strip.setZero();
+      for (Index r = 0; r < count; ++r)
+        spread_row(static_cast<std::uint32_t>(first + r), strip.row(r));
+      result.middleRows(first, count).noalias() = strip.topRows(count) * x;
     }
-    result.row(static_cast<Index>(i)) = (root_area_[i] * sum).cast<float>();
   }
   return result;
+}
+
+void FormFactorMatrix::spread_row(std::uint32_t row, Eigen::Ref<Eigen::RowVectorXf> entries) const {
+  const auto seen = rows_.columns(row);
+  const auto form_factor = rows_.form_factors(row);
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    entries[seen[k]] = static_cast<float>(form_factor[k] * root_area_[row] / root_area_[seen[k]]);
+  }
 }
 
 }  // namespace rebounce

@@ -65,6 +65,9 @@ class FormFactorMatrix final : public SymmetricMatrix {
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
  private:
+  /// Writes the entries of a row that are not 0 into `entries` [n].
+  void spread_row(std::uint32_t row, Eigen::Ref<Eigen::RowVectorXf> entries) const;
+
   std::span<const float> area_;
   FormFactorRows rows_;
   std::vector<double> root_area_;  ///< [n]
