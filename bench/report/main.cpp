@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 
@@ -26,6 +27,7 @@ struct Options {
 ReportSettings settings_for(const Options& options, std::size_t patch_count) {
   ReportSettings settings;
   if (patch_count >= ReportSettings::kLarge) settings.make_large();
+  if (patch_count >= ReportSettings::kHuge) settings.make_huge();
   if (options.quick) settings.make_quick();
   settings.patch_count = patch_count;
   settings.solve_threads = options.solve_threads;
@@ -48,6 +50,41 @@ nlohmann::ordered_json json_of(const ReportSettings& settings, bool quick) {
           {"ranks", settings.ranks}};
 }
 
+/// Wall-clock seconds by phase, in the order of their beginnings: what a measurement takes itself.
+class PhaseSeconds {
+ public:
+  void enter(std::string_view phase) {
+    const auto now = std::chrono::steady_clock::now();
+    if (phase_ < seconds_.size()) {
+      if (seconds_[phase_].first == phase) return;
+      add_until(now);
+    }
+    begin_ = now;
+    const auto found = std::ranges::find(seconds_, phase, &Seconds::first);
+    phase_ = static_cast<std::size_t>(found - seconds_.begin());
+    if (found == seconds_.end()) seconds_.emplace_back(phase, 0.0);
+  }
+
+  nlohmann::ordered_json finish() {
+    add_until(std::chrono::steady_clock::now());
+    nlohmann::ordered_json json;
+    for (const auto& [phase, seconds] : seconds_) json[phase] = seconds;
+    return json;
+  }
+
+ private:
+  using Seconds = std::pair<std::string, double>;
+
+  void add_until(std::chrono::steady_clock::time_point now) {
+    const std::chrono::duration<double> passed = now - begin_;
+    if (phase_ < seconds_.size()) seconds_[phase_].second += passed.count();
+  }
+
+  std::vector<Seconds> seconds_;
+  std::size_t phase_ = 0;
+  std::chrono::steady_clock::time_point begin_;
+};
+
 void run(const Options& options) {
   if (options.describe) {
     fmt::print("{}\n", provenance("bench_report", options.common).dump(2));
@@ -59,7 +96,9 @@ void run(const Options& options) {
     for (const std::size_t patch_count : options.patch_counts) {
       const std::string name =
           fmt::format("{}-{}", std::filesystem::path(scene).stem().string(), patch_count);
+      PhaseSeconds phases;
       const ReportProgress progress = [&](std::string_view phase, double part) {
+        phases.enter(phase);
         return bar.update(fmt::format("{}: {}", name, phase), part);
       };
       const ReportSettings settings = settings_for(options, patch_count);
@@ -70,6 +109,7 @@ void run(const Options& options) {
       json.update(measure_scene(scene, settings, options.folder, name, progress));
       const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
       json["seconds"] = seconds.count();
+      json["seconds_by_phase"] = phases.finish();
       write_text(std::filesystem::path(options.folder) / (name + ".json"), json.dump(1) + "\n");
     }
   }

@@ -43,10 +43,12 @@ struct ReportSettings {
   int frame_count = 300;                                 ///< of each light path
   std::vector<double> budgets = {250, 500, 1000, 2000};  ///< microseconds a frame
 
-  /// From so many patches on, a scene is large.
-  static constexpr std::size_t kLarge = 3000;
+  /// From so many patches on, a scene is large, or huge.
+  static constexpr std::size_t kLarge = 3000, kHuge = 10000;
 
   bool truth = true;  ///< compare with the path tracer
+  /// Shadow rays of the form factors that others are held against; FormFactorSettings::probe_rays.
+  int truth_probe_rays = 64;
   reference::PatchComparisonSettings patch_comparison;
   std::size_t truth_point_count = 8000;
   std::uint32_t truth_samples = 256;
@@ -58,6 +60,9 @@ struct ReportSettings {
 
   /// What is left out of many patches, so that they take minutes and not hours.
   void make_large();
+
+  /// The same of so many that they take tens of minutes: after make_large.
+  void make_huge();
 };
 
 }  // namespace rebounce::bench

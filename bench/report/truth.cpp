@@ -1,5 +1,7 @@
 #include "truth.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -16,7 +18,7 @@ namespace rebounce::bench {
 namespace {
 
 // Form factors as good as can be had in reasonable time.
-constexpr int kManyRays = 64;
+constexpr int kManyRays = 256;
 constexpr double kFineKernel = 1e-5;
 
 /// The scene under its key light, as the path tracer sees it.
@@ -48,20 +50,23 @@ std::vector<Float3> product(const TransferOperator& transfer, std::span<const Fl
   return indirect;
 }
 
-/// The dense operator of the same patches with better form factors.
-std::shared_ptr<const TransferOperator> better_operator(const std::string& scene,
-                                                        const ReportSettings& settings,
-                                                        const ReportProgress& progress) {
+/// H [n] in lx of the same patches with better form factors.
+std::vector<Float3> better_solution(const std::string& scene, const ReportSettings& settings,
+                                    std::span<const Float3> exitance,
+                                    const ReportProgress& progress) {
   BuildSettings build;
   build.subdivision.patch_count = settings.patch_count;
   build.form_factors.seed = settings.seed + 1;
-  build.form_factors.probe_rays = kManyRays;
+  build.form_factors.probe_rays = settings.truth_probe_rays;
   build.form_factors.full_rays = kManyRays;
   build.form_factors.kernel_tolerance = kFineKernel;
-  build.operator_kind = OperatorKind::kDense;
-  build.precision = Precision::kF32;
+  build.operator_kind = OperatorKind::kNoOperator;
   BuildReport report;
-  return build_transfer_data(scene, build, report, progress).transfer;
+  const auto phase = [&](std::string_view name, double part) {
+    return progress(fmt::format("better {}", name), part);
+  };
+  const TransferData data = build_transfer_data(scene, build, report, phase);
+  return ReferenceSolver(data.exchange, data.patches).indirect_irradiance(exitance);
 }
 
 }  // namespace
@@ -78,7 +83,7 @@ TruthResult measure_truth(const std::string& scene, const Contenders& contenders
   const auto exitance = engine.initial_exitance();
   const auto compressed = product(*contenders.operators.front().transfer, exitance);
   const auto dense = product(*data.transfer, exitance);
-  const auto better = product(*better_operator(scene, settings, progress), exitance);
+  const auto better = better_solution(scene, settings, exitance, progress);
 
   TruthResult result;
   const reference::PatchComparison means = reference::compare_patch_means(
