@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "rebounce/precompute/build.h"
+#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 
