@@ -15,14 +15,13 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
-                                  const ExchangeMatrix& exchange, const PatchTable& patches,
+                                  const FormFactorOperator& exact, const PatchTable& patches,
                                   std::span<const std::vector<Float3>> radiosities) {
-  const FormFactorRows rows(exchange, patches.area);
-  std::vector<float> workspace(compressed.workspace_size());
+  std::vector<float> workspace(std::max(compressed.workspace_size(), exact.workspace_size()));
   std::vector<Float3> truth(patches.size()), gathered(patches.size());
   FormFactorError error;
   for (const std::vector<Float3>& radiosity : radiosities) {
-    rows.gather(radiosity, truth);
+    exact.gather(radiosity, truth, workspace);
     compressed.apply(radiosity, gathered, workspace);
     const double e = relative_difference(gathered, truth, patches.area);
     error.mean += e / static_cast<double>(radiosities.size());

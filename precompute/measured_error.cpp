@@ -50,7 +50,7 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress) {
   std::optional<ReferenceSolver> reference;
-  if (exact == nullptr) reference.emplace(data.exchange, data.patches);
+  if (exact == nullptr) reference.emplace(data);
   std::vector<KindError> result;
   for (std::size_t k = 0; k < kLightKinds.size(); ++k) {
     const Progress part = [&](double done) {

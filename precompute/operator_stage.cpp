@@ -53,7 +53,7 @@ void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
       compress_form_factors(data.exchange, data.patches, fitting.view(),
                             {settings.form_factor_tolerance, Precision::kF16}, progress);
   report.form_factor_error = form_factor_error(
-      *data.compressed_form_factors, data.exchange, data.patches,
+      *data.compressed_form_factors, FormFactorRows(data.exchange, data.patches.area), data.patches,
       radiosities_of(
           *data.transfer, data.patches.reflectance,
           random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed)));

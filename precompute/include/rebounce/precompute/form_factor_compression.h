@@ -27,9 +27,9 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress = {});
 
-/// Errors of `compressed` form factors over these B.
+/// Errors of `compressed` form factors, against `exact` ones, over these B.
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
-                                  const ExchangeMatrix& exchange, const PatchTable& patches,
+                                  const FormFactorOperator& exact, const PatchTable& patches,
                                   std::span<const std::vector<Float3>> radiosities);
 
 /// The radiosities B = M0 + rho Y M0 [n] in lx that `initial_exitances` M0 give rise to.
