@@ -18,6 +18,10 @@
 namespace rebounce {
 namespace {
 
+// The operator's tolerance over that of the compressed form factors that it is made from, whose
+// error it has beside its own.
+constexpr double kToleranceOverFormFactors = 5;
+
 void describe_patches(const PatchModel& model, BuildReport& report) {
   report.display_triangle_count = model.mesh.triangle.size();
   report.patch_count = model.patches.size();
@@ -35,11 +39,29 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
   report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
 }
 
+/// What the operator is to be made from, if that was left open.
+FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
+  const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
+                          settings.operator_kind == OperatorKind::kHierarchical;
+  if (settings.form_factor_kind == FormFactorKind::kLinks && !from_links &&
+      settings.operator_kind != OperatorKind::kNoOperator) {
+    throw Error("from links only a hierarchical operator is made; ask for that, or for pairs");
+  }
+  if (settings.form_factor_kind != FormFactorKind::kAutomatic) return settings.form_factor_kind;
+  const bool too_many =
+      model.patches.size() > kPairsPatchCount ||
+      estimate_cost_of_pairs(model, settings).peak_bytes > memory_limit_bytes(settings);
+  return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
+}
+
 /// The settings with what was left open decided.
-BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
+BuildSettings decide(BuildSettings settings, const PatchModel& model) {
+  settings.form_factor_kind = choose_form_factors(settings, model);
+  const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
   if (settings.operator_kind == OperatorKind::kAutomatic) {
-    settings.operator_kind =
-        patch_count <= kDensePatchCount ? OperatorKind::kDense : OperatorKind::kHierarchical;
+    settings.operator_kind = links || model.patches.size() > kDensePatchCount
+                                 ? OperatorKind::kHierarchical
+                                 : OperatorKind::kDense;
   }
   const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
   if (!settings.precision) {
@@ -51,7 +73,13 @@ BuildSettings decide(BuildSettings settings, std::size_t patch_count) {
   if (integers && !hierarchical) {
     throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
   }
-  if (settings.operator_kind != OperatorKind::kHierarchical) settings.tolerance = 0;
+  if (!hierarchical) settings.tolerance = 0;
+  if (links && settings.form_factors.link_epsilon == 0) {
+    settings.form_factors.link_epsilon = kLinkEpsilon;
+  }
+  if (links && settings.form_factor_tolerance == 0) {
+    settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
+  }
   return settings;
 }
 
@@ -102,34 +130,22 @@ class TransferBuild {
       data_.lightmap = clock_.run(
           "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
     }
-    decided_ = decide(settings_, model_.patches.size());
+    decided_ = decide(settings_, model_);
     report_.estimate = estimate_cost(model_, decided_);
     if (on_estimate) on_estimate(report_.estimate);
-    refuse_if_too_large(report_.estimate, settings_.memory_limit_bytes, report_.triangle_count);
+    refuse_if_too_large(report_.estimate, memory_limit_bytes(settings_), report_.triangle_count);
   }
 
   /// Finds what patches exchange; afterwards the patches and the mesh are the data's.
   void find_exchange() {
-    const RayTracer& tracer = tracer_.emplace(make_surface_tracer(model_.mesh));
-    FormFactors form_factors = clock_.run("form factors", [&](const Progress& part) {
-      return compute_form_factors(model_, tracer, settings_.form_factors, part);
-    });
-    report_.ray_count = form_factors.ray_count;
-    report_.pair_count = form_factors.pair_count;
-    report_.form_factor_count = form_factors.exchange.column.size();
-    report_.closure = form_factors.closure;
-    if (settings_.store_links) {
-      data_.links = clock_.run("links", [&](const Progress& part) {
-        return find_links(model_, tracer, settings_.form_factors, part);
-      });
-      report_.link_count = data_.links.pair.size();
-    }
+    tracer_.emplace(make_surface_tracer(model_.mesh));
+    EscapedLight escaped =
+        decided_.form_factor_kind == FormFactorKind::kLinks ? find_links_alone() : find_pairs();
     data_.patches = std::move(model_.patches);
-    data_.patches.sky_visibility = std::move(form_factors.sky_visibility);
-    data_.patches.absorbed = std::move(form_factors.absorbed);
-    data_.sky_cells = std::move(form_factors.sky_cells);
+    data_.patches.sky_visibility = std::move(escaped.sky_visibility);
+    data_.patches.absorbed = std::move(escaped.absorbed);
+    data_.sky_cells = std::move(escaped.sky_cells);
     data_.mesh = std::move(model_.mesh);
-    data_.exchange = std::move(form_factors.exchange);
   }
 
   /// What takes the light of patches to where it is shown.
@@ -157,12 +173,44 @@ class TransferBuild {
   /// Makes the operator, and measures how far off it is.
   void make_operator() {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
-    rebounce::make_operator(*tracer_, decided_, data_, report_, clock_);
+    const bool links = decided_.form_factor_kind == FormFactorKind::kLinks;
+    const auto make = links ? make_operator_from_links : make_operator_from_pairs;
+    make(*tracer_, decided_, data_, report_, clock_);
   }
 
   TransferData take() { return std::move(data_); }
 
  private:
+  EscapedLight find_pairs() {
+    FormFactors form_factors = clock_.run("form factors", [&](const Progress& part) {
+      return compute_form_factors(model_, *tracer_, settings_.form_factors, part);
+    });
+    report_.ray_count = form_factors.ray_count;
+    report_.pair_count = form_factors.pair_count;
+    report_.form_factor_count = form_factors.exchange.column.size();
+    report_.closure = form_factors.closure;
+    if (settings_.store_links) {
+      data_.links = clock_.run("links", [&](const Progress& part) {
+        return find_links(model_, *tracer_, settings_.form_factors, part);
+      });
+      report_.link_count = data_.links.pair.size();
+    }
+    data_.exchange = std::move(form_factors.exchange);
+    return form_factors;
+  }
+
+  EscapedLight find_links_alone() {
+    LinkBuild build = clock_.run("form factors", [&](const Progress& part) {
+      return build_links(model_, *tracer_, decided_.form_factors, {}, part);
+    });
+    report_.ray_count = build.ray_count;
+    report_.pair_count = build.candidate_count;
+    report_.link_count = build.links.pair.size();
+    report_.closure = build.closure;
+    data_.links = std::move(build.links);
+    return build;
+  }
+
   const BuildSettings& settings_;
   BuildSettings decided_;  ///< settings_ with what was left open decided
   BuildReport& report_;

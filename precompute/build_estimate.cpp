@@ -4,8 +4,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/large_transfer.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -20,12 +22,47 @@ std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
 }
 
+std::uint32_t matrix_count(const PatchTable& patches) {
+  std::array<std::uint32_t, kChannelCount> channel_matrix{};
+  return distinct_channels(patches.reflectance, channel_matrix);
+}
+
+double seconds_of_vertices(const PatchModel& model) {
+  return static_cast<double>(model.mesh.position.size()) / 8e4;
+}
+
+// Links of a patch where there are kLinkPatches of them, and how their number grows; bytes of each
+// while they are found, and afterwards with the copy that gathers; bytes of a patch beside them.
+// Measured in furnished rooms, notes/links.md; rooms full of small things have more.
+constexpr double kLinksPerPatch = 165, kLinkPatches = 4000, kLinkGrowth = 0.32;
+constexpr double kLinkPeakBytes = 160, kLinkBytes = 110, kPatchBytes = 8e3;
+
+// Links that are found in a second, about one slow core.
+constexpr double kLinksPerSecond = 5e4;
+
+CostEstimate estimate_cost_of_links(const PatchModel& model) {
+  const PatchTable& patches = model.patches;
+  const auto n = static_cast<double>(patches.size());
+  const double links = n * kLinksPerPatch * std::pow(n / kLinkPatches, kLinkGrowth);
+  const auto transfer =
+      static_cast<double>(large_transfer_peak_bytes(patches.size(), matrix_count(patches)));
+  CostEstimate estimate;
+  estimate.patch_count = patches.size();
+  estimate.peak_bytes = static_cast<std::uint64_t>(
+      kPatchBytes * n + std::max(kLinkPeakBytes * links, kLinkBytes * links + transfer));
+  estimate.seconds = links / kLinksPerSecond + seconds_of_vertices(model);
+  return estimate;
+}
+
 }  // namespace
 
-CostEstimate estimate_cost(const PatchModel& model, const BuildSettings& settings) {
+std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
+  return settings.memory_limit_bytes > 0 ? settings.memory_limit_bytes : machine_memory_bytes() / 2;
+}
+
+CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings& settings) {
   const PatchTable& patches = model.patches;
-  std::array<std::uint32_t, kChannelCount> channel_matrix{};
-  const std::uint32_t matrices = distinct_channels(patches.reflectance, channel_matrix);
+  const std::uint32_t matrices = matrix_count(patches);
   const auto n = static_cast<double>(patches.size());
   CostEstimate estimate;
   estimate.patch_count = patches.size();
@@ -35,22 +72,25 @@ CostEstimate estimate_cost(const PatchModel& model, const BuildSettings& setting
   estimate.peak_bytes = static_cast<std::uint64_t>(std::max(
       40 * factors,
       8 * factors + static_cast<double>(dense_transfer_peak_bytes(patches.size(), matrices))));
-  // Ten million rays, fifty billion operations and eighty thousand vertices a second, about one
-  // slow core.
+  // Ten million rays and fifty billion operations a second, about one slow core.
   estimate.seconds = factors * settings.form_factors.probe_rays / 1e7 +
-                     2 * n * n * n * matrices / 5e10 +
-                     static_cast<double>(model.mesh.position.size()) / 8e4;
+                     2 * n * n * n * matrices / 5e10 + seconds_of_vertices(model);
   return estimate;
+}
+
+CostEstimate estimate_cost(const PatchModel& model, const BuildSettings& settings) {
+  return settings.form_factor_kind == FormFactorKind::kLinks
+             ? estimate_cost_of_links(model)
+             : estimate_cost_of_pairs(model, settings);
 }
 
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
                          std::size_t triangle_count) {
-  const std::uint64_t limit = limit_bytes > 0 ? limit_bytes : machine_memory_bytes() / 2;
-  if (estimate.peak_bytes <= limit) return;
+  if (estimate.peak_bytes <= limit_bytes) return;
   throw Error(fmt::format(
       "{} patches (from {} triangles) need about {} and the limit is {}; ask for "
       "fewer patches, simplify the scene or raise --memory-limit",
-      estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes), in_gib(limit)));
+      estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes), in_gib(limit_bytes)));
 }
 
 }  // namespace rebounce

@@ -7,10 +7,16 @@
 
 namespace rebounce {
 
-/// What form factors and operator of these patches will take.
+/// What the build may take: as it was set, or half of the machine's memory.
+std::uint64_t memory_limit_bytes(const BuildSettings& settings);
+
+/// What form factors and operator of these patches will take, by pairs whatever the settings say.
+CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings& settings);
+
+/// The same of what settings.form_factor_kind, which is no longer open, says.
 CostEstimate estimate_cost(const PatchModel& model, const BuildSettings& settings);
 
-/// Throws Error if that is above `limit_bytes`, or above half of the machine's memory if that is 0.
+/// Throws Error if an estimate is above `limit_bytes`.
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
                          std::size_t triangle_count);
 

@@ -23,9 +23,14 @@ const char* name(OperatorKind kind) {
   return "dense";
 }
 
+const char* name(FormFactorKind kind) {
+  return kind == FormFactorKind::kLinks ? "links" : "pairs";
+}
+
 std::string settings_json(const BuildSettings& settings) {
   const FormFactorSettings& f = settings.form_factors;
   return nlohmann::json{{"operator", name(settings.operator_kind)},
+                        {"form_factors", name(settings.form_factor_kind)},
                         {"tolerance", settings.tolerance},
                         {"form_factor_tolerance", settings.form_factor_tolerance},
                         {"rank", settings.rank},

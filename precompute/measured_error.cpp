@@ -49,6 +49,9 @@ KindError summary(LightKind kind, const std::vector<double>& errors) {
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress) {
+  if (exact == nullptr && data.exchange.empty() && data.links.empty()) {
+    throw Error("measured error: there is no truth without pairs or links; store links too");
+  }
   std::optional<ReferenceSolver> reference;
   if (exact == nullptr) reference.emplace(data);
   std::vector<KindError> result;

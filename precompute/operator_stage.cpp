@@ -48,6 +48,7 @@ void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
                               const BuildSettings& settings, BuildReport& report,
                               const Progress& progress) {
   const std::uint64_t seed = settings.form_factors.seed;
+  report.form_factor_tolerance = settings.form_factor_tolerance;
   const DrawnLights fitting = radiosities_of(draw_fitting_lights(data, tracer, seed), data);
   data.compressed_form_factors =
       compress_form_factors(data.exchange, data.patches, fitting.view(),
@@ -71,8 +72,8 @@ void check_operator(TransferData& data, const RayTracer& tracer, const DenseOper
 
 }  // namespace
 
-void make_operator(const RayTracer& tracer, const BuildSettings& decided, TransferData& data,
-                   BuildReport& report, PhaseClock& clock) {
+void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
+                              TransferData& data, BuildReport& report, PhaseClock& clock) {
   const bool compressed = decided.operator_kind != OperatorKind::kDense;
   const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
   const auto dense = clock.run("operator", [&](const Progress& part) {
