@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "linked_matrix.h"
 #include "matrix_compression.h"
 #include "rebounce/transfer/area_norm.h"
 
@@ -12,6 +13,13 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, radiosities,
                                settings, progress);
+}
+
+std::shared_ptr<const HierarchicalOperator> compress_form_factors(
+    const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,
+    const HierarchicalSettings& settings, const Progress& progress) {
+  return compress_to_tolerance(LinkedMatrix(links, patches), patches, radiosities, settings,
+                               progress);
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,

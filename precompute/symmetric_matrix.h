@@ -30,6 +30,10 @@ class SymmetricMatrix {
 
   /// The product with many vectors at once, x [n][k]. The same bits for any number of threads.
   virtual Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const = 0;
+
+  /// What arrives of the light of each patch alone: the squared norms of the columns, of all
+  /// matrices together, [n] by patch. `order` lists the patches so that neighbours stay together.
+  virtual Eigen::VectorXd energies(std::span<const std::uint32_t> order) const;
 };
 
 /// Yhat, from an operator in f32.
