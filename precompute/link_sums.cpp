@@ -12,6 +12,10 @@ constexpr int kScalingSteps = 30;  // each about halves what is left
 constexpr double kScaled = 1e-6;   // row sums nearer to their targets than this are there
 constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
 
+// What patches exchange that see nothing by all of their hemisphere rays has leaked through nodes
+// on both sides of a wall: it may go.
+constexpr double kLeastFactorUnseeing = 1e-6;
+
 // Relative deviation of a row sum that links amount to, from penumbrae that they average; measured.
 constexpr double kSumDeviation = 0.01;
 
@@ -29,6 +33,10 @@ double largest_error(std::span<const double> sum, std::span<const RowTarget> tar
     largest = std::max(largest, std::abs(sum[i] - target[i].sum));
   }
   return largest;
+}
+
+double least_factor(const RowTarget& target) {
+  return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
 }
 
 /// The targets, drawn to the sums that are there by as much as they are uncertain.
@@ -136,8 +144,8 @@ LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
     for (std::size_t i = 0; i < factor.size(); ++i) {
       worst = std::max(worst, std::abs(row[i] - wanted[i]));
       if (row[i] <= 0 || wanted[i] <= 0) continue;
-      factor[i] =
-          std::clamp(factor[i] * std::sqrt(wanted[i] / row[i]), kLeastFactor, kGreatestFactor);
+      factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row[i]), least_factor(target[i]),
+                             kGreatestFactor);
     }
     if (worst < kScaled) break;
     row = scaled_row_sums(tree, links, factor);

@@ -69,8 +69,9 @@ struct BuildSettings {
   /// (kLinks), to a fifth of its tolerance. Less: more bytes, fewer errors.
   double form_factor_tolerance = 0;
   std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
-  /// With kLinks: what is done of the operator is kept here, so that a build that was killed goes
-  /// on from there when it is started again with the same scene and settings. Empty: nowhere.
+  /// With kLinks: folder that what is done of the operator is kept in, so that a build that was
+  /// killed has that done when it is started again with the same scene and settings. It stays
+  /// behind. Empty: none.
   std::filesystem::path checkpoint;
 };
 
