@@ -27,6 +27,9 @@ constexpr double kTolerance = 0.01;
 // carry it on.
 constexpr double kErrorOfLinks = 0.01;
 
+// What rows of closed rooms may be off: scaling stops after a number of steps.
+constexpr double kClosure = 1e-3;
+
 const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
 
 struct Built {
@@ -34,15 +37,24 @@ struct Built {
   BuildReport report;
 };
 
-Built build(const std::string& scene, FormFactorKind kind, std::size_t patch_count = 500,
-            std::uint64_t memory_limit_bytes = 0) {
+Built build_from_links(std::uint64_t memory_limit_bytes = 0) {
+  BuildSettings settings;
+  settings.subdivision.patch_count = 500;
+  settings.form_factor_kind = FormFactorKind::kLinks;
+  settings.tolerance = kTolerance;
+  settings.store_links = true;
+  settings.memory_limit_bytes = memory_limit_bytes;
+  Built built;
+  built.data = build_transfer_data(kScenes + "furnished_room.gltf", settings, built.report);
+  return built;
+}
+
+/// Form factors alone.
+Built exchange_of(const std::string& scene, FormFactorKind kind, std::size_t patch_count) {
   BuildSettings settings;
   settings.subdivision.patch_count = patch_count;
   settings.form_factor_kind = kind;
-  settings.operator_kind = OperatorKind::kHierarchical;
-  settings.tolerance = kTolerance;
-  settings.store_links = kind == FormFactorKind::kLinks;
-  settings.memory_limit_bytes = memory_limit_bytes;
+  settings.operator_kind = OperatorKind::kNoOperator;
   Built built;
   built.data = build_transfer_data(kScenes + scene, settings, built.report);
   return built;
@@ -50,7 +62,7 @@ Built build(const std::string& scene, FormFactorKind kind, std::size_t patch_cou
 
 /// The furnished room from links, made once.
 const Built& room() {
-  static const Built built = build("furnished_room.gltf", FormFactorKind::kLinks);
+  static const Built built = build_from_links();
   return built;
 }
 
@@ -94,7 +106,7 @@ TEST(BuildFromLinks, TheErrorOnRecordIsThatAgainstTheLinks) {
 }
 
 TEST(BuildFromLinks, IsTheLightOfPairs) {
-  const Built pairs = build("furnished_room.gltf", FormFactorKind::kPairs);
+  const Built pairs = exchange_of("furnished_room.gltf", FormFactorKind::kPairs, 500);
   const TransferData& data = room().data;
   ASSERT_EQ(pairs.data.patches.area, data.patches.area);
   const auto lights = point_lights(data);
@@ -109,13 +121,10 @@ TEST(BuildFromLinks, IsTheLightOfPairs) {
 
 TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
   for (const std::string scene : {"furnished_room.gltf", "pavilion.gltf"}) {
-    BuildSettings settings;
-    settings.subdivision.patch_count = 300;
-    settings.operator_kind = OperatorKind::kNoOperator;
-    BuildReport report, report_of_pairs;
-    const TransferData pairs = build_transfer_data(kScenes + scene, settings, report_of_pairs);
-    settings.form_factor_kind = FormFactorKind::kLinks;
-    const TransferData data = build_transfer_data(kScenes + scene, settings, report);
+    const Built of_pairs = exchange_of(scene, FormFactorKind::kPairs, 300),
+                of_links = exchange_of(scene, FormFactorKind::kLinks, 300);
+    const TransferData &pairs = of_pairs.data, &data = of_links.data;
+    const ClosureReport& closure = of_links.report.closure;
     const PatchTable& patches = data.patches;
     const LinkedFormFactors links(data.links, patches.area, patches.centroid);
     const std::vector<std::array<double, 3>> ones(patches.size(), {1, 1, 1});
@@ -123,14 +132,14 @@ TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
     links.gather(std::span(ones), std::span(sum));
     for (std::size_t i = 0; i < patches.size(); ++i) {
       const double all = sum[i][0] + patches.sky_visibility[i] + patches.absorbed[i];
-      EXPECT_NEAR(all, 1, 1e-5) << scene << " " << i;
+      EXPECT_NEAR(all, 1, kClosure) << scene << " " << i;
       EXPECT_NEAR(patches.sky_visibility[i], pairs.patches.sky_visibility[i], 0.02) << i;
     }
     EXPECT_EQ(data.sky_cells.empty(), pairs.sky_cells.empty());
-    EXPECT_LT(report.closure.row_sum_error_after, 1e-5);
-    EXPECT_GT(report.closure.row_sum_error_before, report.closure.row_sum_error_after);
-    EXPECT_GT(report.closure.relative_change, 0);
-    EXPECT_LT(report.closure.relative_change, 0.1);
+    EXPECT_LT(closure.row_sum_error_after, kClosure);
+    EXPECT_GT(closure.row_sum_error_before, closure.row_sum_error_after);
+    EXPECT_GT(closure.relative_change, 0);
+    EXPECT_LT(closure.relative_change, 0.1);
   }
 }
 
@@ -139,16 +148,16 @@ TEST(BuildFromLinks, TheFileIsTheSameForAnyNumberOfThreads) {
   const int threads = omp_get_max_threads();
   save_transfer_file(folder / "usual", room().data);
   omp_set_num_threads(threads + 1);
-  save_transfer_file(folder / "other", build("furnished_room.gltf", FormFactorKind::kLinks).data);
+  save_transfer_file(folder / "other", build_from_links().data);
   omp_set_num_threads(threads);
   EXPECT_EQ(test::read_bytes(folder / "usual"), test::read_bytes(folder / "other"));
 }
 
-TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumber) {
-  test::expect_error([] { build("furnished_room.gltf", FormFactorKind::kLinks, 500, 1 << 20); },
-                     "need about ");
-  test::expect_error([] { build("furnished_room.gltf", FormFactorKind::kLinks, 500, 1 << 20); },
-                     "the limit is 0.000977 GiB");
+TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
+  const std::string refusal = test::error_of([] { build_from_links(1 << 20); });
+  EXPECT_NE(refusal.find("500 patches (from "), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find(" need about 0.0"), std::string::npos) << refusal;
+  EXPECT_NE(refusal.find("the limit is 0.000977 GiB"), std::string::npos) << refusal;
 }
 
 TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
