@@ -121,8 +121,8 @@ TEST(BuildFromLinks, IsTheLightOfPairs) {
 
 TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
   for (const std::string scene : {"furnished_room.gltf", "pavilion.gltf"}) {
-    const Built of_pairs = exchange_of(scene, FormFactorKind::kPairs, 300),
-                of_links = exchange_of(scene, FormFactorKind::kLinks, 300);
+    const Built of_pairs = exchange_of(scene, FormFactorKind::kPairs, 200),
+                of_links = exchange_of(scene, FormFactorKind::kLinks, 200);
     const TransferData &pairs = of_pairs.data, &data = of_links.data;
     const ClosureReport& closure = of_links.report.closure;
     const PatchTable& patches = data.patches;
