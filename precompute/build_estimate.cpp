@@ -37,20 +37,22 @@ double seconds_of_vertices(const PatchModel& model) {
 constexpr double kLinksPerPatch = 165, kLinkPatches = 4000, kLinkGrowth = 0.32;
 constexpr double kLinkPeakBytes = 160, kLinkBytes = 110, kPatchBytes = 8e3;
 
-// Links that are found in a second, about one slow core.
-constexpr double kLinksPerSecond = 5e4;
+// Links that are found in a second, and as many that lights are gathered along, to fit to and to
+// check with; seconds of a column of the operator and matrix, by patches. About one slow core.
+constexpr double kLinksPerSecond = 3e4, kColumnSeconds = 8e-7;
 
 CostEstimate estimate_cost_of_links(const PatchModel& model) {
-  const PatchTable& patches = model.patches;
-  const auto n = static_cast<double>(patches.size());
+  const auto n = static_cast<double>(model.patches.size());
+  const std::uint32_t matrices = matrix_count(model.patches);
   const double links = n * kLinksPerPatch * std::pow(n / kLinkPatches, kLinkGrowth);
   const auto transfer =
-      static_cast<double>(large_transfer_peak_bytes(patches.size(), matrix_count(patches)));
+      static_cast<double>(large_transfer_peak_bytes(model.patches.size(), matrices));
   CostEstimate estimate;
-  estimate.patch_count = patches.size();
+  estimate.patch_count = model.patches.size();
   estimate.peak_bytes = static_cast<std::uint64_t>(
       kPatchBytes * n + std::max(kLinkPeakBytes * links, kLinkBytes * links + transfer));
-  estimate.seconds = links / kLinksPerSecond + seconds_of_vertices(model);
+  estimate.seconds =
+      2 * links / kLinksPerSecond + kColumnSeconds * n * n * matrices + seconds_of_vertices(model);
   return estimate;
 }
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numeric>
 
 #include "expect_error.h"
@@ -37,13 +38,15 @@ struct Built {
   BuildReport report;
 };
 
-Built build_from_links(std::uint64_t memory_limit_bytes = 0) {
+Built build_from_links(std::uint64_t memory_limit_bytes = 0,
+                       const std::filesystem::path& checkpoint = {}) {
   BuildSettings settings;
   settings.subdivision.patch_count = 500;
   settings.form_factor_kind = FormFactorKind::kLinks;
   settings.tolerance = kTolerance;
   settings.store_links = true;
   settings.memory_limit_bytes = memory_limit_bytes;
+  settings.checkpoint = checkpoint;
   Built built;
   built.data = build_transfer_data(kScenes + "furnished_room.gltf", settings, built.report);
   return built;
@@ -143,14 +146,15 @@ TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
   }
 }
 
-TEST(BuildFromLinks, TheFileIsTheSameForAnyNumberOfThreads) {
+TEST(BuildFromLinks, TheFileIsTheSameForAnyNumberOfThreadsAndWithACheckpoint) {
   const test::TemporaryFolder folder;
   const int threads = omp_get_max_threads();
   save_transfer_file(folder / "usual", room().data);
   omp_set_num_threads(threads + 1);
-  save_transfer_file(folder / "other", build_from_links().data);
+  save_transfer_file(folder / "other", build_from_links(0, folder / "panels").data);
   omp_set_num_threads(threads);
   EXPECT_EQ(test::read_bytes(folder / "usual"), test::read_bytes(folder / "other"));
+  EXPECT_FALSE(std::filesystem::is_empty(folder / "panels"));
 }
 
 TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
