@@ -20,6 +20,7 @@
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/precompute/winding.h"
 #include "rebounce/transfer/area_norm.h"
+#include "single_threaded_blas.h"
 #include "solved_transfer.h"
 
 namespace rebounce::bench {
@@ -77,9 +78,8 @@ class SceneBench {
     // Closed scenes: nothing escapes.
     data_.patches.sky_visibility.assign(model.patches.size(), 0);
     data_.patches.absorbed.assign(model.patches.size(), 0);
-    link_seconds_ = processor_seconds_of([&] {
-      links_ = build_links(model, tracer, {.link_epsilon = kLinkEpsilon}).links;
-    });
+    link_seconds_ = processor_seconds_of(
+        [&] { links_ = build_links(model, tracer, {.link_epsilon = kLinkEpsilon}).links; });
     lights_ = draw_fitting_lights(data_, tracer, 1);
     test_lights_ = random_initial_exitances(data_, tracer, LightKind::kPoint, 64, 77);
   }
@@ -114,16 +114,15 @@ class SceneBench {
       const DrawnLights fitting{bounced(product, lights_.shaping),
                                 bounced(product, lights_.judging)};
       const double before = processor_seconds();
-      form_factors_ =
-          compress_form_factors(links_, data_.patches, fitting.view(),
-                                {options_.form_factor_tolerance, Precision::kF16});
+      form_factors_ = compress_form_factors(links_, data_.patches, fitting.view(),
+                                            {options_.form_factor_tolerance, Precision::kF16});
       std::fprintf(stderr, "compression of F alone %.1f s\n", processor_seconds() - before);
     });
-    std::fprintf(stderr, "%zu patches, %zu links %.1f s, F %.1f s, %.0f bytes per patch, %.2f GiB\n",
-                 data_.patches.size(), links_.pair.size(), link_seconds_, seconds,
-                 static_cast<double>(form_factors_->bytes()) /
-                     static_cast<double>(data_.patches.size()),
-                 peak_gib());
+    std::fprintf(
+        stderr, "%zu patches, %zu links %.1f s, F %.1f s, %.0f bytes per patch, %.2f GiB\n",
+        data_.patches.size(), links_.pair.size(), link_seconds_, seconds,
+        static_cast<double>(form_factors_->bytes()) / static_cast<double>(data_.patches.size()),
+        peak_gib());
   }
 
   /// The radiosities after two reflections.
@@ -163,6 +162,7 @@ class SceneBench {
 
   /// Error of columns, in the norm and summed up over lights of all patches, at a residual.
   void try_residual(const SolvedTransfer& exact, const Lights& /*truth*/, double residual) {
+    const SingleThreadedBlas single_threaded;
     const SolvedTransfer solved(*form_factors_, data_.patches, residual);
     const auto order = solved.patch();
     const std::size_t n = order.size(), count = SolvedTransfer::kTogether;

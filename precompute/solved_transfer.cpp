@@ -2,6 +2,7 @@
 #define EIGEN_DONT_PARALLELIZE
 #include "solved_transfer.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <exception>
@@ -23,6 +24,11 @@ using Factors = Eigen::Array<float, 1, Eigen::Dynamic>;
 
 // Residuals fall by half or more in a step even at a reflectance of 0.9.
 constexpr int kMostSteps = 500;
+
+// Eigenvectors that are told from the rest, no more than a part of all, and multiplications that
+// find them. Measured: notes/operator.md.
+constexpr Index kLeadingCount = 64, kLeadingPart = 8;
+constexpr int kLeadingSteps = 6;
 
 // Rows whose products are summed in single precision before they go into the double.
 constexpr Index kSummedRows = 128;
@@ -48,6 +54,16 @@ Sums column_sums(Index rows, Index width, const Term& term) {
   return sums;
 }
 
+float sign(std::mt19937_64& engine) {
+  return (engine() >> 63) != 0 ? 1.0F : -1.0F;
+}
+
+[[noreturn]] void refuse() {
+  throw Error(
+      "columns of the operator do not converge: the form factors give off more light than they "
+      "take; compress them less");
+}
+
 Factors quotient(const Sums& a, const Sums& b) {
   return (b > 0).select(a / b, 0).cast<float>();
 }
@@ -64,22 +80,70 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors, const P
     for (std::size_t k = 0; k < patches.size(); ++k) {
       root[static_cast<Index>(k)] = std::sqrt(patches.reflectance[patch()[k]][channel]);
     }
+    leading_.push_back(find_leading(root));
   }
+}
+
+Vectors SolvedTransfer::gather(const Vectors& x) const {
+  const SingleThreadedBlas single_threaded;
+  Vectors result(x.rows(), x.cols());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
+    const Index width = std::min(kSmallGroup, x.cols() - begin);
+    Vectors out;
+    HierarchicalMatrix::Workspace workspace;
+    form_factors_.multiply(0, x.middleCols(begin, width), out, workspace);
+    result.middleCols(begin, width) = out;
+  }
+  return result;
+}
+
+/// By subspace iteration.
+SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root) const {
+  const SingleThreadedBlas single_threaded;
+  const auto n = static_cast<Index>(patch().size());
+  const Index count = std::min(kLeadingCount, n / kLeadingPart);
+  Leading leading;
+  std::mt19937_64 engine(2);
+  leading.vectors = Vectors::NullaryExpr(position_count(), count, [&] { return sign(engine); });
+  for (int step = 0;; ++step) {
+    const Eigen::HouseholderQR<MatrixXf> qr(root.asDiagonal() * leading.vectors);
+    leading.vectors = qr.householderQ() * MatrixXf::Identity(position_count(), count);
+    leading.gathered = gather(root.asDiagonal() * leading.vectors);
+    if (step == kLeadingSteps) break;
+    leading.vectors = leading.gathered;
+  }
+  const MatrixXf kept =
+      leading.vectors.transpose() * (leading.vectors - root.asDiagonal() * leading.gathered);
+  leading.system.compute(kept.cast<double>());
+  if (leading.system.info() != Eigen::Success) refuse();
+  return leading;
+}
+
+void SolvedTransfer::solve_leading(std::uint32_t matrix, Vectors& y, Vectors& r) const {
+  const Leading& leading = leading_[matrix];
+  const MatrixXf seen = leading.vectors.transpose() * r;
+  const Vectors part = leading.system.solve(seen.cast<double>()).cast<float>();
+  const Vectors gathered = leading.gathered * part;
+  y += gathered;
+  r += root_[matrix].asDiagonal() * gathered;
+  r.noalias() -= leading.vectors * part;
 }
 
 void SolvedTransfer::solve(std::uint32_t matrix, Vectors& y) const {
   const Eigen::VectorXf& root = root_[matrix];
   const Index rows = y.rows(), width = y.cols();
-  Vectors r = root.asDiagonal() * y, p = r, sent = root.asDiagonal() * p, arrived;
+  const auto squares = [&](const Vectors& v) {
+    return column_sums(rows, width, [&](Index i) { return v.row(i).array().square(); });
+  };
+  Vectors r = root.asDiagonal() * y;
+  const Sums allowed = residual_ * residual_ * squares(r);
+  solve_leading(matrix, y, r);
+  Vectors p = r, sent = root.asDiagonal() * p, arrived;
   HierarchicalMatrix::Workspace workspace;
-  Sums rr = column_sums(rows, width, [&](Index i) { return r.row(i).array().square(); });
-  const Sums allowed = residual_ * residual_ * rr;
+  Sums rr = squares(r);
   for (int step = 0; (rr > allowed).any(); ++step) {
-    if (step == kMostSteps) {
-      throw Error(
-          "columns of the operator do not converge: the form factors give off more light "
-          "than they take, compress them less");
-    }
+    if (step == kMostSteps) refuse();
     form_factors_.multiply(0, sent, arrived, workspace);
     const Sums pq = column_sums(rows, width, [&](Index i) {
       return p.row(i).array().square() - sent.row(i).array() * arrived.row(i).array();
@@ -142,8 +206,7 @@ Eigen::VectorXd SolvedTransfer::estimated_energies() const {
   std::mt19937_64 engine(1);
   Eigen::VectorXd energies = Eigen::VectorXd::Zero(n);
   for (std::uint32_t m = 0; m < matrix_count(); ++m) {
-    const MatrixXf signs =
-        MatrixXf::NullaryExpr(n, kProbeCount, [&] { return (engine() >> 63) != 0 ? 1.0F : -1.0F; });
+    const MatrixXf signs = MatrixXf::NullaryExpr(n, kProbeCount, [&] { return sign(engine); });
     energies += multiply(m, signs).cast<double>().rowwise().squaredNorm() / kProbeCount;
   }
   return energies;

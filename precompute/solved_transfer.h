@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,7 +23,7 @@ class SolvedTransfer {
 
   /// Right-hand sides that one thread solves side by side. More: larger matrix products, and more
   /// memory, five times as many vectors for each thread.
-  static constexpr Eigen::Index kTogether = 128;
+  static constexpr Eigen::Index kTogether = 64;
 
   /// `form_factors` are G. A solution is accepted when the residual of z is `residual` of R G b.
   SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
@@ -48,12 +49,28 @@ class SolvedTransfer {
   Eigen::VectorXd estimated_energies() const;
 
  private:
+  /// The leading eigenvectors V of R G R, nearly.
+  struct Leading {
+    Vectors vectors;                     ///< V, [positions][k], orthonormal columns
+    Vectors gathered;                    ///< G R V
+    Eigen::LLT<Eigen::MatrixXd> system;  ///< of V^T (I - R G R) V
+  };
+
+  Leading find_leading(const Eigen::VectorXf& root) const;
+
+  /// G x, threads sharing the columns; all by position.
+  Vectors gather(const Vectors& x) const;
+
+  /// Moves the solution by its part in the leading eigenvectors: y and the residual r of z.
+  void solve_leading(std::uint32_t matrix, Vectors& y, Vectors& r) const;
+
   /// From y = G b to Yhat b.
   void solve(std::uint32_t matrix, Vectors& y) const;
 
   HierarchicalMatrix form_factors_;
   std::array<std::uint32_t, kChannelCount> channel_matrix_{};
   std::vector<Eigen::VectorXf> root_;  ///< of each matrix: R by position, 0 where no patch is
+  std::vector<Leading> leading_;       ///< of each matrix
   double residual_;
 };
 
