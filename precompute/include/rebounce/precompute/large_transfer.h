@@ -13,14 +13,14 @@
 namespace rebounce {
 
 struct LargeTransferSettings {
-  HierarchicalSettings compression;  ///< of the result
+  HierarchicalSettings compression{};  ///< of the result
   /// Memory that may be taken beside the form factors; more of it makes wider panels, which are
   /// somewhat faster. 0: what large_transfer_peak_bytes says.
   std::uint64_t memory_limit_bytes = 0;
   /// Folder that finished panels are kept in, so that a run that was killed goes on where it was;
   /// empty: none. What was begun from anything else is begun anew. It stays behind: remove it when
   /// the operator is where it belongs.
-  std::filesystem::path checkpoint;
+  std::filesystem::path checkpoint{};
 };
 
 /// Bytes that build_large_transfer holds at its peak with the default memory limit, form factors
