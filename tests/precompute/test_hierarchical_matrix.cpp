@@ -48,14 +48,14 @@ TEST_P(HierarchicalMatrixOf, EntriesAreThoseOfTheOperator) {
   const std::span patches(all);
   for (int channel = 0; channel < kChannelCount; ++channel) {
     const Eigen::MatrixXf truth = expanded(transfer, channel);
+    const float allowed = 1e-5F * truth.cwiseAbs().maxCoeff();
     for (const auto& [rows, columns] : {std::pair(patches.first(150), patches.last(100)),
                                         std::pair(patches.first(90), patches.first(90))}) {
       Eigen::MatrixXf entries(rows.size(), columns.size());
       matrix.entries(matrix.channel_matrix()[channel], rows, columns, entries);
       for (std::size_t i = 0; i < rows.size(); ++i) {
         for (std::size_t j = 0; j < columns.size(); ++j) {
-          ASSERT_NEAR(entries(i, j), truth(rows[i], columns[j]),
-                      1e-5F * truth.cwiseAbs().maxCoeff());
+          ASSERT_NEAR(entries(i, j), truth(rows[i], columns[j]), allowed);
         }
       }
     }
