@@ -32,42 +32,21 @@ constexpr double kFirstStage = 0.7;
 // The part of the time of a panel that its columns take, roughly.
 constexpr double kSolved = 0.8;
 
-// Of panels: rather narrow than none.
-constexpr std::uint32_t kNarrowestPanel = 512;
+// Columns of a panel, and rows of the pieces that it is compressed in. Larger pieces save bytes
+// that the second stage saves anyway, and at so fine a price take several times as long.
+constexpr std::uint32_t kPanelWidth = 512;
 
 // An operator of the first stage, the rounds of the second and what they are judged by, bytes a
 // patch, far on the safe side.
 constexpr std::size_t kOperatorBytes = 48 << 10;
 
-std::size_t group_bytes(std::size_t patch_count) {
-  constexpr std::size_t kVectors = 8;  // those of the solver, coefficients, entries of F
-  return kVectors * patch_count * SolvedTransfer::kTogether * sizeof(float);
-}
-
-std::size_t panel_bytes(std::size_t patch_count, std::size_t matrix_count, std::size_t width) {
-  const auto threads = static_cast<std::size_t>(omp_get_max_threads());
-  const std::size_t panel = patch_count * width * matrix_count * sizeof(float);
-  const std::size_t piece = width * width * matrix_count * (sizeof(float) + 3 * sizeof(double));
-  return panel + threads * std::max(group_bytes(patch_count), piece) + patch_count * kOperatorBytes;
-}
-
-std::uint32_t usual_panel_width(std::size_t patch_count) {
-  return largest_piece(
-      static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count)));
-}
-
-/// The widest panels that the limit has room for.
-std::uint32_t panel_width(std::size_t patch_count, std::size_t matrix_count, std::uint64_t limit) {
-  std::uint32_t width = usual_panel_width(patch_count);
-  if (limit == 0) return width;
-  while (panel_bytes(patch_count, matrix_count, width) > limit) {
-    width /= 2;
-    if (width >= kNarrowestPanel) continue;
-    throw Error("an operator over " + std::to_string(patch_count) + " patches needs " +
-                std::to_string(panel_bytes(patch_count, matrix_count, kNarrowestPanel) >> 20) +
-                " MiB; raise the memory limit, use fewer threads or ask for fewer patches");
-  }
-  return width;
+/// Throws Error unless the limit, if there is one, has room for it all.
+void check_memory(std::size_t patch_count, std::size_t matrix_count, std::uint64_t limit) {
+  const std::size_t peak = large_transfer_peak_bytes(patch_count, matrix_count);
+  if (limit == 0 || peak <= limit) return;
+  throw Error("an operator over " + std::to_string(patch_count) + " patches needs " +
+              std::to_string(peak >> 20) +
+              " MiB; raise the memory limit, use fewer threads or ask for fewer patches");
 }
 
 template <typename T>
@@ -79,10 +58,9 @@ void update(ContentHash& hash, std::span<const T> values) {
 
 /// A hash of all that the first stage depends on.
 std::string key_of(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                   const FittingLights& lights, double price, std::uint32_t width) {
+                   const FittingLights& lights, double price) {
   ContentHash hash;
   update(hash, std::span(std::string_view(version())));
-  update<std::uint32_t>(hash, {{width}});
   update<double>(hash, {{price, kResidualPart}});
   const HierarchicalOperator::Storage& f = form_factors.storage();
   update(hash, std::span(f.blocks));
@@ -106,9 +84,9 @@ struct Panel {
 };
 
 /// The lower triangle as panels, the longest first.
-std::vector<Panel> make_panels(const ClusterTree& tree, std::uint32_t width) {
+std::vector<Panel> make_panels(const ClusterTree& tree) {
   std::vector<Panel> panels;
-  for (const BlockPiece& piece : block_pieces(tree, width)) {
+  for (const BlockPiece& piece : block_pieces(tree, kPanelWidth)) {
     const auto found = std::ranges::find(panels, piece.column, &Panel::column);
     Panel& panel = found == panels.end() ? panels.emplace_back(Panel{piece.column, {}}) : *found;
     panel.pieces.push_back(piece);
@@ -121,13 +99,12 @@ std::vector<Panel> make_panels(const ClusterTree& tree, std::uint32_t width) {
 /// The first stage: all of Yhat, compressed finely, a panel at a time.
 HierarchicalOperator::Storage compress_panels(PanelMatrix& matrix, const PatchTable& patches,
                                               std::span<const std::vector<Float3>> shaping,
-                                              double price, std::uint32_t width,
-                                              const PanelCheckpoint& checkpoint,
+                                              double price, const PanelCheckpoint& checkpoint,
                                               const Progress& progress) {
   const CompressionFrame frame = compression_frame(matrix, patches, shaping);
   const std::vector<ClusterWeight> weights = frame.weights();
   const BlockTreeCompressor compressor(matrix, frame.tree, weights);
-  const std::vector<Panel> panels = make_panels(frame.tree, width);
+  const std::vector<Panel> panels = make_panels(frame.tree);
   BlockPart whole;
   for (std::size_t k = 0; k < panels.size(); ++k) {
     const auto count = static_cast<double>(panels.size());
@@ -148,7 +125,14 @@ HierarchicalOperator::Storage compress_panels(PanelMatrix& matrix, const PatchTa
 }  // namespace
 
 std::size_t large_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
-  return panel_bytes(patch_count, matrix_count, usual_panel_width(patch_count));
+  constexpr std::size_t kVectors = 8;  // those of the solver, coefficients, entries of F
+  const std::size_t group = kVectors * patch_count * SolvedTransfer::kTogether * sizeof(float);
+  const std::size_t side =
+      largest_piece(static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count)));
+  const std::size_t piece = side * side * matrix_count * (sizeof(float) + 3 * sizeof(double));
+  const auto threads = static_cast<std::size_t>(omp_get_max_threads());
+  const std::size_t panel = patch_count * kPanelWidth * matrix_count * sizeof(float);
+  return panel + threads * std::max(group, piece) + patch_count * kOperatorBytes;
 }
 
 std::shared_ptr<const HierarchicalOperator> build_large_transfer(
@@ -156,16 +140,15 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
     const FittingLights& lights, const LargeTransferSettings& settings, const Progress& progress) {
   const double tolerance = settings.compression.tolerance;
   const SolvedTransfer solved(form_factors, patches, kResidualPart * tolerance);
-  const std::uint32_t width =
-      panel_width(patches.size(), solved.matrix_count(), settings.memory_limit_bytes);
+  check_memory(patches.size(), solved.matrix_count(), settings.memory_limit_bytes);
   const double price = kFinePart * first_price(tolerance, patches.size());
   const PanelCheckpoint checkpoint(settings.checkpoint,
-                                   key_of(form_factors, patches, lights, price, width));
+                                   key_of(form_factors, patches, lights, price));
   const Eigen::VectorXd energies = solved.estimated_energies();
   HierarchicalOperator::Storage fine;
   {
     PanelMatrix matrix(solved, energies);
-    fine = compress_panels(matrix, patches, lights.shaping, price, width, checkpoint,
+    fine = compress_panels(matrix, patches, lights.shaping, price, checkpoint,
                            part_of(progress, 0, kFirstStage));
   }
   const RoundedMatrix rounded(solved, energies, fine);

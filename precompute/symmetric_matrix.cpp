@@ -31,6 +31,7 @@ std::span<const std::uint32_t> part_of(std::span<const std::uint32_t> patches, s
 }  // namespace
 
 Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) const {
+  const SingleThreadedBlas single_threaded;
   const std::size_t n = order.size();
   Eigen::VectorXd energy = Eigen::VectorXd::Zero(static_cast<Index>(n));
 #pragma omp parallel for schedule(dynamic, 1)

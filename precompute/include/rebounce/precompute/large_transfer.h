@@ -13,18 +13,17 @@
 namespace rebounce {
 
 struct LargeTransferSettings {
-  HierarchicalSettings compression;  ///< of the result
-  /// Memory that may be taken beside the form factors; more of it makes wider panels, which are
-  /// somewhat faster. 0: what large_transfer_peak_bytes says.
+  HierarchicalSettings compression{};  ///< of the result
+  /// Memory that may be taken beside the form factors; 0: as much as it takes.
   std::uint64_t memory_limit_bytes = 0;
   /// Folder that finished panels are kept in, so that a run that was killed goes on where it was;
   /// empty: none. What was begun from anything else is begun anew. It stays behind: remove it when
   /// the operator is where it belongs.
-  std::filesystem::path checkpoint;
+  std::filesystem::path checkpoint{};
 };
 
-/// Bytes that build_large_transfer holds at its peak with the default memory limit, form factors
-/// not included; in proportion to the number of patches.
+/// Bytes that build_large_transfer holds at its peak, form factors not included; in proportion to
+/// the number of patches.
 std::size_t large_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
 
 /// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
@@ -34,7 +33,7 @@ std::size_t large_transfer_peak_bytes(std::size_t patch_count, std::size_t matri
 ///
 /// `form_factors` are G = A^1/2 F A^-1/2, compressed, f32 or f16 (compress_form_factors): their
 /// error, which must be well below the tolerance, stays in the result and is not part of it. Throws
-/// Error if the memory limit is too low for the narrowest panel, if F is not a passive exchange
+/// Error if that is above the memory limit, if F is not a passive exchange
 /// (I - R G R not positive definite), or if the checkpoint cannot be written, and Cancelled if
 /// asked to stop. The same bits for any number of threads, and from a checkpoint.
 std::shared_ptr<const HierarchicalOperator> build_large_transfer(
