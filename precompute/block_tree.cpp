@@ -18,26 +18,12 @@ using Eigen::Index;
 // What a block costs beside its values, in values: its description, and the start of its loops.
 constexpr double kBlockOverhead = 32;
 
-// Pieces of work: the matrix is gathered and compressed in squares of at most this many rows, and
-// of an eighth of all where that is smaller, so that there are enough of them to share.
+// Rows of the squares that the matrix is gathered and compressed in.
 constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
 
 // A block whose best ranks stay below this part of its sides is smooth: cutting it would only store
 // the same few functions several times over. Measured: notes/operator.md.
 constexpr Index kSmoothPart = 16;
-
-/// A part of the operator: blocks in the order of traversal and what they hold.
-struct Part {
-  std::vector<TransferBlock> blocks;
-  std::vector<float> values;
-  double cost = 0;
-
-  void append(Part&& other) {
-    blocks.insert(blocks.end(), other.blocks.begin(), other.blocks.end());
-    values.insert(values.end(), other.values.begin(), other.values.end());
-    cost += other.cost;
-  }
-};
 
 void append_columns(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
   for (Index k = 0; k < matrix.size(); ++k) values.push_back(static_cast<float>(matrix.data()[k]));
@@ -73,7 +59,7 @@ class PieceCompressor {
     for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) gather(matrix, m);
   }
 
-  Part compress() const { return compress(row_, column_); }
+  BlockPart compress() const { return compress(row_, column_); }
 
  private:
   void gather(const SymmetricMatrix& matrix, std::uint32_t m) {
@@ -121,7 +107,7 @@ class PieceCompressor {
     return block;
   }
 
-  Part compress(std::uint32_t row, std::uint32_t column) const {
+  BlockPart compress(std::uint32_t row, std::uint32_t column) const {
     const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
     const TransferBlock place{.row_begin = rows.begin,
                               .row_count = rows.count,
@@ -140,14 +126,14 @@ class PieceCompressor {
       if (low_rank && low_rank->row_basis.cols() < smooth && low_rank->column_basis.cols() < smooth)
         return low_rank_part(place, *low_rank, row, column, cost);
     }
-    Part best = leaves ? dense_part(place) : compress_children(row, column);
+    BlockPart best = leaves ? dense_part(place) : compress_children(row, column);
     if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
     const auto low_rank = compress_block(block, cost, best.cost - overhead, block.rows(), seed);
     return low_rank ? low_rank_part(place, *low_rank, row, column, cost) : best;
   }
 
-  Part compress_children(std::uint32_t row, std::uint32_t column) const {
-    Part part;
+  BlockPart compress_children(std::uint32_t row, std::uint32_t column) const {
+    BlockPart part;
     const auto child = [&](std::uint32_t cluster, std::uint32_t k) {
       const Cluster& c = tree_.clusters[cluster];
       return c.is_leaf() ? cluster : c.first_child + k;
@@ -163,14 +149,14 @@ class PieceCompressor {
     return part;
   }
 
-  static Part zero_part(TransferBlock place, double cost) {
+  static BlockPart zero_part(TransferBlock place, double cost) {
     place.kind = TransferBlock::Kind::kLowRank;
     return {{place}, {}, cost};
   }
 
-  Part dense_part(const TransferBlock& place) const {
+  BlockPart dense_part(const TransferBlock& place) const {
     const WideBlock block = wide_block(place);
-    Part part{{place}, {}, 0};
+    BlockPart part{{place}, {}, 0};
     for (Index m = 0; m < block.matrix_count; ++m) append_rows(block.matrix(m), part.values);
     part.cost = price_ * (kBlockOverhead + static_cast<double>(part.values.size()));
     return part;
@@ -189,14 +175,14 @@ class PieceCompressor {
     for (Eigen::MatrixXd& core : block.cores) core = row_factor * core * column_factor.transpose();
   }
 
-  Part low_rank_part(TransferBlock place, LowRankBlock block, std::uint32_t row,
-                     std::uint32_t column, const CompressionCost& cost) const {
+  BlockPart low_rank_part(TransferBlock place, LowRankBlock block, std::uint32_t row,
+                          std::uint32_t column, const CompressionCost& cost) const {
     take_weights_away(block, row, column);
     place.kind = TransferBlock::Kind::kLowRank;
     place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
     place.column_rank = place.on_diagonal() ? place.row_rank
                                             : static_cast<std::uint32_t>(block.column_basis.cols());
-    Part part{{place}, {}, 0};
+    BlockPart part{{place}, {}, 0};
     append_columns(block.row_basis, part.values);
     append_columns(block.column_basis, part.values);
     for (const Eigen::MatrixXd& core : block.cores) append_rows(core, part.values);
@@ -212,48 +198,69 @@ class PieceCompressor {
   std::vector<Eigen::MatrixXf> matrices_;
 };
 
-}  // namespace
-
-BlockTreeCompressor::BlockTreeCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
-                                         const std::vector<ClusterWeight>& weights)
-    : matrix_(matrix), tree_(tree), weights_(weights) {
-  add_pieces(0, 0, std::clamp(tree.clusters.front().count / 8, kSmallestPiece, kLargestPiece));
-}
-
-void BlockTreeCompressor::add_pieces(std::uint32_t row, std::uint32_t column,
-                                     std::uint32_t largest) {
-  const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
+void add_pieces(const ClusterTree& tree, BlockPiece piece, std::uint32_t largest,
+                std::vector<BlockPiece>& pieces) {
+  const Cluster &rows = tree.clusters[piece.row], &columns = tree.clusters[piece.column];
   const bool split_row = rows.count > largest && !rows.is_leaf();
   const bool split_column = columns.count > largest && !columns.is_leaf();
   if (!split_row && !split_column) {
-    pieces_.push_back({row, column});
+    pieces.push_back(piece);
     return;
   }
   for (std::uint32_t r = 0; r < (split_row ? 2U : 1U); ++r) {
     for (std::uint32_t c = 0; c < (split_column ? 2U : 1U); ++c) {
-      if (row == column && c > r) continue;
-      add_pieces(split_row ? rows.first_child + r : row,
-                 split_column ? columns.first_child + c : column, largest);
+      if (piece.row == piece.column && c > r) continue;
+      add_pieces(tree,
+                 {split_row ? rows.first_child + r : piece.row,
+                  split_column ? columns.first_child + c : piece.column},
+                 largest, pieces);
     }
   }
 }
 
-HierarchicalOperator::Storage BlockTreeCompressor::compress(double price,
-                                                            const Progress& progress) const {
+}  // namespace
+
+void BlockPart::append(BlockPart&& other) {
+  blocks.insert(blocks.end(), other.blocks.begin(), other.blocks.end());
+  values.insert(values.end(), other.values.begin(), other.values.end());
+  cost += other.cost;
+}
+
+std::uint32_t largest_piece(std::uint32_t position_count) {
+  return std::clamp(position_count / 8, kSmallestPiece, kLargestPiece);
+}
+
+std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t largest) {
+  std::vector<BlockPiece> pieces;
+  add_pieces(tree, {0, 0}, largest, pieces);
+  return pieces;
+}
+
+BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double price,
+                                        const Progress& progress) const {
   const SingleThreadedBlas single_threaded;
-  std::vector<Part> parts(pieces_.size());
-  ParallelProgress loop(progress, pieces_.size());
+  std::vector<BlockPart> parts(pieces.size());
+  ParallelProgress loop(progress, pieces.size());
 #pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < pieces_.size(); ++k) {
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (loop.stopped()) continue;
-    parts[k] = PieceCompressor(matrix_, tree_, weights_, price, pieces_[k].row, pieces_[k].column)
+    parts[k] = PieceCompressor(matrix_, tree_, weights_, price, pieces[k].row, pieces[k].column)
                    .compress();
     loop.advance();
   }
   loop.finish();
+  BlockPart whole;
+  for (BlockPart& part : parts) whole.append(std::move(part));
+  return whole;
+}
 
-  Part whole;
-  for (Part& part : parts) whole.append(std::move(part));
+HierarchicalOperator::Storage BlockTreeCompressor::compress(double price,
+                                                            const Progress& progress) const {
+  const auto pieces = block_pieces(tree_, largest_piece(tree_.clusters.front().count));
+  return assemble(compress(pieces, price, progress));
+}
+
+HierarchicalOperator::Storage BlockTreeCompressor::assemble(BlockPart whole) const {
   whole.values.resize(whole.values.size() + HierarchicalOperator::kPadding, 0.0F);
   HierarchicalOperator::Storage storage;
   storage.area.assign(matrix_.area().begin(), matrix_.area().end());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "cluster_tree.h"
@@ -11,6 +12,28 @@
 
 namespace rebounce {
 
+/// Two clusters, by index: a square of the lower triangle that is compressed in one go.
+struct BlockPiece {
+  std::uint32_t row = 0, column = 0;
+};
+
+/// A part of an operator: blocks in the order of traversal and what they hold, in f32.
+struct BlockPart {
+  std::vector<TransferBlock> blocks;
+  std::vector<float> values;
+  double cost = 0;
+
+  void append(BlockPart&& other);
+};
+
+/// The side of a piece for so many positions: 2048, and an eighth of all where that is smaller, so
+/// that there are enough pieces to share.
+std::uint32_t largest_piece(std::uint32_t position_count);
+
+/// The lower triangle cut into pieces with sides of `largest` positions at most, in the order of
+/// traversal.
+std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t largest);
+
 /// Compresses one matrix at any number of prices.
 ///
 /// What is minimised is error² + price x values, in which the error is that of the
@@ -19,23 +42,23 @@ class BlockTreeCompressor {
  public:
   /// All that is given must outlive the object; `weights` has one entry for each cluster.
   BlockTreeCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
-                      const std::vector<ClusterWeight>& weights);
+                      const std::vector<ClusterWeight>& weights)
+      : matrix_(matrix), tree_(tree), weights_(weights) {}
 
   /// The operator (f32) at a price > 0. Throws Cancelled if asked to stop.
   HierarchicalOperator::Storage compress(double price, const Progress& progress = {}) const;
 
+  /// Some pieces of it.
+  BlockPart compress(std::span<const BlockPiece> pieces, double price,
+                     const Progress& progress = {}) const;
+
+  /// The operator that all parts together are.
+  HierarchicalOperator::Storage assemble(BlockPart whole) const;
+
  private:
-  /// Two clusters, by index: a square of the lower triangle that is compressed in one go.
-  struct Piece {
-    std::uint32_t row, column;
-  };
-
-  void add_pieces(std::uint32_t row, std::uint32_t column, std::uint32_t largest);
-
   const SymmetricMatrix& matrix_;
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
-  std::vector<Piece> pieces_;  ///< in the order of traversal
 };
 
 }  // namespace rebounce

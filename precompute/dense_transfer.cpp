@@ -115,20 +115,19 @@ std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& 
   return std::make_shared<const DenseOperator>(std::move(storage));
 }
 
-double transfer_residual(const TransferOperator& transfer, const ExchangeMatrix& exchange,
+double transfer_residual(const TransferOperator& transfer, const FormFactorOperator& form_factors,
                          const PatchTable& patches) {
   constexpr int kProbeCount = 4;
   const std::size_t n = patches.size();
-  const FormFactorRows rows(exchange, patches.area);
   std::vector<Float3> v(n), fv(n), w(n), result(n);
-  std::vector<float> workspace(transfer.workspace_size());
+  std::vector<float> workspace(std::max(transfer.workspace_size(), form_factors.workspace_size()));
   std::mt19937 engine(1);
   double largest = 0;
   for (int probe = 0; probe < kProbeCount; ++probe) {
     for (Float3& value : v) {
       for (float& x : value) x = static_cast<float>(engine() * 0x1p-32);
     }
-    rows.gather(v, fv);
+    form_factors.gather(v, fv, workspace);
     for (std::size_t i = 0; i < n; ++i) {
       for (int c = 0; c < kChannelCount; ++c)
         w[i][c] = v[i][c] - patches.reflectance[i][c] * fv[i][c];
@@ -137,6 +136,11 @@ double transfer_residual(const TransferOperator& transfer, const ExchangeMatrix&
     largest = std::max(largest, relative_difference(result, fv, patches.area));
   }
   return largest;
+}
+
+double transfer_residual(const TransferOperator& transfer, const ExchangeMatrix& exchange,
+                         const PatchTable& patches) {
+  return transfer_residual(transfer, FormFactorRows(exchange, patches.area), patches);
 }
 
 }  // namespace rebounce

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/ray_tracer.h"
@@ -33,5 +34,9 @@ struct EscapeScratch {
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch);
+
+/// What the rows of F, which add up to `row_sum` [n], leave of 1 is what escapes; its parts are
+/// shared as they were measured, `escape` [n].
+EscapedLight share_escape(std::span<const double> row_sum, std::span<const Escape> escape);
 
 }  // namespace rebounce

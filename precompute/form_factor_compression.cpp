@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "linked_matrix.h"
 #include "matrix_compression.h"
 #include "rebounce/transfer/area_norm.h"
 
@@ -14,15 +15,21 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
                                settings, progress);
 }
 
+std::shared_ptr<const HierarchicalOperator> compress_form_factors(
+    const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,
+    const HierarchicalSettings& settings, const Progress& progress) {
+  return compress_to_tolerance(LinkedMatrix(links, patches), patches, radiosities, settings,
+                               progress);
+}
+
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
-                                  const ExchangeMatrix& exchange, const PatchTable& patches,
+                                  const FormFactorOperator& exact, const PatchTable& patches,
                                   std::span<const std::vector<Float3>> radiosities) {
-  const FormFactorRows rows(exchange, patches.area);
-  std::vector<float> workspace(compressed.workspace_size());
+  std::vector<float> workspace(std::max(compressed.workspace_size(), exact.workspace_size()));
   std::vector<Float3> truth(patches.size()), gathered(patches.size());
   FormFactorError error;
   for (const std::vector<Float3>& radiosity : radiosities) {
-    rows.gather(radiosity, truth);
+    exact.gather(radiosity, truth, workspace);
     compressed.apply(radiosity, gathered, workspace);
     const double e = relative_difference(gathered, truth, patches.area);
     error.mean += e / static_cast<double>(radiosities.size());

@@ -1,7 +1,5 @@
 #include "rebounce/precompute/form_factors.h"
 
-#include <algorithm>
-
 #include "closure.h"
 #include "escape.h"
 #include "link_expansion.h"
@@ -48,35 +46,12 @@ class FormFactorAssembly {
   FormFactors close(RawExchange raw) const {
     FormFactors result;
     result.closure = enforce_closure(raw.rows, geometry_.areas(), raw.target);
-    store_escape(raw.rows, raw.escape, result);
+    static_cast<EscapedLight&>(result) =
+        share_escape(row_sums(raw.rows, geometry_.areas()), raw.escape);
     result.exchange = compress_rows(raw.rows);
     result.ray_count = raw.ray_count;
     result.pair_count = raw.pair_count;
     return result;
-  }
-
-  /// What the rows of F leave of 1 is what escapes; its parts are shared as they were measured.
-  void store_escape(const ExchangeRows& rows, const std::vector<Escape>& escape,
-                    FormFactors& result) const {
-    const std::vector<double> sum = row_sums(rows, geometry_.areas());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double rest = std::max(0.0, 1 - sum[i]), lost = escape[i].sky + escape[i].absorbed;
-      const double sky = lost > 0 ? rest * escape[i].sky / lost : 0;
-      result.sky_visibility.push_back(static_cast<float>(sky));
-      result.absorbed.push_back(static_cast<float>(std::max(0.0, rest - sky)));
-      append_sky_cells(escape[i], sky, result.sky_cells);
-    }
-  }
-
-  /// Adds the cells by which one more patch sees the sky, `sky` in all.
-  static void append_sky_cells(const Escape& escape, double sky, SkyCells& cells) {
-    if (cells.empty()) cells.entry_begin.push_back(0);
-    for (const auto& [cell, part] : escape.sky_cells) {
-      if (!(sky > 0)) break;
-      cells.entry_cell.push_back(cell);
-      cells.entry_part.push_back(static_cast<float>(part * sky / escape.sky));
-    }
-    cells.entry_begin.push_back(static_cast<std::uint32_t>(cells.entry_cell.size()));
   }
 
   static ExchangeMatrix compress_rows(const ExchangeRows& rows) {

@@ -29,9 +29,6 @@ constexpr double kBackground = 1;
 // notes/operator.md.
 constexpr double kDarkPower = 0.4, kLeastEnergy = 1e-6;
 
-// Rows and columns of the matrix that are looked at together.
-constexpr std::size_t kTile = 256;
-
 struct Principal {
   MatrixXd directions;
   VectorXd energies;
@@ -56,32 +53,6 @@ Principal principal_directions(const MatrixXd& sample) {
       [&](double e) { return e > 1e-12 * result.energies.maxCoeff() ? 1 / std::sqrt(e) : 0.0; });
   result.directions = sample * vectors * scale.asDiagonal();
   return result;
-}
-
-/// Positions [begin, begin + kTile) that hold a patch.
-std::span<const std::uint32_t> tile_of(const ClusterTree& tree, std::size_t begin) {
-  return std::span(tree.patch).subspan(begin, std::min(kTile, tree.patch.size() - begin));
-}
-
-/// What arrives of the light of each patch alone: the squared norms of the columns, of all channels
-/// together, [n] by position.
-VectorXd energies_of_patches(const SymmetricMatrix& matrix, const ClusterTree& tree) {
-  const std::size_t n = tree.patch.size();
-  VectorXd energy = VectorXd::Zero(static_cast<Index>(n));
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t column = 0; column < n; column += kTile) {
-    const auto columns = tile_of(tree, column);
-    for (std::size_t row = 0; row < n; row += kTile) {
-      const auto rows = tile_of(tree, row);
-      Eigen::MatrixXf entries(rows.size(), columns.size());
-      for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) {
-        matrix.entries(m, rows, columns, entries);
-        energy.segment(static_cast<Index>(column), entries.cols()) +=
-            entries.cast<double>().colwise().squaredNorm().transpose();
-      }
-    }
-  }
-  return energy;
 }
 
 }  // namespace
@@ -109,7 +80,9 @@ VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree
   const auto positions =
       static_cast<Index>(HierarchicalOperator::position_count(tree.patch.size()));
   VectorXd background = VectorXd::Ones(positions);
-  const VectorXd energy = energies_of_patches(matrix, tree);
+  const VectorXd of_patch = matrix.energies(tree.patch);
+  VectorXd energy(of_patch.size());
+  for (Index k = 0; k < energy.size(); ++k) energy[k] = of_patch[tree.patch[k]];
   std::vector<double> sorted(energy.begin(), energy.end());
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::ranges::nth_element(sorted, middle);

@@ -12,6 +12,10 @@ constexpr int kScalingSteps = 30;  // each about halves what is left
 constexpr double kScaled = 1e-6;   // row sums nearer to their targets than this are there
 constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
 
+// What patches exchange that see nothing by all of their hemisphere rays has leaked through nodes
+// on both sides of a wall: it may go.
+constexpr double kLeastFactorUnseeing = 1e-6;
+
 // Relative deviation of a row sum that links amount to, from penumbrae that they average; measured.
 constexpr double kSumDeviation = 0.01;
 
@@ -20,6 +24,65 @@ struct Moments {
   double sum = 0;
   glm::dvec3 first{0};
 };
+
+/// The largest error of a row sum, of all rows or of those whose target is certain.
+double largest_error(std::span<const double> sum, std::span<const RowTarget> target, bool certain) {
+  double largest = 0;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    if (certain && target[i].deviation > 0) continue;
+    largest = std::max(largest, std::abs(sum[i] - target[i].sum));
+  }
+  return largest;
+}
+
+double least_factor(const RowTarget& target) {
+  return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
+}
+
+/// The targets, drawn to the sums that are there by as much as they are uncertain.
+std::vector<double> wanted_sums(std::span<const double> sum, std::span<const RowTarget> target) {
+  std::vector<double> wanted(sum.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const double variance = kSumDeviation * kSumDeviation,
+                 uncertain = target[i].deviation * target[i].deviation;
+    wanted[i] = sum[i] + variance / (variance + uncertain) * (target[i].sum - sum[i]);
+  }
+  return wanted;
+}
+
+std::vector<double> scaled_row_sums(const LinkTree& tree, std::span<const Link> links,
+                                    const std::vector<double>& factor) {
+  std::vector<double> sum = gather_links(tree, links, factor);
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] *= factor[i];
+  return sum;
+}
+
+/// How much factors change what is exchanged, Frobenius, each link taken as the same for all of its
+/// pairs.
+double relative_change(const LinkTree& tree, std::span<const Link> links,
+                       std::span<const double> factor) {
+  const auto nodes = tree.nodes();
+  std::vector<double> mean(nodes.size(), 0.0);
+  for (std::size_t k = nodes.size(); k-- > 0;) {
+    const LinkNode& node = nodes[k];
+    if (node.is_leaf()) {
+      mean[k] = factor[tree.leaf_patch(node)];
+      continue;
+    }
+    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+      mean[k] += nodes[c].count * mean[c] / node.count;
+    }
+  }
+  double change = 0, norm = 0;
+  for (const Link& link : links) {
+    const double pairs = static_cast<double>(nodes[link.a].count) * nodes[link.b].count;
+    const double squared = static_cast<double>(link.exchange_area) * link.exchange_area / pairs;
+    const double part = mean[link.a] * mean[link.b] - 1;
+    change += squared * part * part;
+    norm += squared;
+  }
+  return norm > 0 ? std::sqrt(change / norm) : 0;
+}
 
 }  // namespace
 
@@ -68,27 +131,29 @@ std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> lin
   return out;
 }
 
-std::vector<double> scale_links(const LinkTree& tree, std::span<const Link> links,
-                                std::span<const RowTarget> target) {
-  std::vector<double> factor(target.size(), 1.0), wanted(target.size());
-  std::vector<double> sum = gather_links(tree, links, factor);
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const double variance = kSumDeviation * kSumDeviation,
-                 uncertain = target[i].deviation * target[i].deviation;
-    wanted[i] = sum[i] + variance / (variance + uncertain) * (target[i].sum - sum[i]);
-  }
+LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
+                        std::span<const RowTarget> target) {
+  LinkScaling result;
+  std::vector<double>&factor = result.factor, &row = result.row_sum;
+  factor.assign(target.size(), 1.0);
+  row = gather_links(tree, links, factor);
+  result.closure.row_sum_error_before = largest_error(row, target, /*certain=*/false);
+  const std::vector<double> wanted = wanted_sums(row, target);
   for (int step = 0; step < kScalingSteps; ++step) {
     double worst = 0;
     for (std::size_t i = 0; i < factor.size(); ++i) {
-      const double row = factor[i] * sum[i];
-      worst = std::max(worst, std::abs(row - wanted[i]));
-      if (row <= 0 || wanted[i] <= 0) continue;
-      factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row), kLeastFactor, kGreatestFactor);
+      worst = std::max(worst, std::abs(row[i] - wanted[i]));
+      if (row[i] <= 0 || wanted[i] <= 0) continue;
+      factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row[i]), least_factor(target[i]),
+                             kGreatestFactor);
     }
     if (worst < kScaled) break;
-    sum = gather_links(tree, links, factor);
+    row = scaled_row_sums(tree, links, factor);
   }
-  return factor;
+  row = scaled_row_sums(tree, links, factor);
+  result.closure.row_sum_error_after = largest_error(row, target, /*certain=*/true);
+  result.closure.relative_change = relative_change(tree, links, factor);
+  return result;
 }
 
 }  // namespace rebounce

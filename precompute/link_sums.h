@@ -14,13 +14,19 @@ namespace rebounce {
 std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> links,
                                  std::span<const double> x);
 
-/// Factors d [n] of the patches with which rows of D F D add up to their targets, D the diagonal
+struct LinkScaling {
+  std::vector<double> factor;   ///< [n] d, of the patches
+  std::vector<double> row_sum;  ///< [n] with it
+  ClosureReport closure;
+};
+
+/// Factors d of the patches with which rows of D F D add up to their targets, D the diagonal
 /// matrix of d: reciprocity is kept, and no link changes.
 ///
 /// Symmetric scaling (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix
 /// scaling", 2014). A target that was measured counts for as much as it is more certain than the
-/// row sum. Factors stay in [0.5, 2].
-std::vector<double> scale_links(const LinkTree& tree, std::span<const Link> links,
-                                std::span<const RowTarget> target);
+/// row sum. Factors stay in [0.5, 2], but for patches that see nothing, which may lose it all.
+LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
+                        std::span<const RowTarget> target);
 
 }  // namespace rebounce

@@ -42,8 +42,10 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
   LinkBuild build;
   copy_tree(refined.tree, build.links);
   copy_links(refined.links, build.links);
-  const std::vector<double> scale = scale_links(refined.tree, refined.links, refined.target);
-  build.links.scale.assign(scale.begin(), scale.end());
+  const LinkScaling scaling = scale_links(refined.tree, refined.links, refined.target);
+  build.links.scale.assign(scaling.factor.begin(), scaling.factor.end());
+  build.closure = scaling.closure;
+  static_cast<EscapedLight&>(build) = share_escape(scaling.row_sum, refined.escape);
   build.ray_count = refined.ray_count + model.patches.size() * settings.hemisphere_rays;
   build.candidate_count = refined.candidate_count;
   return build;

@@ -5,8 +5,6 @@
 #include <numeric>
 
 #include "block_tree.h"
-#include "cluster_tree.h"
-#include "light_weights.h"
 #include "lit_truth.h"
 #include "price_search.h"
 
@@ -53,22 +51,27 @@ double mean(const std::vector<double>& errors) {
   return std::accumulate(errors.begin(), errors.end(), 0.0) / static_cast<double>(errors.size());
 }
 
+CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patches,
+                          const LitTruth& shaping) {
+  CompressionFrame frame{build_cluster_tree(patches, kLeafSize), {}, {}};
+  frame.background = background_light(matrix, frame.tree);
+  frame.sample = shaping.normalised_lights(frame.tree.patch,
+                                           HierarchicalOperator::position_count(patches.size()));
+  frame.sample.col(0) *= std::sqrt(kUniformShare * static_cast<double>(frame.sample.cols()));
+  return frame;
+}
+
 /// A compressor with all that it looks at.
 class Compression {
  public:
   Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping)
       : matrix_(matrix),
         truth_(matrix, with_uniform(patches.size(), shaping)),
-        tree_(build_cluster_tree(patches, kLeafSize)),
-        background_(background_light(matrix, tree_)),
-        sample_(truth_.normalised_lights(tree_.patch,
-                                         HierarchicalOperator::position_count(patches.size()))) {
-    sample_.col(0) *= std::sqrt(kUniformShare * static_cast<double>(sample_.cols()));
-  }
+        frame_(frame_of(matrix, patches, truth_)) {}
 
   HierarchicalOperator::Storage at(double price, const Progress& progress) const {
-    const std::vector<ClusterWeight> weights = make_cluster_weights(tree_, sample_, background_);
-    return BlockTreeCompressor(matrix_, tree_, weights).compress(price, progress);
+    const std::vector<ClusterWeight> weights = frame_.weights();
+    return BlockTreeCompressor(matrix_, frame_.tree, weights).compress(price, progress);
   }
 
   /// Gives the shaping lights weight by the errors that they have with `transfer`.
@@ -77,7 +80,7 @@ class Compression {
     const double usual = mean(errors);
     if (usual == 0) return;
     for (std::size_t k = 0; k < errors.size(); ++k) {
-      sample_.col(static_cast<Eigen::Index>(k)) *=
+      frame_.sample.col(static_cast<Eigen::Index>(k)) *=
           std::clamp(errors[k] / usual, kLeastEmphasis, kMostEmphasis);
     }
   }
@@ -85,9 +88,7 @@ class Compression {
  private:
   const SymmetricMatrix& matrix_;
   LitTruth truth_;
-  ClusterTree tree_;
-  Eigen::VectorXd background_;
-  Eigen::MatrixXd sample_;
+  CompressionFrame frame_;
 };
 
 /// The mean error, or the largest by kLargestOverMean if that is more.
@@ -118,6 +119,15 @@ class Best {
 
 }  // namespace
 
+CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
+                                   Exitances shaping) {
+  return frame_of(matrix, patches, LitTruth(matrix, with_uniform(patches.size(), shaping)));
+}
+
+double first_price(double tolerance, std::size_t patch_count) {
+  return kFirstPrice * tolerance * tolerance / static_cast<double>(patch_count);
+}
+
 HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
                                               const PatchTable& patches, Exitances shaping,
                                               double price, const Progress& progress) {
@@ -130,7 +140,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   const LitTruth judging = judging_truth(matrix, lights.judging);
   Compression compression(matrix, patches, lights.shaping);
   const double tolerance = settings.tolerance;
-  PriceSearch search(kFirstPrice * tolerance * tolerance / static_cast<double>(patches.size()),
+  PriceSearch search(first_price(tolerance, patches.size()),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});
   Best best(kMost * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {

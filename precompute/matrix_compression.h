@@ -4,10 +4,30 @@
 #include <span>
 #include <vector>
 
+#include "cluster_tree.h"
+#include "light_weights.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {
+
+/// How blocks are cut and errors weighed in an operator over some patches.
+struct CompressionFrame {
+  ClusterTree tree;
+  Eigen::VectorXd background;  ///< as background_light gives it
+  Eigen::MatrixXd sample;      ///< the shaping lights, normalised
+
+  std::vector<ClusterWeight> weights() const {
+    return make_cluster_weights(tree, sample, background);
+  }
+};
+
+/// That of `matrix` under these lights; only its products and energies are asked for.
+CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
+                                   std::span<const std::vector<Float3>> shaping);
+
+/// The price that the search for a tolerance begins with.
+double first_price(double tolerance, std::size_t patch_count);
 
 /// Compresses `matrix` as compress_transfer does. `patches` are those of the matrix.
 HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,

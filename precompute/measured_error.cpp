@@ -15,7 +15,9 @@ namespace {
 
 using Exitances = std::vector<std::vector<Float3>>;
 
-constexpr int kReferenceLightCount = 16, kLightCount = 256;
+// Against the dense inverse, against pairs, of an operator that has rounding errors alone, and
+// against links.
+constexpr int kLightCount = 256, kReferenceLightCount = 16, kLinkedLightCount = 64;
 constexpr double kReferenceResidual = 1e-9;
 
 /// Against an iterative solution. Throws Cancelled if asked to stop.
@@ -49,8 +51,14 @@ KindError summary(LightKind kind, const std::vector<double>& errors) {
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress) {
+  if (exact == nullptr && data.exchange.empty() && data.links.empty()) {
+    throw Error("measured error: there is no truth without pairs or links; store links too");
+  }
   std::optional<ReferenceSolver> reference;
-  if (exact == nullptr) reference.emplace(data.exchange, data.patches);
+  if (exact == nullptr) reference.emplace(data);
+  const int light_count = exact != nullptr        ? kLightCount
+                          : data.exchange.empty() ? kLinkedLightCount
+                                                  : kReferenceLightCount;
   std::vector<KindError> result;
   for (std::size_t k = 0; k < kLightKinds.size(); ++k) {
     const Progress part = [&](double done) {
@@ -58,8 +66,7 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
     };
     if (!part(0)) throw Cancelled();
     const LightKind kind = kLightKinds[k];
-    const Exitances lights = random_initial_exitances(
-        data, tracer, kind, exact != nullptr ? kLightCount : kReferenceLightCount, seed);
+    const Exitances lights = random_initial_exitances(data, tracer, kind, light_count, seed);
     const std::vector<double> errors =
         exact != nullptr ? LitTruth(DenseMatrix(*exact), lights).errors(*data.transfer)
                          : errors_by_reference(data, *reference, lights, part);

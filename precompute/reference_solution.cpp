@@ -11,25 +11,74 @@ namespace rebounce {
 namespace {
 
 using Double3 = ReferenceSolver::Double3;
+using Form = ReferenceSolver::Form;
 
 constexpr int kMaxSteps = 10000;
 
-/// kLights lights on one scene, solved together. A column of an array is a patch and holds all
-/// channels of the first light, then of the next.
+/// A column is a patch and holds all channels of the first light, then of the next.
+template <int kRows>
+using Field = Eigen::Array<double, kRows, Eigen::Dynamic>;
+
+/// F times `in`.
+template <int kRows>
+Field<kRows> gather(const FormFactorRows& rows, const Field<kRows>& in) {
+  Field<kRows> out(kRows, in.cols());
+#pragma omp parallel for schedule(dynamic, 64)
+  for (Eigen::Index i = 0; i < in.cols(); ++i) {
+    const auto columns = rows.columns(i);
+    const auto factors = rows.form_factors(i);
+    Eigen::Array<double, kRows, 1> sum = Eigen::Array<double, kRows, 1>::Zero();
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      sum += static_cast<double>(factors[k]) * in.col(columns[k]);
+    }
+    out.col(i) = sum;
+  }
+  return out;
+}
+
+template <int kRows>
+Field<kRows> gather(const LinkedFormFactors& links, const Field<kRows>& in) {
+  using Columns = std::array<double, kRows>;
+  std::vector<Columns> from(in.cols()), to(in.cols());
+  const auto size = static_cast<std::size_t>(in.size());
+  std::copy_n(in.data(), size, from.front().data());
+  links.gather(std::span<const Columns>(from), std::span(to));
+  return Eigen::Map<const Field<kRows>>(to.front().data(), kRows, in.cols());
+}
+
+/// Light after light, in single precision.
+template <int kRows>
+Field<kRows> gather(const CompressedFormFactors& compressed, const Field<kRows>& in) {
+  Field<kRows> out(kRows, in.cols());
+  std::vector<Float3> from(in.cols()), to(in.cols());
+  std::vector<float> workspace(compressed.workspace_size());
+  for (int begin = 0; begin < kRows; begin += kChannelCount) {
+    for (Eigen::Index i = 0; i < in.cols(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) from[i][c] = static_cast<float>(in(begin + c, i));
+    }
+    compressed.gather(from, to, workspace);
+    for (Eigen::Index i = 0; i < in.cols(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) out(begin + c, i) = to[i][c];
+    }
+  }
+  return out;
+}
+
+/// kLights lights on one scene, solved together.
 template <int kLights>
 class ConjugateGradients {
  public:
   using Lights = std::span<const std::vector<Float3>>;
   static constexpr int kRows = kLights * kChannelCount;
-  using Field = Eigen::Array<double, kRows, Eigen::Dynamic>;
+  using Field = rebounce::Field<kRows>;
 
   /// `lights`: kLights of them at most.
-  ConjugateGradients(const FormFactorRows& rows, const PatchTable& patches, Lights lights)
-      : rows_(rows),
-        area_(Eigen::Map<const Eigen::VectorXf>(patches.area.data(), rows.patch_count())
+  ConjugateGradients(const Form& form, const PatchTable& patches, Lights lights)
+      : form_(form),
+        area_(Eigen::Map<const Eigen::VectorXf>(patches.area.data(), std::ssize(patches.area))
                   .cast<double>()),
-        root_(kRows, rows.patch_count()),
-        m0_(Field::Zero(kRows, rows.patch_count())) {
+        root_(kRows, std::ssize(patches.area)),
+        m0_(Field::Zero(kRows, std::ssize(patches.area))) {
     for (std::size_t i = 0; i < patches.size(); ++i) {
       for (int k = 0; k < kRows; ++k) {
         const int light = k / kChannelCount, channel = k % kChannelCount;
@@ -55,18 +104,7 @@ class ConjugateGradients {
 
   /// F times `in`.
   Field gather(const Field& in) const {
-    Field out(kRows, in.cols());
-#pragma omp parallel for schedule(dynamic, 64)
-    for (Eigen::Index i = 0; i < in.cols(); ++i) {
-      const auto columns = rows_.columns(i);
-      const auto factors = rows_.form_factors(i);
-      Eigen::Array<double, kRows, 1> sum = Eigen::Array<double, kRows, 1>::Zero();
-      for (std::size_t k = 0; k < columns.size(); ++k) {
-        sum += static_cast<double>(factors[k]) * in.col(columns[k]);
-      }
-      out.col(i) = sum;
-    }
-    return out;
+    return std::visit([&](const auto& form) { return rebounce::gather<kRows>(form, in); }, form_);
   }
 
  private:
@@ -108,19 +146,27 @@ class ConjugateGradients {
     return (b > 0).select(a / b, 0);
   }
 
-  const FormFactorRows& rows_;
+  const Form& form_;
   Eigen::VectorXd area_;
   Field root_, m0_;
 };
+
+Form best_form(const TransferData& data) {
+  if (!data.exchange.empty()) return FormFactorRows(data.exchange, data.patches.area);
+  if (!data.links.empty()) {
+    return LinkedFormFactors(data.links, data.patches.area, data.patches.centroid);
+  }
+  return CompressedFormFactors(data.compressed_form_factors);
+}
 
 enum class Quantity { kRadiosity, kIndirectIrradiance };
 
 /// Appends the solutions [n] of kLights lights at most.
 template <int kLights>
-void solve_together(const FormFactorRows& rows, const PatchTable& patches,
+void solve_together(const Form& form, const PatchTable& patches,
                     std::span<const std::vector<Float3>> lights, double residual, Quantity quantity,
                     std::vector<std::vector<Double3>>& solutions) {
-  const ConjugateGradients<kLights> solver(rows, patches, lights);
+  const ConjugateGradients<kLights> solver(form, patches, lights);
   auto field = solver.solve(residual);
   if (quantity == Quantity::kIndirectIrradiance) field = solver.gather(field);
   for (std::size_t light = 0; light < lights.size(); ++light) {
@@ -131,17 +177,20 @@ void solve_together(const FormFactorRows& rows, const PatchTable& patches,
   }
 }
 
-std::vector<std::vector<Double3>> solve(const FormFactorRows& rows, const PatchTable& patches,
+std::vector<std::vector<Double3>> solve(const Form& form, const PatchTable& patches,
                                         std::span<const std::vector<Float3>> lights,
                                         double residual, Quantity quantity) {
+  if (std::holds_alternative<CompressedFormFactors>(form)) {
+    residual = std::max(residual, ReferenceSolver::kSinglePrecisionResidual);
+  }
   std::vector<std::vector<Double3>> solutions;
   while (solutions.size() < lights.size()) {
     const auto left = lights.subspan(solutions.size());
     if (left.size() == 1) {
-      solve_together<1>(rows, patches, left, residual, quantity, solutions);
+      solve_together<1>(form, patches, left, residual, quantity, solutions);
     } else {
       solve_together<ReferenceSolver::kTogether>(
-          rows, patches, left.first(std::min<std::size_t>(ReferenceSolver::kTogether, left.size())),
+          form, patches, left.first(std::min<std::size_t>(ReferenceSolver::kTogether, left.size())),
           residual, quantity, solutions);
     }
   }
@@ -151,7 +200,13 @@ std::vector<std::vector<Double3>> solve(const FormFactorRows& rows, const PatchT
 }  // namespace
 
 ReferenceSolver::ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches)
-    : patches_(patches), rows_(exchange, patches.area) {}
+    : patches_(patches), form_(FormFactorRows(exchange, patches.area)) {}
+
+ReferenceSolver::ReferenceSolver(const FormFactorLinks& links, const PatchTable& patches)
+    : patches_(patches), form_(LinkedFormFactors(links, patches.area, patches.centroid)) {}
+
+ReferenceSolver::ReferenceSolver(const TransferData& data)
+    : patches_(data.patches), form_(best_form(data)) {}
 
 std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_exitance,
                                                 double residual) const {
@@ -161,7 +216,7 @@ std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_
 
 std::vector<std::vector<Double3>> ReferenceSolver::radiosities(
     std::span<const std::vector<Float3>> initial_exitances, double residual) const {
-  return solve(rows_, patches_, initial_exitances, residual, Quantity::kRadiosity);
+  return solve(form_, patches_, initial_exitances, residual, Quantity::kRadiosity);
 }
 
 std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3> initial_exitance,
@@ -173,7 +228,7 @@ std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3>
 std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
     std::span<const std::vector<Float3>> initial_exitances, double residual) const {
   const auto solutions =
-      solve(rows_, patches_, initial_exitances, residual, Quantity::kIndirectIrradiance);
+      solve(form_, patches_, initial_exitances, residual, Quantity::kIndirectIrradiance);
   std::vector<std::vector<Float3>> result;
   for (const std::vector<Double3>& h : solutions) {
     std::vector<Float3>& rounded = result.emplace_back(h.size());

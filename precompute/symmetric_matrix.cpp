@@ -18,7 +18,39 @@ constexpr Index kTile = DenseOperator::kTile;
 using Tile = Eigen::Matrix<float, kTile, kTile, Eigen::RowMajor>;
 using RowMajorMatrixXf = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+// Rows and columns that are looked at together: few columns, which are what threads share, and many
+// rows, as a matrix made of links is read by the columns.
+constexpr std::size_t kTogetherRows = 2048, kTogetherColumns = 256;
+
+/// Patches [begin, begin + count) of a list, or those that there are.
+std::span<const std::uint32_t> part_of(std::span<const std::uint32_t> patches, std::size_t begin,
+                                       std::size_t count) {
+  return patches.subspan(begin, std::min(count, patches.size() - begin));
+}
+
 }  // namespace
+
+Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) const {
+  const SingleThreadedBlas single_threaded;
+  const std::size_t n = order.size();
+  Eigen::VectorXd energy = Eigen::VectorXd::Zero(static_cast<Index>(n));
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t column = 0; column < n; column += kTogetherColumns) {
+    const auto columns = part_of(order, column, kTogetherColumns);
+    for (std::size_t row = 0; row < n; row += kTogetherRows) {
+      const auto rows = part_of(order, row, kTogetherRows);
+      MatrixXf part(rows.size(), columns.size());
+      for (std::uint32_t m = 0; m < matrix_count(); ++m) {
+        entries(m, rows, columns, part);
+        const Eigen::VectorXd squares = part.cast<double>().colwise().squaredNorm();
+        for (std::size_t k = 0; k < columns.size(); ++k) {
+          energy[columns[k]] += squares[static_cast<Index>(k)];
+        }
+      }
+    }
+  }
+  return energy;
+}
 
 void DenseMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                           std::span<const std::uint32_t> columns,

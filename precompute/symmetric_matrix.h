@@ -23,13 +23,17 @@ class SymmetricMatrix {
   virtual std::array<std::uint32_t, kChannelCount> channel_matrix() const = 0;
 
   /// Writes the entries between two lists of patches without repetitions, which are the same or
-  /// have none in common; `entries` is [rows][columns].
+  /// have none in common; `entries` is [rows][columns]. BLAS must run on one thread.
   virtual void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                        std::span<const std::uint32_t> columns,
                        Eigen::Ref<Eigen::MatrixXf> entries) const = 0;
 
   /// The product with many vectors at once, x [n][k]. The same bits for any number of threads.
   virtual Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const = 0;
+
+  /// What arrives of the light of each patch alone: the squared norms of the columns, of all
+  /// matrices together, [n] by patch. `order` lists the patches so that neighbours stay together.
+  virtual Eigen::VectorXd energies(std::span<const std::uint32_t> order) const;
 };
 
 /// Yhat, from an operator in f32.

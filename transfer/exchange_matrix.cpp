@@ -56,6 +56,11 @@ class RowRelaxation final : public Relaxation {
 
 FormFactorRows::FormFactorRows(const ExchangeMatrix& exchange, std::span<const float> area) {
   const std::size_t n = exchange.patch_count();
+  if (exchange.empty()) {
+    throw Error(
+        "form factors: there are no pairs, compressed ones only; make them again with "
+        "--form-factors pairs");
+  }
   if (area.size() != n) throw Error("form factors and patch areas differ in number");
   row_begin_.assign(n + 1, 0);
   for (std::size_t i = 0; i < n; ++i) {

@@ -358,6 +358,41 @@ Storage HierarchicalOperator::encode(const Storage& storage, Precision precision
   return stream(storage);
 }
 
+Storage decode(const Storage& storage) {
+  const Storage streamed = HierarchicalOperator::stream(storage);
+  if (streamed.precision == Precision::kF32) return streamed;
+  Storage decoded = streamed;
+  decoded.precision = Precision::kF32;
+  decoded.values_f16 = {};
+  decoded.bases_q16 = {};
+  decoded.bases_q8 = {};
+  const HierarchicalLayout from(streamed), to(decoded);
+  const ValueReader read(streamed, from);
+  std::vector<float> values(HierarchicalLayout::padded(to.basis_value_count + to.core_value_count));
+  const auto copy_basis = [&](const HierarchicalLayout::End& source,
+                              const HierarchicalLayout::End& target, std::uint32_t rank,
+                              std::uint32_t size) {
+    for (std::uint32_t r = 0; r < rank; ++r) {
+      for (std::uint32_t k = 0; k < size; ++k) {
+        values[to.basis_index(target, r, k)] =
+            static_cast<float>(read.basis(from.basis_index(source, r, k)));
+      }
+    }
+  };
+  for (std::size_t b = 0; b < streamed.blocks.size(); ++b) {
+    const TransferBlock& block = streamed.blocks[b];
+    if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
+    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_count);
+    if (block.on_diagonal()) continue;
+    copy_basis(from.places[b].column, to.places[b].column, block.column_rank, block.column_count);
+  }
+  for (std::uint64_t k = 0; k < to.core_value_count; ++k) {
+    values[to.basis_value_count + k] = static_cast<float>(read.core(k));
+  }
+  decoded.values_f32 = SharedArray(std::move(values));
+  return decoded;
+}
+
 std::vector<double> block_entries(const Storage& storage, const HierarchicalLayout& layout,
                                   std::size_t index, std::uint32_t matrix) {
   const ValueReader read(storage, layout);

@@ -13,6 +13,9 @@ void check_hierarchical_storage(const HierarchicalOperator::Storage& storage);
 /// What products of stored values must be multiplied by.
 float product_scale(Precision precision);
 
+/// What the values of an operator stand for, in f32 and in the order kStreamed.
+HierarchicalOperator::Storage decode(const HierarchicalOperator::Storage& storage);
+
 /// The entries of one block, [row_count][column_count], of one matrix; values in the order
 /// kStreamed.
 std::vector<double> block_entries(const HierarchicalOperator::Storage& storage,

@@ -19,11 +19,11 @@ namespace {
 constexpr std::size_t kWorthThreads = 16384;
 
 // Colour channels and one more, so that a colour is one vector.
-constexpr int kLanes = 4;
-using Lanes = std::array<float, kLanes>;
+using ColourLanes = std::array<float, 4>;
 
+template <typename Lanes>
 void add(Lanes& to, float factor, const Lanes& from) {
-  for (int c = 0; c < kLanes; ++c) to[c] += factor * from[c];
+  for (std::size_t c = 0; c < to.size(); ++c) to[c] += factor * from[c];
 }
 
 /// Position of the first patch of each node.
@@ -102,6 +102,7 @@ void check_links(const FormFactorLinks& links, std::size_t patch_count) {
 
 /// Of a node: in the pull, mean light and its first moments over the area; in the push, what
 /// arrived, m² lx, and its gradients, m lx.
+template <typename Lanes>
 struct LinkedFormFactors::Light {
   Lanes mean;
   std::array<Lanes, 3> first;
@@ -186,31 +187,40 @@ std::size_t LinkedFormFactors::bytes() const {
 }
 
 std::size_t LinkedFormFactors::workspace_size() const {
-  return 2 * node_.size() * sizeof(Light) / sizeof(float);
+  return 2 * node_.size() * sizeof(Light<ColourLanes>) / sizeof(float);
 }
 
 void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
                                std::span<float> workspace) const {
   assert(in.size() == patch_count() && out.size() == patch_count() &&
          workspace.size() >= workspace_size());
-  auto* light = reinterpret_cast<Light*>(workspace.data());
-  Light* arrived = light + node_.size();
+  auto* light = reinterpret_cast<Light<ColourLanes>*>(workspace.data());
+  auto* arrived = light + node_.size();
   pull(in, light);
   gather_nodes(light, arrived);
   push(arrived, out);
 }
 
-void LinkedFormFactors::pull(std::span<const Float3> in, Light* light) const {
+template <typename Columns>
+void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
+  assert(in.size() == patch_count() && out.size() == patch_count());
+  std::vector<Light<Columns>> light(node_.size()), arrived(node_.size());
+  pull(in, light.data());
+  gather_nodes(light.data(), arrived.data());
+  push(arrived.data(), out);
+}
+
+template <typename Columns, typename Lanes>
+void LinkedFormFactors::pull(std::span<const Columns> in, Light<Lanes>* light) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
 #pragma omp for schedule(static)
     for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
       const Node& node = node_[k];
-      Light sum{};
+      Light<Lanes> sum{};
       if (node.patch != kNone) {
-        const Float3& x = in[node.patch];
-        const float s = scale_[node.patch];
-        sum.mean = {s * x[0], s * x[1], s * x[2], 0};
+        const Columns& x = in[node.patch];
+        for (std::size_t c = 0; c < x.size(); ++c) sum.mean[c] = scale_[node.patch] * x[c];
       } else {
         for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
           const Node& child = node_[c];
@@ -226,13 +236,14 @@ void LinkedFormFactors::pull(std::span<const Float3> in, Light* light) const {
   }
 }
 
-void LinkedFormFactors::gather_nodes(const Light* light, Light* arrived) const {
+template <typename Lanes>
+void LinkedFormFactors::gather_nodes(const Light<Lanes>* light, Light<Lanes>* arrived) const {
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t k = 0; k < node_.size(); ++k) {
-    Light sum{};
+    Light<Lanes> sum{};
     for (std::uint64_t l = incoming_begin_[k]; l < incoming_begin_[k + 1]; ++l) {
       const Incoming& link = incoming_[l];
-      const Light& from = light[link.from];
+      const Light<Lanes>& from = light[link.from];
       add(sum.mean, link.exchange_area, from.mean);
       for (int axis = 0; axis < 3; ++axis) {
         add(sum.mean, link.gradient_from[axis], from.first[axis]);
@@ -243,16 +254,18 @@ void LinkedFormFactors::gather_nodes(const Light* light, Light* arrived) const {
   }
 }
 
-void LinkedFormFactors::push(Light* arrived, std::span<Float3> out) const {
+template <typename Lanes, typename Columns>
+void LinkedFormFactors::push(Light<Lanes>* arrived, std::span<Columns> out) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = 0; level + 1 < level_begin_.size(); ++level) {
 #pragma omp for schedule(static)
     for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
       const Node& node = node_[k];
-      const Light& here = arrived[k];
+      const Light<Lanes>& here = arrived[k];
       if (node.patch != kNone) {
-        const float factor = scale_[node.patch] / node.area;
-        for (int c = 0; c < kChannelCount; ++c) out[node.patch][c] = factor * here.mean[c];
+        const typename Lanes::value_type scale = scale_[node.patch], factor = scale / node.area;
+        Columns& y = out[node.patch];
+        for (std::size_t c = 0; c < y.size(); ++c) y[c] = factor * here.mean[c];
         continue;
       }
       for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
@@ -266,5 +279,10 @@ void LinkedFormFactors::push(Light* arrived, std::span<Float3> out) const {
     }
   }
 }
+
+template void LinkedFormFactors::gather(std::span<const std::array<double, 3>>,
+                                        std::span<std::array<double, 3>>) const;
+template void LinkedFormFactors::gather(std::span<const std::array<double, 24>>,
+                                        std::span<std::array<double, 24>>) const;
 
 }  // namespace rebounce

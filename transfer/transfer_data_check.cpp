@@ -125,7 +125,7 @@ class Checker {
       refuse("mesh.back_triangle", "more rows than there are triangles");
     }
 
-    rows(tensor::kRowBegin, data_.exchange.row_begin.size(), n + 1);
+    if (!data_.exchange.empty()) rows(tensor::kRowBegin, data_.exchange.row_begin.size(), n + 1);
     rows(tensor::kExchangeArea, data_.exchange.exchange_area.size(), data_.exchange.column.size());
   }
 
@@ -330,6 +330,7 @@ class Checker {
 
   void check_exchange() const {
     const ExchangeMatrix& exchange = data_.exchange;
+    if (exchange.empty()) return;
     begins(tensor::kRowBegin, exchange.row_begin.span(), exchange.column.size());
     for (std::size_t row = 0; row < data_.patches.size(); ++row) {
       std::size_t least = row;  // not below the diagonal

@@ -173,7 +173,9 @@ void read_scene(const SafetensorsFile& file, TransferData& data) {
                     [&](const char* kind, auto& items) { read_names(file, names, kind, items); });
 }
 
+/// Empty if the file has none.
 ExchangeMatrix read_exchange(const SafetensorsFile& file) {
+  if (!file.tensors().contains(tensor::kRowBegin)) return {};
   return {file.tensor<std::uint64_t>(tensor::kRowBegin, {kAnySize}),
           file.tensor<std::uint32_t>(tensor::kColumn, {kAnySize}),
           file.tensor<float>(tensor::kExchangeArea, {kAnySize})};
@@ -311,6 +313,7 @@ std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsF
       read_channel_matrix(file, tensor::kLowRankChannelMatrix, storage.matrix_count);
   std::shared_ptr<const FormFactorOperator> gather;
   if (first_bounce) {
+    if (data.exchange.empty()) refuse(file, "its operator needs form factors by pairs");
     gather = std::make_shared<const FormFactorBlocks>(data.exchange, data.patches.area);
   }
   try {
@@ -404,6 +407,9 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   data.links = read_links(file, data.patches);
   data.transfer = read_operator(file, data);
   data.compressed_form_factors = read_compressed_form_factors(file, data.patches.area);
+  if (data.exchange.empty() && !data.compressed_form_factors) {
+    refuse(file, "there are no form factors, neither pairs nor compressed ones");
+  }
   return data;
 }
 

@@ -61,7 +61,9 @@ void collect_textures(const std::vector<Texture>& textures, TensorCollector& col
   }
 }
 
+/// Files of scenes with too many pairs have no tensors of them.
 void collect_exchange(const ExchangeMatrix& exchange, TensorCollector& collector) {
+  if (exchange.empty()) return;
   collector.add(tensor::kRowBegin, {exchange.row_begin.size()}, exchange.row_begin.span());
   collector.add(tensor::kColumn, {exchange.column.size()}, exchange.column.span());
   collector.add(tensor::kExchangeArea, {exchange.exchange_area.size()},
@@ -193,6 +195,9 @@ void seal(SafetensorsLayout& layout) {
 }  // namespace
 
 void save_transfer_file(const std::filesystem::path& path, const TransferData& data) {
+  if (data.exchange.empty() && !data.compressed_form_factors) {
+    throw Error("a transfer file needs form factors; give it pairs or compressed ones");
+  }
   TensorCollector collector;
   visit_tensors_of_patches(data.patches, collector);
   visit_tensors_of_mesh(data.mesh, collector);

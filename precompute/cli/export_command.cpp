@@ -4,6 +4,7 @@
 
 #include "commands.h"
 #include "rebounce/precompute/npz_writer.h"
+#include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {
@@ -37,7 +38,11 @@ void add_patches(const TransferData& data, Export& out) {
   out.arrays.push_back(numpy_array("absorbed", {n}, view(p.absorbed)));
 }
 
-void add_form_factors(const TransferData& data, Export& out) {
+void add_form_factors(const TransferData& data, const std::string& file, Export& out) {
+  if (data.exchange.empty()) {
+    throw Error(file +
+                " holds its form factors compressed only; make it again with --form-factors pairs");
+  }
   const std::size_t n = data.patches.size();
   const std::vector<float>& area = data.patches.area;
   out.form_factor.assign(n * n, 0.0);
@@ -87,7 +92,7 @@ void run(const ExportOptions& chosen, const CommonOptions& options) {
   const TransferData data = load_transfer_file(chosen.file);
   Export out;
   if (chosen.what == "patches") add_patches(data, out);
-  if (chosen.what == "form-factors") add_form_factors(data, out);
+  if (chosen.what == "form-factors") add_form_factors(data, chosen.file, out);
   if (chosen.what == "transfer") add_transfer(data, out);
   if (chosen.what == "mesh") add_mesh(data, out);
   write_npz(chosen.output, out.arrays);

@@ -16,6 +16,11 @@ nlohmann::json parse_or_text(const std::string& text) {
   return parsed.is_discarded() ? nlohmann::json(text) : parsed;
 }
 
+const char* form_factors_of(const TransferData& data) {
+  if (data.exchange.empty()) return "compressed";
+  return data.compressed_form_factors ? "pairs, compressed" : "pairs";
+}
+
 void print_summary(const nlohmann::json& info) {
   for (const auto& [key, value] : info.items()) {
     fmt::print("{:<20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
@@ -37,30 +42,36 @@ void run(const std::string& path, const CommonOptions& options) {
 nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
   const auto n = static_cast<double>(data.patches.size());
   const BuildRecord& record = data.record;
-  return {{"format_version", kFileFormatVersion},
-          {"generator", record.generator},
-          {"scene", record.scene_name},
-          {"scene_hash", record.scene_hash},
-          {"patch_count", data.patches.size()},
-          {"display_triangle_count", data.mesh.triangle.size()},
-          {"display_vertex_count", data.mesh.position.size()},
-          {"material_count", data.materials.size()},
-          {"light_count", data.lights.size()},
-          {"camera_count", data.cameras.size()},
-          {"form_factor_count", data.exchange.column.size()},
-          {"compressed_form_factor_bytes",
-           data.compressed_form_factors ? data.compressed_form_factors->bytes() : 0},
-          {"operator", data.transfer->kind()},
-          {"operator_bytes", data.transfer->bytes()},
-          {"bytes_per_patch", static_cast<double>(data.transfer->bytes()) / n},
-          {"file_bytes", file_bytes},
-          {"residual", record.solve_residual},
-          {"tolerance", record.tolerance},
-          {"error_mean", record.error_mean},
-          {"error_max", record.error_max},
-          {"error_bound", record.error_bound},
-          {"settings", parse_or_text(record.settings_json)},
-          {"report", parse_or_text(record.report_json)}};
+  nlohmann::json info = {{"format_version", kFileFormatVersion},
+                         {"generator", record.generator},
+                         {"scene", record.scene_name},
+                         {"scene_hash", record.scene_hash},
+                         {"patch_count", data.patches.size()},
+                         {"display_triangle_count", data.mesh.triangle.size()},
+                         {"display_vertex_count", data.mesh.position.size()},
+                         {"material_count", data.materials.size()},
+                         {"light_count", data.lights.size()},
+                         {"camera_count", data.cameras.size()},
+                         {"form_factors", form_factors_of(data)},
+                         {"form_factor_count", data.exchange.column.size()},
+                         {"compressed_form_factor_bytes",
+                          data.compressed_form_factors ? data.compressed_form_factors->bytes() : 0},
+                         {"link_count", data.links.pair.size()},
+                         {"operator", data.transfer->kind()},
+                         {"operator_bytes", data.transfer->bytes()},
+                         {"bytes_per_patch", static_cast<double>(data.transfer->bytes()) / n},
+                         {"file_bytes", file_bytes},
+                         {"residual", record.solve_residual},
+                         {"tolerance", record.tolerance},
+                         {"error_mean", record.error_mean},
+                         {"error_max", record.error_max},
+                         {"error_bound", record.error_bound},
+                         {"settings", parse_or_text(record.settings_json)},
+                         {"report", parse_or_text(record.report_json)}};
+  for (const char* error : {"form_factor_error_mean", "form_factor_error_max"}) {
+    if (info["report"].contains(error)) info[error] = info["report"][error];
+  }
+  return info;
 }
 
 void add_info_command(CLI::App& app, const CommonOptions& options) {

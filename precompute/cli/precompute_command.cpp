@@ -17,7 +17,7 @@ namespace rebounce::cli {
 namespace {
 
 struct PrecomputeOptions {
-  std::string scene, output, operator_kind, precision, quality = "default";
+  std::string scene, output, form_factors, operator_kind, precision, quality = "default";
   bool tolerance_given = false;
   BuildSettings settings;
   double memory_limit_gib = 0;
@@ -53,10 +53,12 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
       "(min / median / max)\n",
       report.triangle_count, report.degenerate_triangle_count, report.patch_count,
       report.patch_size_min, report.patch_size_median, report.patch_size_max);
+  const bool pairs = report.form_factor_count > 0;
   fmt::print(
-      "form factors: {} from {} pairs, {:.1f} million rays; row sums off by {:.1e} before and "
+      "form factors: {} {} from {} pairs, {:.1f} million rays; row sums off by {:.1e} before and "
       "{:.1e} after closure, which changed F by {:.2f} %\n",
-      report.form_factor_count, report.pair_count, static_cast<double>(report.ray_count) / 1e6,
+      pairs ? report.form_factor_count : report.link_count, pairs ? "entries" : "links",
+      report.pair_count, static_cast<double>(report.ray_count) / 1e6,
       report.closure.row_sum_error_before, report.closure.row_sum_error_after,
       100 * report.closure.relative_change);
   fmt::print(
@@ -79,19 +81,18 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
 }
 
 /// The file is written all the same, with the errors that it has.
-void check_tolerances(const BuildRecord& record, const BuildReport& report,
-                      double form_factor_tolerance) {
+void check_tolerances(const BuildRecord& record, const BuildReport& report) {
   if (record.tolerance > 0 && record.error_mean > record.tolerance) {
     throw Error(fmt::format(
         "the operator misses its tolerance: the mean error is {:.2g} and {:.2g} was asked for; "
         "ask for less, or for --precision f32 or --operator dense",
         record.error_mean, record.tolerance));
   }
-  if (report.form_factor_error && report.form_factor_error->mean > form_factor_tolerance) {
+  if (report.form_factor_error && report.form_factor_error->mean > report.form_factor_tolerance) {
     throw Error(fmt::format(
         "the compressed form factors miss their tolerance: the mean error is {:.2g} and {:.2g} was "
         "asked for; ask for less with --compress-form-factors, or go without",
-        report.form_factor_error->mean, form_factor_tolerance));
+        report.form_factor_error->mean, report.form_factor_tolerance));
   }
 }
 
@@ -116,6 +117,8 @@ FormFactorQuality quality_named(std::string_view name) {
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
   take_probes(chosen.probes, settings.probes);
+  if (chosen.form_factors == "pairs") settings.form_factor_kind = FormFactorKind::kPairs;
+  if (chosen.form_factors == "links") settings.form_factor_kind = FormFactorKind::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
   for (const Precision precision :
        {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
@@ -152,7 +155,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   } else if (!options.quiet) {
     print_summary(data, report, file_bytes);
   }
-  check_tolerances(data.record, report, settings.form_factor_tolerance);
+  check_tolerances(data.record, report);
 }
 
 // The options below are kept by CLI11 for as long as `command` lives, and so must `chosen` be.
@@ -177,6 +180,13 @@ void add_scene_options(CLI::App& command, PrecomputeOptions& chosen) {
 
 void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
+      .add_option("--form-factors", chosen.form_factors,
+                  "What the operator is made from: pairs of patches, with memory in proportion to "
+                  "their number squared, or links between sets of them, with which the file holds "
+                  "form factors compressed only; by default links above 20000 patches or where "
+                  "pairs are over the memory limit")
+      ->check(CLI::IsMember({"pairs", "links"}));
+  command
       .add_option("--quality", chosen.quality,
                   "Rays and kernels of the form factors: view factors to some 0.5 % by default, to "
                   "0.1 % in ten times as long with high")
@@ -194,7 +204,8 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
       .add_option(
           "--compress-form-factors", chosen.settings.form_factor_tolerance,
           "Keep the form factors compressed as well, for iterative methods, with this error of the "
-          "light that is gathered in the mean")
+          "light that is gathered in the mean; always with --form-factors links, by default to a "
+          "fifth of the tolerance")
       ->check(CLI::Range(1e-5, 0.5));
   command.add_option("--seed", chosen.settings.form_factors.seed, "Seed of the sample points")
       ->capture_default_str();
@@ -268,6 +279,9 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--memory-limit", chosen->memory_limit_gib,
                    "Refuse to start what needs more GiB; by default half of the machine's memory")
       ->check(CLI::PositiveNumber);
+  command->add_option("--checkpoint", chosen->settings.checkpoint,
+                      "Folder for what is done of an operator from links: started again, a run "
+                      "that was killed has it done. Remove it afterwards");
   command->callback([chosen, &options] { run(*chosen, options); });
 }
 

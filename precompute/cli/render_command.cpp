@@ -45,7 +45,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
   std::vector<float> error;
   if (settings.show == Show::kError) {
-    const ReferenceSolver solver(data->exchange, data->patches);
+    const ReferenceSolver solver(*data);
     error = patch_errors(engine.indirect_irradiance(),
                          solver.indirect_irradiance(engine.initial_exitance()), data->patches.area);
   }

@@ -28,7 +28,7 @@ constexpr const char *kExact = "exact", *kCompressed = "compressed";  // F as me
 constexpr const char* kAutomatic = "auto";
 
 struct SolveOptions {
-  std::string file, lights, method = kTransferMethod, form_factors = kExact, output;
+  std::string file, lights, method = kTransferMethod, form_factors, output;
   SolveSettings settings;
   double error = 0.01;  // that kAutomatic may leave
 };
@@ -95,10 +95,9 @@ Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
 }
 
 Solution solve_automatically(const SolveOptions& chosen, const Engine& engine,
-                             const FormFactorOperator& form_factors) {
+                             const SweepableFormFactors& form_factors) {
   const TransferData& data = engine.data();
-  AutomaticSolver solver(dynamic_cast<const SweepableFormFactors&>(form_factors),
-                         {data.patches.area, data.patches.reflectance}, data.transfer,
+  AutomaticSolver solver(form_factors, {data.patches.area, data.patches.reflectance}, data.transfer,
                          data.record.error_mean);
   Solution solution;
   AutomaticSolver::Result result;
@@ -169,7 +168,7 @@ Solution solve_on_links(const SolveOptions& chosen, Engine& engine) {
 }
 
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
-                       const FormFactorOperator& form_factors) {
+                       const SweepableFormFactors& form_factors) {
   if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
   if (chosen.method == kHierarchicalMethod) return solve_on_links(chosen, engine);
   if (chosen.method == kAutomatic) return solve_automatically(chosen, engine, form_factors);
@@ -179,16 +178,26 @@ Solution find_solution(const SolveOptions& chosen, Engine& engine,
   return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
 }
 
-std::unique_ptr<const FormFactorOperator> choose_form_factors(const SolveOptions& chosen,
-                                                              const TransferData& data) {
-  if (chosen.form_factors == kExact) {
-    return make_form_factors(method_of(chosen), data.exchange, data.patches.area);
-  }
-  if (!data.compressed_form_factors) {
+/// kExact or kCompressed: what was asked for, or the best that the file holds.
+const char* form_factors_of(const SolveOptions& chosen, const TransferData& data) {
+  if (chosen.form_factors == kCompressed && !data.compressed_form_factors) {
     throw Error(chosen.file +
                 " holds no compressed form factors; make it with --compress-form-factors");
   }
-  return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
+  if (chosen.form_factors == kExact && data.exchange.empty()) {
+    throw Error(chosen.file +
+                " holds its form factors compressed only; go without --form-factors exact");
+  }
+  if (chosen.form_factors.empty()) return data.exchange.empty() ? kCompressed : kExact;
+  return chosen.form_factors == kCompressed ? kCompressed : kExact;
+}
+
+std::unique_ptr<const SweepableFormFactors> choose_form_factors(const SolveOptions& chosen,
+                                                                const TransferData& data) {
+  if (chosen.form_factors == kCompressed) {
+    return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
+  }
+  return make_form_factors(method_of(chosen), data);
 }
 
 void run(const SolveOptions& chosen, const CommonOptions& options) {
@@ -197,6 +206,7 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   engine.compute_direct(setup.lights, setup.sky);
   engine.compute_initial_exitance();
+  const char* const kind = form_factors_of(chosen, *data);
   const auto form_factors = choose_form_factors(chosen, *data);
   const Solution solution = find_solution(chosen, engine, *form_factors);
   if (solution.diverged) {
@@ -208,7 +218,7 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   write_solution(chosen.output, engine, solution);
   if (options.json) {
     nlohmann::json summary = {{"method", chosen.method},
-                              {"form_factors", chosen.form_factors},
+                              {"form_factors", kind},
                               {"sweeps", solution.sweeps},
                               {"residual", residual},
                               {"microseconds", solution.microseconds}};
@@ -238,10 +248,10 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
       ->capture_default_str();
   command
       ->add_option("--form-factors", chosen->form_factors,
-                   "What iterative methods gather with: the exact form factors, or the compressed "
-                   "ones of a file that holds them")
-      ->check(CLI::IsMember({kExact, kCompressed}))
-      ->capture_default_str();
+                   "What iterative methods gather with: the exact form factors of pairs, or the "
+                   "compressed ones of a file that holds them; by default exact ones where there "
+                   "are any")
+      ->check(CLI::IsMember({kExact, kCompressed}));
   command
       ->add_option("--iterations", chosen->settings.max_sweeps,
                    "Sweeps at most, for iterative methods")

@@ -35,7 +35,7 @@ void IndirectSolver::make_iteration(const IndirectMethod& method) {
     solver_ = std::make_unique<HierarchicalSolver>(*links, problem);
     form_factors_ = std::move(links);
   } else {
-    auto form = make_form_factors(*method.iteration, data_.exchange, data_.patches.area);
+    auto form = make_form_factors(*method.iteration, data_);
     solver_ = make_solver(*method.iteration, *form, problem, data_.transfer);
     form_factors_ = std::move(form);
   }

@@ -13,6 +13,7 @@
 #include "exposure.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sky_light.h"
+#include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/error.h"
 #include "sample_sequence.h"
 #include "srgb.h"
@@ -378,8 +379,9 @@ float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
 
 std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
   std::vector<Float3> irradiance(data.patches.size());
-  FormFactorRows(data.exchange, data.patches.area)
-      .gather(data.patches.emitted_exitance, irradiance);
+  const auto form_factors = make_form_factors(SolveMethod::kGathering, data);
+  std::vector<float> workspace(form_factors->workspace_size());
+  form_factors->gather(data.patches.emitted_exitance, irradiance, workspace);
   return irradiance;
 }
 

@@ -5,6 +5,7 @@
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/runtime/refinement_solver.h"
 #include "rebounce/runtime/southwell_solver.h"
+#include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
@@ -29,18 +30,25 @@ const SweepableFormFactors& sweepable(const FormFactorOperator& form_factors) {
 /// A shot goes from one patch to all that it sees.
 const FormFactorBlocks& rows_of(const FormFactorOperator& form_factors) {
   return as<FormFactorBlocks>(
-      form_factors, "solver: southwell needs form factors by rows; give it FormFactorBlocks");
+      form_factors,
+      "solver: southwell needs form factors by rows, and these are not; take gauss-seidel");
 }
 
 }  // namespace
 
-std::unique_ptr<const FormFactorOperator> make_form_factors(SolveMethod method,
-                                                            const ExchangeMatrix& exchange,
-                                                            std::span<const float> area) {
+std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
+                                                              const ExchangeMatrix& exchange,
+                                                              std::span<const float> area) {
   if (method == SolveMethod::kGaussSeidel || method == SolveMethod::kSouthwell) {
     return std::make_unique<FormFactorBlocks>(exchange, area);
   }
   return std::make_unique<ExchangeBlocks>(exchange, area);
+}
+
+std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
+                                                              const TransferData& data) {
+  if (!data.exchange.empty()) return make_form_factors(method, data.exchange, data.patches.area);
+  return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
 }
 
 std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,

@@ -316,6 +316,52 @@ TEST_F(CommandLine, EveryMethodReachesTheResidualItWasAsked) {
   }
 }
 
+TEST_F(CommandLine, WorksWithoutPairs) {
+  const std::string file = path("box.safetensors");
+  const json built = summary_of({"precompute", kScene, "--patches", "400", "--form-factors",
+                                 "links", "--tolerance", "0.02", "--store-links", "-o", file});
+  EXPECT_EQ(built["form_factors"], "compressed");
+  EXPECT_EQ(built["form_factor_count"], 0);
+  EXPECT_GT(built["link_count"], 0);
+  EXPECT_EQ(built["settings"]["form_factors"], "links");
+  const json info = summary_of({"info", file});
+  EXPECT_EQ(info["operator"], "hierarchical");
+  EXPECT_GT(info["error_mean"], 0);
+  EXPECT_LT(info["error_mean"], 0.02);
+  EXPECT_GT(info["form_factor_error_mean"], 0);
+  EXPECT_LT(info["form_factor_error_mean"], 0.004);
+
+  const std::string once = path("once.csv");
+  summary_of({"solve", file, "--lights", kLights, "-o", once});
+  for (const std::string method :
+       {"gathering", "jacobi", "gauss-seidel", "symmetric-gauss-seidel", "conjugate-gradient",
+        "refine", "preconditioned-conjugate-gradient", "hierarchical", "auto"}) {
+    const json solved = summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"),
+                                    "--method", method, "--residual", "1e-5"});
+    EXPECT_EQ(solved["form_factors"], "compressed") << method;
+    EXPECT_LT(difference(read_csv(once), read_csv(path("x.csv")), 6), 0.1) << method;
+  }
+  const auto solve = [&](const char* option, const char* value) {
+    return Words{"solve", file, "--lights", kLights, "-o", path("y.csv"), option, value};
+  };
+  expect_refused(solve("--method", "southwell"), "by rows");
+  expect_refused(solve("--form-factors", "exact"), "compressed only");
+  expect_refused({"export", file, "--what", "form-factors", "-o", path("x.npz")},
+                 "--form-factors pairs");
+  for (const std::string show : {"radiosity", "error"}) {
+    summary_of({"render", file, "--lights", kLights, "--size", "32x24", "--show", show, "-o",
+                path("x.png")});
+  }
+}
+
+TEST_F(CommandLine, LinksMakeHierarchicalOperatorsOnly) {
+  for (const std::string kind : {"dense", "low-rank", "first-bounce"}) {
+    expect_refused({"precompute", kScene, "--patches", "100", "--form-factors", "links",
+                    "--operator", kind, "-o", path("x.safetensors")},
+                   "only a hierarchical operator");
+  }
+}
+
 TEST_F(CommandLine, QualitySetsTheRaysOfFormFactors) {
   const json low = summary_of({"info", precompute("low.safetensors", {"--quality", "low"})});
   const json usual = summary_of({"info", precompute("usual.safetensors")});

@@ -10,7 +10,10 @@
 #include <cmath>
 #include <random>
 
+#include "exchange_samples.h"
 #include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/links.h"
+#include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
 
@@ -124,6 +127,42 @@ TEST(ReferenceSolution, LightsTogetherAreThoseAlone) {
         ASSERT_NEAR(alone[i][c], lights[k][i][c] + room.patches.reflectance[i][c] * h[i][c], 1e-5);
       }
     }
+  }
+}
+
+TEST(ReferenceSolution, SolvesOnLinksInDoublePrecision) {
+  const Float3 reflectance = {0.9F, 0.5F, 0.1F};
+  PatchModel model = make_patch_model(test::room_with_block(reflectance), {.patch_count = 300});
+  const FormFactorLinks links =
+      build_links(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}).links;
+  const PatchTable& patches = model.patches;
+  const LinkedFormFactors form_factors(links, patches.area, patches.centroid);
+  const std::vector<Float3> light(patches.size(), Float3{1, 2, 3});
+  const auto b = ReferenceSolver(links, patches).radiosity(light, 1e-12);
+  std::vector<Double3> h(b.size());
+  form_factors.gather(std::span<const Double3>(b), std::span(h));
+  double left = 0, all = 0;
+  for (std::size_t i = 0; i < b.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      left += patches.area[i] *
+              std::pow(light[i][c] + patches.reflectance[i][c] * h[i][c] - b[i][c], 2);
+      all += patches.area[i] * std::pow(light[i][c], 2);
+    }
+  }
+  EXPECT_LE(std::sqrt(left / all), 1e-11);
+}
+
+TEST(ReferenceSolution, SolvesOnCompressedFormFactorsToSinglePrecision) {
+  const Room room({0.9F, 0.5F, 0.1F});
+  TransferData data;
+  data.patches = room.patches;
+  data.compressed_form_factors = test::dense_blocks(room.exchange, room.patches.area);
+  const ReferenceSolver exact(room.exchange, room.patches), compressed(data);
+  const auto lights = room.lights(ReferenceSolver::kTogether + 1);
+  const auto truths = exact.indirect_irradiances(lights),
+             found = compressed.indirect_irradiances(lights);
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    EXPECT_LE(relative_difference(found[k], truths[k], room.patches.area), 1e-5);
   }
 }
 

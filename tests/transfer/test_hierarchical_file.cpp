@@ -110,6 +110,34 @@ TEST(HierarchicalFile, HoldsCompressedFormFactorsBesideTheOperator) {
   EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
 }
 
+TEST(HierarchicalFile, HoldsFormFactorsThatAreCompressedOnly) {
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data(Precision::kF32);
+  data.exchange = {};
+  expect_error([&] { save_transfer_file(folder / "file", data); }, "needs form factors");
+  data.compressed_form_factors = sample_form_factors(1);
+  save_transfer_file(folder / "file", data);
+  const TransferData loaded = load_transfer_file(folder / "file");
+  EXPECT_TRUE(loaded.exchange.empty());
+  EXPECT_EQ(loaded.exchange.patch_count(), 0U);
+  ASSERT_NE(loaded.compressed_form_factors, nullptr);
+  EXPECT_TRUE(std::ranges::equal(data.compressed_form_factors->storage().values_f16,
+                                 loaded.compressed_form_factors->storage().values_f16));
+  save_transfer_file(folder / "again", loaded);
+  EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
+}
+
+TEST(HierarchicalFile, RefusesAFileWithoutFormFactors) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kF32));
+  std::string bytes = test::read_bytes(folder / "file");
+  const std::string name = "form_factor.row_begin";
+  bytes.replace(bytes.find(name), name.size(), "form_factor.row_begun");
+  test::reseal(bytes);
+  test::write_bytes(folder / "file", bytes);
+  expect_error([&] { load_transfer_file(folder / "file"); }, "there are no form factors");
+}
+
 TEST(HierarchicalFile, RefusesFormFactorsThatDifferByChannel) {
   const test::TemporaryFolder folder;
   TransferData data = sample_data(Precision::kF32);

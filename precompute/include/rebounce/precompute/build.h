@@ -36,10 +36,22 @@ enum class OperatorKind : std::uint8_t {
 /// (at 5,000: 150 MB) for who has not said what error may be.
 inline constexpr std::size_t kDensePatchCount = 5000;
 
+/// What the operator is made from.
+enum class FormFactorKind : std::uint8_t {
+  kAutomatic,  ///< links above kPairsPatchCount patches or where pairs are over the memory limit
+  kPairs,      ///< all pairs of patches, up to n² / 4 of them, and a dense inverse
+  kLinks,      ///< links (links.h): nothing grows with n²; the file holds F compressed only
+};
+
+/// Above this, memory in proportion to n² is no longer asked for.
+inline constexpr std::size_t kPairsPatchCount = 20000;
+
 struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
+  /// kLinks: link_epsilon 0 stands for kLinkEpsilon, and the operator is hierarchical or none.
+  FormFactorKind form_factor_kind = FormFactorKind::kAutomatic;
   /// Store links too, for hierarchical radiosity: to form_factors.link_epsilon, or kLinkEpsilon if
   /// that is 0.
   bool store_links = false;
@@ -53,16 +65,21 @@ struct BuildSettings {
   /// which is f32.
   std::optional<Precision> precision;
   /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are
-  /// compressed for iterative solvers; 0: they are not. Less: more bytes, fewer errors.
+  /// compressed for iterative solvers; 0: they are not, or, where the operator is made from them
+  /// (kLinks), to a fifth of its tolerance. Less: more bytes, fewer errors.
   double form_factor_tolerance = 0;
   std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
+  /// With kLinks: folder that what is done of the operator is kept in, so that a build that was
+  /// killed has that done when it is started again with the same scene and settings. It stays
+  /// behind. Empty: none.
+  std::filesystem::path checkpoint;
 };
 
 /// What the expensive part will take, known before it begins.
 struct CostEstimate {
   std::size_t patch_count = 0;
   std::uint64_t peak_bytes = 0;
-  double seconds = 0;  ///< rough: from pairs, the flops of the inversion, and vertices
+  double seconds = 0;  ///< of one processor; rough
 };
 
 struct BuildReport {
@@ -82,6 +99,7 @@ struct BuildReport {
   /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
   /// were not fitted to.
   std::optional<FormFactorError> form_factor_error;
+  double form_factor_tolerance = 0;  ///< that they were compressed to
   CostEstimate estimate;
 };
 

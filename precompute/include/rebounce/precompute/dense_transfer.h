@@ -29,6 +29,8 @@ std::uint32_t distinct_channels(std::span<const Float3> reflectance,
                                 std::array<std::uint32_t, kChannelCount>& channel_matrix);
 
 /// The largest relative area-weighted L2 residual of Y (I - rho F) v = F v over a few random v.
+double transfer_residual(const TransferOperator& transfer, const FormFactorOperator& form_factors,
+                         const PatchTable& patches);
 double transfer_residual(const TransferOperator& transfer, const ExchangeMatrix& exchange,
                          const PatchTable& patches);
 

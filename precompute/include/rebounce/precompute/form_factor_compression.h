@@ -9,6 +9,7 @@
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -27,9 +28,16 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress = {});
 
-/// Errors of `compressed` form factors over these B.
+/// The same from links, without the pairs that they stand for: the cost is that of the links and of
+/// a look at each entry for every price that is tried, the memory that of a few pieces of the
+/// matrix. Throws Error if `links` are not of these patches.
+std::shared_ptr<const HierarchicalOperator> compress_form_factors(
+    const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,
+    const HierarchicalSettings& settings, const Progress& progress = {});
+
+/// Errors of `compressed` form factors, against `exact` ones, over these B.
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
-                                  const ExchangeMatrix& exchange, const PatchTable& patches,
+                                  const FormFactorOperator& exact, const PatchTable& patches,
                                   std::span<const std::vector<Float3>> radiosities);
 
 /// The radiosities B = M0 + rho Y M0 [n] in lx that `initial_exitances` M0 give rise to.

@@ -56,12 +56,16 @@ struct ClosureReport {
   double relative_change = 0;       ///< |S' - S| / |S|, Frobenius
 };
 
-struct FormFactors {
-  ExchangeMatrix exchange;
+/// Where the light of patches goes that no patch gets.
+struct EscapedLight {
   std::vector<float> sky_visibility;  ///< [n] fraction of a patch's light that leaves the scene
   std::vector<float> absorbed;        ///< [n] fraction that meets back faces; with the row sum of F
                                       ///< the three add up to 1
   SkyCells sky_cells;                 ///< by which of its cells patches see the sky
+};
+
+struct FormFactors : EscapedLight {
+  ExchangeMatrix exchange;
   ClosureReport closure;
   std::uint64_t ray_count = 0;
   std::uint64_t pair_count = 0;  ///< pairs of patches that face each other

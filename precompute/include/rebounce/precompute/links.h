@@ -15,8 +15,9 @@ namespace rebounce {
 /// notes/links.md.
 inline constexpr double kLinkEpsilon = 5e-4;
 
-struct LinkBuild {
+struct LinkBuild : EscapedLight {
   FormFactorLinks links;
+  ClosureReport closure;
   std::uint64_t ray_count = 0;        ///< with those that measure what escapes
   std::uint64_t candidate_count = 0;  ///< pairs of nodes that were looked at
 };

@@ -2,9 +2,12 @@
 
 #include <array>
 #include <span>
+#include <variant>
 #include <vector>
 
+#include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -23,7 +26,20 @@ class ReferenceSolver {
   /// Lights for which F is read together: what is gathered for them just fills the registers.
   static constexpr int kTogether = 8;
 
+  /// What is solved with: F by pairs, as links, or compressed.
+  using Form = std::variant<FormFactorRows, LinkedFormFactors, CompressedFormFactors>;
+
+  /// Compressed form factors gather in single precision: no solution with them has a smaller
+  /// residual than this, whatever is asked for.
+  static constexpr double kSinglePrecisionResidual = 1e-6;
+
+  /// `patches` must outlive the solver. Throws Error if sizes do not agree.
   ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches);
+  ReferenceSolver(const FormFactorLinks& links, const PatchTable& patches);
+
+  /// With what `data`, which must outlive the solver, hold F best as: pairs, else links, else
+  /// compressed. Throws Error if they hold none of them.
+  explicit ReferenceSolver(const TransferData& data);
 
   /// Solves (I - rho F) B = M0 until the area-weighted residual is `residual` of M0 (default
   /// 1e-10); returns the radiosity B [n] in lx. Throws Error if 10,000 steps do not get there.
@@ -43,7 +59,7 @@ class ReferenceSolver {
 
  private:
   const PatchTable& patches_;
-  FormFactorRows rows_;
+  Form form_;
 };
 
 }  // namespace rebounce

@@ -9,7 +9,8 @@
 
 #include "rebounce/runtime/radiosity_solver.h"
 #include "rebounce/transfer/exchange_matrix.h"
-#include "rebounce/transfer/form_factor_operator.h"
+#include "rebounce/transfer/relaxation.h"
+#include "rebounce/transfer/transfer_data.h"
 #include "rebounce/transfer/transfer_operator.h"
 
 namespace rebounce {
@@ -44,9 +45,14 @@ inline constexpr std::array<NamedSolveMethod, 8> kSolveMethods = {{
 /// Sparse F in the form that `method` is fastest on: rows in blocks where it goes by rows in one
 /// direction, otherwise the symmetric half of them. `area` has n entries in m². Throws Error if the
 /// sizes do not agree.
-std::unique_ptr<const FormFactorOperator> make_form_factors(SolveMethod method,
-                                                            const ExchangeMatrix& exchange,
-                                                            std::span<const float> area);
+std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
+                                                              const ExchangeMatrix& exchange,
+                                                              std::span<const float> area);
+
+/// The best F that `data` hold: by pairs, as above, or where those are not kept compressed, for all
+/// methods but southwell. Throws Error if there is neither.
+std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
+                                                              const TransferData& data);
 
 /// A solver of its own for `method`. `form_factors` must outlive it; `transfer` may be null for the
 /// methods that do not need it. Throws Error if sizes differ, the operator is needed and missing,

@@ -22,7 +22,8 @@ struct ExchangeMatrix {
   SharedArray<std::uint32_t> column;     ///< ascending in each row, row <= column < n
   SharedArray<float> exchange_area;      ///< m², > 0
 
-  std::size_t patch_count() const { return row_begin.empty() ? 0 : row_begin.size() - 1; }
+  bool empty() const { return row_begin.empty(); }  ///< pairs are not kept
+  std::size_t patch_count() const { return empty() ? 0 : row_begin.size() - 1; }
 };
 
 /// Form factors by full rows, ready for gathering: row i lists every j with F(i,j) > 0.

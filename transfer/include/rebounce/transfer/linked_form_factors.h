@@ -52,6 +52,11 @@ class LinkedFormFactors final : public FormFactorOperator {
   void gather(std::span<const Float3> in, std::span<Float3> out,
               std::span<float> workspace) const override;
 
+  /// The same in double precision for several lights at once: `Columns` is an array of 3 or 24
+  /// doubles, the channels of one or of eight lights. Allocates its workspace.
+  template <typename Columns>
+  void gather(std::span<const Columns> in, std::span<Columns> out) const;
+
  private:
   struct Node {
     std::uint32_t first_child = kNone;
@@ -66,14 +71,18 @@ class LinkedFormFactors final : public FormFactorOperator {
     float exchange_area;
     Float3 gradient_to, gradient_from;
   };
+  template <typename Lanes>
   struct Light;
 
   void build_tree(const FormFactorLinks& links, std::span<const float> area,
                   std::span<const Float3> centroid);
   void sort_links(const FormFactorLinks& links);
-  void pull(std::span<const Float3> in, Light* light) const;
-  void gather_nodes(const Light* light, Light* arrived) const;
-  void push(Light* arrived, std::span<Float3> out) const;
+  template <typename Columns, typename Lanes>
+  void pull(std::span<const Columns> in, Light<Lanes>* light) const;
+  template <typename Lanes>
+  void gather_nodes(const Light<Lanes>* light, Light<Lanes>* arrived) const;
+  template <typename Lanes, typename Columns>
+  void push(Light<Lanes>* arrived, std::span<Columns> out) const;
 
   std::vector<Node> node_;                     ///< level by level
   std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number

@@ -86,9 +86,11 @@ struct TransferData {
   LightProbes probes;                  ///< may be none
   Lightmap lightmap;                   ///< may be empty
   SurfaceHarmonics surface_harmonics;  ///< may be empty
+  /// F by pairs of patches; empty where there are too many of them: then F is what
+  /// compressed_form_factors say.
   ExchangeMatrix exchange;
-  /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels, or null if that is not kept:
-  /// see CompressedFormFactors.
+  /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels, or null if that is not kept,
+  /// which takes pairs: see CompressedFormFactors.
   std::shared_ptr<const HierarchicalOperator> compressed_form_factors;
   FormFactorLinks links;  ///< empty if they were not asked for
   std::shared_ptr<const TransferOperator> transfer;

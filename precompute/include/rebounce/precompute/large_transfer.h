@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+
+#include "rebounce/precompute/hierarchical_transfer.h"
+#include "rebounce/precompute/progress.h"
+#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+struct LargeTransferSettings {
+  HierarchicalSettings compression{};  ///< of the result
+  /// Memory that may be taken beside the form factors; 0: as much as it takes.
+  std::uint64_t memory_limit_bytes = 0;
+  /// Folder that finished panels are kept in, so that a run that was killed goes on where it was;
+  /// empty: none. What was begun from anything else is begun anew. It stays behind: remove it when
+  /// the operator is where it belongs.
+  std::filesystem::path checkpoint{};
+};
+
+/// Bytes that build_large_transfer holds at its peak, form factors not included; in proportion to
+/// the number of patches.
+std::size_t large_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
+
+/// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
+/// are solved for by conjugate gradients, a panel of neighbouring patches at a time, and each panel
+/// is compressed finely as soon as it is there. The operator that this leaves, a few times as large
+/// as the result, is then compressed to the tolerance as build_hierarchical_transfer does.
+///
+/// `form_factors` are G = A^1/2 F A^-1/2, compressed, f32 or f16 (compress_form_factors): their
+/// error, which must be well below the tolerance, stays in the result and is not part of it. Throws
+/// Error if that is above the memory limit, if F is not a passive exchange
+/// (I - R G R not positive definite), or if the checkpoint cannot be written, and Cancelled if
+/// asked to stop. The same bits for any number of threads, and from a checkpoint.
+std::shared_ptr<const HierarchicalOperator> build_large_transfer(
+    const HierarchicalOperator& form_factors, const PatchTable& patches,
+    const FittingLights& lights, const LargeTransferSettings& settings,
+    const Progress& progress = {});
+
+}  // namespace rebounce

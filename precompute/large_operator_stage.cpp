@@ -1,0 +1,106 @@
+#include <algorithm>
+
+#include "build_record.h"
+#include "operator_stage.h"
+#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/precompute/form_factor_compression.h"
+#include "rebounce/precompute/large_transfer.h"
+#include "rebounce/precompute/measured_error.h"
+#include "rebounce/precompute/reference_solution.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+// Lights that compressed form factors are measured under.
+constexpr int kTestLightCount = 16;
+
+// Residual of the radiosities that form factors are fitted to and measured with: what light patches
+// give off matters there, not its third digit.
+constexpr double kFittingResidual = 1e-2;
+
+using Lights = std::vector<std::vector<Float3>>;
+
+/// The radiosities that initial exitances give rise to. Throws Cancelled if asked to stop.
+Lights radiosities_of(const ReferenceSolver& solver, const Lights& exitances,
+                      const Progress& progress) {
+  Lights radiosities;
+  while (radiosities.size() < exitances.size()) {
+    if (progress && !progress(static_cast<double>(radiosities.size()) / exitances.size())) {
+      throw Cancelled();
+    }
+    const auto left = std::span(exitances).subspan(radiosities.size());
+    const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kTogether));
+    for (const auto& solution : solver.radiosities(some, kFittingResidual)) {
+      std::vector<Float3>& radiosity = radiosities.emplace_back();
+      for (const auto& [r, g, b] : solution) {
+        radiosity.push_back({static_cast<float>(r), static_cast<float>(g), static_cast<float>(b)});
+      }
+    }
+  }
+  return radiosities;
+}
+
+/// What the compressions are fitted to and measured by.
+struct FittedLights {
+  DrawnLights exitances, radiosities;
+  Lights test_radiosities;
+};
+
+FittedLights find_lights(const RayTracer& tracer, const TransferData& data, std::uint64_t seed,
+                         const Progress& progress) {
+  FittedLights lights;
+  lights.exitances = draw_fitting_lights(data, tracer, seed);
+  const Lights tests =
+      random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed);
+  const ReferenceSolver solver(data.links, data.patches);
+  const std::size_t shaping = lights.exitances.shaping.size(),
+                    judging = lights.exitances.judging.size();
+  const auto all = static_cast<double>(shaping + judging + tests.size());
+  std::size_t before = 0;
+  const auto solve = [&](const Lights& some) {
+    const double begin = before / all, part = some.size() / all;
+    before += some.size();
+    return radiosities_of(solver, some,
+                          [&](double done) { return !progress || progress(begin + part * done); });
+  };
+  lights.radiosities.shaping = solve(lights.exitances.shaping);
+  lights.radiosities.judging = solve(lights.exitances.judging);
+  lights.test_radiosities = solve(tests);
+  return lights;
+}
+
+}  // namespace
+
+void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
+                              TransferData& data, BuildReport& report, PhaseClock& clock) {
+  const PatchTable& patches = data.patches;
+  const std::uint64_t seed = decided.form_factors.seed;
+  const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
+    return find_lights(tracer, data, seed, part);
+  });
+  data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
+    return compress_form_factors(data.links, patches, lights.radiosities.view(),
+                                 {decided.form_factor_tolerance, Precision::kF16}, part);
+  });
+  data.transfer = clock.run("operator", [&](const Progress& part) {
+    LargeTransferSettings settings;
+    settings.compression = {decided.tolerance, *decided.precision};
+    settings.checkpoint = decided.checkpoint;
+    return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
+                                settings, part);
+  });
+  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
+    const LinkedFormFactors links(data.links, patches.area, patches.centroid);
+    report.form_factor_tolerance = decided.form_factor_tolerance;
+    report.form_factor_error =
+        form_factor_error(*data.compressed_form_factors, links, patches, lights.test_radiosities);
+    data.record.solve_residual = transfer_residual(*data.transfer, links, patches);
+    return measure_error(data, tracer, nullptr, seed, part);
+  });
+  record_build(decided, report, errors, data.record);
+  if (!decided.store_links) data.links = {};
+}
+
+}  // namespace rebounce

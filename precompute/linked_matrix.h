@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/transfer/linked_form_factors.h"
+#include "rebounce/transfer/transfer_data.h"
+#include "symmetric_matrix.h"
+
+namespace rebounce {
+
+/// G = A^1/2 F A^-1/2 from links between sets of patches: one matrix for all channels. Entries are
+/// those that the links stand for; the pairs themselves are nowhere kept.
+class LinkedMatrix final : public SymmetricMatrix {
+ public:
+  /// Both must outlive it. Throws Error if the links are not of these patches.
+  LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches);
+
+  std::span<const float> area() const override { return patches_.area; }
+  std::uint32_t matrix_count() const override { return 1; }
+  std::array<std::uint32_t, kChannelCount> channel_matrix() const override { return {0, 0, 0}; }
+  void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+               std::span<const std::uint32_t> columns,
+               Eigen::Ref<Eigen::MatrixXf> entries) const override;
+  Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
+
+ private:
+  struct Node {
+    std::uint32_t begin = 0, count = 0;  ///< positions in the order of the links
+    double area = 0;                     ///< m²
+    Float3 center{};                     ///< area-weighted, metres
+  };
+  class Filler;
+
+  void measure_nodes();
+  void sort_links();
+
+  const FormFactorLinks& links_;
+  const PatchTable& patches_;
+  LinkedFormFactors product_;
+  std::vector<std::uint32_t> position_;        ///< [n] of each patch
+  std::vector<Node> nodes_;                    ///< [m]
+  std::vector<std::uint64_t> incident_begin_;  ///< [m + 1]
+  std::vector<std::uint32_t> incident_;        ///< links by their nodes, those of a pair twice
+};
+
+}  // namespace rebounce

@@ -1,0 +1,98 @@
+#include "operator_stage.h"
+
+#include <fmt/format.h>
+
+#include "build_record.h"
+#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/precompute/form_factor_compression.h"
+#include "rebounce/precompute/hierarchical_transfer.h"
+#include "rebounce/precompute/low_rank_transfer.h"
+#include "rebounce/precompute/measured_error.h"
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+// Lights that compressed form factors are measured under.
+constexpr int kTestLightCount = 16;
+
+// A residual above this is not rounding but a mistake; f32 and f16 entries.
+constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
+
+void check_residual(double residual, Precision precision) {
+  const double largest = precision == Precision::kF16 ? kLargestResidualF16 : kLargestResidualF32;
+  if (residual <= largest) return;
+  throw Error(
+      fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
+                  "please report this scene",
+                  residual, largest));
+}
+
+std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
+                                                 const TransferData& data, const RayTracer& tracer,
+                                                 const BuildSettings& settings,
+                                                 const Progress& progress) {
+  if (settings.operator_kind != OperatorKind::kHierarchical) {
+    const bool first_bounce = settings.operator_kind == OperatorKind::kFirstBounce;
+    return build_low_rank_transfer(dense, data.exchange,
+                                   {settings.rank, *settings.precision, first_bounce}, progress);
+  }
+  const DrawnLights lights = draw_fitting_lights(data, tracer, settings.form_factors.seed);
+  return build_hierarchical_transfer(dense, data.patches, lights.view(),
+                                     {settings.tolerance, *settings.precision}, progress);
+}
+
+/// Compresses the form factors of `data` and measures how well, with data.transfer as it is.
+void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
+                              const BuildSettings& settings, BuildReport& report,
+                              const Progress& progress) {
+  const std::uint64_t seed = settings.form_factors.seed;
+  report.form_factor_tolerance = settings.form_factor_tolerance;
+  const DrawnLights fitting = radiosities_of(draw_fitting_lights(data, tracer, seed), data);
+  data.compressed_form_factors =
+      compress_form_factors(data.exchange, data.patches, fitting.view(),
+                            {settings.form_factor_tolerance, Precision::kF16}, progress);
+  report.form_factor_error = form_factor_error(
+      *data.compressed_form_factors, FormFactorRows(data.exchange, data.patches.area), data.patches,
+      radiosities_of(
+          *data.transfer, data.patches.reflectance,
+          random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed)));
+}
+
+/// Measures the operator against `exact`, or if that is null against an iterative solution.
+void check_operator(TransferData& data, const RayTracer& tracer, const DenseOperator* exact,
+                    const BuildSettings& decided, const BuildReport& report, PhaseClock& clock) {
+  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
+    data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
+    return measure_error(data, tracer, exact, decided.form_factors.seed, part);
+  });
+  record_build(decided, report, errors, data.record);
+}
+
+}  // namespace
+
+void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
+                              TransferData& data, BuildReport& report, PhaseClock& clock) {
+  const bool compressed = decided.operator_kind != OperatorKind::kDense;
+  const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
+  const auto dense = clock.run("operator", [&](const Progress& part) {
+    return build_dense_transfer(data.exchange, data.patches, dense_precision, part);
+  });
+  check_residual(transfer_residual(*dense, data.exchange, data.patches), dense_precision);
+  data.transfer = dense;
+  if (compressed) {
+    data.transfer = clock.run("compression", [&](const Progress& part) {
+      return compress(*dense, data, tracer, decided, part);
+    });
+  }
+  if (decided.form_factor_tolerance > 0) {
+    clock.run("form factor compression", [&](const Progress& part) {
+      compress_form_factors_of(data, tracer, decided, report, part);
+      return true;
+    });
+  }
+  check_operator(data, tracer, compressed ? dense.get() : nullptr, decided, report, clock);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <vector>
+
+#include "cluster_tree.h"
+#include "hierarchical_matrix.h"
+#include "rebounce/precompute/progress.h"
+#include "solved_transfer.h"
+#include "symmetric_matrix.h"
+
+namespace rebounce {
+
+/// Yhat as far as its products say; where entries come from is left open.
+class SolvedMatrix : public SymmetricMatrix {
+ public:
+  /// `solved` must outlive it; `energies` [n] are those that it estimates.
+  SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies)
+      : solved_(solved), energies_(std::move(energies)) {}
+
+  std::span<const float> area() const override { return solved_.area(); }
+  std::uint32_t matrix_count() const override { return solved_.matrix_count(); }
+  std::array<std::uint32_t, kChannelCount> channel_matrix() const override {
+    return solved_.channel_matrix();
+  }
+  Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override {
+    return solved_.multiply(matrix, x);
+  }
+  Eigen::VectorXd energies(std::span<const std::uint32_t> /*order*/) const override {
+    return energies_;
+  }
+
+ protected:
+  const SolvedTransfer& solved() const { return solved_; }
+
+ private:
+  const SolvedTransfer& solved_;
+  Eigen::VectorXd energies_;
+};
+
+/// Its columns, exact, of one panel of patches at a time.
+class PanelMatrix final : public SolvedMatrix {
+ public:
+  using SolvedMatrix::SolvedMatrix;
+
+  /// Solves for the columns of the patches at `columns` of `tree`, in the rows from there to the
+  /// end: the lower triangle. Throws Cancelled if asked to stop.
+  void solve(const ClusterTree& tree, const Cluster& columns, const Progress& progress = {});
+
+  /// Those of rows and columns that the panel has.
+  void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+               std::span<const std::uint32_t> columns,
+               Eigen::Ref<Eigen::MatrixXf> entries) const override;
+
+ private:
+  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, [rows][columns]
+  std::vector<std::uint32_t> place_;            ///< [n] row, and column, of a patch
+};
+
+/// Its entries as an operator has them that was made of it.
+class RoundedMatrix final : public SolvedMatrix {
+ public:
+  RoundedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies,
+                const HierarchicalOperator::Storage& rounded)
+      : SolvedMatrix(solved, std::move(energies)), rounded_(rounded) {}
+
+  void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+               std::span<const std::uint32_t> columns,
+               Eigen::Ref<Eigen::MatrixXf> entries) const override {
+    rounded_.entries(matrix, rows, columns, entries);
+  }
+
+ private:
+  HierarchicalMatrix rounded_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,93 @@
+// A hierarchical operator read by its entries and multiplied with many vectors.
+
+#include "hierarchical_matrix.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "hierarchical_samples.h"
+#include "single_threaded_blas.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kPatchCount = 340;
+
+/// What products are given by: irradiance from exitance, one channel.
+Eigen::MatrixXf expanded(const HierarchicalOperator& transfer, int channel) {
+  const std::size_t n = transfer.patch_count();
+  std::vector<float> entries(n * n);
+  transfer.expand(channel, entries);
+  Eigen::MatrixXf result(n, n);
+  const auto& area = transfer.storage().area;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      result(i, j) = entries[i * n + j] * std::sqrt(area[i] / area[j]);
+    }
+  }
+  return result;
+}
+
+class HierarchicalMatrixOf : public testing::TestWithParam<Precision> {
+ protected:
+  HierarchicalOperator transfer{HierarchicalOperator::encode(
+      test::RandomHierarchicalStorage(kPatchCount, 2, 5).storage, GetParam())};
+  HierarchicalMatrix matrix{transfer.storage()};
+  SingleThreadedBlas single_threaded;
+};
+
+TEST_P(HierarchicalMatrixOf, EntriesAreThoseOfTheOperator) {
+  std::vector<std::uint32_t> all(kPatchCount);
+  std::iota(all.begin(), all.end(), 0U);
+  std::ranges::shuffle(all, std::mt19937(1));
+  const std::span patches(all);
+  for (int channel = 0; channel < kChannelCount; ++channel) {
+    const Eigen::MatrixXf truth = expanded(transfer, channel);
+    const float allowed = 1e-5F * truth.cwiseAbs().maxCoeff();
+    for (const auto& [rows, columns] : {std::pair(patches.first(150), patches.last(100)),
+                                        std::pair(patches.first(90), patches.first(90))}) {
+      Eigen::MatrixXf entries(rows.size(), columns.size());
+      matrix.entries(matrix.channel_matrix()[channel], rows, columns, entries);
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        for (std::size_t j = 0; j < columns.size(); ++j) {
+          ASSERT_NEAR(entries(i, j), truth(rows[i], columns[j]), allowed);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(HierarchicalMatrixOf, ProductsAreThoseOfItsEntries) {
+  const Eigen::MatrixXf x = Eigen::MatrixXf::Random(kPatchCount, 40);  // more than one group
+  for (int channel = 0; channel < kChannelCount; ++channel) {
+    const Eigen::MatrixXf truth = expanded(transfer, channel) * x;
+    const Eigen::MatrixXf y = matrix.multiply(matrix.channel_matrix()[channel], x);
+    EXPECT_LT((y - truth).norm(), 1e-5F * truth.norm());
+  }
+}
+
+TEST_P(HierarchicalMatrixOf, SameBitsForAnyNumberOfThreads) {
+  const Eigen::MatrixXf x = Eigen::MatrixXf::Random(kPatchCount, 100);
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const Eigen::MatrixXf one = matrix.multiply(0, x);
+  omp_set_num_threads(4);
+  const Eigen::MatrixXf four = matrix.multiply(0, x);
+  omp_set_num_threads(before);
+  EXPECT_EQ(one, four);
+}
+
+INSTANTIATE_TEST_SUITE_P(Precisions, HierarchicalMatrixOf,
+                         testing::Values(Precision::kF32, Precision::kF16, Precision::kQ16,
+                                         Precision::kQ8),
+                         [](const auto& parameter) {
+                           return std::string(precision_name(parameter.param));
+                         });
+
+}  // namespace
+}  // namespace rebounce
