@@ -99,7 +99,7 @@ class RawExchangeBuilder {
         [&](std::uint32_t i, Scratch& scratch) {
           escape[i] = measure_escape(model_, patch_triangles_[i], i, tracer_,
                                      settings_.hemisphere_rays, settings_.seed, scratch.escape);
-          met[i] = scratch.counter.count(model_, scratch.escape.hits);
+          met[i] = scratch.counter.count(n, scratch.escape.met);
         },
         [](double done) { return 0.2 * done; });
     hemisphere_.emplace(met, geometry_.areas(), settings_.hemisphere_rays);
@@ -228,8 +228,7 @@ class RawExchangeBuilder {
     const double spread = binary > 0 ? visible.variance * rays / binary : 1;
     // No part is known better than that many rays tell (rule of succession).
     const double expected = (part * rays + 1) / (rays + 2), least = 1 / (rays + 2);
-    return kSpreadGain *
-           std::max(spread * expected * (1 - expected) / (rays + 1), least * least);
+    return kSpreadGain * std::max(spread * expected * (1 - expected) / (rays + 1), least * least);
   }
 
   /// Adds the near pairs of many triangles to row i, as hemisphere rays have them.

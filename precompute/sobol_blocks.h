@@ -11,8 +11,8 @@ namespace rebounce {
 
 /// Sobol's sequence in four dimensions (direction numbers of S. Joe and F. Y. Kuo 2008), shifted
 /// digit by digit (exclusive or) by random bits: every point is uniform over [0, 1)^4, and the
-/// points of each aligned block of 2^k are as well spread as unshifted ones. Made in blocks, so that
-/// the compiler makes several points at once.
+/// points of each aligned block of 2^k are as well spread as unshifted ones. Made in blocks, so
+/// that the compiler makes several points at once.
 class SobolBlocks {
  public:
   static constexpr int kDimensions = 4;
@@ -34,8 +34,8 @@ class SobolBlocks {
       const std::array<std::uint32_t, kSize>& first = kFirstBlock[d];
       for (std::size_t k = 0; k < count; ++k) {
         // By way of signed integers, whose conversion is one instruction.
-        block[d][k] = static_cast<float>(static_cast<std::int32_t>((first[k] ^ shift) >> 8)) *
-                      0x1p-24F;
+        block[d][k] =
+            static_cast<float>(static_cast<std::int32_t>((first[k] ^ shift) >> 8)) * 0x1p-24F;
       }
     }
   }
@@ -96,7 +96,6 @@ class SobolBlocks {
 };
 
 inline constexpr SobolBlocks::Directions SobolBlocks::kDirections = SobolBlocks::make_directions();
-inline constexpr SobolBlocks::FirstBlock SobolBlocks::kFirstBlock =
-    SobolBlocks::make_first_block();
+inline constexpr SobolBlocks::FirstBlock SobolBlocks::kFirstBlock = SobolBlocks::make_first_block();
 
 }  // namespace rebounce

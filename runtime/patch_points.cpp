@@ -63,7 +63,8 @@ PatchPoint PatchSurface::at_chosen_place(const glm::dvec2& square) const {
 void PatchSurface::fill(std::size_t count, const PatchPointBlock::Coordinates& u,
                         const PatchPointBlock::Coordinates& v, float offset,
                         PatchPointBlock& block) const {
-  if (places_.size() == 1 && choice_.total() > 0) return fill(grounds_[0], count, u, v, offset, block);
+  if (places_.size() == 1 && choice_.total() > 0)
+    return fill(grounds_[0], count, u, v, offset, block);
   for (std::size_t k = 0; k < count; ++k) {
     const PatchPoint point = at_chosen_place({u[k], v[k]});
     for (int axis = 0; axis < 3; ++axis) {

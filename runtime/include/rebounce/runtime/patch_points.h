@@ -63,8 +63,8 @@ class PatchSurface {
     return at_chosen_place(square);
   }
 
-  /// The points of the `count` <= PatchPointBlock::kSize squares (`u`[k], `v`[k]), moved by `offset`
-  /// along their normals; in single precision.
+  /// The points of the `count` <= PatchPointBlock::kSize squares (`u`[k], `v`[k]), moved by
+  /// `offset` along their normals; in single precision.
   void fill(std::size_t count, const PatchPointBlock::Coordinates& u,
             const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block) const;
 
