@@ -60,7 +60,7 @@ class ReferenceBuilder {
         for (int round = 0; round < factor_; ++round) {
           measure_escape(model_, patch_triangles_[i], i, tracer_, rays_each_, kFirstSeed + round,
                          scratch);
-          for (const MetPatch& met : counter.count(model_, scratch.hits)) {
+          for (const MetPatch& met : counter.count(n_, scratch.met)) {
             count_[i * n_ + met.patch] += met.count;
             half_[round % 2][i] += met.count * radiosity_[met.patch];
           }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "escape.h"
+#include "raw_exchange.h"
 #include "shadow_rays.h"
 
 namespace rebounce::bench {
@@ -20,7 +21,7 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
   const PatchGeometry geometry(model, tracer);
   const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
   StageRays result;
-  std::vector<FacingPatch> facing, mixed;
+  std::vector<FacingPatch> facing, mixed, large_mixed;
   std::vector<Ray> rays;
   std::vector<float> transmitted;
   EscapeScratch escape;
@@ -42,14 +43,17 @@ StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
         row, facing, [&](std::uint32_t column) { return !is_coarse_pair(geometry, row, column); });
     add_shadow_stream(row, facing, settings.probe_rays, true);
     mixed.clear();
+    large_mixed.clear();
     const auto probe_rays = static_cast<std::size_t>(settings.probe_rays);
     for (std::size_t p = 0; p < facing.size(); ++p) {
       const auto agreement =
           ShadowRays::agreement(std::span(rays).subspan(p * probe_rays, probe_rays),
                                 std::span(transmitted).subspan(p * probe_rays, probe_rays));
-      if (agreement == ShadowRays::Agreement::kMixed) mixed.push_back(facing[p]);
+      if (agreement != ShadowRays::Agreement::kMixed) continue;
+      (is_large_pair(geometry, row, facing[p]) ? large_mixed : mixed).push_back(facing[p]);
     }
     add_shadow_stream(row, mixed, settings.full_rays, false);
+    add_shadow_stream(row, large_mixed, kLargeFactor * settings.full_rays, false);
     measure_escape(model, patch_triangles[row], row, tracer, settings.hemisphere_rays,
                    settings.seed, escape);
     result.escape.push_back(escape.rays);

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 
 #include "hemisphere_rays.h"
 #include "rebounce/transfer/sky_cells.h"
+#include "sobol_blocks.h"
 
 namespace rebounce {
 namespace {
@@ -20,17 +23,73 @@ void append_sky_cells(const Escape& escape, double sky, SkyCells& cells) {
   cells.entry_begin.push_back(static_cast<std::uint32_t>(cells.entry_cell.size()));
 }
 
+using Coordinates = PatchPointBlock::Coordinates;
+using Directions = std::array<Coordinates, 3>;
+
+/// to_cosine_direction() of `count` points (`u`[k], `v`[k]) of the unit square.
+void fill_cosine_directions(std::size_t count, const Coordinates& u, const Coordinates& v,
+                            Directions& direction) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const float x = 2 * u[k] - 1, y = 2 * v[k] - 1;
+    const bool wide = std::abs(x) > std::abs(y);
+    const float r = wide ? x : y, across = wide ? y : x;
+    const float quotient = across / r;
+    const float angle = r == 0 ? 0 : std::numbers::pi_v<float> / 4 * quotient;
+    const float along = r * small_cosine(angle), aside = r * small_sine(angle);
+    direction[0][k] = wide ? along : aside;
+    direction[1][k] = wide ? aside : along;
+    direction[2][k] = std::max(0.0F, 1 - r * r);
+  }
+  for (std::size_t k = 0; k < count; ++k) direction[2][k] = std::sqrt(direction[2][k]);
+}
+
+/// Turns directions around +Z to the normals of `points` (frame_around()).
+void turn_to_normals(std::size_t count, const PatchPointBlock& points, Directions& direction) {
+  const auto& [nx, ny, nz] = points.normal;
+  for (std::size_t k = 0; k < count; ++k) {
+    const float x = direction[0][k], y = direction[1][k], z = direction[2][k];
+    const float sign = std::copysign(1.0F, nz[k]);
+    const float a = -1 / (sign + nz[k]), b = nx[k] * ny[k] * a;
+    direction[0][k] = x * (1 + sign * nx[k] * nx[k] * a) + y * b + z * nx[k];
+    direction[1][k] = x * sign * b + y * (sign + ny[k] * ny[k] * a) + z * ny[k];
+    direction[2][k] = -x * sign * nx[k] - y * ny[k] + z * nz[k];
+  }
+}
+
+/// One cosine-distributed ray from each of as many points spread over `surface`.
+void make_escape_rays(const PatchSurface& surface, float offset, std::uint64_t bits,
+                      std::span<Ray> rays) {
+  constexpr std::size_t kBlock = SobolBlocks::kSize;
+  const SobolBlocks sequence(bits);
+  SobolBlocks::Block square;
+  PatchPointBlock points;
+  Directions direction;
+  for (std::size_t begin = 0; begin < rays.size(); begin += kBlock) {
+    const std::size_t count = std::min(kBlock, rays.size() - begin);
+    sequence.fill(static_cast<std::uint32_t>(begin / kBlock), count, square);
+    surface.fill(count, square[0], square[1], offset, points);
+    fill_cosine_directions(count, square[2], square[3], direction);
+    turn_to_normals(count, points, direction);
+    for (std::size_t k = 0; k < count; ++k) {
+      Ray& ray = rays[begin + k];
+      ray = {.origin = {points.position[0][k], points.position[1][k], points.position[2][k]},
+             .t_near = 0,
+             .direction = {direction[0][k], direction[1][k], direction[2][k]},
+             .t_far = std::numeric_limits<float>::infinity()};
+    }
+  }
+}
+
 }  // namespace
 
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch) {
-  scratch.points.resize(ray_count);
   scratch.rays.resize(ray_count);
   scratch.hits.resize(ray_count);
-  const std::uint64_t bits = mix_bits(seed ^ (patch * 2654435761ULL));
-  spread_points(model.mesh, triangles, unit_square(mix_bits(bits)), scratch.points);
-  make_hemisphere_rays(scratch.points, tracer, unit_square(mix_bits(bits + 1)), scratch.rays);
+  scratch.met.resize(ray_count);
+  make_escape_rays(PatchSurface(model.mesh, triangles), tracer.offset_distance(),
+                   mix_bits(seed ^ (patch * 2654435761ULL)), scratch.rays);
   tracer.intersect(scratch.rays, scratch.hits);
 
   int sky = 0, absorbed = 0;
@@ -38,10 +97,11 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
   for (std::size_t k = 0; k < scratch.hits.size(); ++k) {
     Hit& hit = scratch.hits[k];
     prefer_lit_side(model.mesh, tracer, scratch.rays[k], hit, scratch.coincidence);
+    scratch.met[k] = patch_at(model.mesh, model.shown_patch, hit);
     if (hit.triangle == kNone) {
       ++sky;
       ++count[sky_cell(scratch.rays[k].direction)];
-    } else if (patch_at(model.mesh, model.shown_patch, hit) == kNone) {
+    } else if (scratch.met[k] == kNone) {
       ++absorbed;
     }
   }

@@ -21,16 +21,17 @@ struct Escape {
   std::vector<std::pair<std::uint8_t, float>> sky_cells{};
 };
 
-/// Room for the work of measure_escape; afterwards `rays` and `hits` hold what was traced.
+/// Room for the work of measure_escape; afterwards `rays` hold what was traced, and `met` which
+/// patch's light each of them met: kNone if none's.
 struct EscapeScratch {
-  std::vector<PatchPoint> points;
   std::vector<Ray> rays;
   std::vector<Hit> hits;
+  std::vector<std::uint32_t> met;
   CoincidenceScratch coincidence;
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over its `triangles`; what they meet is what prefer_lit_side says.
+/// over its `triangles`, by Sobol's sequence; what they meet is what prefer_lit_side says.
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch);

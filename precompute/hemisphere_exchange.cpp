@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "seen_patch.h"
+#include "rebounce/transfer/types.h"
 
 namespace rebounce {
 namespace {
@@ -18,10 +18,10 @@ double variance_of_count(double expected) {
 
 }  // namespace
 
-std::vector<MetPatch> MetPatchCounter::count(const PatchModel& model, std::span<const Hit> hits) {
-  count_.resize(model.patches.size(), 0);
-  for (const Hit& hit : hits) {
-    const std::uint32_t patch = patch_at(model.mesh, model.shown_patch, hit);
+std::vector<MetPatch> MetPatchCounter::count(std::size_t patch_count,
+                                             std::span<const std::uint32_t> met_by_rays) {
+  count_.resize(patch_count, 0);
+  for (const std::uint32_t patch : met_by_rays) {
     if (patch != kNone && count_[patch]++ == 0) met_.push_back(patch);
   }
   std::ranges::sort(met_);

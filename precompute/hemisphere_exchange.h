@@ -1,11 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
-
-#include "rebounce/precompute/patch_model.h"
-#include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
 
@@ -18,9 +16,9 @@ struct MetPatch {
 /// Counts what the hemisphere rays of one patch after another met; for one thread.
 class MetPatchCounter {
  public:
-  /// What the `hits` of one patch's rays say, by patch in ascending order. A side that another
-  /// covers stands for that one; rays that met a side without a patch are left out.
-  std::vector<MetPatch> count(const PatchModel& model, std::span<const Hit> hits);
+  /// How often the patches < `patch_count` occur in `met`, which is what the rays of one patch met
+  /// (EscapeScratch), in ascending order; kNone is left out.
+  std::vector<MetPatch> count(std::size_t patch_count, std::span<const std::uint32_t> met);
 
  private:
   std::vector<std::uint32_t> count_;  ///< [n] all 0 between calls

@@ -81,7 +81,8 @@ LinkRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int
                      y = shadow_rays_.geometry().point(j, to[7 * k]);
     weight[k] = ShadowRays::kernel(x, y);
     // Between points that do not face each other there is no light to hide.
-    scratch.rays[k] = weight[k] > 0 ? ShadowRays::ray_between(x, y) : ShadowRays::void_ray();
+    scratch.rays[k] = weight[k] > 0 ? ShadowRays::ray_between(x, y, static_cast<float>(weight[k]))
+                                    : ShadowRays::void_ray();
   }
   trace(scratch);
   return judge(scratch, std::span(weight).first(count), children);

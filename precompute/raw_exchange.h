@@ -23,6 +23,12 @@ struct RawExchange {
   std::uint64_t pair_count = 0;  ///< pairs that face each other and were asked by shadow rays
 };
 
+/// True for a pair of patch i that exchanges so much that, if it is partly hidden, it gets
+/// kLargeFactor times the rays of others: what they miss is seen in the sums of rows, and their
+/// noise in the ranks of blocks.
+bool is_large_pair(const PatchGeometry& geometry, std::uint32_t i, const FacingPatch& pair);
+inline constexpr int kLargeFactor = 5;
+
 /// Looks at every pair of patches:
 ///
 /// - 1. Hemisphere rays of every patch say what escapes, and which patches see each other.
@@ -32,7 +38,7 @@ struct RawExchange {
 ///   exchanges, and if those do not agree either the mean of what they and the hemisphere rays say,
 ///   weighted by the inverse of their variances.
 /// - 3. A near pair of many triangles is taken from the hemisphere rays alone.
-/// - 4. Rows whose sum is off its target get more probe rays for every pair.
+/// - 4. Rows whose sum is off its target get more probe rays for every pair (second_look.h).
 ///
 /// Rows are shared out among OpenMP threads; the bits do not depend on how many. Throws Cancelled
 /// when `progress` says so.

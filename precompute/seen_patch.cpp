@@ -21,19 +21,8 @@ glm::dvec3 normal_at(const DisplayMesh& mesh, const Hit& hit) {
 
 }  // namespace
 
-bool meets_back(const DisplayMesh& mesh, const Hit& hit) {
-  return hit.triangle != kNone && !hit.front && mesh.back_triangle[hit.triangle] == kNone;
-}
-
-std::uint32_t patch_at(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
-                       const Hit& hit) {
-  if (hit.triangle == kNone || meets_back(mesh, hit)) return kNone;
-  return shown_patch[side_of(mesh, hit.triangle, hit.front)];
-}
-
-void prefer_lit_side(const DisplayMesh& mesh, const RayTracer& tracer, const Ray& ray, Hit& hit,
-                     CoincidenceScratch& scratch) {
-  if (hit.triangle == kNone || patch_at(mesh, mesh.triangle_patch, hit) != kNone) return;
+void find_lit_side(const DisplayMesh& mesh, const RayTracer& tracer, const Ray& ray, Hit& hit,
+                   CoincidenceScratch& scratch) {
   const glm::dvec3 point =
       to_dvec3(ray.origin) + static_cast<double>(hit.t) * to_dvec3(ray.direction);
   find_coincident_sides(

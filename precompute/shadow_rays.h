@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <numbers>
@@ -28,6 +29,13 @@ class VisibilityEstimate {
     sum_of_squares_ += weight * weight;
     visible_ += weight * transmitted;
     visible_squared_ += weight * transmitted * transmitted;
+  }
+
+  void add(const VisibilityEstimate& other) {
+    sum_ += other.sum_;
+    sum_of_squares_ += other.sum_of_squares_;
+    visible_ += other.visible_;
+    visible_squared_ += other.visible_squared_;
   }
 
   bool is_empty() const { return sum_ <= 0; }  ///< no ray weighs anything: nothing below holds
@@ -71,7 +79,8 @@ class ShadowRays {
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
   /// Writes to `rays` `count` untraced rays for each pair of patch i, one pair after the other,
-  /// each with its weight (ray_weight). Rays between points that do not face each other carry no
+  /// each with its weight (ray_weight), between points of Sobol's sequence (sobol_blocks.h) over
+  /// both patches. Rays between points that do not face each other carry no
   /// light and are not made; where a pair has fewer the rest are never occluded and void (is_void).
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
@@ -87,7 +96,7 @@ class ShadowRays {
   static Agreement agreement(std::span<const Ray> rays, std::span<const float> transmitted);
 
   /// True for a ray that stands for none.
-  static bool is_void(const Ray& ray) { return ray.id == kNone; }
+  static bool is_void(const Ray& ray) { return ray_weight(ray) == 0; }
 
   struct Visibility {
     double part;       ///< of the pair's light that gets through, [0, 1]
@@ -103,11 +112,21 @@ class ShadowRays {
   static void add(std::span<const Ray> rays, std::span<const float> transmitted,
                   VisibilityEstimate& estimate);
 
-  /// The kernel between the ends of a ray that make_rays made.
+  /// The kernel between the ends of a ray; 0 of a void one.
   static double ray_weight(const Ray& ray) { return std::bit_cast<float>(ray.id); }
 
-  /// A ray from `x` to `y`.
-  static Ray ray_between(const PatchPoint& x, const PatchPoint& y);
+  /// A ray from `x` to `y`, of `weight` > 0: the kernel between them.
+  static Ray ray_between(const PatchPoint& x, const PatchPoint& y, float weight) {
+    Ray ray;
+    for (int axis = 0; axis < 3; ++axis) {
+      ray.origin[axis] = x.position[axis];
+      ray.direction[axis] = y.position[axis] - x.position[axis];
+    }
+    ray.t_near = 0;
+    ray.t_far = 1;
+    ray.id = std::bit_cast<std::uint32_t>(weight);
+    return ray;
+  }
 
   /// One that stands for none and is never occluded.
   static Ray void_ray();
@@ -123,7 +142,7 @@ class ShadowRays {
   }
 
  private:
-  std::uint64_t pair_hash(std::uint32_t i, std::uint32_t j) const;
+  std::uint64_t shift_of_pair(std::uint32_t i, std::uint32_t j) const;
   void make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
   std::size_t make_corner_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const;
 

@@ -1,5 +1,7 @@
 #include "rebounce/runtime/patch_points.h"
 
+#include <algorithm>
+
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 
@@ -56,6 +58,39 @@ PatchPoint PatchSurface::at_chosen_place(const glm::dvec2& square) const {
     place = place_in_micro_triangle(ground.map_level, micro_triangle, place);
   }
   return ground.at({place.u, place.v});
+}
+
+void PatchSurface::fill(std::size_t count, const PatchPointBlock::Coordinates& u,
+                        const PatchPointBlock::Coordinates& v, float offset,
+                        PatchPointBlock& block) const {
+  if (places_.size() == 1 && choice_.total() > 0)
+    return fill(grounds_[0], count, u, v, offset, block);
+  for (std::size_t k = 0; k < count; ++k) {
+    const PatchPoint point = at_chosen_place({u[k], v[k]});
+    for (int axis = 0; axis < 3; ++axis) {
+      block.position[axis][k] = point.position[axis] + offset * point.normal[axis];
+      block.normal[axis][k] = point.normal[axis];
+    }
+  }
+}
+
+/// On one triangle.
+void PatchSurface::fill(const Ground& ground, std::size_t count,
+                        const PatchPointBlock::Coordinates& u,
+                        const PatchPointBlock::Coordinates& v, float offset,
+                        PatchPointBlock& block) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const float normal = ground.normal[axis],
+                corner = static_cast<float>(ground.corner[axis] + offset * normal),
+                along = static_cast<float>(ground.first_edge[axis]),
+                aside = static_cast<float>(ground.second_edge[axis]);
+    PatchPointBlock::Coordinates &position = block.position[axis], &normals = block.normal[axis];
+    for (std::size_t k = 0; k < count; ++k) {
+      const float fold = 0.5F * std::min(u[k], v[k]);  // square_to_triangle
+      position[k] = corner + (u[k] - fold) * along + (v[k] - fold) * aside;
+      normals[k] = normal;
+    }
+  }
 }
 
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,

@@ -65,6 +65,12 @@ class PatchGeometry {
     return point;
   }
 
+  /// The points of `count` squares (`u`[k], `v`[k]) likewise (PatchSurface::fill).
+  void points(std::size_t patch, std::size_t count, const PatchPointBlock::Coordinates& u,
+              const PatchPointBlock::Coordinates& v, PatchPointBlock& block) const {
+    surface_[patch].fill(count, u, v, offset_, block);
+  }
+
   /// Three points beside corners that span about the largest triangle, moved off the surface.
   std::span<const PatchPoint, 3> outermost_points(std::size_t patch) const {
     return outermost_[patch];

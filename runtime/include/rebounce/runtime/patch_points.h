@@ -2,6 +2,8 @@
 
 // Patches as sets of display triangles, and points spread over them.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
@@ -37,6 +39,14 @@ struct PatchPoint {
   Float3 normal{0, 0, 0};    ///< unit, of the flat triangle
 };
 
+/// Points with their normals, coordinate by coordinate, so that the compiler works on several at
+/// once.
+struct PatchPointBlock {
+  static constexpr std::size_t kSize = 64;
+  using Coordinates = std::array<float, kSize>;
+  std::array<Coordinates, 3> position, normal;  ///< as in PatchPoint
+};
+
 /// What of a patch stops light, to take points from.
 class PatchSurface {
  public:
@@ -53,6 +63,11 @@ class PatchSurface {
     return at_chosen_place(square);
   }
 
+  /// The points of the `count` <= PatchPointBlock::kSize squares (`u`[k], `v`[k]), moved by
+  /// `offset` along their normals; in single precision.
+  void fill(std::size_t count, const PatchPointBlock::Coordinates& u,
+            const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block) const;
+
  private:
   struct Ground {
     glm::dvec3 corner, first_edge, second_edge;
@@ -68,6 +83,8 @@ class PatchSurface {
     std::uint32_t micro_triangle;
   };
 
+  static void fill(const Ground& ground, std::size_t count, const PatchPointBlock::Coordinates& u,
+                   const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block);
   PatchPoint at_chosen_place(const glm::dvec2& square) const;
   void add(const DisplayMesh& mesh, std::uint32_t triangle);
   void add_places(std::span<const std::uint8_t> map, double area);
