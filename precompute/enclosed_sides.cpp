@@ -26,6 +26,12 @@ constexpr std::array<Look, 4> kLooks{{{4, 1}, {12, 2}, {32, 3}, {128, 5}}};
 // So many paths of which none is out are enough.
 constexpr std::uint32_t kClear = 32;
 
+// Sides of triangles that follow each other, no farther apart than this part of the reach, are
+// first looked at together, by so many paths each: where none is out they are all inside.
+constexpr std::size_t kGroup = 8;
+constexpr double kGroupReach = 1.0 / 8;
+constexpr std::uint32_t kGroupPaths = 8;
+
 // Half of the paths end at each bounce; none is followed for longer than this.
 constexpr int kBounces = 16;
 
@@ -42,18 +48,23 @@ class EnclosedSides {
   }
 
   void run() {
-    std::vector<std::uint8_t> inside(2 * sides_.size(), 0);
+    group_candidates();
+    const std::size_t group_count = group_begin_.size() - 1;
+    std::vector<std::uint8_t> inside(candidates_.size(), 0);
 #pragma omp parallel
     {
       Scratch scratch;
-#pragma omp for schedule(dynamic, 256)
-      for (std::uint32_t side = 0; side < inside.size(); ++side) {
-        if (kind(side) != SideKind::kLit || !material(side / 2).double_sided) continue;
-        inside[side] = is_inside(side, scratch) ? 1 : 0;
+#pragma omp for schedule(dynamic, 64)
+      for (std::size_t g = 0; g < group_count; ++g) {
+        const std::size_t begin = group_begin_[g], end = group_begin_[g + 1];
+        const bool all = are_inside(std::span(candidates_).subspan(begin, end - begin), scratch);
+        for (std::size_t k = begin; k < end; ++k) {
+          inside[k] = all || is_inside(candidates_[k], scratch) ? 1 : 0;
+        }
       }
     }
-    for (std::uint32_t side = 0; side < inside.size(); ++side) {
-      if (inside[side] != 0) kind(side) = SideKind::kBuried;
+    for (std::size_t k = 0; k < candidates_.size(); ++k) {
+      if (inside[k] != 0) kind(candidates_[k]) = SideKind::kBuried;
     }
   }
 
@@ -76,10 +87,52 @@ class EnclosedSides {
     return material(t).emitted_luminance != Float3{0, 0, 0};
   }
 
+  /// Gathers the lit sides of double-sided triangles, fronts first.
+  void group_candidates() {
+    for (const bool front : {true, false}) {
+      for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+        const std::uint32_t side = 2 * t + (front ? 0 : 1);
+        if (kind(side) != SideKind::kLit || !material(t).double_sided) continue;
+        if (!joins_group(side)) {
+          group_begin_.push_back(static_cast<std::uint32_t>(candidates_.size()));
+        }
+        candidates_.push_back(side);
+      }
+    }
+    group_begin_.push_back(static_cast<std::uint32_t>(candidates_.size()));
+  }
+
+  /// True if a side is like the first of the last group, and there is room for it.
+  bool joins_group(std::uint32_t side) const {
+    if (group_begin_.empty() || candidates_.size() - group_begin_.back() >= kGroup) return false;
+    const std::uint32_t first = candidates_[group_begin_.back()];
+    return first % 2 == side % 2 &&
+           glm::distance(centroid(first / 2), centroid(side / 2)) <= kGroupReach * reach_;
+  }
+
+  glm::dvec3 centroid(std::uint32_t t) const {
+    const auto [a, b, c] = scene_.triangle[t];
+    return (to_dvec3(scene_.position[a]) + to_dvec3(scene_.position[b]) +
+            to_dvec3(scene_.position[c])) /
+           3.0;
+  }
+
+  /// Tells whether clearly all of a group are inside.
+  bool are_inside(std::span<const std::uint32_t> group, Scratch& scratch) const {
+    if (group.size() == 1) return false;
+    const auto all = std::max<std::uint32_t>(kClear, kGroupPaths * group.size());
+    std::uint32_t begin = 0;
+    for (const std::uint32_t end : {4U, 16U, all}) {
+      if (count_paths_out(group, begin, end, scratch) > 0) return false;
+      begin = end;
+    }
+    return true;
+  }
+
   bool is_inside(std::uint32_t side, Scratch& scratch) const {
     std::uint32_t begin = 0, out = 0;
     for (const Look& look : kLooks) {
-      out += count_paths_out(side, begin, look.paths, scratch);
+      out += count_paths_out({&side, 1}, begin, look.paths, scratch);
       if (out > look.most_out) return false;
       if (out == 0 && look.paths >= kClear) return true;
       begin = look.paths;
@@ -87,10 +140,13 @@ class EnclosedSides {
     return true;
   }
 
-  /// How many of the paths [begin, end) of a side get out.
-  std::uint32_t count_paths_out(std::uint32_t side, std::uint32_t begin, std::uint32_t end,
-                                Scratch& scratch) const {
-    start_paths(side, begin, end, scratch.rays);
+  /// How many of the paths [begin, end) get out, which the sides take in turn.
+  std::uint32_t count_paths_out(std::span<const std::uint32_t> sides, std::uint32_t begin,
+                                std::uint32_t end, Scratch& scratch) const {
+    scratch.rays.resize(end - begin);
+    for (std::uint32_t k = begin; k < end; ++k) {
+      scratch.rays[k - begin] = start_path(sides[k % sides.size()], k);
+    }
     std::uint32_t out = 0;
     for (int bounce = 0; bounce < kBounces && !scratch.rays.empty(); ++bounce) {
       scratch.hits.resize(scratch.rays.size());
@@ -102,7 +158,7 @@ class EnclosedSides {
         if (is_out(hit)) {
           ++out;
         } else if (reflects(hit)) {
-          const std::uint64_t bits = path_bits(side, ray.id, bounce);
+          const std::uint64_t bits = path_bits(sides[ray.id % sides.size()], ray.id, bounce);
           if (bits % 2 == 0) scratch.rays[kept++] = reflect(ray, hit, mix_bits(bits));
         }
       }
@@ -115,16 +171,16 @@ class EnclosedSides {
     return mix_bits(mix_bits(side) ^ (std::uint64_t{path} << 8 | static_cast<unsigned>(bounce)));
   }
 
-  void start_paths(std::uint32_t side, std::uint32_t begin, std::uint32_t end,
-                   std::vector<Ray>& rays) const {
+  Ray start_path(std::uint32_t side, std::uint32_t path) const {
     std::array<glm::dvec3, 3> corner;
     for (int k = 0; k < 3; ++k) {
       corner[k] = to_dvec3(scene_.position[scene_.triangle[side / 2][k]]);
     }
-    rays.resize(end - begin);
-    make_hemisphere_rays(corner, normal(side / 2, side % 2 == 0), tracer_, mix_bits(side), rays,
-                         begin);
-    for (std::uint32_t k = begin; k < end; ++k) rays[k - begin].id = k;
+    Ray ray{};
+    make_hemisphere_rays(corner, normal(side / 2, side % 2 == 0), tracer_, mix_bits(side),
+                         {&ray, 1}, path);
+    ray.id = path;
+    return ray;
   }
 
   glm::dvec3 normal(std::uint32_t t, bool front) const {
@@ -158,7 +214,9 @@ class EnclosedSides {
   const Scene& scene_;
   const RayTracer& tracer_;
   std::vector<TriangleSides>& sides_;
-  double reach_;  ///< metres
+  double reach_;                            ///< metres
+  std::vector<std::uint32_t> candidates_;   ///< sides
+  std::vector<std::uint32_t> group_begin_;  ///< [g + 1] in candidates_
 };
 
 }  // namespace
