@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include "hemisphere_rays.h"
@@ -31,6 +32,11 @@ constexpr std::uint32_t kClear = 32;
 constexpr std::size_t kGroup = 8;
 constexpr double kGroupReach = 1.0 / 8;
 constexpr std::uint32_t kGroupPaths = 8;
+
+// Of a triangle larger than the square of this part of the reach none may be out of so many paths
+// for each such square, up to a largest number: a wall's triangle may look out from behind a board.
+constexpr double kLarge = 1.0 / 8;
+constexpr std::uint32_t kMostPaths = 2048;
 
 // Half of the paths end at each bounce; none is followed for longer than this.
 constexpr int kBounces = 16;
@@ -106,7 +112,7 @@ class EnclosedSides {
   bool joins_group(std::uint32_t side) const {
     if (group_begin_.empty() || candidates_.size() - group_begin_.back() >= kGroup) return false;
     const std::uint32_t first = candidates_[group_begin_.back()];
-    return first % 2 == side % 2 &&
+    return first % 2 == side % 2 && area(first / 2) <= 1 && area(side / 2) <= 1 &&
            glm::distance(centroid(first / 2), centroid(side / 2)) <= kGroupReach * reach_;
   }
 
@@ -120,16 +126,33 @@ class EnclosedSides {
   /// Tells whether clearly all of a group are inside.
   bool are_inside(std::span<const std::uint32_t> group, Scratch& scratch) const {
     if (group.size() == 1) return false;
-    const auto all = std::max<std::uint32_t>(kClear, kGroupPaths * group.size());
-    std::uint32_t begin = 0;
-    for (const std::uint32_t end : {4U, 16U, all}) {
-      if (count_paths_out(group, begin, end, scratch) > 0) return false;
-      begin = end;
+    return is_none_out(group, std::max<std::size_t>(kClear, kGroupPaths * group.size()), scratch);
+  }
+
+  /// Tells whether of so many paths that the sides take in turn none gets out.
+  bool is_none_out(std::span<const std::uint32_t> sides, std::size_t count,
+                   Scratch& scratch) const {
+    for (std::size_t begin = 0, end = 4; begin < count; begin = end, end *= 4) {
+      end = std::min(end, count);
+      if (count_paths_out(sides, begin, end, scratch) > 0) return false;
     }
     return true;
   }
 
+  /// In such squares as are large.
+  double area(std::uint32_t t) const {
+    const auto [a, b, c] = scene_.triangle[t];
+    const glm::dvec3 p = to_dvec3(scene_.position[a]);
+    const glm::dvec3 cross =
+        glm::cross(to_dvec3(scene_.position[b]) - p, to_dvec3(scene_.position[c]) - p);
+    return 0.5 * glm::length(cross) / std::pow(kLarge * reach_, 2);
+  }
+
   bool is_inside(std::uint32_t side, Scratch& scratch) const {
+    if (const double size = area(side / 2); size > 1) {
+      const auto paths = static_cast<std::size_t>(std::min<double>(kMostPaths, kClear * size));
+      return is_none_out({&side, 1}, paths, scratch);
+    }
     std::uint32_t begin = 0, out = 0;
     for (const Look& look : kLooks) {
       out += count_paths_out({&side, 1}, begin, look.paths, scratch);
@@ -141,11 +164,11 @@ class EnclosedSides {
   }
 
   /// How many of the paths [begin, end) get out, which the sides take in turn.
-  std::uint32_t count_paths_out(std::span<const std::uint32_t> sides, std::uint32_t begin,
-                                std::uint32_t end, Scratch& scratch) const {
+  std::uint32_t count_paths_out(std::span<const std::uint32_t> sides, std::size_t begin,
+                                std::size_t end, Scratch& scratch) const {
     scratch.rays.resize(end - begin);
-    for (std::uint32_t k = begin; k < end; ++k) {
-      scratch.rays[k - begin] = start_path(sides[k % sides.size()], k);
+    for (std::size_t k = begin; k < end; ++k) {
+      scratch.rays[k - begin] = start_path(sides[k % sides.size()], static_cast<std::uint32_t>(k));
     }
     std::uint32_t out = 0;
     for (int bounce = 0; bounce < kBounces && !scratch.rays.empty(); ++bounce) {

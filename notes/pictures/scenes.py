@@ -68,7 +68,7 @@ def make_sheet(pictures, path):
 def main():
     if len(sys.argv) < 4:
         sys.exit(__doc__)
-    program, scenes, work = map(pathlib.Path, sys.argv[1:4])
+    program, scenes, work = (pathlib.Path(path).resolve() for path in sys.argv[1:4])
     work.mkdir(parents=True, exist_ok=True)
     wanted = sys.argv[4:]
     names = [n for n in VIEWS if not wanted or n.split("_")[0] in wanted]

@@ -97,6 +97,19 @@ TEST(EnclosedSides, AShellThatAWallClosesIsBuried) {
   }
 }
 
+TEST(EnclosedSides, AWallThatLooksOutFromBehindABoardIsLit) {
+  // Of the wall's triangle 2 % are seen, beside a board 2 cm before it that hides the rest.
+  Scene scene = room();
+  const std::vector<glm::dvec3> wall = {{1, 0.5, 0.1}, {3, 0.5, 0.1}, {1, 2.5, 0.1}};
+  test::add_polygon(scene, wall, kShell);
+  test::add_box(scene, {1.02, 0.4, 0.1}, {3.1, 2.6, 0.12}, false, kShell);
+  const std::vector<TriangleSides> sides =
+      find_lit_sides(scene, RayTracer(scene.position, scene.triangle));
+  for (std::uint32_t t = 0; t < sides.size(); ++t) {
+    EXPECT_EQ(sides[t].front, SideKind::kLit) << t;
+  }
+}
+
 TEST(EnclosedSides, AnOpenBoxIsLit) {
   Scene scene = room();
   add_open_box(scene, kLow, kHigh);
