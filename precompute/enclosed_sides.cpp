@@ -28,10 +28,15 @@ constexpr std::array<Look, 4> kLooks{{{4, 1}, {12, 2}, {32, 3}, {128, 5}}};
 constexpr std::uint32_t kClear = 32;
 
 // Sides of triangles that follow each other, no farther apart than this part of the reach, are
-// first looked at together, by so many paths each: where none is out they are all inside.
+// first looked at together, by so many paths each: where none is out they are all inside, where
+// this part of them or more is out they are all lit.
 constexpr std::size_t kGroup = 8;
 constexpr double kGroupReach = 1.0 / 8;
 constexpr std::uint32_t kGroupPaths = 8;
+constexpr double kClearlyLit = 1.0 / 8;
+
+// A group is looked at twice; it is lit already if twice that part of the first paths is out.
+constexpr std::uint32_t kFirstPaths = 16;
 
 // Of a triangle larger than the square of this part of the reach none may be out of so many paths
 // for each such square, up to a largest number: a wall's triangle may look out from behind a board.
@@ -63,9 +68,12 @@ class EnclosedSides {
 #pragma omp for schedule(dynamic, 64)
       for (std::size_t g = 0; g < group_count; ++g) {
         const std::size_t begin = group_begin_[g], end = group_begin_[g + 1];
-        const bool all = are_inside(std::span(candidates_).subspan(begin, end - begin), scratch);
+        const Verdict verdict =
+            look_at(std::span(candidates_).subspan(begin, end - begin), scratch);
+        if (verdict == Verdict::kLit) continue;
         for (std::size_t k = begin; k < end; ++k) {
-          inside[k] = all || is_inside(candidates_[k], scratch) ? 1 : 0;
+          const bool is = verdict == Verdict::kInside || is_inside(candidates_[k], scratch);
+          inside[k] = is ? 1 : 0;
         }
       }
     }
@@ -75,6 +83,8 @@ class EnclosedSides {
   }
 
  private:
+  enum class Verdict : std::uint8_t { kInside, kLit, kDoubt };
+
   struct Scratch {
     std::vector<Ray> rays;  ///< of the paths that go on; their ids are the paths' numbers
     std::vector<Hit> hits;
@@ -123,10 +133,15 @@ class EnclosedSides {
            3.0;
   }
 
-  /// Tells whether clearly all of a group are inside.
-  bool are_inside(std::span<const std::uint32_t> group, Scratch& scratch) const {
-    if (group.size() == 1) return false;
-    return is_none_out(group, std::max<std::size_t>(kClear, kGroupPaths * group.size()), scratch);
+  /// Tells what all of a group are, if that is clear.
+  Verdict look_at(std::span<const std::uint32_t> group, Scratch& scratch) const {
+    if (group.size() == 1) return Verdict::kDoubt;
+    const std::size_t count = std::max<std::size_t>(kClear, kGroupPaths * group.size());
+    std::uint32_t out = count_paths_out(group, 0, kFirstPaths, scratch);
+    if (out >= 2 * kClearlyLit * kFirstPaths) return Verdict::kLit;
+    out += count_paths_out(group, kFirstPaths, count, scratch);
+    if (out == 0) return Verdict::kInside;
+    return out >= kClearlyLit * static_cast<double>(count) ? Verdict::kLit : Verdict::kDoubt;
   }
 
   /// Tells whether of so many paths that the sides take in turn none gets out.
