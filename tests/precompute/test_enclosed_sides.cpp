@@ -23,6 +23,13 @@ Scene room() {
   return scene;
 }
 
+/// A shell without its face +z.
+void add_open_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high) {
+  test::add_box(scene, low, high, false, kShell);
+  scene.triangle.resize(scene.triangle.size() - 2);
+  scene.triangle_material.resize(scene.triangle.size());
+}
+
 void refine(Scene& scene, std::size_t count) {
   subdivide(scene, std::vector<std::uint8_t>(scene.triangle.size(), 1), {.patch_count = count});
 }
@@ -68,11 +75,44 @@ TEST(EnclosedSides, ShellsThatPassThroughEachOtherAreInsideToo) {
   EXPECT_GT(count.buried_inside, count.lit_outside / 2);
 }
 
+TEST(EnclosedSides, AShellThatAWallClosesIsBuried) {
+  // The wall's triangles are large, for the most part outside, and one-sided or double-sided.
+  for (const std::uint32_t wall : {kRoom, kShell}) {
+    Scene scene = test::empty_scene();
+    scene.materials.resize(3, scene.materials[0]);
+    scene.materials[kShell].double_sided = true;
+    add_open_box(scene, {2, 0.5, 3.5}, {3, 1, 4});
+    refine(scene, 500);
+    const std::size_t shell_count = scene.triangle.size();
+    test::add_box(scene, {0, 0, 0}, {5, 3, 4}, true, wall);
+    const std::vector<TriangleSides> sides =
+        find_lit_sides(scene, RayTracer(scene.position, scene.triangle));
+    for (std::uint32_t t = 0; t < shell_count; ++t) {
+      EXPECT_EQ(sides[t].front, SideKind::kLit);
+      EXPECT_EQ(sides[t].back, SideKind::kBuried);
+    }
+    for (std::size_t t = shell_count; t < sides.size(); ++t) {
+      EXPECT_EQ(sides[t].front, SideKind::kLit);
+    }
+  }
+}
+
+TEST(EnclosedSides, AWallThatLooksOutFromBehindABoardIsLit) {
+  // Of the wall's triangle 2 % are seen, beside a board 2 cm before it that hides the rest.
+  Scene scene = room();
+  const std::vector<glm::dvec3> wall = {{1, 0.5, 0.1}, {3, 0.5, 0.1}, {1, 2.5, 0.1}};
+  test::add_polygon(scene, wall, kShell);
+  test::add_box(scene, {1.02, 0.4, 0.1}, {3.1, 2.6, 0.12}, false, kShell);
+  const std::vector<TriangleSides> sides =
+      find_lit_sides(scene, RayTracer(scene.position, scene.triangle));
+  for (std::uint32_t t = 0; t < sides.size(); ++t) {
+    EXPECT_EQ(sides[t].front, SideKind::kLit) << t;
+  }
+}
+
 TEST(EnclosedSides, AnOpenBoxIsLit) {
   Scene scene = room();
-  test::add_box(scene, kLow, kHigh, false, kShell);
-  scene.triangle.resize(scene.triangle.size() - 2);  // without the face +z
-  scene.triangle_material.resize(scene.triangle.size());
+  add_open_box(scene, kLow, kHigh);
   refine(scene, 2000);
   const ShellSides count = sides_of_shell(scene);
   EXPECT_EQ(count.buried_inside, 0);
@@ -98,9 +138,7 @@ TEST(EnclosedSides, AClosedRoomOfDoubleSidedWallsIsLit) {
 TEST(EnclosedSides, NoPatchHoldsTheInsideAndTheOutsideOfAShell) {
   // An open box, so that both have patches, of triangles far smaller than they are.
   Scene box = room();
-  test::add_box(box, kLow, kHigh, false, kShell);
-  box.triangle.resize(box.triangle.size() - 2);
-  box.triangle_material.resize(box.triangle.size());
+  add_open_box(box, kLow, kHigh);
   refine(box, 8000);
   for (const std::size_t wanted : {700U, 2000U}) {
     const PatchModel model = make_patch_model(box, {.patch_count = wanted});
