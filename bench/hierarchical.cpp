@@ -65,12 +65,12 @@ class HierarchicalBench {
     draw_lights();
     if (model_.patches.size() <= options.most_flat) add_flat();
     for (const double epsilon : options.epsilons) add_links(epsilon);
+    for (Contender& contender : contenders_) count_sweeps(contender);
   }
 
   /// `sweep_before` holds the patches and the seconds of a sweep of the scene before, by method.
   using SweepTimes = std::map<std::string, std::pair<double, double>>;
-  void measure(SweepTimes& sweep_before, Table& table) {
-    for (Contender& contender : contenders_) count_sweeps(contender);
+  void measure(int threads, SweepTimes& sweep_before, Table& table) {
     std::vector<TimedCase> cases;
     for (const Contender& contender : contenders_) {
       cases.push_back({.work = [&] { solve_all(contender, contender.sweeps); }});
@@ -84,12 +84,13 @@ class HierarchicalBench {
       const double sweep = seconds / contender.sweeps;
       Table::Cell ratio, growth;
       if (!flat_.empty()) ratio = timings[k].minimum / timings[0].minimum;
-      const std::string key = contender.method + contender.form + std::to_string(contender.epsilon);
+      const std::string key = contender.method + contender.form +
+                              std::to_string(contender.epsilon) + std::to_string(threads);
       if (const auto before = sweep_before.find(key); before != sweep_before.end()) {
         growth = std::log(sweep / before->second.second) / std::log(n / before->second.first);
       }
       sweep_before[key] = {n, sweep};
-      table.add({scene_, n, contender.method, contender.form,
+      table.add({scene_, n, threads, contender.method, contender.form,
                  contender.epsilon > 0 ? Table::Cell(contender.epsilon) : Table::Cell(),
                  static_cast<double>(contender.entry_count) / (n * n),
                  static_cast<double>(contender.form_factors->bytes()) / n,
@@ -108,6 +109,7 @@ class HierarchicalBench {
   void draw_lights() {
     TransferData data;
     data.patches = model_.patches;
+    data.patches.sky_visibility.assign(data.patches.size(), 0);  // no light of these is a sky
     data.mesh = model_.mesh;
     for (const LightKind kind : {LightKind::kPoint, LightKind::kPatch}) {
       for (auto& light : random_initial_exitances(data, tracer_, kind, options_.light_count, 1)) {
@@ -208,12 +210,15 @@ class HierarchicalBench {
 };
 
 void run(const HierarchicalOptions& options) {
-  Table table({"scene", "patches", "method", "form", "epsilon", "entries / n2", "bytes a patch",
-               "converged", "sweeps", "error", "ms", "ms a sweep", "of gauss-seidel", "growth"});
+  Table table({"scene", "patches", "threads", "method", "form", "epsilon", "entries / n2",
+               "bytes a patch", "converged", "sweeps", "error", "ms", "ms a sweep",
+               "of gauss-seidel", "growth"});
   for (const std::string& scene : options.scenes) {
     HierarchicalBench::SweepTimes sweep_before;
     for (const std::size_t patches : options.patches) {
-      HierarchicalBench(scene, patches, options).measure(sweep_before, table);
+      HierarchicalBench bench(scene, patches, options);
+      run_at_thread_counts(options.common,
+                           [&](int threads) { bench.measure(threads, sweep_before, table); });
     }
   }
   publish("hierarchical", table, options.common);
