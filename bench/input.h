@@ -3,12 +3,16 @@
 #include <string>
 
 #include "rebounce/precompute/build.h"
+#include "rebounce/precompute/patch_model.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce::bench {
 
 /// Loads a transfer file, or builds its data from a scene. Throws Error if it cannot.
 TransferData load_or_build(const std::string& input, const BuildSettings& settings);
+
+/// The patches of a scene, made as load_or_build makes them. Throws Error if it cannot.
+PatchModel model_of_scene(const std::string& path, std::size_t patch_count);
 
 /// Name of the scene, without its extension.
 std::string scene_name(const TransferData& data);

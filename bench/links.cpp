@@ -1,4 +1,4 @@
-// Links against all pairs of patches: how many, how many rays, how far off, how fast to solve with.
+// Links against all pairs of patches: how many, how many rays, how far off.
 //
 // All pairs are looked at for some rows only, so that n may be large.
 
@@ -7,15 +7,10 @@
 #include <numeric>
 
 #include "escape.h"
+#include "input.h"
 #include "program.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_geometry.h"
-#include "rebounce/precompute/winding.h"
-#include "rebounce/runtime/gauss_seidel_solver.h"
-#include "rebounce/runtime/hierarchical_solver.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/form_factor_blocks.h"
 #include "row_targets.h"
 #include "shadow_rays.h"
 #include "timing.h"
@@ -31,8 +26,7 @@ struct LinksOptions {
   std::vector<std::size_t> patches = {1000, 4000};
   std::vector<double> epsilons = {kLinkEpsilon};
   std::size_t row_count = 192;  ///< of all pairs that are looked at
-  bool solve = false;
-  CommonOptions common{.repeats = 5};
+  CommonOptions common{.repeats = 1};
 };
 
 /// Some rows of F, from all pairs, each scaled to what escape leaves of 1.
@@ -60,7 +54,7 @@ class SceneBench {
  public:
   SceneBench(const std::string& scene, std::size_t patch_count, const LinksOptions& options)
       : options_(options),
-        model_(make_model(scene, patch_count)),
+        model_(model_of_scene(scene, patch_count)),
         tracer_(make_surface_tracer(model_.mesh)),
         geometry_(model_, tracer_),
         shadow_rays_(geometry_, settings_.seed, settings_.kernel_tolerance) {
@@ -74,31 +68,13 @@ class SceneBench {
     const auto n = static_cast<double>(model_.patches.size());
     const double rays = static_cast<double>(build.ray_count) - n * settings_.hemisphere_rays;
     const LinkedFormFactors links(build.links, model_.patches.area, model_.patches.centroid);
-    std::vector<Table::Cell> row = {name,
-                                    n,
-                                    epsilon,
-                                    build.links.pair.size(),
-                                    static_cast<double>(build.links.pair.size()) / (n * n),
-                                    rays,
-                                    rays / rows_.rays_of_all,
-                                    seconds / rows_.seconds_of_all,
-                                    matrix_error(links),
-                                    gather_error(links)};
-    if (options_.solve) {
-      const auto [error, ratio] = compare_solvers(links);
-      row.insert(row.end(), {error, ratio});
-    }
-    table.add(std::move(row));
+    table.add({name, n, epsilon, build.links.pair.size(),
+               static_cast<double>(build.links.pair.size()) / (n * n), rays,
+               rays / rows_.rays_of_all, seconds / rows_.seconds_of_all, matrix_error(links),
+               gather_error(links)});
   }
 
  private:
-  static PatchModel make_model(const std::string& path, std::size_t patch_count) {
-    Scene scene = import_gltf(path);
-    const RayTracer tracer(scene.position, scene.triangle);
-    make_double_sided(scene, find_inside_out(scene, tracer));
-    return make_patch_model(std::move(scene), {.patch_count = patch_count});
-  }
-
   void sample_rows() {
     const std::size_t n = model_.patches.size(), count = std::min(n, options_.row_count);
     for (std::size_t k = 0; k < count; ++k) {
@@ -239,33 +215,6 @@ class SceneBench {
     return std::sqrt(difference / norm);
   }
 
-  struct SolverComparison {
-    double error;  ///< of hierarchical radiosity
-    double ratio;  ///< its time in that of Gauss-Seidel
-  };
-
-  /// From a point-like light to a residual of 1e-3; Gauss-Seidel on pairs that links were expanded
-  /// to.
-  SolverComparison compare_solvers(const LinkedFormFactors& links) const {
-    const FormFactorBlocks pairs(compute_form_factors(model_, tracer_, settings_).exchange,
-                                 model_.patches.area);
-    const RadiosityProblem problem{model_.patches.area, model_.patches.reflectance};
-    std::vector<Float3> light = smooth_light();
-    for (Float3& m : light) m = m[0] > 2 ? Float3{1, 1, 1} : Float3{0, 0, 0};
-    HierarchicalSolver hierarchical(links, problem);
-    GaussSeidelSolver flat(pairs, problem);
-    flat.solve(light, {.residual = 1e-6});
-    hierarchical.solve(light, {.residual = 1e-6});
-    const double error =
-        relative_difference(hierarchical.radiosity(), flat.radiosity(), model_.patches.area);
-    const SolveSettings to_a_thousandth{.residual = 1e-3, .measure_residual = false};
-    const std::vector<TimedCase> cases = {
-        {[&] { hierarchical.solve(light, to_a_thousandth); }, [&] { hierarchical.forget(); }},
-        {[&] { flat.solve(light, to_a_thousandth); }, [&] { flat.forget(); }}};
-    const auto timing = time_interleaved(cases, {.rounds = options_.common.repeats});
-    return {error, timing[0].median / timing[1].median};
-  }
-
   const LinksOptions& options_;
   FormFactorSettings settings_;
   PatchModel model_;
@@ -276,11 +225,8 @@ class SceneBench {
 };
 
 void run(const LinksOptions& options) {
-  std::vector<std::string> columns = {
-      "scene", "patches",     "epsilon",          "links",      "links / n2",
-      "rays",  "/ all pairs", "time / all pairs", "error of F", "error of F B"};
-  if (options.solve) columns.insert(columns.end(), {"error of B", "time / Gauss-Seidel"});
-  Table table(columns);
+  Table table({"scene", "patches", "epsilon", "links", "links / n2", "rays", "/ all pairs",
+               "time / all pairs", "error of F", "error of F B"});
   for (const std::string& scene : options.scenes) {
     const std::string name = std::filesystem::path(scene).stem().string();
     for (const std::size_t patches : options.patches) {
@@ -304,7 +250,6 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--rows", options.row_count, "Rows of F that are found from all pairs")
       ->capture_default_str();
-  app.add_flag("--solve", options.solve, "Compare hierarchical radiosity with Gauss-Seidel too");
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] { run(options); });
 }

@@ -55,7 +55,8 @@ namespace {
 static_assert(sizeof(Float3) == 3 * sizeof(float));
 static_assert(REBOUNCE_SKY_CELL_COUNT == kSkyCellCount);
 static_assert(sizeof(SurfaceLight) == 12 * sizeof(float));
-static_assert(sizeof(ProbeLight) == 27 * sizeof(float));
+static_assert(sizeof(QuadraticProbeLight) == 27 * sizeof(float));
+static_assert(sizeof(ProbeLight) == 54 * sizeof(float));
 
 thread_local std::string last_error;
 
@@ -171,6 +172,25 @@ Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_sett
   static_cast<void>(settings);
   return Engine(transfer.data);
 #endif
+}
+
+/// The light at the probes in the coefficients that `Light` has.
+template <typename Light>
+rebounce_status write_probe_light(const rebounce_engine& engine, float* harmonics,
+                                  std::size_t probe_count) {
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    apply_probes(engine.engine.data().probes, engine.engine.radiosity(), engine.sky,
+                 std::span(reinterpret_cast<Light*>(harmonics), probe_count));
+    return REBOUNCE_OK;
+  });
+}
+
+template <typename Light>
+void write_irradiance(const float* harmonics, const float* normal, float* irradiance) {
+  if (harmonics == nullptr || normal == nullptr || irradiance == nullptr) return;
+  Light light;
+  std::memcpy(light.data(), harmonics, sizeof(light));
+  std::ranges::copy(probe_irradiance(light, triple(normal)), irradiance);
 }
 
 }  // namespace
@@ -459,17 +479,22 @@ rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, flo
 rebounce_status rebounce_engine_probe_light(const rebounce_engine* engine, float* harmonics,
                                             size_t probe_count) {
   if (engine == nullptr || harmonics == nullptr) return missing("rebounce_engine_probe_light");
-  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    apply_probes(engine->engine.data().probes, engine->engine.radiosity(), engine->sky,
-                 {reinterpret_cast<ProbeLight*>(harmonics), probe_count});
-    return REBOUNCE_OK;
-  });
+  return write_probe_light<QuadraticProbeLight>(*engine, harmonics, probe_count);
+}
+
+rebounce_status rebounce_engine_probe_light_to_degree_4(const rebounce_engine* engine,
+                                                        float* harmonics, size_t probe_count) {
+  if (engine == nullptr || harmonics == nullptr) {
+    return missing("rebounce_engine_probe_light_to_degree_4");
+  }
+  return write_probe_light<ProbeLight>(*engine, harmonics, probe_count);
 }
 
 void rebounce_harmonics_irradiance(const float* harmonics, const float* normal, float* irradiance) {
-  if (harmonics == nullptr || normal == nullptr || irradiance == nullptr) return;
-  ProbeLight light;
-  std::memcpy(light.data(), harmonics, sizeof(light));
-  const Float3 sum = probe_irradiance(light, triple(normal));
-  std::ranges::copy(sum, irradiance);
+  write_irradiance<QuadraticProbeLight>(harmonics, normal, irradiance);
+}
+
+void rebounce_harmonics_irradiance_to_degree_4(const float* harmonics, const float* normal,
+                                               float* irradiance) {
+  write_irradiance<ProbeLight>(harmonics, normal, irradiance);
 }

@@ -21,8 +21,8 @@ struct PlanarLight {
       for (std::size_t k = 0; k < kHarmonicCount; ++k) channel[c][k] += color[c] * weight[k];
     }
   }
-  ProbeLight interleaved() const {
-    ProbeLight light;
+  QuadraticProbeLight interleaved() const {
+    QuadraticProbeLight light;
     for (std::size_t k = 0; k < kHarmonicCount; ++k) {
       light[k] = {channel[0][k], channel[1][k], channel[2][k]};
     }
@@ -74,7 +74,7 @@ float for_each_probe_around(const LightProbes& probes, const Float3& position, c
 }
 
 void add_scaled(ProbeLight& sum, const ProbeLight& light, float factor) {
-  for (std::size_t k = 0; k < kHarmonicCount; ++k) {
+  for (std::size_t k = 0; k < sum.size(); ++k) {
     for (std::size_t c = 0; c < kChannelCount; ++c) sum[k][c] += factor * light[k][c];
   }
 }
@@ -86,8 +86,9 @@ void divide(ProbeLight& light, float divisor) {
 }
 
 /// What probe `p` sees.
-ProbeLight light_of_probe(const LightProbes& probes, std::size_t p,
-                          std::span<const Float3> radiosity, const SeenSky<Harmonics>& sky) {
+QuadraticProbeLight quadratic_light(const LightProbes& probes, std::size_t p,
+                                    std::span<const Float3> radiosity,
+                                    const SeenSky<Harmonics>& sky) {
   PlanarLight sum;
   sum.add(sky.coefficients(p), sky.luminance());
   for (std::uint32_t e = probes.entry_begin[p]; e < probes.entry_begin[p + 1]; ++e) {
@@ -96,27 +97,53 @@ ProbeLight light_of_probe(const LightProbes& probes, std::size_t p,
   return sum.interleaved();
 }
 
+ProbeLight light_of_probe(const LightProbes& probes, std::size_t p,
+                          std::span<const Float3> radiosity, const SeenSky<Harmonics>& sky) {
+  PlanarLight degree_4;
+  degree_4.add(sky.degree_4(p), sky.luminance());
+  ProbeLight light;
+  const auto rest = std::ranges::copy(quadratic_light(probes, p, radiosity, sky), light.begin());
+  std::ranges::copy(degree_4.interleaved(), rest.out);
+  return light;
+}
+
 void check_size(std::size_t size, std::size_t wanted, const char* name) {
   if (size == wanted) return;
   throw Error(std::string("probes: ") + name + " has " + std::to_string(size) +
               " entries; it must have " + std::to_string(wanted));
 }
 
-}  // namespace
-
-void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
-                  std::span<ProbeLight> light) {
+/// Writes what light_of finds for each probe.
+template <typename Light, typename LightOf>
+void apply(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
+           const LightOf& light_of, std::span<Light> light) {
   check_size(light.size(), probes.size(), "the result");
   if (probes.size() == 0) return;
   check_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
 #pragma omp parallel for schedule(static)
   for (std::size_t p = 0; p < probes.size(); ++p) {
-    light[p] = light_of_probe(probes, p, radiosity, seen_sky);
+    light[p] = light_of(probes, p, radiosity, seen_sky);
   }
 }
 
+}  // namespace
+
+void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
+                  std::span<ProbeLight> light) {
+  apply(probes, radiosity, sky, light_of_probe, light);
+}
+
+void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
+                  std::span<QuadraticProbeLight> light) {
+  apply(probes, radiosity, sky, quadratic_light, light);
+}
+
 Float3 probe_irradiance(const ProbeLight& light, const Float3& normal) {
+  return irradiance_of(light, normal);
+}
+
+Float3 probe_irradiance(const QuadraticProbeLight& light, const Float3& normal) {
   return irradiance_of(light, normal);
 }
 

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
 #include "rebounce/runtime/sky_light.h"
+#include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/scene_description.h"
 #include "rebounce/transfer/sky_harmonics.h"
 
@@ -25,15 +27,28 @@ class SeenSky {
 
   Weight coefficients(std::size_t place) const {
     if (distribution_ == nullptr) return uniform_[place];
-    Weight sum{};
+    return sum_of_cells<Weight>(place,
+                                [](const Weight& weight) -> const Weight& { return weight; });
+  }
+
+  /// Degree 4, each cell taken for a spot of light; none where the cells are not known.
+  Harmonics degree_4(std::size_t place) const {
+    if (cells_.empty() || luminance_ == Float3{0, 0, 0}) return {};
+    return sum_of_cells<Harmonics>(place, degree_4_of_spot<std::tuple_size_v<Weight>>);
+  }
+
+ private:
+  template <typename Sum, typename Of>
+  Sum sum_of_cells(std::size_t place, const Of& of) const {
+    Sum sum{};
     for (auto e = cells_.entry_begin[place]; e < cells_.entry_begin[place + 1]; ++e) {
-      const float part = (*distribution_)[cells_.entry_cell[e]];
-      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += part * cells_.entry_weight[e][k];
+      const float part = distribution_ == nullptr ? 1 : (*distribution_)[cells_.entry_cell[e]];
+      const Sum& weight = of(cells_.entry_weight[e]);
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += part * weight[k];
     }
     return sum;
   }
 
- private:
   const std::vector<Weight>& uniform_;
   const SkyHarmonics<Weight>& cells_;
   const SkyDistribution* distribution_;

@@ -228,8 +228,16 @@ rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, flo
 rebounce_status rebounce_engine_probe_light(const rebounce_engine* engine, float* harmonics,
                                             size_t probe_count);
 
-/* Irradiance in lx on a surface with unit normal [3] of coefficients [9][3]; writes [3]. */
+/* The same with the nine coefficients of degree 4 after those: [probe_count][18][3]. It is truer
+ * under a sky with a bright part; irradiance has none of degree 3. */
+rebounce_status rebounce_engine_probe_light_to_degree_4(const rebounce_engine* engine,
+                                                        float* harmonics, size_t probe_count);
+
+/* Irradiance in lx on a surface with unit normal [3] of coefficients [9][3], or [18][3]; writes
+ * [3]. */
 void rebounce_harmonics_irradiance(const float* harmonics, const float* normal, float* irradiance);
+void rebounce_harmonics_irradiance_to_degree_4(const float* harmonics, const float* normal,
+                                               float* irradiance);
 
 #ifdef __cplusplus
 }

@@ -95,6 +95,12 @@ int main(int argc, char** argv) {
     float irradiance[3];
     rebounce_harmonics_irradiance(harmonics, up, irradiance);
     CHECK(isfinite(irradiance[0]) && irradiance[0] >= 0);
+    float* more = malloc(54 * (size_t)info.probe_count * sizeof(float));
+    CHECK(rebounce_engine_probe_light_to_degree_4(engine, more, info.probe_count) == REBOUNCE_OK);
+    CHECK(memcmp(more, harmonics, 27 * sizeof(float)) == 0);
+    rebounce_harmonics_irradiance_to_degree_4(more, up, irradiance);
+    CHECK(isfinite(irradiance[0]) && irradiance[0] >= 0);
+    free(more);
     free(harmonics);
   }
   check_failures(engine);

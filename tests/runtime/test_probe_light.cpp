@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <vector>
 
 #include "allocation_counter.h"
@@ -31,16 +33,53 @@ void over_sphere(const Function& f) {
 }
 
 TEST(SphericalHarmonics, AreOrthonormal) {
-  std::array<std::array<double, 9>, 9> product{};
+  std::array<std::array<double, 18>, 18> product{};
   over_sphere([&](const Float3& d, double solid_angle) {
-    const Harmonics y = spherical_harmonics(d);
-    for (std::size_t a = 0; a < 9; ++a) {
-      for (std::size_t b = 0; b < 9; ++b) product[a][b] += solid_angle * y[a] * y[b];
+    const auto y = irradiance_harmonics(d);
+    for (std::size_t a = 0; a < 18; ++a) {
+      for (std::size_t b = 0; b < 18; ++b) product[a][b] += solid_angle * y[a] * y[b];
     }
   });
-  for (std::size_t a = 0; a < 9; ++a) {
-    for (std::size_t b = 0; b < 9; ++b) EXPECT_NEAR(product[a][b], a == b ? 1 : 0, 1e-3);
+  for (std::size_t a = 0; a < 18; ++a) {
+    for (std::size_t b = 0; b < 18; ++b) EXPECT_NEAR(product[a][b], a == b ? 1 : 0, 2e-3);
   }
+}
+
+float dot(const Float3& u, const Float3& v) {
+  return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+}
+
+TEST(SphericalHarmonics, TheCosineLobeHasTheirFactors) {
+  const Float3 normal = {-0.48F, 0.6F, -0.64F};
+  std::array<double, 18> lobe{};
+  over_sphere([&](const Float3& d, double solid_angle) {
+    const auto y = irradiance_harmonics(d);
+    for (std::size_t k = 0; k < 18; ++k)
+      lobe[k] += solid_angle * y[k] * std::max(0.0F, dot(d, normal));
+  });
+  const auto y = irradiance_harmonics(normal);
+  for (std::size_t k = 0; k < 18; ++k) EXPECT_NEAR(lobe[k], kCosineLobe[k] * y[k], 1e-3) << k;
+}
+
+TEST(SphericalHarmonics, DegreeFourOfASpotFollowsFromItsDirectionAndSize) {
+  const Float3 middle = {0.36F, 0.48F, 0.8F};
+  // As wide as a cell of the sky, twice that, and a half sphere, which has no degree 4. The columns
+  // of the grid make a spot that is not quite round.
+  for (const double width : {0.1, 0.2, kPi / 2}) {
+    Harmonics weight{}, truth{};
+    over_sphere([&](const Float3& d, double solid_angle) {
+      if (dot(d, middle) < std::cos(width)) return;
+      const Harmonics y = spherical_harmonics(d), y_4 = degree_4_harmonics(d);
+      for (std::size_t k = 0; k < 9; ++k) {
+        weight[k] += static_cast<float>(solid_angle) * y[k];
+        truth[k] += static_cast<float>(solid_angle) * y_4[k];
+      }
+    });
+    const Harmonics found = degree_4_of_spot(weight);
+    for (std::size_t k = 0; k < 9; ++k) EXPECT_NEAR(found[k], truth[k], 5e-3 * weight[0]) << width;
+  }
+  EXPECT_EQ(degree_4_of_spot(Harmonics{}), Harmonics{});
+  EXPECT_EQ(degree_4_of_spot(Harmonics{1}), Harmonics{});
 }
 
 TEST(ProbeLight, UniformLightIsPiTimesLuminance) {
@@ -53,9 +92,6 @@ TEST(ProbeLight, UniformLightIsPiTimesLuminance) {
 TEST(ProbeLight, SmoothLightIsExact) {
   // L = 1 + d.a + (d.b)²: degree 2, for which the method is exact.
   const Float3 a = {0.2F, -0.1F, 0.3F}, b = {0.5F, 0.4F, -0.6F};
-  const auto dot = [](const Float3& u, const Float3& v) {
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-  };
   ProbeLight light{};
   over_sphere([&](const Float3& d, double solid_angle) {
     const Harmonics y = spherical_harmonics(d);
@@ -101,6 +137,28 @@ TEST(ProbeLight, AppliesItsMap) {
                      "must have 3");
   test::expect_error([&] { apply_probes(probes, std::span(radiosity).first(1), sky, light); },
                      "must have 2");
+}
+
+TEST(ProbeLight, DegreeFourIsThatOfTheSkyByItsCells) {
+  LightProbes probes = row_of_three();
+  const std::vector<Float3> radiosity = {{10, 0, 1}, {0, 20, 2}};
+  std::vector<ProbeLight> light(3);
+  const Sky sky{.color = {1, 0, 0.5F}, .luminance = 100};
+  apply_probes(probes, radiosity, sky, light);
+  for (std::size_t k = 9; k < 18; ++k) EXPECT_EQ(light[0][k], (Float3{0, 0, 0}));
+  const Float3 direction = {0.36F, 0.48F, 0.8F};
+  probes.sky_cells = {{0, 1, 1, 1}, {7}, {spherical_harmonics(direction)}};
+  EXPECT_LE(test::count_allocations([&] { apply_probes(probes, radiosity, sky, light); }), 0);
+  const Harmonics degree_4 = degree_4_harmonics(direction);
+  for (std::size_t k = 0; k < 9; ++k) {
+    EXPECT_NEAR(light[0][9 + k][0], 100 * degree_4[k], 0.01);
+    EXPECT_NEAR(light[0][9 + k][2], 50 * degree_4[k], 0.01);
+  }
+  std::vector<QuadraticProbeLight> quadratic(3);
+  apply_probes(probes, radiosity, sky, quadratic);
+  EXPECT_TRUE(std::ranges::equal(quadratic[0], std::span(light[0]).first<9>()));
+  EXPECT_EQ(probe_irradiance(quadratic[0], direction)[1], probe_irradiance(light[0], direction)[1]);
+  EXPECT_LT(probe_irradiance(light[0], direction)[0], probe_irradiance(quadratic[0], direction)[0]);
 }
 
 TEST(ProbeLight, InterpolatesBetweenValidProbes) {

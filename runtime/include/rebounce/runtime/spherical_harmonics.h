@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "rebounce/transfer/light_probes.h"
@@ -24,15 +25,61 @@ inline Harmonics spherical_harmonics(const Float3& d) {
           0.546274F * (x * x - y * y)};
 }
 
-/// What the cosine lobe does to each harmonic, by degree: pi, 2 pi / 3, pi / 4 (ibid., eq. 8).
-inline constexpr Harmonics kCosineLobe = {3.141593F, 2.094395F, 2.094395F, 2.094395F, 0.785398F,
-                                          0.785398F, 0.785398F, 0.785398F, 0.785398F};
+/// Those of degree 4, (4,-4) to (4,4), with signs to match.
+inline Harmonics degree_4_harmonics(const Float3& d) {
+  const auto [x, y, z] = d;
+  const float xx = x * x, yy = y * y, zz = z * z;
+  return {2.503343F * x * y * (xx - yy),
+          1.770131F * y * z * (3 * xx - yy),
+          0.946175F * x * y * (7 * zz - 1),
+          0.669047F * y * z * (7 * zz - 3),
+          0.105786F * (zz * (35 * zz - 30) + 3),
+          0.669047F * x * z * (7 * zz - 3),
+          0.473087F * (xx - yy) * (7 * zz - 1),
+          1.770131F * x * z * (xx - 3 * yy),
+          0.625836F * (xx * (xx - 3 * yy) - yy * (3 * xx - yy))};
+}
 
-/// The irradiance (lx) on a surface that faces `normal` (unit) of light given by the first N
-/// coefficients, lx/pi (ibid., eq. 7); never negative, though the series may undershoot.
+/// Degree 4 of what is seen in a small part of the sphere, of `weight` in degrees 0 and 1: as of a
+/// Gaussian spot around the mean direction. Degree l of the Gauss-Weierstrass kernel of the sphere
+/// is exp(-l (l + 1) t), so the tenth power in degree 4 of what degree 1 leaves of degree 0. It
+/// says nearly nothing of a part as large as a half sphere, and is zero where weight[0] is none.
+template <std::size_t N>
+Harmonics degree_4_of_spot(const std::array<float, N>& weight) {
+  static_assert(N >= 4);
+  const float whole = weight[0] * (0.488603F / 0.282095F);
+  const float length =
+      std::sqrt(weight[1] * weight[1] + weight[2] * weight[2] + weight[3] * weight[3]);
+  if (!(whole > 0 && length > 0)) return {};
+  Harmonics spot = degree_4_harmonics({weight[3] / length, weight[1] / length, weight[2] / length});
+  const float sharpness = std::min(length / whole, 1.0F), squared = sharpness * sharpness;
+  const float factor = weight[0] / 0.282095F * squared * squared * squared * squared * squared;
+  for (float& y : spot) y *= factor;
+  return spot;
+}
+
+/// The harmonics that irradiance has up to degree 5: nine of degree 0 to 2, nine of degree 4. The
+/// cosine lobe has no other odd degree than 1.
+inline constexpr std::size_t kIrradianceHarmonicCount = 2 * kHarmonicCount;
+
+inline std::array<float, kIrradianceHarmonicCount> irradiance_harmonics(const Float3& d) {
+  std::array<float, kIrradianceHarmonicCount> all;
+  const auto rest = std::ranges::copy(spherical_harmonics(d), all.begin()).out;
+  std::ranges::copy(degree_4_harmonics(d), rest);
+  return all;
+}
+
+/// What the cosine lobe does to each of them: pi, 2 pi / 3, pi / 4, -pi / 24 (ibid., eq. 8).
+inline constexpr std::array<float, kIrradianceHarmonicCount> kCosineLobe = {
+    3.141593F,  2.094395F,  2.094395F,  2.094395F,  0.785398F,  0.785398F,
+    0.785398F,  0.785398F,  0.785398F,  -0.130900F, -0.130900F, -0.130900F,
+    -0.130900F, -0.130900F, -0.130900F, -0.130900F, -0.130900F, -0.130900F};
+
+/// The irradiance (lx) on a surface that faces `normal` (unit) of light given by the first N of the
+/// irradiance_harmonics, in cd/m² (ibid., eq. 7); never negative, though the series may undershoot.
 template <std::size_t N>
 Float3 irradiance_of(const std::array<Float3, N>& light, const Float3& normal) {
-  const Harmonics y = spherical_harmonics(normal);
+  const auto y = irradiance_harmonics(normal);
   Float3 sum{0, 0, 0};
   for (std::size_t k = 0; k < N; ++k) {
     for (std::size_t c = 0; c < kChannelCount; ++c) sum[c] += kCosineLobe[k] * y[k] * light[k][c];
