@@ -20,7 +20,7 @@ namespace rebounce {
 namespace {
 
 // Of the tolerance, the residual that columns are solved to. Measured: notes/operator.md.
-constexpr double kResidualPart = 0.1;
+constexpr double kResidualPart = 0.2;
 
 // The price of a value in the first stage, in first prices of the search for the tolerance: its
 // error is about a quarter of what the second stage may do. Measured: notes/operator.md.
