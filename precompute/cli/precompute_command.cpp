@@ -30,6 +30,12 @@ std::uint64_t peak_memory_bytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
+std::string rough_time(double seconds) {
+  if (seconds < 120) return fmt::format("{:.2g} s", seconds);
+  if (seconds < 7200) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
 void print_json(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
   nlohmann::json summary = info_json(data, file_bytes);
   nlohmann::json seconds;
@@ -142,8 +148,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
         chosen.scene, settings, report,
         [&](std::string_view phase, double fraction) { return bar.update(phase, fraction); },
         [&](const CostEstimate& estimate) {
-          print_note(options, fmt::format("{} patches: about {:.2g} s and {:.2g} GiB",
-                                          estimate.patch_count, estimate.seconds,
+          print_note(options, fmt::format("{} patches: about {} and {:.2g} GiB",
+                                          estimate.patch_count, rough_time(estimate.seconds),
                                           static_cast<double>(estimate.peak_bytes) / (1ULL << 30)));
         });
   }
