@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "hemisphere_rays.h"
 #include "rebounce/transfer/sky_cells.h"
