@@ -14,6 +14,7 @@
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/low_rank_transfer.h"
 #include "rebounce/precompute/measured_error.h"
@@ -263,7 +264,8 @@ void record_errors(const std::vector<KindError>& errors, BuildRecord& record) {
 FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
                            FormFactorSettings settings, const Progress& progress) {
   if (settings.link_epsilon == 0) settings.link_epsilon = kLinkEpsilon;
-  return build_links(model, tracer, settings, {}, progress).links;
+  return coarsen_links(build_links(model, tracer, settings, {}, progress).links, model.patches.area,
+                       model.patches.centroid, kLinkCoarsening * settings.link_epsilon);
 }
 
 Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,

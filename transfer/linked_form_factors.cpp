@@ -6,6 +6,8 @@
 #include <cstring>
 #include <string>
 
+#include "bfloat16.h"
+#include "link_kernels.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -18,12 +20,12 @@ namespace {
 // Trees of fewer nodes than this are walked before threads have met at every level.
 constexpr std::size_t kWorthThreads = 16384;
 
-// Colour channels and one more, so that a colour is one vector.
-constexpr int kLanes = 4;
-using Lanes = std::array<float, kLanes>;
+void add(ColorLanes& to, float factor, const ColorLanes& from) {
+  for (std::size_t c = 0; c < kColorLanes; ++c) to[c] += factor * from[c];
+}
 
-void add(Lanes& to, float factor, const Lanes& from) {
-  for (int c = 0; c < kLanes; ++c) to[c] += factor * from[c];
+std::array<std::uint16_t, 3> bfloat16s(const float* values) {
+  return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
 }
 
 /// Position of the first patch of each node.
@@ -100,13 +102,6 @@ void check_links(const FormFactorLinks& links, std::size_t patch_count) {
   check_values(links);
 }
 
-/// Of a node: in the pull, mean light and its first moments over the area; in the push, what
-/// arrived, m² lx, and its gradients, m lx.
-struct LinkedFormFactors::Light {
-  Lanes mean;
-  std::array<Lanes, 3> first;
-};
-
 LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                                      std::span<const Float3> centroid)
     : scale_(links.scale) {
@@ -115,6 +110,8 @@ LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<con
   build_tree(links, area, centroid);
   sort_links(links);
 }
+
+LinkedFormFactors::~LinkedFormFactors() = default;
 
 /// Lays out the nodes, and their areas and centres.
 void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const float> area,
@@ -173,40 +170,40 @@ void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
   for (std::size_t k = 0; k < links.pair.size(); ++k) {
     const auto [a, b] = links.pair[k];
     const float exchange = links.exchange_area[k];
-    const auto& g = links.gradient[k];
-    const Float3 of_a = {g[0], g[1], g[2]}, of_b = {g[3], g[4], g[5]};
-    incoming_[next[a]++] = {b, exchange, of_a, of_b};
-    if (a != b) incoming_[next[b]++] = {a, exchange, of_b, of_a};
+    const auto of_a = bfloat16s(links.gradient[k].data());
+    const auto of_b = bfloat16s(links.gradient[k].data() + 3);
+    incoming_[next[a]++] = {of_b, of_a, b, exchange};
+    if (a != b) incoming_[next[b]++] = {of_a, of_b, a, exchange};
   }
 }
 
 std::size_t LinkedFormFactors::bytes() const {
-  return incoming_.size() * sizeof(Incoming) + incoming_begin_.size() * sizeof(std::uint64_t) +
+  return incoming_.size() * sizeof(IncomingLink) + incoming_begin_.size() * sizeof(std::uint64_t) +
          2 * node_.size() * sizeof(Node);
 }
 
 std::size_t LinkedFormFactors::workspace_size() const {
-  return 2 * node_.size() * sizeof(Light) / sizeof(float);
+  return 2 * node_.size() * sizeof(LinkLight) / sizeof(float);
 }
 
 void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
                                std::span<float> workspace) const {
   assert(in.size() == patch_count() && out.size() == patch_count() &&
          workspace.size() >= workspace_size());
-  auto* light = reinterpret_cast<Light*>(workspace.data());
-  Light* arrived = light + node_.size();
+  auto* light = reinterpret_cast<LinkLight*>(workspace.data());
+  LinkLight* arrived = light + node_.size();
   pull(in, light);
   gather_nodes(light, arrived);
   push(arrived, out);
 }
 
-void LinkedFormFactors::pull(std::span<const Float3> in, Light* light) const {
+void LinkedFormFactors::pull(std::span<const Float3> in, LinkLight* light) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
 #pragma omp for schedule(static)
     for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
       const Node& node = node_[k];
-      Light sum{};
+      LinkLight sum{};
       if (node.patch != kNone) {
         const Float3& x = in[node.patch];
         const float s = scale_[node.patch];
@@ -226,30 +223,22 @@ void LinkedFormFactors::pull(std::span<const Float3> in, Light* light) const {
   }
 }
 
-void LinkedFormFactors::gather_nodes(const Light* light, Light* arrived) const {
+void LinkedFormFactors::gather_nodes(const LinkLight* light, LinkLight* arrived) const {
+  const LinkKernels& kernels = link_kernels();
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t k = 0; k < node_.size(); ++k) {
-    Light sum{};
-    for (std::uint64_t l = incoming_begin_[k]; l < incoming_begin_[k + 1]; ++l) {
-      const Incoming& link = incoming_[l];
-      const Light& from = light[link.from];
-      add(sum.mean, link.exchange_area, from.mean);
-      for (int axis = 0; axis < 3; ++axis) {
-        add(sum.mean, link.gradient_from[axis], from.first[axis]);
-        add(sum.first[axis], link.gradient_to[axis], from.mean);
-      }
-    }
-    arrived[k] = sum;
+    arrived[k] = kernels.gather(incoming_.data() + incoming_begin_[k],
+                                incoming_begin_[k + 1] - incoming_begin_[k], light);
   }
 }
 
-void LinkedFormFactors::push(Light* arrived, std::span<Float3> out) const {
+void LinkedFormFactors::push(LinkLight* arrived, std::span<Float3> out) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = 0; level + 1 < level_begin_.size(); ++level) {
 #pragma omp for schedule(static)
     for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
       const Node& node = node_[k];
-      const Light& here = arrived[k];
+      const LinkLight& here = arrived[k];
       if (node.patch != kNone) {
         const float factor = scale_[node.patch] / node.area;
         for (int c = 0; c < kChannelCount; ++c) out[node.patch][c] = factor * here.mean[c];
