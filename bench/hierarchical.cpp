@@ -11,6 +11,7 @@
 #include "input.h"
 #include "program.h"
 #include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/conjugate_gradient_solver.h"
@@ -26,14 +27,17 @@ namespace rebounce::bench {
 namespace {
 
 constexpr int kMostSweeps = 100;
+constexpr int kSweepsToConverge = 40;  // for what links leave: an error that no sweep mends
 constexpr int kSweepsWithoutTruth = 8;
 
 struct HierarchicalOptions {
   std::vector<std::string> scenes;
   std::vector<std::size_t> patches = {4000, 16000};
   std::vector<double> epsilons = {kLinkEpsilon};
-  std::size_t most_flat = 20000;  ///< patches of which F of all pairs is found
-  int light_count = 4;            ///< of each kind
+  std::vector<double> coarsening = {kLinkCoarsening *
+                                    kLinkEpsilon};  ///< errors for which links are merged again
+  std::size_t most_flat = 20000;                    ///< patches of which F of all pairs is found
+  int light_count = 4;                              ///< of each kind
   double error = 0.01;
   CommonOptions common{.repeats = 7};
 };
@@ -46,7 +50,8 @@ struct LightCase {
 /// One method on one form of F.
 struct Contender {
   std::string method, form;
-  double epsilon = 0;  ///< of links; 0: all pairs
+  double epsilon = 0;     ///< of links; 0: all pairs
+  double coarsening = 0;  ///< for which links were merged again
   std::size_t entry_count = 0;
   const FormFactorOperator* form_factors = nullptr;
   std::unique_ptr<RadiositySolver> solver;
@@ -85,13 +90,15 @@ class HierarchicalBench {
       Table::Cell ratio, growth;
       if (!flat_.empty()) ratio = timings[k].minimum / timings[0].minimum;
       const std::string key = contender.method + contender.form +
-                              std::to_string(contender.epsilon) + std::to_string(threads);
+                              std::to_string(contender.epsilon) +
+                              std::to_string(contender.coarsening) + std::to_string(threads);
       if (const auto before = sweep_before.find(key); before != sweep_before.end()) {
         growth = std::log(sweep / before->second.second) / std::log(n / before->second.first);
       }
       sweep_before[key] = {n, sweep};
       table.add({scene_, n, threads, contender.method, contender.form,
                  contender.epsilon > 0 ? Table::Cell(contender.epsilon) : Table::Cell(),
+                 contender.epsilon > 0 ? Table::Cell(contender.coarsening) : Table::Cell(),
                  static_cast<double>(contender.entry_count) / (n * n),
                  static_cast<double>(contender.form_factors->bytes()) / n,
                  cell(contender.converged_error), contender.sweeps, cell(contender.error),
@@ -123,11 +130,11 @@ class HierarchicalBench {
     const std::size_t entries = 2 * exchange.column.size();
     auto blocks = std::make_unique<FormFactorBlocks>(exchange, model_.patches.area);
     auto half = std::make_unique<ExchangeBlocks>(exchange, model_.patches.area);
-    add({"gauss-seidel", "blocks", 0, entries, blocks.get(),
+    add({"gauss-seidel", "blocks", 0, 0, entries, blocks.get(),
          std::make_unique<GaussSeidelSolver>(*blocks, problem())});
-    add({"gathering", "exchange", 0, entries, half.get(),
+    add({"gathering", "exchange", 0, 0, entries, half.get(),
          std::make_unique<GatheringSolver>(*half, problem())});
-    add({"conjugate-gradient", "exchange", 0, entries, half.get(),
+    add({"conjugate-gradient", "exchange", 0, 0, entries, half.get(),
          std::make_unique<ConjugateGradientSolver>(*half, problem())});
     RadiositySolver& exact = *contenders_.back().solver;
     for (LightCase& light : lights_) {
@@ -142,15 +149,20 @@ class HierarchicalBench {
   void add_links(double epsilon) {
     FormFactorSettings settings;
     settings.link_epsilon = epsilon;
-    const LinkBuild build = build_links(model_, tracer_, settings);
-    linked_.push_back(std::make_unique<LinkedFormFactors>(build.links, model_.patches.area,
-                                                          model_.patches.centroid));
-    const LinkedFormFactors& links = *linked_.back();
-    const std::size_t count = build.links.pair.size();
-    add({"hierarchical", "links", epsilon, count, &links,
-         std::make_unique<HierarchicalSolver>(links, problem())});
-    add({"conjugate-gradient", "links", epsilon, count, &links,
-         std::make_unique<ConjugateGradientSolver>(links, problem())});
+    const FormFactorLinks links = build_links(model_, tracer_, settings).links;
+    const PatchTable& patches = model_.patches;
+    for (const double coarsening : options_.coarsening) {
+      const FormFactorLinks coarse =
+          coarsen_links(links, patches.area, patches.centroid, coarsening);
+      const std::size_t count = coarse.pair.size();
+      linked_.push_back(
+          std::make_unique<LinkedFormFactors>(coarse, patches.area, patches.centroid));
+      const LinkedFormFactors& form = *linked_.back();
+      add({"hierarchical", "links", epsilon, coarsening, count, &form,
+           std::make_unique<HierarchicalSolver>(form, problem())});
+      add({"conjugate-gradient", "links", epsilon, coarsening, count, &form,
+           std::make_unique<ConjugateGradientSolver>(form, problem())});
+    }
   }
 
   void add(Contender contender) { contenders_.push_back(std::move(contender)); }
@@ -192,7 +204,8 @@ class HierarchicalBench {
 
   void count_sweeps(Contender& contender) const {
     if (flat_.empty()) return;
-    contender.converged_error = error_after(contender, kMostSweeps);
+    contender.converged_error = error_after(contender, kSweepsToConverge);
+    if (*contender.converged_error > options_.error) return;
     for (contender.sweeps = 1; contender.sweeps < kMostSweeps; ++contender.sweeps) {
       contender.error = error_after(contender, contender.sweeps);
       if (*contender.error <= options_.error) return;
@@ -210,8 +223,8 @@ class HierarchicalBench {
 };
 
 void run(const HierarchicalOptions& options) {
-  Table table({"scene", "patches", "threads", "method", "form", "epsilon", "entries / n2",
-               "bytes a patch", "converged", "sweeps", "error", "ms", "ms a sweep",
+  Table table({"scene", "patches", "threads", "method", "form", "epsilon", "coarsened",
+               "entries / n2", "bytes a patch", "converged", "sweeps", "error", "ms", "ms a sweep",
                "of gauss-seidel", "growth"});
   for (const std::string& scene : options.scenes) {
     HierarchicalBench::SweepTimes sweep_before;
@@ -235,6 +248,8 @@ int main(int argc, char** argv) {
   app.add_option("scenes", options.scenes, "Scenes (.glb or .gltf)")->required();
   app.add_option("--patches", options.patches, "Numbers of patches")->capture_default_str();
   app.add_option("--epsilon", options.epsilons, "Errors that a link may have")
+      ->capture_default_str();
+  app.add_option("--coarsen", options.coarsening, "Errors for which links are merged again")
       ->capture_default_str();
   app.add_option("--most-flat", options.most_flat,
                  "With more patches than this, links alone are found and timed")

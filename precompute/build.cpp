@@ -8,6 +8,7 @@
 #include "operator_stage.h"
 #include "phase_clock.h"
 #include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/reconstruction_weights.h"
@@ -86,7 +87,8 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
 FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
                            FormFactorSettings settings, const Progress& progress) {
   if (settings.link_epsilon == 0) settings.link_epsilon = kLinkEpsilon;
-  return build_links(model, tracer, settings, {}, progress).links;
+  return coarsen_links(build_links(model, tracer, settings, {}, progress).links, model.patches.area,
+                       model.patches.centroid, kLinkCoarsening * settings.link_epsilon);
 }
 
 Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,

@@ -1,5 +1,6 @@
 #include "rebounce/precompute/links.h"
 
+#include "bfloat16.h"
 #include "link_sums.h"
 #include "rebounce/transfer/error.h"
 #include "refined_links.h"
@@ -26,6 +27,15 @@ void copy_links(std::span<const Link> from, FormFactorLinks& links) {
   }
 }
 
+/// To what LinkedFormFactors keep, before rows are added up: everything that is made of the links
+/// is of the same F.
+void round_gradients(std::span<Link> links) {
+  for (Link& link : links) {
+    for (float& g : link.gradient_a) g = round_to_bfloat16(g);
+    for (float& g : link.gradient_b) g = round_to_bfloat16(g);
+  }
+}
+
 }  // namespace
 
 LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
@@ -38,7 +48,8 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
   }
   const PatchGeometry geometry(model, tracer);
   const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
-  const RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
+  RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
+  round_gradients(refined.links);
   LinkBuild build;
   copy_tree(refined.tree, build.links);
   copy_links(refined.links, build.links);

@@ -27,7 +27,7 @@ struct RawExchange {
 /// kLargeFactor times the rays of others: what they miss is seen in the sums of rows, and their
 /// noise in the ranks of blocks.
 bool is_large_pair(const PatchGeometry& geometry, std::uint32_t i, const FacingPatch& pair);
-inline constexpr int kLargeFactor = 5;
+inline constexpr int kLargeFactor = 6;
 
 /// Looks at every pair of patches:
 ///

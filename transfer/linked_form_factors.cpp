@@ -6,6 +6,8 @@
 #include <cstring>
 #include <string>
 
+#include "bfloat16.h"
+#include "link_kernels.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -18,12 +20,13 @@ namespace {
 // Trees of fewer nodes than this are walked before threads have met at every level.
 constexpr std::size_t kWorthThreads = 16384;
 
-// Colour channels and one more, so that a colour is one vector.
-using ColourLanes = std::array<float, 4>;
-
 template <typename Lanes>
 void add(Lanes& to, float factor, const Lanes& from) {
   for (std::size_t c = 0; c < to.size(); ++c) to[c] += factor * from[c];
+}
+
+std::array<std::uint16_t, 3> bfloat16s(const float* values) {
+  return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
 }
 
 /// Position of the first patch of each node.
@@ -100,14 +103,6 @@ void check_links(const FormFactorLinks& links, std::size_t patch_count) {
   check_values(links);
 }
 
-/// Of a node: in the pull, mean light and its first moments over the area; in the push, what
-/// arrived, m² lx, and its gradients, m lx.
-template <typename Lanes>
-struct LinkedFormFactors::Light {
-  Lanes mean;
-  std::array<Lanes, 3> first;
-};
-
 LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                                      std::span<const Float3> centroid)
     : scale_(links.scale) {
@@ -116,6 +111,8 @@ LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<con
   build_tree(links, area, centroid);
   sort_links(links);
 }
+
+LinkedFormFactors::~LinkedFormFactors() = default;
 
 /// Lays out the nodes, and their areas and centres.
 void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const float> area,
@@ -174,28 +171,28 @@ void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
   for (std::size_t k = 0; k < links.pair.size(); ++k) {
     const auto [a, b] = links.pair[k];
     const float exchange = links.exchange_area[k];
-    const auto& g = links.gradient[k];
-    const Float3 of_a = {g[0], g[1], g[2]}, of_b = {g[3], g[4], g[5]};
-    incoming_[next[a]++] = {b, exchange, of_a, of_b};
-    if (a != b) incoming_[next[b]++] = {a, exchange, of_b, of_a};
+    const auto of_a = bfloat16s(links.gradient[k].data());
+    const auto of_b = bfloat16s(links.gradient[k].data() + 3);
+    incoming_[next[a]++] = {of_b, of_a, b, exchange};
+    if (a != b) incoming_[next[b]++] = {of_a, of_b, a, exchange};
   }
 }
 
 std::size_t LinkedFormFactors::bytes() const {
-  return incoming_.size() * sizeof(Incoming) + incoming_begin_.size() * sizeof(std::uint64_t) +
+  return incoming_.size() * sizeof(IncomingLink) + incoming_begin_.size() * sizeof(std::uint64_t) +
          2 * node_.size() * sizeof(Node);
 }
 
 std::size_t LinkedFormFactors::workspace_size() const {
-  return 2 * node_.size() * sizeof(Light<ColourLanes>) / sizeof(float);
+  return 2 * node_.size() * sizeof(LinkLight) / sizeof(float);
 }
 
 void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
                                std::span<float> workspace) const {
   assert(in.size() == patch_count() && out.size() == patch_count() &&
          workspace.size() >= workspace_size());
-  auto* light = reinterpret_cast<Light<ColourLanes>*>(workspace.data());
-  auto* arrived = light + node_.size();
+  auto* light = reinterpret_cast<LinkLight*>(workspace.data());
+  LinkLight* arrived = light + node_.size();
   pull(in, light);
   gather_nodes(light, arrived);
   push(arrived, out);
@@ -204,20 +201,20 @@ void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out
 template <typename Columns>
 void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
   assert(in.size() == patch_count() && out.size() == patch_count());
-  std::vector<Light<Columns>> light(node_.size()), arrived(node_.size());
+  std::vector<LinkLightOf<Columns>> light(node_.size()), arrived(node_.size());
   pull(in, light.data());
   gather_nodes(light.data(), arrived.data());
   push(arrived.data(), out);
 }
 
 template <typename Columns, typename Lanes>
-void LinkedFormFactors::pull(std::span<const Columns> in, Light<Lanes>* light) const {
+void LinkedFormFactors::pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
 #pragma omp for schedule(static)
     for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
       const Node& node = node_[k];
-      Light<Lanes> sum{};
+      LinkLightOf<Lanes> sum{};
       if (node.patch != kNone) {
         const Columns& x = in[node.patch];
         for (std::size_t c = 0; c < x.size(); ++c) sum.mean[c] = scale_[node.patch] * x[c];
@@ -237,31 +234,42 @@ void LinkedFormFactors::pull(std::span<const Columns> in, Light<Lanes>* light) c
 }
 
 template <typename Lanes>
-void LinkedFormFactors::gather_nodes(const Light<Lanes>* light, Light<Lanes>* arrived) const {
+void LinkedFormFactors::gather_nodes(const LinkLightOf<Lanes>* light,
+                                     LinkLightOf<Lanes>* arrived) const {
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t k = 0; k < node_.size(); ++k) {
-    Light<Lanes> sum{};
+    LinkLightOf<Lanes> sum{};
     for (std::uint64_t l = incoming_begin_[k]; l < incoming_begin_[k + 1]; ++l) {
-      const Incoming& link = incoming_[l];
-      const Light<Lanes>& from = light[link.from];
+      const IncomingLink& link = incoming_[l];
+      const LinkLightOf<Lanes>& from = light[link.from];
       add(sum.mean, link.exchange_area, from.mean);
       for (int axis = 0; axis < 3; ++axis) {
-        add(sum.mean, link.gradient_from[axis], from.first[axis]);
-        add(sum.first[axis], link.gradient_to[axis], from.mean);
+        add(sum.mean, bfloat16_to_float(link.gradient_from[axis]), from.first[axis]);
+        add(sum.first[axis], bfloat16_to_float(link.gradient_to[axis]), from.mean);
       }
     }
     arrived[k] = sum;
   }
 }
 
+template <>
+void LinkedFormFactors::gather_nodes(const LinkLight* light, LinkLight* arrived) const {
+  const LinkKernels& kernels = link_kernels();
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t k = 0; k < node_.size(); ++k) {
+    arrived[k] = kernels.gather(incoming_.data() + incoming_begin_[k],
+                                incoming_begin_[k + 1] - incoming_begin_[k], light);
+  }
+}
+
 template <typename Lanes, typename Columns>
-void LinkedFormFactors::push(Light<Lanes>* arrived, std::span<Columns> out) const {
+void LinkedFormFactors::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = 0; level + 1 < level_begin_.size(); ++level) {
 #pragma omp for schedule(static)
     for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
       const Node& node = node_[k];
-      const Light<Lanes>& here = arrived[k];
+      const LinkLightOf<Lanes>& here = arrived[k];
       if (node.patch != kNone) {
         const typename Lanes::value_type scale = scale_[node.patch], factor = scale / node.area;
         Columns& y = out[node.patch];

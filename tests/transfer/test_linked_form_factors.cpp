@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 
+#include "../../transfer/bfloat16.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
 #include "rebounce/transfer/error.h"
@@ -54,6 +55,11 @@ Whole whole_of(const std::vector<std::uint32_t>& members) {
   return whole;
 }
 
+/// Gradients have the eight bits of a bfloat16.
+double as_kept(float gradient) {
+  return bfloat16_to_float(float_to_bfloat16(gradient));
+}
+
 /// F as the definition of a link has it.
 std::array<std::array<double, kPatchCount>, kPatchCount> dense_of(const FormFactorLinks& links) {
   std::array<std::array<double, kPatchCount>, kPatchCount> f{};
@@ -65,8 +71,8 @@ std::array<std::array<double, kPatchCount>, kPatchCount> dense_of(const FormFact
       for (const std::uint32_t j : in_b) {
         double exchange = links.exchange_area[l];
         for (int k = 0; k < 3; ++k) {
-          exchange += links.gradient[l][k] * (kCentroid[i][k] - a.center[k]) +
-                      links.gradient[l][3 + k] * (kCentroid[j][k] - b.center[k]);
+          exchange += as_kept(links.gradient[l][k]) * (kCentroid[i][k] - a.center[k]) +
+                      as_kept(links.gradient[l][3 + k]) * (kCentroid[j][k] - b.center[k]);
         }
         exchange *= kArea[i] * kArea[j] / (a.area * b.area) * links.scale[i] * links.scale[j];
         f[i][j] += exchange / kArea[i];

@@ -10,6 +10,10 @@
 
 namespace rebounce {
 
+struct IncomingLink;
+template <typename Lanes>
+struct LinkLightOf;
+
 /// Form factors as links between nodes of a binary tree of patches, in flat arrays.
 ///
 /// A link (a, b) stands for every pair of a patch of a and a patch of b. Between points x and y of
@@ -44,6 +48,7 @@ class LinkedFormFactors final : public FormFactorOperator {
   /// patches and links between its nodes.
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                     std::span<const Float3> centroid);
+  ~LinkedFormFactors() override;
 
   std::size_t patch_count() const override { return scale_.size(); }
   std::size_t node_count() const { return node_.size(); }
@@ -65,30 +70,22 @@ class LinkedFormFactors final : public FormFactorOperator {
     float part = 1;        ///< of its parent's area
     Float3 from_parent{};  ///< its centre less that of its parent, metres
   };
-  /// A link as the node that gathers along it sees it.
-  struct Incoming {
-    std::uint32_t from;
-    float exchange_area;
-    Float3 gradient_to, gradient_from;
-  };
-  template <typename Lanes>
-  struct Light;
 
   void build_tree(const FormFactorLinks& links, std::span<const float> area,
                   std::span<const Float3> centroid);
   void sort_links(const FormFactorLinks& links);
   template <typename Columns, typename Lanes>
-  void pull(std::span<const Columns> in, Light<Lanes>* light) const;
+  void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const;
   template <typename Lanes>
-  void gather_nodes(const Light<Lanes>* light, Light<Lanes>* arrived) const;
+  void gather_nodes(const LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived) const;
   template <typename Lanes, typename Columns>
-  void push(Light<Lanes>* arrived, std::span<Columns> out) const;
+  void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const;
 
   std::vector<Node> node_;                     ///< level by level
   std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number
   std::vector<std::uint64_t> incoming_begin_;  ///< [m + 1]
-  std::vector<Incoming> incoming_;
-  std::vector<float> scale_;  ///< [n]
+  std::vector<IncomingLink> incoming_;         ///< every link twice, by the node that gathers
+  std::vector<float> scale_;                   ///< [n]
 };
 
 }  // namespace rebounce

@@ -1,0 +1,129 @@
+#include "rebounce/precompute/link_coarsening.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <vector>
+
+#include "expect_error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::uint32_t kSide = 16;  // patches of each of two walls
+
+struct Walls {
+  FormFactorLinks links;
+  std::vector<float> area;
+  std::vector<Float3> centroid;
+};
+
+/// Two rows of patches that face each other, each pair linked with the exchange area `exchange` of
+/// the places along them, times the patches' areas.
+Walls two_walls(const std::function<double(double, double)>& exchange) {
+  Walls walls;
+  constexpr std::uint32_t kPatches = 2 * kSide, kNodes = 2 * kPatches - 1;
+  for (std::uint32_t i = 0; i < kPatches; ++i) {
+    const auto along = static_cast<float>(i % kSide);
+    walls.area.push_back(0.5F + 0.05F * along);
+    walls.centroid.push_back({along, i < kSide ? 0.0F : 4.0F, 0.1F * along});
+    walls.links.patch.push_back(i);
+    walls.links.scale.push_back(1);
+  }
+  for (std::uint32_t k = 0; k < kNodes; ++k) {
+    const bool is_leaf = k >= kPatches - 1;
+    walls.links.first_child.push_back(is_leaf ? kNone : 2 * k + 1);
+    walls.links.count.push_back(is_leaf ? 1 : 0);
+  }
+  for (std::uint32_t k = kPatches - 1; k-- > 0;) {
+    walls.links.count[k] = walls.links.count[2 * k + 1] + walls.links.count[2 * k + 2];
+  }
+  for (std::uint32_t i = 0; i < kSide; ++i) {
+    for (std::uint32_t j = kSide; j < kPatches; ++j) {
+      const double kernel = exchange(walls.centroid[i][0], walls.centroid[j][0]);
+      walls.links.pair.push_back({kPatches - 1 + i, kPatches - 1 + j});
+      walls.links.exchange_area.push_back(
+          static_cast<float>(kernel * walls.area[i] * walls.area[j]));
+      walls.links.gradient.push_back({});
+    }
+  }
+  return walls;
+}
+
+std::vector<Float3> gathered(const Walls& walls, const FormFactorLinks& links,
+                             const std::vector<Float3>& light) {
+  const LinkedFormFactors form_factors(links, walls.area, walls.centroid);
+  std::vector<Float3> result(light.size());
+  std::vector<float> workspace(form_factors.workspace_size());
+  form_factors.gather(light, result, workspace);
+  return result;
+}
+
+/// Of the symmetric form, Frobenius.
+double difference(const Walls& walls, const FormFactorLinks& coarse) {
+  double sum = 0;
+  for (std::size_t j = 0; j < walls.area.size(); ++j) {
+    std::vector<Float3> unit(walls.area.size());
+    unit[j][0] = 1;
+    const auto a = gathered(walls, walls.links, unit), b = gathered(walls, coarse, unit);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      sum += std::pow(a[i][0] - b[i][0], 2) * walls.area[i] / walls.area[j];
+    }
+  }
+  return std::sqrt(sum);
+}
+
+double near_kernel(double x, double y) {
+  return 0.02 / (0.2 + 0.05 * (x - y) * (x - y));
+}
+
+TEST(LinkCoarsening, AnAffineKernelIsOneLink) {
+  const Walls walls = two_walls([](double x, double y) { return 1e-3 * (5 + 0.2 * x - 0.1 * y); });
+  const FormFactorLinks coarse = coarsen_links(walls.links, walls.area, walls.centroid, 1e-4);
+  ASSERT_EQ(coarse.pair.size(), 1U);
+  EXPECT_EQ(coarse.count[coarse.pair[0][0]], kSide);
+  EXPECT_EQ(coarse.count[coarse.pair[0][1]], kSide);
+  EXPECT_LE(difference(walls, coarse), 1e-3);  // of 0.08: gradients have eight bits
+}
+
+TEST(LinkCoarsening, LosesNoMoreThanItIsAllowed) {
+  const Walls walls = two_walls(near_kernel);
+  std::size_t before = walls.links.pair.size();
+  for (const double epsilon : {1e-3, 3e-3, 1e-2}) {
+    const FormFactorLinks coarse = coarsen_links(walls.links, walls.area, walls.centroid, epsilon);
+    const auto count = static_cast<double>(coarse.pair.size());
+    EXPECT_LT(coarse.pair.size(), before);
+    before = coarse.pair.size();
+    EXPECT_GT(coarse.pair.size(), 1U);
+    // Both triangles; scaling moves it a little.
+    EXPECT_LE(difference(walls, coarse), 1.5 * epsilon * std::sqrt(2 * count));
+  }
+}
+
+TEST(LinkCoarsening, KeepsRowSums) {
+  const Walls walls = two_walls(near_kernel);
+  const FormFactorLinks coarse = coarsen_links(walls.links, walls.area, walls.centroid, 1e-2);
+  const std::vector<Float3> ones(walls.area.size(), {1, 1, 1});
+  const auto a = gathered(walls, walls.links, ones), b = gathered(walls, coarse, ones);
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(b[i][0] / a[i][0], 1, 1e-3);
+}
+
+TEST(LinkCoarsening, WithoutAnErrorNothingIsMerged) {
+  const Walls walls = two_walls(near_kernel);
+  const FormFactorLinks same = coarsen_links(walls.links, walls.area, walls.centroid, 0);
+  EXPECT_EQ(same.pair, walls.links.pair);
+  EXPECT_EQ(same.exchange_area, walls.links.exchange_area);
+}
+
+TEST(LinkCoarsening, RefusesWhatIsNoError) {
+  const Walls walls = two_walls(near_kernel);
+  for (const double epsilon : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
+    test::expect_error([&] { coarsen_links(walls.links, walls.area, walls.centroid, epsilon); },
+                       "not negative");
+  }
+}
+
+}  // namespace
+}  // namespace rebounce
