@@ -88,7 +88,7 @@ class SceneBench {
     compress_form_factors_of_links();
     const SolvedTransfer exact(*form_factors_, data_.patches, 1e-6);
     const Lights truth = products(exact);
-    for (const double residual : options_.residuals) try_residual(exact, truth, residual);
+    for (const double residual : options_.residuals) try_residual(exact, residual);
     LargeTransferSettings settings{.compression = {.tolerance = options_.tolerance},
                                    .checkpoint = options_.checkpoint};
     std::shared_ptr<const HierarchicalOperator> large;
@@ -160,13 +160,12 @@ class SceneBench {
     return result;
   }
 
-  /// Error of columns, in the norm and summed up over lights of all patches, at a residual.
-  void try_residual(const SolvedTransfer& exact, const Lights& /*truth*/, double residual) {
+  /// Errors at a residual: of some columns, and of the light of all their patches together.
+  void try_residual(const SolvedTransfer& exact, double residual) {
     const SingleThreadedBlas single_threaded;
     const SolvedTransfer solved(*form_factors_, data_.patches, residual);
     const auto order = solved.patch();
     const std::size_t n = order.size(), count = SolvedTransfer::kTogether;
-    Eigen::MatrixXd y(0, 0);
     double error = 0, norm = 0, seconds = 0;
     Eigen::VectorXd sum, exact_sum;
     for (std::size_t begin = 0; begin + count <= n; begin += n / 4) {

@@ -20,10 +20,10 @@ namespace rebounce {
 namespace {
 
 // Of the tolerance, the residual that columns are solved to. Measured: notes/operator.md.
-constexpr double kResidualPart = 0.1;
+constexpr double kResidualPart = 0.2;
 
-// The price of a value in the first stage, in first prices of the search for the tolerance: its
-// error is about a quarter of what the second stage may do. Measured: notes/operator.md.
+// The price of a value in the first stage, in first prices of the search for the tolerance. Errors
+// go about like the root of the price: a quarter of what the second stage may do.
 constexpr double kFinePart = 1.0 / 16;
 
 // The part of the whole time that the first stage takes, roughly.

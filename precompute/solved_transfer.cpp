@@ -27,7 +27,7 @@ constexpr int kMostSteps = 500;
 
 // Eigenvectors that are told from the rest, no more than a part of all, and multiplications that
 // find them. Measured: notes/operator.md.
-constexpr Index kLeadingCount = 64, kLeadingPart = 8;
+constexpr Index kLeadingCount = 128, kLeadingPart = 8;
 constexpr int kLeadingSteps = 6;
 
 // Rows whose products are summed in single precision before they go into the double.
@@ -102,7 +102,7 @@ Vectors SolvedTransfer::gather(const Vectors& x) const {
 SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root) const {
   const SingleThreadedBlas single_threaded;
   const auto n = static_cast<Index>(patch().size());
-  const Index count = std::min(kLeadingCount, n / kLeadingPart);
+  const Index count = std::clamp<Index>(n / kLeadingPart, 1, kLeadingCount);
   Leading leading;
   std::mt19937_64 engine(2);
   leading.vectors = Vectors::NullaryExpr(position_count(), count, [&] { return sign(engine); });

@@ -23,7 +23,7 @@ class SolvedTransfer {
 
   /// Right-hand sides that one thread solves side by side. More: larger matrix products, and more
   /// memory, five times as many vectors for each thread.
-  static constexpr Eigen::Index kTogether = 64;
+  static constexpr Eigen::Index kTogether = 128;
 
   /// `form_factors` are G. A solution is accepted when the residual of z is `residual` of R G b.
   SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,

@@ -182,6 +182,24 @@ TEST(LargeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
   EXPECT_LT(static_cast<double>(large->bytes()), 1.1 * static_cast<double>(by_dense->bytes()));
 }
 
+TEST(LargeTransfer, TakesAFewPatchesAndNoLights) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 12});
+  const FormFactors f = compute_form_factors(model, test::make_tracer(model));
+  const HierarchicalOperator form_factors(
+      compress_matrix(FormFactorMatrix(f.exchange, model.patches.area), model.patches, {}, 1e-16));
+  const auto large = build_large_transfer(form_factors, model.patches, {}, {});
+  const auto dense = build_dense_transfer(f.exchange, model.patches, Precision::kF32);
+  const std::size_t n = model.patches.size();
+  const std::vector<Float3> light(n, {1, 1, 1});
+  std::vector<Float3> result(n), truth(n);
+  std::vector<float> workspace(std::max(large->workspace_size(), dense->workspace_size()));
+  large->apply(light, result, workspace);
+  dense->apply(light, truth, workspace);
+  EXPECT_LT(relative_difference(result, truth, model.patches.area), 0.005);
+}
+
 TEST(LargeTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = grey_room();
   const int before = omp_get_max_threads();
