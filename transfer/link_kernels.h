@@ -2,19 +2,10 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
+
+#include "rebounce/transfer/linked_form_factors.h"
 
 namespace rebounce {
-
-/// A link as the node that gathers along it sees it: 20 bytes. Gradients are corrections, and are
-/// kept as bfloat16, the upper half of a float.
-struct IncomingLink {
-  std::array<std::uint16_t, 3> gradient_from;  ///< of the exchange area over the other node, m
-  std::array<std::uint16_t, 3> gradient_to;    ///< over the node that gathers
-  std::uint32_t from;                          ///< the other node
-  float exchange_area;                         ///< m²
-};
-static_assert(sizeof(IncomingLink) == 20);
 
 // Colour channels and one more, so that a colour is one vector.
 inline constexpr std::size_t kColorLanes = 4;

@@ -112,8 +112,6 @@ LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<con
   sort_links(links);
 }
 
-LinkedFormFactors::~LinkedFormFactors() = default;
-
 /// Lays out the nodes, and their areas and centres.
 void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const float> area,
                                    std::span<const Float3> centroid) {
@@ -252,7 +250,6 @@ void LinkedFormFactors::gather_nodes(const LinkLightOf<Lanes>* light,
   }
 }
 
-template <>
 void LinkedFormFactors::gather_nodes(const LinkLight* light, LinkLight* arrived) const {
   const LinkKernels& kernels = link_kernels();
 #pragma omp parallel for schedule(dynamic, 64)

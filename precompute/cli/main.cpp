@@ -5,6 +5,7 @@
 #include <exception>
 #include <new>
 
+#include "blas_kernels.h"
 #include "commands.h"
 #include "console.h"
 #include "rebounce/transfer/error.h"
@@ -67,6 +68,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  rebounce::cli::choose_blas_kernels(argv);
   rebounce::cli::install_interrupt_handler();
   try {
     return run(argc, argv);

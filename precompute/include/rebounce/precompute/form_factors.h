@@ -17,7 +17,7 @@ struct FormFactorSettings {
   /// Shadow rays for a pair of patches to begin with; if they agree that is all. More: partly
   /// hidden pairs are noticed more often. At most 256.
   int probe_rays = 8;
-  /// Shadow rays for a pair that is partly hidden; one that exchanges much gets five times as many.
+  /// Shadow rays for a pair that is partly hidden; one that exchanges much gets six times as many.
   /// More: smoother penumbrae, slower. At most 256.
   int full_rays = 64;
   /// Rays per patch into its hemisphere. They measure what escapes, and what near patches of many

@@ -10,7 +10,6 @@
 
 namespace rebounce {
 
-struct IncomingLink;
 template <typename Lanes>
 struct LinkLightOf;
 
@@ -38,6 +37,16 @@ struct FormFactorLinks {
 /// and links between its nodes.
 void check_links(const FormFactorLinks& links, std::size_t patch_count);
 
+/// A link as the node that gathers along it sees it: 20 bytes. Gradients are corrections, and are
+/// kept as bfloat16, the upper half of a float.
+struct IncomingLink {
+  std::array<std::uint16_t, 3> gradient_from;  ///< of the exchange area over the other node, m
+  std::array<std::uint16_t, 3> gradient_to;    ///< over the node that gathers
+  std::uint32_t from;                          ///< the other node
+  float exchange_area;                         ///< m²
+};
+static_assert(sizeof(IncomingLink) == 20);
+
 /// Gathers with links: pulls light up the tree, gathers it at every level along the links, and
 /// pushes what arrived down again (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical
 /// radiosity algorithm", SIGGRAPH 1991), with a mean and a first moment for each node. The cost is
@@ -48,7 +57,6 @@ class LinkedFormFactors final : public FormFactorOperator {
   /// patches and links between its nodes.
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                     std::span<const Float3> centroid);
-  ~LinkedFormFactors() override;
 
   std::size_t patch_count() const override { return scale_.size(); }
   std::size_t node_count() const { return node_.size(); }
@@ -78,6 +86,9 @@ class LinkedFormFactors final : public FormFactorOperator {
   void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const;
   template <typename Lanes>
   void gather_nodes(const LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived) const;
+  /// Of one light in single precision, by the widest kernels.
+  void gather_nodes(const LinkLightOf<std::array<float, 4>>* light,
+                    LinkLightOf<std::array<float, 4>>* arrived) const;
   template <typename Lanes, typename Columns>
   void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const;
 
