@@ -5,7 +5,6 @@
 
 #include <exception>
 
-#include "cli/blas_kernels.h"
 #include "machine.h"
 #include "rebounce/transfer/atomic_file.h"
 
@@ -62,7 +61,6 @@ void run_at_thread_counts(const CommonOptions& options, const std::function<void
 
 int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
                 const std::function<void()>& work) {
-  cli::choose_blas_kernels(argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -5,7 +5,6 @@
 #include <exception>
 #include <new>
 
-#include "blas_kernels.h"
 #include "commands.h"
 #include "console.h"
 #include "rebounce/transfer/error.h"
@@ -68,7 +67,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  rebounce::cli::choose_blas_kernels(argv);
   rebounce::cli::install_interrupt_handler();
   try {
     return run(argc, argv);
