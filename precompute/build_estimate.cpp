@@ -39,7 +39,7 @@ constexpr double kLinkPeakBytes = 160, kLinkBytes = 110, kPatchBytes = 8e3;
 
 // Links that are found in a second, and as many that lights are gathered along, to fit to and to
 // check with; seconds of a column of the operator and matrix, by patches. About one slow core.
-constexpr double kLinksPerSecond = 3e4, kColumnSeconds = 8e-7;
+constexpr double kLinksPerSecond = 3e4, kColumnSeconds = 4e-7;
 
 CostEstimate estimate_cost_of_links(const PatchModel& model) {
   const auto n = static_cast<double>(model.patches.size());
