@@ -7,13 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
+#include "unshadowed_lights.h"
 
 namespace rebounce {
 namespace {
@@ -46,24 +46,10 @@ const Room& furnished_room() {
   return room;
 }
 
-/// What point lights in the free upper part of the room give its patches, shadows aside.
+/// Of lights in the free upper part of the room.
 std::vector<std::vector<Float3>> lights_in(const PatchTable& patches, int count,
                                            std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<double> uniform(0.1, 0.9);
-  std::vector<std::vector<Float3>> lights;
-  for (int k = 0; k < count; ++k) {
-    const glm::dvec3 lamp(4 * uniform(engine), 2.2 + 0.7 * uniform(engine), 5 * uniform(engine));
-    std::vector<Float3>& light = lights.emplace_back();
-    for (std::size_t i = 0; i < patches.size(); ++i) {
-      const glm::dvec3 d = lamp - to_dvec3(patches.centroid[i]);
-      const double cosine = std::max(0.0, glm::dot(glm::normalize(d), to_dvec3(patches.normal[i])));
-      const auto e = static_cast<float>(cosine / glm::dot(d, d));
-      const Float3& rho = patches.reflectance[i];
-      light.push_back({e * rho[0], e * rho[1], e * rho[2]});
-    }
-  }
-  return lights;
+  return test::unshadowed_lights(patches, count, seed, 2.2, 0.7);
 }
 
 std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {

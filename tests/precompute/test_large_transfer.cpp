@@ -9,7 +9,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <random>
 
 #include "expect_error.h"
 #include "matrix_compression.h"
@@ -20,29 +19,15 @@
 #include "solved_transfer.h"
 #include "temporary_folder.h"
 #include "test_scenes.h"
+#include "unshadowed_lights.h"
 
 namespace rebounce {
 namespace {
 
 using Lights = std::vector<std::vector<Float3>>;
 
-/// Lights that fall off across the room from somewhere in it.
 Lights lights_in(const PatchTable& patches, int count, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<double> uniform(0.1, 0.9);
-  Lights lights;
-  for (int k = 0; k < count; ++k) {
-    const glm::dvec3 lamp(4 * uniform(engine), 1.6 + 1.2 * uniform(engine), 5 * uniform(engine));
-    std::vector<Float3>& light = lights.emplace_back();
-    for (std::size_t i = 0; i < patches.size(); ++i) {
-      const glm::dvec3 d = lamp - to_dvec3(patches.centroid[i]);
-      const double cosine = std::max(0.0, glm::dot(glm::normalize(d), to_dvec3(patches.normal[i])));
-      const auto e = static_cast<float>(cosine / glm::dot(d, d));
-      const Float3& rho = patches.reflectance[i];
-      light.push_back({e * rho[0], e * rho[1], e * rho[2]});
-    }
-  }
-  return lights;
+  return test::unshadowed_lights(patches, count, seed, 1.6, 1.2);
 }
 
 /// A room of 4 x 3 x 5 m with a black box.
