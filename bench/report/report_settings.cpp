@@ -33,8 +33,8 @@ void ReportSettings::make_large() {
 }
 
 void ReportSettings::make_huge() {
-  operators = {{0.005, Precision::kQ16}, {0.001, Precision::kQ16}};
-  form_factor_tolerances = {0.0003, 0.001};
+  operators = {{0.005, Precision::kQ16}, {0.002, Precision::kQ16}, {0.001, Precision::kQ16}};
+  form_factor_tolerances = {0.0003, 0.0005, 0.001};
   motions = {0.001, 0.01};
   sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16};
   repeats = 3;
