@@ -267,7 +267,8 @@ TEST(ProbeIrradiance, OfTheSkyGoesByItsCells) {
 }
 
 TEST(ProbeIrradiance, NeedsRightSizesAndNoMemory) {
-  const LightProbes probes = row_of_three();
+  LightProbes probes = row_of_three();
+  probes.entry_weight[2] = {3, 0, 1};  // nowhere negative
   const std::vector<Float3> radiosity = {{10, 0, 1}, {0, 20, 2}}, normals = map_normals();
   std::vector<Float3> irradiance(3 * normals.size()), in_air(normals.size());
   const int count = test::count_allocations([&] {
