@@ -10,6 +10,8 @@
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/runtime/engine.h"
+#include "rebounce/runtime/octahedral_map.h"
+#include "rebounce/runtime/probe_irradiance.h"
 #include "rebounce/runtime/probe_light.h"
 #include "rebounce/runtime/surface_light.h"
 #include "rebounce/runtime/texel_light.h"
@@ -22,6 +24,7 @@ namespace {
 
 constexpr std::array<std::size_t, 3> kLightCounts = {1, 4, 16};
 constexpr std::size_t kMovingCount = 2;  // of the lights of a whole frame
+constexpr std::size_t kMapSize = 8;      // of an irradiance map
 
 struct FrameOptions {
   std::vector<std::string> inputs;
@@ -74,7 +77,10 @@ class FrameBenchmark {
       : options_(options),
         engine_(std::move(data)),
         vertices_(engine_.data().mesh.position.size()),
-        probes_(engine_.data().probes.size()) {
+        probes_(engine_.data().probes.size()),
+        map_normals_(kMapSize * kMapSize),
+        maps_(probes_.size() * map_normals_.size()) {
+    write_octahedral_normals(kMapSize, map_normals_);
     const TransferData& scene = engine_.data();
     texels_.resize(scene.lightmap.triangle.size());
     if (!scene.surface_harmonics.empty()) {
@@ -133,6 +139,7 @@ class FrameBenchmark {
     if (!surface_.empty()) add("bent normals", {}, [this] { to_surface(); });
     if (probes_.empty()) return;
     add("probes", {}, [this] { to_probes(); });
+    add("irradiance maps of probes", {}, [this] { to_maps(); });
     if (engine_.data().probes.grid[0] > 0) {
       add("one point in the air", {}, [this] { to_point_in_air(); });
     }
@@ -149,6 +156,9 @@ class FrameBenchmark {
     reconstruct_at_vertices(engine_.data().mesh, surface_, surface_at_vertices_);
   }
   void to_probes() { apply_probes(engine_.data().probes, engine_.radiosity(), {}, probes_); }
+  void to_maps() {
+    irradiance_at_probes(engine_.data().probes, engine_.radiosity(), {}, map_normals_, maps_);
+  }
   void to_point_in_air() {
     const LightProbes& probes = engine_.data().probes;
     // In the middle of the grid, between eight probes.
@@ -161,6 +171,7 @@ class FrameBenchmark {
   Engine engine_;
   std::vector<Float3> vertices_;
   std::vector<ProbeLight> probes_;
+  std::vector<Float3> map_normals_, maps_;
   ProbeLight air_{};
   std::vector<Float3> texels_;
   std::vector<SurfaceLight> surface_, surface_at_vertices_;

@@ -14,6 +14,8 @@
 
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/light_sampling.h"
+#include "rebounce/runtime/octahedral_map.h"
+#include "rebounce/runtime/probe_irradiance.h"
 #include "rebounce/runtime/probe_light.h"
 #include "rebounce/runtime/sky_light.h"
 #include "rebounce/runtime/sky_model.h"
@@ -497,4 +499,23 @@ void rebounce_harmonics_irradiance(const float* harmonics, const float* normal, 
 void rebounce_harmonics_irradiance_to_degree_4(const float* harmonics, const float* normal,
                                                float* irradiance) {
   write_irradiance<ProbeLight>(harmonics, normal, irradiance);
+}
+
+rebounce_status rebounce_engine_probe_irradiance(const rebounce_engine* engine,
+                                                 const float* normals, size_t normal_count,
+                                                 float* irradiance, size_t probe_count) {
+  if (engine == nullptr || normals == nullptr || irradiance == nullptr) {
+    return missing("rebounce_engine_probe_irradiance");
+  }
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    irradiance_at_probes(engine->engine.data().probes, engine->engine.radiosity(), engine->sky,
+                         {reinterpret_cast<const Float3*>(normals), normal_count},
+                         {reinterpret_cast<Float3*>(irradiance), probe_count * normal_count});
+    return REBOUNCE_OK;
+  });
+}
+
+void rebounce_octahedral_normals(size_t size, float* normals) {
+  if (normals == nullptr) return;
+  write_octahedral_normals(size, {reinterpret_cast<Float3*>(normals), size * size});
 }

@@ -31,6 +31,20 @@ class SeenSky {
                                 [](const Weight& weight) -> const Weight& { return weight; });
   }
 
+  /// Calls visit(weight, part) for each part of the sky that can be told from others: with `part`
+  /// times the luminance it adds `weight` to the coefficients.
+  template <typename Visit>
+  void for_each_part(std::size_t place, const Visit& visit) const {
+    if (cells_.empty()) {
+      visit(uniform_[place], 1.0F);
+      return;
+    }
+    for (auto e = cells_.entry_begin[place]; e < cells_.entry_begin[place + 1]; ++e) {
+      const float part = distribution_ == nullptr ? 1 : (*distribution_)[cells_.entry_cell[e]];
+      visit(cells_.entry_weight[e], part);
+    }
+  }
+
   /// Degree 4, each cell taken for a spot of light; none where the cells are not known.
   Harmonics degree_4(std::size_t place) const {
     if (cells_.empty() || luminance_ == Float3{0, 0, 0}) return {};
@@ -41,11 +55,10 @@ class SeenSky {
   template <typename Sum, typename Of>
   Sum sum_of_cells(std::size_t place, const Of& of) const {
     Sum sum{};
-    for (auto e = cells_.entry_begin[place]; e < cells_.entry_begin[place + 1]; ++e) {
-      const float part = distribution_ == nullptr ? 1 : (*distribution_)[cells_.entry_cell[e]];
-      const Sum& weight = of(cells_.entry_weight[e]);
+    for_each_part(place, [&](const Weight& seen, float part) {
+      const Sum& weight = of(seen);
       for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += part * weight[k];
-    }
+    });
     return sum;
   }
 

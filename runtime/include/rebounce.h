@@ -239,6 +239,17 @@ void rebounce_harmonics_irradiance(const float* harmonics, const float* normal, 
 void rebounce_harmonics_irradiance_to_degree_4(const float* harmonics, const float* normal,
                                                float* irradiance);
 
+/* Irradiance in lx at the light probes on surfaces of each of the unit normals [normal_count][3]:
+ * [probe_count][normal_count][3]. True of small bright surfaces in view too, which harmonics blur.
+ */
+rebounce_status rebounce_engine_probe_irradiance(const rebounce_engine* engine,
+                                                 const float* normals, size_t normal_count,
+                                                 float* irradiance, size_t probe_count);
+
+/* Writes normals [size x size][3] for irradiance maps: the directions at the middles of the texels
+ * of an octahedral map, u fastest, +z in its middle. */
+void rebounce_octahedral_normals(size_t size, float* normals);
+
 #ifdef __cplusplus
 }
 #endif

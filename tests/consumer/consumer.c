@@ -100,6 +100,16 @@ int main(int argc, char** argv) {
     CHECK(memcmp(more, harmonics, 27 * sizeof(float)) == 0);
     rebounce_harmonics_irradiance_to_degree_4(more, up, irradiance);
     CHECK(isfinite(irradiance[0]) && irradiance[0] >= 0);
+    float normals[12], at_normals[12];
+    rebounce_octahedral_normals(2, normals);
+    float* all = malloc(12 * (size_t)info.probe_count * sizeof(float));
+    CHECK(rebounce_engine_probe_irradiance(engine, normals, 4, all, info.probe_count) ==
+          REBOUNCE_OK);
+    CHECK(rebounce_engine_probe_irradiance(engine, normals, 4, all, info.probe_count + 1) ==
+          REBOUNCE_INVALID_ARGUMENT);
+    memcpy(at_normals, all, sizeof(at_normals));
+    CHECK(isfinite(sum_of(at_normals, 4)) && sum_of(at_normals, 4) >= 0);
+    free(all);
     free(more);
     free(harmonics);
   }

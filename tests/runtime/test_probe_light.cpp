@@ -10,6 +10,8 @@
 
 #include "allocation_counter.h"
 #include "expect_error.h"
+#include "rebounce/runtime/octahedral_map.h"
+#include "rebounce/runtime/probe_irradiance.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 
 namespace rebounce {
@@ -173,6 +175,123 @@ TEST(ProbeLight, InterpolatesBetweenValidProbes) {
   EXPECT_FLOAT_EQ(at(-9), 8);
   EXPECT_FLOAT_EQ(at(1.9F), 4);  // the third is not valid
   EXPECT_FLOAT_EQ(at(5), 0);
+}
+
+constexpr std::size_t kMapSize = 9;  // 81 normals: more than one block of them
+
+std::vector<Float3> map_normals() {
+  std::vector<Float3> normals(kMapSize * kMapSize);
+  write_octahedral_normals(kMapSize, normals);
+  return normals;
+}
+
+TEST(OctahedralMap, UnfoldsTheSphere) {
+  const std::vector<Float3> normals = map_normals();
+  EXPECT_EQ(normals[kMapSize * kMapSize / 2], (Float3{0, 0, 1}));
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    const auto [x, y, z] = normals[k];
+    EXPECT_NEAR(x * x + y * y + z * z, 1, 1e-6);
+    // Back to the octahedron, and its lower half unfolded.
+    const float sum = std::abs(x) + std::abs(y) + std::abs(z);
+    float u = x / sum, v = y / sum;
+    if (z < 0) {
+      const float inner = u;
+      u = std::copysign(1 - std::abs(v), u);
+      v = std::copysign(1 - std::abs(inner), v);
+    }
+    EXPECT_NEAR(u, (2 * static_cast<float>(k % kMapSize) + 1) / kMapSize - 1, 1e-6);
+    EXPECT_NEAR(v, (2 * static_cast<float>(k / kMapSize) + 1) / kMapSize - 1, 1e-6);
+  }
+}
+
+/// One probe that sees one patch: what lies within `half_angle` of `middle`.
+LightProbes probe_before_a_cap(const Float3& middle, double half_angle) {
+  LightProbes probes;
+  probes.position = {{0, 0, 0}};
+  probes.valid = {1};
+  probes.sky = {Harmonics{}};
+  probes.entry_begin = {0, 1};
+  probes.entry_patch = {0};
+  probes.entry_weight = {Harmonics{}};
+  probes.patch_count = 1;
+  over_sphere([&](const Float3& d, double solid_angle) {
+    if (dot(d, middle) < std::cos(half_angle)) return;
+    const Harmonics y = spherical_harmonics(d);
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      probes.entry_weight[0][k] += static_cast<float>(solid_angle * y[k]);
+    }
+  });
+  return probes;
+}
+
+TEST(ProbeIrradiance, OfCapsOfTheSphereIsThatOfASum) {
+  const Float3 middle = {0.36F, 0.48F, 0.8F};
+  const std::vector<Float3> normals = map_normals(), radiosity = {{1, 2, 0}};
+  std::vector<Float3> irradiance(normals.size());
+  for (const double half_angle : {0.1, 0.3, 0.6, 1.2, kPi}) {
+    irradiance_at_probes(probe_before_a_cap(middle, half_angle), radiosity, {}, normals,
+                         irradiance);
+    double difference = 0, total = 0;
+    for (std::size_t k = 0; k < normals.size(); ++k) {
+      double truth = 0;
+      over_sphere([&](const Float3& d, double solid_angle) {
+        if (dot(d, middle) < std::cos(half_angle)) return;
+        truth += solid_angle * std::max(0.0F, dot(d, normals[k]));
+      });
+      difference += std::pow(irradiance[k][0] - truth, 2);
+      total += truth * truth;
+      EXPECT_FLOAT_EQ(irradiance[k][1], 2 * irradiance[k][0]);
+      EXPECT_EQ(irradiance[k][2], 0);
+    }
+    const double error = std::sqrt(difference / total);
+    std::printf("cap of %.1f rad: relative L2 error of the irradiance %.4f\n", half_angle, error);
+    EXPECT_LE(error, 0.02);
+  }
+}
+
+TEST(ProbeIrradiance, OfTheSkyGoesByItsCells) {
+  LightProbes probes = row_of_three();
+  const Float3 up = {0, 1, 0}, aside = {1, 0, 0};
+  const std::vector<Float3> radiosity(2), normals = {up, aside};
+  std::vector<Float3> irradiance(6);
+  const Sky sky{.color = {1, 0, 0.5F}, .luminance = 100};
+  probes.sky_cells = {{0, 1, 1, 1}, {145}, {spherical_harmonics(up)}};
+  irradiance_at_probes(probes, radiosity, sky, normals, irradiance);
+  EXPECT_NEAR(irradiance[0][0], 100, 1e-3);  // a point of 1 sr right above
+  EXPECT_NEAR(irradiance[0][2], 50, 1e-3);
+  EXPECT_NEAR(irradiance[1][0], 0, 0.1);
+  EXPECT_EQ(irradiance[2], (Float3{0, 0, 0}));  // the second probe sees none
+  probes.sky_cells = {};
+  irradiance_at_probes(probes, radiosity, sky, normals, irradiance);
+  EXPECT_NEAR(irradiance[0][0], 100 * kPi * 0.282095, 0.01);  // its mean, of degree 0 alone
+}
+
+TEST(ProbeIrradiance, NeedsRightSizesAndNoMemory) {
+  LightProbes probes = row_of_three();
+  probes.entry_weight[2] = {3, 0, 1};  // nowhere negative
+  const std::vector<Float3> radiosity = {{10, 0, 1}, {0, 20, 2}}, normals = map_normals();
+  std::vector<Float3> irradiance(3 * normals.size()), in_air(normals.size());
+  const int count = test::count_allocations([&] {
+    irradiance_at_probes(probes, radiosity, {}, normals, irradiance);
+    irradiance_in_air(probes, radiosity, {}, {0.5F, 0, 0}, normals, in_air);
+  });
+  EXPECT_LE(count, 0);
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    const Float3 &a = irradiance[k], &b = irradiance[normals.size() + k];
+    EXPECT_NEAR(in_air[k][0], 0.5F * (a[0] + b[0]), 1e-4);
+    EXPECT_NEAR(in_air[k][1], 0.5F * (a[1] + b[1]), 1e-4);
+    EXPECT_EQ(irradiance[2 * normals.size() + k], (Float3{0, 0, 0}));  // not valid
+  }
+  irradiance_in_air(probes, radiosity, {}, {2, 0, 0}, normals, in_air);
+  EXPECT_EQ(in_air.front(), (Float3{0, 0, 0}));
+  test::expect_error(
+      [&] { irradiance_at_probes(probes, radiosity, {}, normals, std::span(irradiance).first(5)); },
+      "must have 243");
+  test::expect_error(
+      [&] {
+        irradiance_in_air(probes, std::span(radiosity).first(1), {}, {0, 0, 0}, normals, in_air);
+      },
+      "must have 2");
 }
 
 }  // namespace

@@ -95,18 +95,27 @@ float area_of_lamp(const Light& lamp) {
   return lamp.type == LightType::kSphere ? 4 * disc : disc;
 }
 
+const std::vector<Float3>& sphere_normals() {
+  static const std::vector<Float3> normals = [] {
+    std::vector<Float3> made;
+    for (int j = 0; j <= kLatitudes; ++j) {
+      for (int i = 0; i <= kLongitudes; ++i) made.push_back(direction_at(i, j));
+    }
+    return made;
+  }();
+  return normals;
+}
+
 void add_sphere(const Float3& center, float radius,
-                const std::function<BodyVertex(const Float3& normal)>& shade, BodyMesh& mesh) {
+                const std::function<BodyVertex(std::size_t k)>& shade, BodyMesh& mesh) {
   BodyPart part{.begin = static_cast<std::uint32_t>(mesh.triangle.size())};
   const std::uint32_t first = next_vertex(mesh);
-  for (int j = 0; j <= kLatitudes; ++j) {
-    for (int i = 0; i <= kLongitudes; ++i) {
-      const Float3 normal = direction_at(i, j);
-      BodyVertex vertex = shade(normal);
-      vertex.position = to_float3(to_glm(center) + radius * to_glm(normal));
-      vertex.normal = normal;
-      mesh.vertex.push_back(vertex);
-    }
+  const std::vector<Float3>& normals = sphere_normals();
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    BodyVertex vertex = shade(k);
+    vertex.position = to_float3(to_glm(center) + radius * to_glm(normals[k]));
+    vertex.normal = normals[k];
+    mesh.vertex.push_back(vertex);
   }
   for (std::uint32_t j = 0; j < kLatitudes; ++j) {
     for (std::uint32_t i = 0; i < kLongitudes; ++i) {
@@ -123,7 +132,7 @@ void add_lamp_surface(const Light& lamp, BodyMesh& mesh) {
   const auto begin = static_cast<std::uint32_t>(mesh.triangle.size());
   if (lamp.type == LightType::kSphere) {
     add_sphere(
-        lamp.position, lamp.radius, [](const Float3&) { return BodyVertex{}; }, mesh);
+        lamp.position, lamp.radius, [](std::size_t) { return BodyVertex{}; }, mesh);
     mesh.part.pop_back();
   } else if (lamp.type == LightType::kRectangle || lamp.type == LightType::kDisc) {
     add_flat_lamp(lamp, mesh);

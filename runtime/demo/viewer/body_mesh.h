@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -30,9 +31,12 @@ struct BodyMesh {
   std::vector<BodyPart> part;
 };
 
-/// Adds a sphere; `shade`(unit normal) is all of a vertex but its place and normal.
+/// Unit normals of the vertices that add_sphere makes, in their order.
+const std::vector<Float3>& sphere_normals();
+
+/// Adds a sphere; `shade`(k) is all of its vertex k but place and normal.
 void add_sphere(const Float3& center, float radius,
-                const std::function<BodyVertex(const Float3& normal)>& shade, BodyMesh& mesh);
+                const std::function<BodyVertex(std::size_t k)>& shade, BodyMesh& mesh);
 
 /// Adds the surface of `lamp` as something that shines; nothing if it has none.
 void add_lamp_surface(const Light& lamp, BodyMesh& mesh);

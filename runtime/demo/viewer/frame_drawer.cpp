@@ -85,12 +85,12 @@ BodyMesh FrameDrawer::make_spheres(std::span<const ViewerSphere> spheres,
                                    const ViewerState& state) {
   BodyMesh mesh;
   for (const ViewerSphere& sphere : spheres) {
-    const LightInAir light = lit_.light_in_air(sphere.position, state.sky, state.is_split);
-    const auto shade = [&](const Float3& normal) {
+    const LightInAir light =
+        lit_.light_in_air(sphere.position, sphere_normals(), state.sky, state.is_split);
+    const auto shade = [&](std::size_t k) {
       return BodyVertex{.color = sphere.reflectance,
-                        .first_flight = probe_irradiance(light.first_flight, normal),
-                        .bounced = {probe_irradiance(light.bounced[0], normal),
-                                    probe_irradiance(light.bounced[1], normal)}};
+                        .first_flight = light.first_flight[k],
+                        .bounced = {light.bounced[0][k], light.bounced[1][k]}};
     };
     add_sphere(sphere.position, sphere.radius, shade, mesh);
   }

@@ -8,6 +8,8 @@
 #include "display_surface.h"
 #include "rebounce/demo/patch_errors.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/probe_irradiance.h"
+#include "rebounce/runtime/probe_light.h"
 #include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/area_norm.h"
 #include "vertex_light.h"
@@ -54,13 +56,21 @@ const LightProbes& LitScene::probes() {
   return *own_probes_;
 }
 
-LightInAir LitScene::light_in_air(const Float3& position, const Sky& sky, bool both) {
+LightInAir LitScene::light_in_air(const Float3& position, std::span<const Float3> normals,
+                                  const Sky& sky, bool both) {
   LightInAir light;
+  light.first_flight.resize(normals.size());
+  for (auto& irradiance : light.bounced) irradiance.resize(normals.size());
   const LightProbes& around = probes();
   if (around.size() == 0) return light;
-  light.first_flight = gather_probe_light(around, data_->patches.emitted_exitance, sky, position);
+  // Lamps and openings are small and bright; what has bounced is smooth enough for harmonics.
+  irradiance_in_air(around, data_->patches.emitted_exitance, sky, position, normals,
+                    light.first_flight);
   for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {
-    light.bounced[side] = gather_probe_light(around, reflected_[side], {}, position);
+    const ProbeLight bounced = gather_probe_light(around, reflected_[side], {}, position);
+    for (std::size_t k = 0; k < normals.size(); ++k) {
+      light.bounced[side][k] = probe_irradiance(bounced, normals[k]);
+    }
   }
   return light;
 }

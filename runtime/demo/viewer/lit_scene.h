@@ -12,14 +12,13 @@
 #include "rebounce/demo/indirect_solver.h"
 #include "rebounce/demo/viewer.h"
 #include "rebounce/runtime/engine.h"
-#include "rebounce/runtime/probe_light.h"
 
 namespace rebounce {
 
-/// What arrives at a point in the air.
+/// Irradiance in lx at a point in the air, on surfaces of given normals.
 struct LightInAir {
-  ProbeLight first_flight{};  ///< from sky and emitters
-  std::array<ProbeLight, kSideCount> bounced{};
+  std::vector<Float3> first_flight;  ///< from sky and emitters
+  std::array<std::vector<Float3>, kSideCount> bounced;
 };
 
 /// The light of a frame on the patches, by two methods.
@@ -44,9 +43,11 @@ class LitScene {
   std::vector<glm::vec3> first_flight_at_vertices(const Sky& sky) const;
   std::vector<glm::vec3> bounced_at_vertices(Side side) const;
 
-  /// What the probes around `position` see of the last frame but for lamps; the second side's only
-  /// if `both`. Finds probes first where the file has none.
-  LightInAir light_in_air(const Float3& position, const Sky& sky, bool both);
+  /// What arrives at `position` on surfaces of these unit normals, as the probes around it see the
+  /// last frame but for lamps; the second side's is zero unless `both`. Finds probes first where the
+  /// file has none.
+  LightInAir light_in_air(const Float3& position, std::span<const Float3> normals, const Sky& sky,
+                          bool both);
 
   /// Compares a side with the reference solution for the same direct light, which is found anew
   /// where that has changed. Returns |H - reference| of each patch as a part of the reference's

@@ -40,22 +40,39 @@ inline Harmonics degree_4_harmonics(const Float3& d) {
           0.625836F * (xx * (xx - 3 * yy) - yy * (3 * xx - yy))};
 }
 
+/// What degrees 0 and 1 say of light that comes from a part of the sphere.
+struct LightSpot {
+  Float3 direction{0, 0, 0};  ///< mean, unit; 0 where there is none
+  float amount = 0;           ///< radiance times solid angle
+  /// Mean cosine to `direction`, 0 to 1: 1 of a point, 1/2 of a half sphere.
+  float sharpness = 0;
+};
+
+template <std::size_t N>
+LightSpot spot_of(const std::array<float, N>& weight) {
+  static_assert(N >= 4);
+  const float amount = weight[0] / 0.282095F;
+  const float length =
+      std::sqrt(weight[1] * weight[1] + weight[2] * weight[2] + weight[3] * weight[3]);
+  if (!(amount > 0 && length > 0)) return {};
+  return {.direction = {weight[3] / length, weight[1] / length, weight[2] / length},
+          .amount = amount,
+          .sharpness = std::min(length / (0.488603F * amount), 1.0F)};
+}
+
 /// Degree 4 of what is seen in a small part of the sphere, of `weight` in degrees 0 and 1: as of a
 /// Gaussian spot around the mean direction. Degree l of the Gauss-Weierstrass kernel of the sphere
 /// is exp(-l (l + 1) t), so the tenth power in degree 4 of what degree 1 leaves of degree 0. It
 /// says nearly nothing of a part as large as a half sphere, and is zero where weight[0] is none.
 template <std::size_t N>
 Harmonics degree_4_of_spot(const std::array<float, N>& weight) {
-  static_assert(N >= 4);
-  const float whole = weight[0] * (0.488603F / 0.282095F);
-  const float length =
-      std::sqrt(weight[1] * weight[1] + weight[2] * weight[2] + weight[3] * weight[3]);
-  if (!(whole > 0 && length > 0)) return {};
-  Harmonics spot = degree_4_harmonics({weight[3] / length, weight[1] / length, weight[2] / length});
-  const float sharpness = std::min(length / whole, 1.0F), squared = sharpness * sharpness;
-  const float factor = weight[0] / 0.282095F * squared * squared * squared * squared * squared;
-  for (float& y : spot) y *= factor;
-  return spot;
+  const LightSpot spot = spot_of(weight);
+  if (spot.amount == 0) return {};
+  Harmonics degree_4 = degree_4_harmonics(spot.direction);
+  const float squared = spot.sharpness * spot.sharpness;
+  const float factor = spot.amount * squared * squared * squared * squared * squared;
+  for (float& y : degree_4) y *= factor;
+  return degree_4;
 }
 
 /// The harmonics that irradiance has up to degree 5: nine of degree 0 to 2, nine of degree 4. The
