@@ -12,6 +12,7 @@
 #include "program.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/link_coarsening.h"
+#include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/conjugate_gradient_solver.h"
@@ -50,8 +51,8 @@ struct LightCase {
 /// One method on one form of F.
 struct Contender {
   std::string method, form;
-  double epsilon = 0;     ///< of links; 0: all pairs
-  double coarsening = 0;  ///< for which links were merged again
+  double epsilon = 0;     ///< of links that were refined; 0: all pairs
+  double coarsening = 0;  ///< for which links were merged again, or pairs to links
   std::size_t entry_count = 0;
   const FormFactorOperator* form_factors = nullptr;
   std::unique_ptr<RadiositySolver> solver;
@@ -98,7 +99,7 @@ class HierarchicalBench {
       sweep_before[key] = {n, sweep};
       table.add({scene_, n, threads, contender.method, contender.form,
                  contender.epsilon > 0 ? Table::Cell(contender.epsilon) : Table::Cell(),
-                 contender.epsilon > 0 ? Table::Cell(contender.coarsening) : Table::Cell(),
+                 contender.coarsening > 0 ? Table::Cell(contender.coarsening) : Table::Cell(),
                  static_cast<double>(contender.entry_count) / (n * n),
                  static_cast<double>(contender.form_factors->bytes()) / n,
                  cell(contender.converged_error), contender.sweeps, cell(contender.error),
@@ -144,6 +145,10 @@ class HierarchicalBench {
     }
     flat_.push_back(std::move(blocks));
     flat_.push_back(std::move(half));
+    for (const double error : options_.coarsening) {
+      add_hierarchical("links of pairs", 0, error,
+                       fit_links(exchange, model_.patches, error));
+    }
   }
 
   void add_links(double epsilon) {
@@ -152,17 +157,22 @@ class HierarchicalBench {
     const FormFactorLinks links = build_links(model_, tracer_, settings).links;
     const PatchTable& patches = model_.patches;
     for (const double coarsening : options_.coarsening) {
-      const FormFactorLinks coarse =
-          coarsen_links(links, patches.area, patches.centroid, coarsening);
-      const std::size_t count = coarse.pair.size();
-      linked_.push_back(
-          std::make_unique<LinkedFormFactors>(coarse, patches.area, patches.centroid));
-      const LinkedFormFactors& form = *linked_.back();
-      add({"hierarchical", "links", epsilon, coarsening, count, &form,
-           std::make_unique<HierarchicalSolver>(form, problem())});
-      add({"conjugate-gradient", "links", epsilon, coarsening, count, &form,
-           std::make_unique<ConjugateGradientSolver>(form, problem())});
+      add_hierarchical("links", epsilon, coarsening,
+                       coarsen_links(links, patches.area, patches.centroid, coarsening));
     }
+  }
+
+  /// Hierarchical radiosity and conjugate gradients on `links`.
+  void add_hierarchical(const char* form, double epsilon, double coarsening,
+                        const FormFactorLinks& links) {
+    const std::size_t count = links.pair.size();
+    linked_.push_back(std::make_unique<LinkedFormFactors>(links, model_.patches.area,
+                                                          model_.patches.centroid));
+    const LinkedFormFactors& linked = *linked_.back();
+    add({"hierarchical", form, epsilon, coarsening, count, &linked,
+         std::make_unique<HierarchicalSolver>(linked, problem())});
+    add({"conjugate-gradient", form, epsilon, coarsening, count, &linked,
+         std::make_unique<ConjugateGradientSolver>(linked, problem())});
   }
 
   void add(Contender contender) { contenders_.push_back(std::move(contender)); }
