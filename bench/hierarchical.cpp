@@ -8,10 +8,14 @@
 #include <memory>
 #include <optional>
 
+#include "bounced_light.h"
 #include "input.h"
 #include "program.h"
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/link_coarsening.h"
+#include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/conjugate_gradient_solver.h"
@@ -19,6 +23,7 @@
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/runtime/hierarchical_solver.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "timing.h"
@@ -36,6 +41,7 @@ struct HierarchicalOptions {
   std::vector<double> epsilons = {kLinkEpsilon};
   std::vector<double> coarsening = {kLinkCoarsening *
                                     kLinkEpsilon};  ///< errors for which links are merged again
+  std::vector<double> compression = {1e-3};         ///< errors of F B to which F is compressed
   std::size_t most_flat = 20000;                    ///< patches of which F of all pairs is found
   int light_count = 4;                              ///< of each kind
   double error = 0.01;
@@ -50,8 +56,8 @@ struct LightCase {
 /// One method on one form of F.
 struct Contender {
   std::string method, form;
-  double epsilon = 0;     ///< of links; 0: all pairs
-  double coarsening = 0;  ///< for which links were merged again
+  double epsilon = 0;    ///< of links that were refined; 0: from all pairs
+  double tolerance = 0;  ///< for which links were merged again, or F was compressed
   std::size_t entry_count = 0;
   const FormFactorOperator* form_factors = nullptr;
   std::unique_ptr<RadiositySolver> solver;
@@ -91,14 +97,14 @@ class HierarchicalBench {
       if (!flat_.empty()) ratio = timings[k].minimum / timings[0].minimum;
       const std::string key = contender.method + contender.form +
                               std::to_string(contender.epsilon) +
-                              std::to_string(contender.coarsening) + std::to_string(threads);
+                              std::to_string(contender.tolerance) + std::to_string(threads);
       if (const auto before = sweep_before.find(key); before != sweep_before.end()) {
         growth = std::log(sweep / before->second.second) / std::log(n / before->second.first);
       }
       sweep_before[key] = {n, sweep};
       table.add({scene_, n, threads, contender.method, contender.form,
                  contender.epsilon > 0 ? Table::Cell(contender.epsilon) : Table::Cell(),
-                 contender.epsilon > 0 ? Table::Cell(contender.coarsening) : Table::Cell(),
+                 contender.tolerance > 0 ? Table::Cell(contender.tolerance) : Table::Cell(),
                  static_cast<double>(contender.entry_count) / (n * n),
                  static_cast<double>(contender.form_factors->bytes()) / n,
                  cell(contender.converged_error), contender.sweeps, cell(contender.error),
@@ -123,6 +129,7 @@ class HierarchicalBench {
         lights_.push_back({std::move(light), {}});
       }
     }
+    fitting_ = draw_fitting_lights(data, tracer_, 1);
   }
 
   void add_flat() {
@@ -144,6 +151,10 @@ class HierarchicalBench {
     }
     flat_.push_back(std::move(blocks));
     flat_.push_back(std::move(half));
+    for (const double error : options_.coarsening) {
+      add_hierarchical("links of pairs", 0, error, fit_links(exchange, model_.patches, error));
+    }
+    add_compressed(exchange, *flat_.front());
   }
 
   void add_links(double epsilon) {
@@ -151,17 +162,42 @@ class HierarchicalBench {
     settings.link_epsilon = epsilon;
     const FormFactorLinks links = build_links(model_, tracer_, settings).links;
     const PatchTable& patches = model_.patches;
+    if (flat_.empty()) {
+      add_compressed(links, LinkedFormFactors(links, patches.area, patches.centroid));
+    }
     for (const double coarsening : options_.coarsening) {
-      const FormFactorLinks coarse =
-          coarsen_links(links, patches.area, patches.centroid, coarsening);
-      const std::size_t count = coarse.pair.size();
-      linked_.push_back(
-          std::make_unique<LinkedFormFactors>(coarse, patches.area, patches.centroid));
-      const LinkedFormFactors& form = *linked_.back();
-      add({"hierarchical", "links", epsilon, coarsening, count, &form,
-           std::make_unique<HierarchicalSolver>(form, problem())});
-      add({"conjugate-gradient", "links", epsilon, coarsening, count, &form,
-           std::make_unique<ConjugateGradientSolver>(form, problem())});
+      add_hierarchical("links", epsilon, coarsening,
+                       coarsen_links(links, patches.area, patches.centroid, coarsening));
+    }
+  }
+
+  /// Hierarchical radiosity and conjugate gradients on `links`.
+  void add_hierarchical(const char* form, double epsilon, double coarsening,
+                        const FormFactorLinks& links) {
+    const std::size_t count = links.pair.size();
+    linked_.push_back(std::make_unique<LinkedFormFactors>(links, model_.patches.area,
+                                                          model_.patches.centroid));
+    const LinkedFormFactors& linked = *linked_.back();
+    add({"hierarchical", form, epsilon, coarsening, count, &linked,
+         std::make_unique<HierarchicalSolver>(linked, problem())});
+    add({"conjugate-gradient", form, epsilon, coarsening, count, &linked,
+         std::make_unique<ConjugateGradientSolver>(linked, problem())});
+  }
+
+  /// Sweeps on compressed F, from pairs or links; `product` is a product with the same F.
+  template <typename FormFactors>
+  void add_compressed(const FormFactors& form_factors, const FormFactorOperator& product) {
+    for (const double tolerance : options_.compression) {
+      const auto made = compress_form_factors(
+          form_factors, model_.patches, bounced(fitting_, product, model_.patches).view(),
+          {tolerance, Precision::kF16});
+      compressed_.push_back(std::make_unique<CompressedFormFactors>(made));
+      const CompressedFormFactors& form = *compressed_.back();
+      const std::size_t numbers = made->bytes() / sizeof(std::uint16_t);
+      add({"gauss-seidel", "compressed", 0, tolerance, numbers, &form,
+           std::make_unique<GaussSeidelSolver>(form, problem())});
+      add({"gathering", "compressed", 0, tolerance, numbers, &form,
+           std::make_unique<GatheringSolver>(form, problem())});
     }
   }
 
@@ -217,13 +253,15 @@ class HierarchicalBench {
   PatchModel model_;
   RayTracer tracer_;
   std::vector<LightCase> lights_;
+  DrawnLights fitting_;  ///< for compression
   std::vector<std::unique_ptr<FormFactorOperator>> flat_;
+  std::vector<std::unique_ptr<CompressedFormFactors>> compressed_;
   std::vector<std::unique_ptr<LinkedFormFactors>> linked_;
   std::vector<Contender> contenders_;
 };
 
 void run(const HierarchicalOptions& options) {
-  Table table({"scene", "patches", "threads", "method", "form", "epsilon", "coarsened",
+  Table table({"scene", "patches", "threads", "method", "form", "epsilon", "tolerance",
                "entries / n2", "bytes a patch", "converged", "sweeps", "error", "ms", "ms a sweep",
                "of gauss-seidel", "growth"});
   for (const std::string& scene : options.scenes) {
@@ -250,6 +288,8 @@ int main(int argc, char** argv) {
   app.add_option("--epsilon", options.epsilons, "Errors that a link may have")
       ->capture_default_str();
   app.add_option("--coarsen", options.coarsening, "Errors for which links are merged again")
+      ->capture_default_str();
+  app.add_option("--compress", options.compression, "Errors of F B to which F is compressed")
       ->capture_default_str();
   app.add_option("--most-flat", options.most_flat,
                  "With more patches than this, links alone are found and timed")

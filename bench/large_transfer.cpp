@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "bounced_light.h"
 #include "hierarchical_matrix.h"
 #include "linked_matrix.h"
 #include "program.h"
@@ -111,8 +112,7 @@ class SceneBench {
   void compress_form_factors_of_links() {
     const double seconds = processor_seconds_of([&] {
       const LinkedFormFactors product(links_, data_.patches.area, data_.patches.centroid);
-      const DrawnLights fitting{bounced(product, lights_.shaping),
-                                bounced(product, lights_.judging)};
+      const DrawnLights fitting = bounced(lights_, product, data_.patches);
       const double before = processor_seconds();
       form_factors_ = compress_form_factors(links_, data_.patches, fitting.view(),
                                             {options_.form_factor_tolerance, Precision::kF16});
@@ -123,24 +123,6 @@ class SceneBench {
         data_.patches.size(), links_.pair.size(), link_seconds_, seconds,
         static_cast<double>(form_factors_->bytes()) / static_cast<double>(data_.patches.size()),
         peak_gib());
-  }
-
-  /// The radiosities after two reflections.
-  Lights bounced(const LinkedFormFactors& product, const Lights& lights) const {
-    std::vector<float> workspace(product.workspace_size());
-    Lights radiosities;
-    for (const auto& m0 : lights) {
-      std::vector<Float3>& b = radiosities.emplace_back(m0);
-      for (int bounce = 0; bounce < 2; ++bounce) {
-        std::vector<Float3> h(m0.size());
-        product.gather(b, h, workspace);
-        for (std::size_t i = 0; i < h.size(); ++i) {
-          for (int c = 0; c < kChannelCount; ++c)
-            b[i][c] = m0[i][c] + data_.patches.reflectance[i][c] * h[i][c];
-        }
-      }
-    }
-    return radiosities;
   }
 
   Lights products(const SolvedTransfer& solved) const {

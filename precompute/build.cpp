@@ -9,6 +9,7 @@
 #include "phase_clock.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/link_coarsening.h"
+#include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/reconstruction_weights.h"
@@ -55,6 +56,11 @@ FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchMod
   return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
 }
 
+/// Of links that are stored for hierarchical radiosity.
+double stored_link_error(const FormFactorSettings& settings) {
+  return kLinkCoarsening * (settings.link_epsilon > 0 ? settings.link_epsilon : kLinkEpsilon);
+}
+
 /// The settings with what was left open decided.
 BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   settings.form_factor_kind = choose_form_factors(settings, model);
@@ -82,13 +88,6 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
     settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
   }
   return settings;
-}
-
-FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
-                           FormFactorSettings settings, const Progress& progress) {
-  if (settings.link_epsilon == 0) settings.link_epsilon = kLinkEpsilon;
-  return coarsen_links(build_links(model, tracer, settings, {}, progress).links, model.patches.area,
-                       model.patches.centroid, kLinkCoarsening * settings.link_epsilon);
 }
 
 Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
@@ -192,8 +191,9 @@ class TransferBuild {
     report_.form_factor_count = form_factors.exchange.column.size();
     report_.closure = form_factors.closure;
     if (settings_.store_links) {
-      data_.links = clock_.run("links", [&](const Progress& part) {
-        return find_links(model_, *tracer_, settings_.form_factors, part);
+      data_.links = clock_.run("links", [&](const Progress&) {
+        return fit_links(form_factors.exchange, model_.patches,
+                         stored_link_error(settings_.form_factors));
       });
       report_.link_count = data_.links.pair.size();
     }

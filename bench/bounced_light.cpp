@@ -1,0 +1,39 @@
+#include "bounced_light.h"
+
+#include <vector>
+
+namespace rebounce::bench {
+namespace {
+
+using Lights = std::vector<std::vector<Float3>>;
+
+constexpr int kBounces = 2;
+
+Lights bounced_lights(const Lights& lights, const FormFactorOperator& form_factors,
+                      const PatchTable& patches) {
+  std::vector<float> workspace(form_factors.workspace_size());
+  std::vector<Float3> arrived(patches.size());
+  Lights radiosities;
+  for (const auto& initial : lights) {
+    std::vector<Float3>& radiosity = radiosities.emplace_back(initial);
+    for (int bounce = 0; bounce < kBounces; ++bounce) {
+      form_factors.gather(radiosity, arrived, workspace);
+      for (std::size_t i = 0; i < arrived.size(); ++i) {
+        for (std::size_t c = 0; c < kChannelCount; ++c) {
+          radiosity[i][c] = initial[i][c] + patches.reflectance[i][c] * arrived[i][c];
+        }
+      }
+    }
+  }
+  return radiosities;
+}
+
+}  // namespace
+
+DrawnLights bounced(const DrawnLights& lights, const FormFactorOperator& form_factors,
+                    const PatchTable& patches) {
+  return {bounced_lights(lights.shaping, form_factors, patches),
+          bounced_lights(lights.judging, form_factors, patches)};
+}
+
+}  // namespace rebounce::bench

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/transfer/form_factor_operator.h"
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce::bench {
+
+/// The radiosities after two reflections of `lights`, by `form_factors` of the `patches`: near
+/// enough to the whole for compressed form factors to be fitted to, and in closed scenes of any
+/// reflectance quick to have.
+DrawnLights bounced(const DrawnLights& lights, const FormFactorOperator& form_factors,
+                    const PatchTable& patches);
+
+}  // namespace rebounce::bench

@@ -1,0 +1,115 @@
+#include "affine_links.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "rebounce/transfer/error.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Directions in which a node extends by less than this part of its size have no gradient.
+constexpr double kFlat = 1e-6;
+constexpr int kScalingRounds = 4;
+
+Matrix3d inverse_without_flat(const Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance);
+  const double least = kFlat * kFlat * eigen.eigenvalues()[2];
+  Matrix3d inverse = Matrix3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const double value = eigen.eigenvalues()[k];
+    if (!(value > least)) continue;
+    const Vector3d axis = eigen.eigenvectors().col(k);
+    inverse += axis * axis.transpose() / value;
+  }
+  return inverse;
+}
+
+}  // namespace
+
+std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<const float> area,
+                                     std::span<const Float3> centroid) {
+  const std::size_t m = links.first_child.size();
+  std::vector<NodeSpread> nodes(m);
+  std::vector<std::uint32_t> begin(m, 0);
+  for (std::uint32_t k = 0; k < m; ++k) {
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) continue;
+    begin[child] = begin[k];
+    begin[child + 1] = begin[k] + links.count[child];
+    nodes[child].parent = nodes[child + 1].parent = k;
+    nodes[child].sibling = child + 1;
+    nodes[child + 1].sibling = child;
+  }
+  for (std::size_t k = m; k-- > 0;) {
+    NodeSpread& node = nodes[k];
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) {
+      const std::uint32_t patch = links.patch[begin[k]];
+      node.area = area[patch];
+      for (int axis = 0; axis < 3; ++axis) {
+        node.center[axis] = centroid[patch][static_cast<std::size_t>(axis)];
+      }
+      continue;
+    }
+    const NodeSpread &a = nodes[child], &b = nodes[child + 1];
+    node.area = a.area + b.area;
+    node.center = (a.area * a.center + b.area * b.center) / node.area;
+    for (const NodeSpread* part : {&a, &b}) {
+      const Vector3d d = part->center - node.center;
+      node.covariance += part->area / node.area * (part->covariance + d * d.transpose());
+    }
+    node.inverse = inverse_without_flat(node.covariance);
+  }
+  return nodes;
+}
+
+double squared_norm(const AffineLink& link, const NodeSpread& a, const NodeSpread& b) {
+  return (link.exchange * link.exchange + link.gradient_a.dot(a.covariance * link.gradient_a) +
+          link.gradient_b.dot(b.covariance * link.gradient_b)) /
+         (a.area * b.area);
+}
+
+void append_link(const AffineLink& link, FormFactorLinks& links) {
+  links.pair.push_back({link.a, link.b});
+  links.exchange_area.push_back(static_cast<float>(link.exchange));
+  std::array<float, 6>& gradient = links.gradient.emplace_back();
+  for (int axis = 0; axis < 3; ++axis) {
+    gradient[static_cast<std::size_t>(axis)] = static_cast<float>(link.gradient_a[axis]);
+    gradient[static_cast<std::size_t>(axis) + 3] = static_cast<float>(link.gradient_b[axis]);
+  }
+}
+
+std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,
+                            std::span<const Float3> centroid) {
+  const LinkedFormFactors form_factors(links, area, centroid);
+  const std::vector<Float3> ones(area.size(), {1, 1, 1});
+  std::vector<Float3> sums(area.size());
+  std::vector<float> workspace(form_factors.workspace_size());
+  form_factors.gather(ones, sums, workspace);
+  std::vector<float> result;
+  result.reserve(sums.size());
+  for (const Float3& sum : sums) result.push_back(sum[0]);
+  return result;
+}
+
+void scale_rows(std::span<const float> target, std::span<const float> area,
+                std::span<const Float3> centroid, FormFactorLinks& links) {
+  for (int round = 0; round < kScalingRounds; ++round) {
+    const std::vector<float> sum = row_sums(links, area, centroid);
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      if (sum[i] > 0 && target[i] > 0) links.scale[i] *= std::sqrt(target[i] / sum[i]);
+    }
+  }
+}
+
+void check_link_error(double epsilon) {
+  if (!(epsilon >= 0) || !std::isfinite(epsilon)) {
+    throw Error("links: the error of coarser ones must be finite and not negative");
+  }
+}
+
+}  // namespace rebounce

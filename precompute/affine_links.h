@@ -1,0 +1,50 @@
+#pragma once
+
+// What coarser links are made with, whether from links or from pairs of patches.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/transfer/linked_form_factors.h"
+
+namespace rebounce {
+
+/// A node of a tree of links and how its patches' centroids are spread, by area.
+struct NodeSpread {
+  std::uint32_t parent = kNone, sibling = kNone;
+  double area = 0;                                    ///< m²
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< area-weighted, metres
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m²
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();  ///< of it, without flat directions
+};
+
+/// The nodes of the tree that `links` have, [m]; `area` [n] in m², `centroid` [n] in metres.
+std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<const float> area,
+                                     std::span<const Float3> centroid);
+
+/// A link as FormFactorLinks has it, in double precision.
+struct AffineLink {
+  std::uint32_t a = 0, b = 0;
+  double exchange = 0;  ///< m²
+  Eigen::Vector3d gradient_a = Eigen::Vector3d::Zero(), gradient_b = Eigen::Vector3d::Zero();
+};
+
+/// The square of the Frobenius norm of what `link` says of A^1/2 F A^-1/2.
+double squared_norm(const AffineLink& link, const NodeSpread& a, const NodeSpread& b);
+
+void append_link(const AffineLink& link, FormFactorLinks& links);
+
+/// The sums of the rows of F as links have it [n].
+std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,
+                            std::span<const Float3> centroid);
+
+/// Multiplies the scales of `links` until rows add up to `target` [n], nearly.
+void scale_rows(std::span<const float> target, std::span<const float> area,
+                std::span<const Float3> centroid, FormFactorLinks& links);
+
+/// Throws Error if `epsilon` is not the error of a link.
+void check_link_error(double epsilon);
+
+}  // namespace rebounce
