@@ -110,6 +110,7 @@ class PieceCompressor {
 
   BlockPart compress(std::uint32_t row, std::uint32_t column) const {
     if (!wanted_.wanted(row, column)) return {};
+    if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return compress_children(row, column);
     const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
     const TransferBlock place{.row_begin = rows.begin,
                               .row_count = rows.count,

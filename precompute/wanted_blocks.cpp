@@ -20,11 +20,18 @@ std::vector<std::uint8_t> role_groups(const PatchRoles& roles) {
 }
 
 WantedBlocks::WantedBlocks(const PatchRoles& roles, const ClusterTree& tree)
-    : roles_(roles), receives_(tree.clusters.size()), sends_(tree.clusters.size()) {
+    : roles_(roles),
+      receives_(tree.clusters.size()),
+      sends_(tree.clusters.size()),
+      mixed_(tree.clusters.size()) {
   for (std::size_t c = 0; c < tree.clusters.size(); ++c) {
-    for (const std::uint32_t p : patches_of(tree, tree.clusters[c])) {
+    const Cluster& cluster = tree.clusters[c];
+    const auto patches = patches_of(tree, cluster);
+    for (const std::uint32_t p : patches) {
       if (roles.is_receiver(p)) receives_[c] = 1;
       if (roles.is_source(p)) sends_[c] = 1;
+      const bool other = !roles.all_are_both() && roles.role[p] != roles.role[patches.front()];
+      if (other && !cluster.is_leaf()) mixed_[c] = 1;
     }
   }
 }

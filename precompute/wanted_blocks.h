@@ -34,13 +34,16 @@ class WantedBlocks {
     return leads(row, column) || leads(column, row);
   }
 
+  /// Whether a cluster has patches of several roles that its children part.
+  bool is_mixed(std::uint32_t cluster) const { return mixed_[cluster] != 0; }
+
   /// Sets the entries [rows][columns] to 0 that are wanted in neither direction.
   void clear_unwanted(std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns,
                       Eigen::Ref<Eigen::MatrixXf> entries) const;
 
  private:
   const PatchRoles& roles_;
-  std::vector<std::uint8_t> receives_, sends_;  ///< by cluster: whether it has any
+  std::vector<std::uint8_t> receives_, sends_, mixed_;  ///< by cluster
 };
 
 }  // namespace rebounce

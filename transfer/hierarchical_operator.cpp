@@ -249,7 +249,7 @@ std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
          storage_.bases_q16.size_bytes() + storage_.bases_q8.size_bytes() +
          storage_.blocks.size() * sizeof(TransferBlock) +
-         storage_.patch.size() * sizeof(std::uint32_t);
+         storage_.patch.size() * sizeof(std::uint32_t) + storage_.roles.role.size();
 }
 
 std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
