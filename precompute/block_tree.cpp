@@ -47,15 +47,16 @@ Eigen::MatrixXd make_orthonormal(Eigen::MatrixXd& basis) {
 class PieceCompressor {
  public:
   PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
-                  const std::vector<ClusterWeight>& weights, double price, std::uint32_t row,
-                  std::uint32_t column)
+                  const std::vector<ClusterWeight>& weights, const WantedBlocks& wanted,
+                  double price, const BlockPiece& piece)
       : tree_(tree),
         weights_(weights),
+        wanted_(wanted),
         price_(price),
-        row_(row),
-        column_(column),
-        row_begin_(tree.clusters[row].begin),
-        column_begin_(tree.clusters[column].begin) {
+        row_(piece.row),
+        column_(piece.column),
+        row_begin_(tree.clusters[piece.row].begin),
+        column_begin_(tree.clusters[piece.column].begin) {
     for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) gather(matrix, m);
   }
 
@@ -64,19 +65,13 @@ class PieceCompressor {
  private:
   void gather(const SymmetricMatrix& matrix, std::uint32_t m) {
     const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
-    const auto rows = patches_of(row), columns = patches_of(column);
+    const auto rows = patches_of(tree_, row), columns = patches_of(tree_, column);
     Eigen::MatrixXf& entries =
         matrices_.emplace_back(Eigen::MatrixXf::Zero(row.count, column.count));
-    matrix.entries(
-        m, rows, columns,
-        entries.topLeftCorner(static_cast<Index>(rows.size()), static_cast<Index>(columns.size())));
-  }
-
-  /// Those of a cluster's positions that hold one.
-  std::span<const std::uint32_t> patches_of(const Cluster& cluster) const {
-    const std::size_t end =
-        std::min<std::size_t>(cluster.begin + cluster.count, tree_.patch.size());
-    return {tree_.patch.data() + cluster.begin, tree_.patch.data() + end};
+    auto held =
+        entries.topLeftCorner(static_cast<Index>(rows.size()), static_cast<Index>(columns.size()));
+    matrix.entries(m, rows, columns, held);
+    wanted_.clear_unwanted(rows, columns, held);
   }
 
   Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
@@ -99,7 +94,8 @@ class PieceCompressor {
   WideBlock weighted_block(const TransferBlock& place, std::uint32_t row,
                            std::uint32_t column) const {
     WideBlock block = wide_block(place);
-    weights_[row].put_left(block.entries);
+    if (wanted_.leads(row, column)) weights_[row].put_left(block.entries);
+    if (!wanted_.leads(column, row)) return block;
     for (Index m = 0; m < matrix_count(); ++m) {
       weights_[column].put_right(
           block.entries.middleCols(m * place.column_count, place.column_count));
@@ -107,14 +103,21 @@ class PieceCompressor {
     return block;
   }
 
+  /// In how many directions light goes through a block.
+  double multiplicity(std::uint32_t row, std::uint32_t column) const {
+    return row != column && wanted_.leads(row, column) && wanted_.leads(column, row) ? 2 : 1;
+  }
+
   BlockPart compress(std::uint32_t row, std::uint32_t column) const {
+    if (!wanted_.wanted(row, column)) return {};
+    if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return compress_children(row, column);
     const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
     const TransferBlock place{.row_begin = rows.begin,
                               .row_count = rows.count,
                               .column_begin = columns.begin,
                               .column_count = columns.count};
     const WideBlock block = weighted_block(place, row, column);
-    const CompressionCost cost{price_, place.on_diagonal() ? 1.0 : 2.0};
+    const CompressionCost cost{price_, multiplicity(row, column)};
     const double zero_cost = cost.total(block.entries.squaredNorm(), kBlockOverhead);
     const double overhead = price_ * kBlockOverhead;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
@@ -165,11 +168,11 @@ class PieceCompressor {
   /// Of the weighted block's factors those of the block itself. Bases are made orthonormal again,
   /// so that neither they nor the cores leave the range of half precision.
   void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
-    weights_[row].take_away(block.row_basis);
+    if (wanted_.leads(row, column)) weights_[row].take_away(block.row_basis);
     const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);
     Eigen::MatrixXd column_factor = row_factor;
     if (row != column) {
-      weights_[column].take_away(block.column_basis);
+      if (wanted_.leads(column, row)) weights_[column].take_away(block.column_basis);
       column_factor = make_orthonormal(block.column_basis);
     }
     for (Eigen::MatrixXd& core : block.cores) core = row_factor * core * column_factor.transpose();
@@ -193,6 +196,7 @@ class PieceCompressor {
 
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
+  const WantedBlocks& wanted_;
   double price_;
   std::uint32_t row_, column_, row_begin_, column_begin_;
   std::vector<Eigen::MatrixXf> matrices_;
@@ -244,8 +248,10 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (loop.stopped()) continue;
-    parts[k] = PieceCompressor(matrix_, tree_, weights_, price, pieces[k].row, pieces[k].column)
-                   .compress();
+    if (wants(pieces[k])) {
+      parts[k] =
+          PieceCompressor(matrix_, tree_, weights_, wanted_, price, pieces[k]).compress();
+    }
     loop.advance();
   }
   loop.finish();
@@ -267,6 +273,7 @@ HierarchicalOperator::Storage BlockTreeCompressor::assemble(BlockPart whole) con
   storage.patch = tree_.patch;
   storage.channel_matrix = matrix_.channel_matrix();
   storage.matrix_count = matrix_.matrix_count();
+  storage.roles = matrix_.roles();
   storage.blocks = std::move(whole.blocks);
   storage.values_f32 = SharedArray(std::move(whole.values));
   return storage;

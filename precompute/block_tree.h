@@ -9,6 +9,7 @@
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 #include "symmetric_matrix.h"
+#include "wanted_blocks.h"
 
 namespace rebounce {
 
@@ -37,16 +38,21 @@ std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t larg
 /// Compresses one matrix at any number of prices.
 ///
 /// What is minimised is error² + price x values, in which the error is that of the
-/// symmetric form in the Frobenius norm, with the weights of light_weights.h on both sides.
+/// symmetric form in the Frobenius norm, with the weights of light_weights.h on both sides, or on
+/// the side that light comes from where but one direction is wanted. Where the roles of the matrix
+/// want none there is no block.
 class BlockTreeCompressor {
  public:
   /// All that is given must outlive the object; `weights` has one entry for each cluster.
   BlockTreeCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
                       const std::vector<ClusterWeight>& weights)
-      : matrix_(matrix), tree_(tree), weights_(weights) {}
+      : matrix_(matrix), tree_(tree), weights_(weights), wanted_(matrix.roles(), tree) {}
 
   /// The operator (f32) at a price > 0. Throws Cancelled if asked to stop.
   HierarchicalOperator::Storage compress(double price, const Progress& progress = {}) const;
+
+  /// Whether anything of a piece is wanted.
+  bool wants(const BlockPiece& piece) const { return wanted_.wanted(piece.row, piece.column); }
 
   /// Some pieces of it.
   BlockPart compress(std::span<const BlockPiece> pieces, double price,
@@ -59,6 +65,7 @@ class BlockTreeCompressor {
   const SymmetricMatrix& matrix_;
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
+  WantedBlocks wanted_;
 };
 
 }  // namespace rebounce

@@ -12,6 +12,7 @@
 #include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_model.h"
+#include "rebounce/precompute/patch_selection.h"
 #include "rebounce/precompute/reconstruction_weights.h"
 #include "rebounce/precompute/winding.h"
 #include "rebounce/transfer/error.h"
@@ -65,12 +66,16 @@ double stored_link_error(const FormFactorSettings& settings) {
 BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   settings.form_factor_kind = choose_form_factors(settings, model);
   const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
+  const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
   if (settings.operator_kind == OperatorKind::kAutomatic) {
-    settings.operator_kind = links || model.patches.size() > kDensePatchCount
+    settings.operator_kind = links || of_some || model.patches.size() > kDensePatchCount
                                  ? OperatorKind::kHierarchical
                                  : OperatorKind::kDense;
   }
   const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
+  if (of_some && !hierarchical) {
+    throw Error("receivers and sources are for hierarchical operators alone; ask for one");
+  }
   if (!settings.precision) {
     const bool dense = settings.operator_kind == OperatorKind::kDense;
     settings.precision = hierarchical ? Precision::kQ16 : dense ? Precision::kF32 : Precision::kF16;
@@ -111,6 +116,8 @@ class TransferBuild {
     report_.triangle_count = scene.triangle.size();
     report_.degenerate_triangle_count = scene.degenerate_triangle_count;
     report_.warnings = scene.warnings;
+    receivers_ = PatchSelection(settings_.receivers, scene, "receivers");
+    sources_ = PatchSelection(settings_.sources, scene, "sources");
     data_.materials = scene.materials;
     data_.textures = scene.textures;
     data_.cameras = scene.cameras;
@@ -127,6 +134,7 @@ class TransferBuild {
       return make_patch_model(std::move(scene), settings_.subdivision, part);
     });
     describe_patches(model_, report_);
+    roles_ = choose_roles(model_, receivers_, sources_);
     if (settings_.lightmap.size > 0) {
       data_.lightmap = clock_.run(
           "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
@@ -156,11 +164,17 @@ class TransferBuild {
                                      data_.mesh, part);
       return true;
     });
-    if (settings_.probes.grid[0] > 0 || settings_.probes.spacing > 0) {
+    const bool probes = settings_.probes.grid[0] > 0 || settings_.probes.spacing > 0;
+    if ((probes || settings_.surface_harmonics.ray_count > 0) && !receivers_.empty()) {
+      report_.warnings.push_back(
+          "light probes and surface harmonics see patches that are no receivers without their "
+          "indirect light");
+    }
+    if (probes) {
       data_.probes = clock_.run("probes", [&](const Progress& part) {
-        LightProbes probes = place_probes(data_.mesh, settings_.probes);
-        trace_probes(data_, model_.shown_patch, *tracer_, settings_.probes, probes, part);
-        return probes;
+        LightProbes placed = place_probes(data_.mesh, settings_.probes);
+        trace_probes(data_, model_.shown_patch, *tracer_, settings_.probes, placed, part);
+        return placed;
       });
     }
     if (settings_.surface_harmonics.ray_count > 0) {
@@ -176,7 +190,7 @@ class TransferBuild {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
     const bool links = decided_.form_factor_kind == FormFactorKind::kLinks;
     const auto make = links ? make_operator_from_links : make_operator_from_pairs;
-    make(*tracer_, decided_, data_, report_, clock_);
+    make(*tracer_, decided_, roles_, data_, report_, clock_);
   }
 
   TransferData take() { return std::move(data_); }
@@ -219,6 +233,8 @@ class TransferBuild {
   PhaseClock clock_;
   TransferData data_;
   PatchModel model_;
+  PatchSelection receivers_, sources_;
+  PatchRoles roles_;
   std::optional<RayTracer> tracer_;
 };
 

@@ -34,6 +34,8 @@ std::string settings_json(const BuildSettings& settings) {
                         {"tolerance", settings.tolerance},
                         {"form_factor_tolerance", settings.form_factor_tolerance},
                         {"rank", settings.rank},
+                        {"receivers", settings.receivers},
+                        {"sources", settings.sources},
                         {"scale", settings.scale},
                         {"precision", precision_name(*settings.precision)},
                         {"patches", settings.subdivision.patch_count},

@@ -35,8 +35,12 @@ std::vector<Feature> make_features(const PatchTable& patches) {
 
 class TreeBuilder {
  public:
-  TreeBuilder(const PatchTable& patches, std::uint32_t leaf_size, std::uint32_t alignment)
-      : features_(make_features(patches)), leaf_size_(leaf_size), alignment_(alignment) {
+  TreeBuilder(const PatchTable& patches, std::uint32_t leaf_size, std::uint32_t alignment,
+              std::span<const std::uint8_t> group)
+      : features_(make_features(patches)),
+        group_(group),
+        leaf_size_(leaf_size),
+        alignment_(alignment) {
     tree_.patch.resize(patches.size());
     std::iota(tree_.patch.begin(), tree_.patch.end(), 0U);
     projection_.resize(patches.size());
@@ -58,11 +62,34 @@ class TreeBuilder {
         std::min<std::size_t>(cluster.begin + cluster.count, tree_.patch.size());
     const std::span<std::uint32_t> members(tree_.patch.data() + cluster.begin,
                                            tree_.patch.data() + end);
-    sort_along_axis(members);
-    const std::uint32_t first = best_split(members, cluster.count);
+    std::uint32_t first = part_groups(members, cluster.count);
+    if (first == 0) {
+      sort_along_axis(members);
+      first = best_split(members, cluster.count);
+    }
     tree_.clusters[index].first_child = static_cast<std::uint32_t>(tree_.clusters.size());
     tree_.clusters.push_back({cluster.begin, first});
     tree_.clusters.push_back({cluster.begin + first, cluster.count - first});
+  }
+
+  /// Sorts the patches by their groups, and returns the size of a first child that ends where one
+  /// does, nearest to the middle; 0 if there is but one group, or all are in the same run.
+  std::uint32_t part_groups(std::span<std::uint32_t> members, std::uint32_t count) const {
+    if (group_.empty()) return 0;
+    std::ranges::sort(members, [&](std::uint32_t a, std::uint32_t b) {
+      return group_[a] != group_[b] ? group_[a] < group_[b] : a < b;
+    });
+    const auto off_middle = [&](std::uint32_t first) {
+      return 2 * first > count ? 2 * first - count : count - 2 * first;
+    };
+    std::uint32_t best = 0;
+    for (std::uint32_t k = 1; k < members.size(); ++k) {
+      if (group_[members[k - 1]] == group_[members[k]]) continue;
+      // The run that both groups share begins the second child, and is then the first of its own.
+      const std::uint32_t first = std::max(k / alignment_ * alignment_, alignment_);
+      if (first < count && (best == 0 || off_middle(first) < off_middle(best))) best = first;
+    }
+    return best;
   }
 
   void sort_along_axis(std::span<std::uint32_t> members) {
@@ -104,6 +131,7 @@ class TreeBuilder {
   }
 
   std::vector<Feature> features_;
+  std::span<const std::uint8_t> group_;
   std::uint32_t leaf_size_, alignment_;
   ClusterTree tree_;
   std::vector<double> projection_;  ///< of each patch on the axis of the cluster that is split
@@ -112,8 +140,13 @@ class TreeBuilder {
 }  // namespace
 
 ClusterTree build_cluster_tree(const PatchTable& patches, std::uint32_t leaf_size,
-                               std::uint32_t alignment) {
-  return TreeBuilder(patches, leaf_size, alignment).take();
+                               std::uint32_t alignment, std::span<const std::uint8_t> group) {
+  return TreeBuilder(patches, leaf_size, alignment, group).take();
+}
+
+std::span<const std::uint32_t> patches_of(const ClusterTree& tree, const Cluster& cluster) {
+  const std::size_t end = std::min<std::size_t>(cluster.begin + cluster.count, tree.patch.size());
+  return {tree.patch.data() + cluster.begin, tree.patch.data() + end};
 }
 
 }  // namespace rebounce

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "rebounce/transfer/hierarchical_operator.h"
@@ -28,9 +29,15 @@ struct ClusterTree {
 };
 
 /// Builds the tree; leaves have at most `leaf_size` positions, a multiple of `alignment`. With 1
-/// and 1 the leaves are the patches.
+/// and 1 the leaves are the patches. With `group` [n], patches of different groups are parted
+/// before anything else, in the order of the groups: only leaves, which multiples of the alignment
+/// cannot part, and clusters of whole groups have patches of several.
 ClusterTree build_cluster_tree(
     const PatchTable& patches, std::uint32_t leaf_size,
-    std::uint32_t alignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment));
+    std::uint32_t alignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment),
+    std::span<const std::uint8_t> group = {});
+
+/// Those at the positions of a cluster that hold one.
+std::span<const std::uint32_t> patches_of(const ClusterTree& tree, const Cluster& cluster);
 
 }  // namespace rebounce

@@ -156,14 +156,16 @@ void ConformingMesh::move_vertex(std::uint32_t v, std::uint32_t to, double part)
 
 std::vector<std::uint32_t> ConformingMesh::finish() {
   std::vector<Uint3> triangle;
-  std::vector<std::uint32_t> material, source;
+  std::vector<std::uint32_t> material, source, mesh;
   for (std::uint32_t t = source_.empty() ? kNone : 0; t != kNone; t = next_[t]) {
     triangle.push_back(scene_.triangle[t]);
     material.push_back(scene_.triangle_material[t]);
     source.push_back(source_[t]);
+    if (!scene_.triangle_mesh.empty()) mesh.push_back(scene_.triangle_mesh[source_[t]]);
   }
   scene_.triangle = std::move(triangle);
   scene_.triangle_material = std::move(material);
+  scene_.triangle_mesh = std::move(mesh);
   return source;
 }
 

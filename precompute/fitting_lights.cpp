@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/sampling.h"
@@ -16,10 +17,10 @@ constexpr int kJudgingLightCount = 64;
 }  // namespace
 
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed) {
+                                std::uint64_t seed, const PatchRoles& roles) {
   const auto draw = [&](LightKind kind, int count) {
     seed = mix_bits(seed);
-    return random_initial_exitances(data, tracer, kind, count, seed);
+    return random_initial_exitances(data, tracer, kind, count, seed, roles);
   };
   DrawnLights lights;
   for (const auto& [kind, count] : {std::pair(LightKind::kPoint, kShapingPointCount),
@@ -29,8 +30,10 @@ DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& trace
   }
   lights.judging = draw(LightKind::kPoint, kJudgingLightCount);
   // The scene's own lamps are sure to be used.
-  lights.shaping.push_back(data.patches.emitted_exitance);
-  lights.judging.push_back(data.patches.emitted_exitance);
+  std::vector<Float3> own = data.patches.emitted_exitance;
+  roles.keep(PatchRoles::kSource, own);
+  lights.shaping.push_back(own);
+  lights.judging.push_back(std::move(own));
   return lights;
 }
 

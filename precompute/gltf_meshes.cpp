@@ -9,6 +9,7 @@
 #include <glm/matrix.hpp>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "gltf_instances.h"
 #include "gltf_primitives.h"
@@ -31,7 +32,8 @@ glm::dmat3 cofactors(const glm::dmat3& m) {
   return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
 }
 
-// Puts one primitive into the world and appends what is left of it to the scene.
+// Puts one primitive into the world and appends what is left of it to the scene, as of the last of
+// its placed meshes.
 class Placement {
  public:
   Placement(const Primitive& primitive, const glm::dmat4& world, std::uint32_t lightmap_page,
@@ -59,6 +61,7 @@ class Placement {
       }
       scene_.triangle.push_back(placed);
       scene_.triangle_material.push_back(primitive_.material);
+      scene_.triangle_mesh.push_back(static_cast<std::uint32_t>(scene_.placed_meshes.size() - 1));
     }
   }
 
@@ -206,6 +209,7 @@ void reserve(const Document& document, std::span<const PlacedNode> nodes, Meshes
                });
   scene.triangle.reserve(triangles);
   scene.triangle_material.reserve(triangles);
+  scene.triangle_mesh.reserve(triangles);
   scene.position.reserve(vertices);
   scene.normal.reserve(vertices);
   scene.base_color_texcoord.reserve(vertices);
@@ -227,9 +231,15 @@ void import_meshes(const Document& document, std::span<const PlacedNode> nodes,
   Meshes meshes(document, texcoords, warnings);
   reserve(document, nodes, meshes, scene);
   LightmapPages pages(scene.lightmap_page);
+  const PlacedNode* last = nullptr;
   for_each_use(
       document, nodes, meshes,
       [&](const Primitive& primitive, const PlacedNode& placed, const Instances& instances) {
+        if (std::exchange(last, &placed) != &placed) {
+          const tinygltf::Node& node = document.model.nodes[placed.node];
+          const auto mesh = static_cast<std::size_t>(node.mesh);
+          scene.placed_meshes.push_back({document.model.meshes[mesh].name, node.name});
+        }
         for (std::size_t i = 0; i < instances.count; ++i) {
           Placement(primitive, placed.world * instances.transform(i),
                     pages.page(primitive, placed.node, i), scene)

@@ -48,12 +48,12 @@ struct FittedLights {
   Lights test_radiosities;
 };
 
-FittedLights find_lights(const RayTracer& tracer, const TransferData& data, std::uint64_t seed,
-                         const Progress& progress) {
+FittedLights find_lights(const RayTracer& tracer, const TransferData& data,
+                         const PatchRoles& roles, std::uint64_t seed, const Progress& progress) {
   FittedLights lights;
-  lights.exitances = draw_fitting_lights(data, tracer, seed);
+  lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
   const Lights tests =
-      random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed);
+      random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
   const ReferenceSolver solver(data.links, data.patches);
   const std::size_t shaping = lights.exitances.shaping.size(),
                     judging = lights.exitances.judging.size();
@@ -74,11 +74,12 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, std:
 }  // namespace
 
 void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
-                              TransferData& data, BuildReport& report, PhaseClock& clock) {
+                              const PatchRoles& roles, TransferData& data, BuildReport& report,
+                              PhaseClock& clock) {
   const PatchTable& patches = data.patches;
   const std::uint64_t seed = decided.form_factors.seed;
   const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
-    return find_lights(tracer, data, seed, part);
+    return find_lights(tracer, data, roles, seed, part);
   });
   data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
     return compress_form_factors(data.links, patches, lights.radiosities.view(),
@@ -87,6 +88,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
   data.transfer = clock.run("operator", [&](const Progress& part) {
     LargeTransferSettings settings;
     settings.compression = {decided.tolerance, *decided.precision};
+    settings.roles = roles;
     settings.checkpoint = decided.checkpoint;
     return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
                                 settings, part);
@@ -96,7 +98,9 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     report.form_factor_tolerance = decided.form_factor_tolerance;
     report.form_factor_error =
         form_factor_error(*data.compressed_form_factors, links, patches, lights.test_radiosities);
-    data.record.solve_residual = transfer_residual(*data.transfer, links, patches);
+    if (roles.all_are_both()) {
+      data.record.solve_residual = transfer_residual(*data.transfer, links, patches);
+    }
     return measure_error(data, tracer, nullptr, seed, part);
   });
   record_build(decided, report, errors, data.record);

@@ -58,7 +58,7 @@ void update(ContentHash& hash, std::span<const T> values) {
 
 /// A hash of all that the first stage depends on.
 std::string key_of(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                   const FittingLights& lights, double price) {
+                   const FittingLights& lights, const PatchRoles& roles, double price) {
   ContentHash hash;
   update(hash, std::span(std::string_view(version())));
   update<double>(hash, {{price, kResidualPart}});
@@ -73,6 +73,7 @@ std::string key_of(const HierarchicalOperator& form_factors, const PatchTable& p
   update<Float3>(hash, patches.centroid);
   update<Float3>(hash, patches.normal);
   update<Float3>(hash, patches.reflectance);
+  update<std::uint8_t>(hash, roles.role);
   for (const std::vector<Float3>& light : lights.shaping) update<Float3>(hash, light);
   return hash.text();
 }
@@ -83,10 +84,11 @@ struct Panel {
   std::vector<BlockPiece> pieces;
 };
 
-/// The lower triangle as panels, the longest first.
-std::vector<Panel> make_panels(const ClusterTree& tree) {
+/// What is wanted of the lower triangle as panels, the longest first.
+std::vector<Panel> make_panels(const ClusterTree& tree, const BlockTreeCompressor& compressor) {
   std::vector<Panel> panels;
   for (const BlockPiece& piece : block_pieces(tree, kPanelWidth)) {
+    if (!compressor.wants(piece)) continue;
     const auto found = std::ranges::find(panels, piece.column, &Panel::column);
     Panel& panel = found == panels.end() ? panels.emplace_back(Panel{piece.column, {}}) : *found;
     panel.pieces.push_back(piece);
@@ -104,7 +106,7 @@ HierarchicalOperator::Storage compress_panels(PanelMatrix& matrix, const PatchTa
   const CompressionFrame frame = compression_frame(matrix, patches, shaping);
   const std::vector<ClusterWeight> weights = frame.weights();
   const BlockTreeCompressor compressor(matrix, frame.tree, weights);
-  const std::vector<Panel> panels = make_panels(frame.tree);
+  const std::vector<Panel> panels = make_panels(frame.tree, compressor);
   BlockPart whole;
   for (std::size_t k = 0; k < panels.size(); ++k) {
     const auto count = static_cast<double>(panels.size());
@@ -143,11 +145,11 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
   check_memory(patches.size(), solved.matrix_count(), settings.memory_limit_bytes);
   const double price = kFinePart * first_price(tolerance, patches.size());
   const PanelCheckpoint checkpoint(settings.checkpoint,
-                                   key_of(form_factors, patches, lights, price));
-  const Eigen::VectorXd energies = solved.estimated_energies();
+                                   key_of(form_factors, patches, lights, settings.roles, price));
+  const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
   HierarchicalOperator::Storage fine;
   {
-    PanelMatrix matrix(solved, energies);
+    PanelMatrix matrix(solved, energies, settings.roles);
     fine = compress_panels(matrix, patches, lights.shaping, price, checkpoint,
                            part_of(progress, 0, kFirstStage));
   }

@@ -81,25 +81,33 @@ VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree
       static_cast<Index>(HierarchicalOperator::position_count(tree.patch.size()));
   VectorXd background = VectorXd::Ones(positions);
   const VectorXd of_patch = matrix.energies(tree.patch);
-  VectorXd energy(of_patch.size());
-  for (Index k = 0; k < energy.size(); ++k) energy[k] = of_patch[tree.patch[k]];
-  std::vector<double> sorted(energy.begin(), energy.end());
+  std::vector<double> sorted;
+  for (const std::uint32_t p : tree.patch) {
+    if (matrix.roles().is_source(p)) sorted.push_back(of_patch[p]);
+  }
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::ranges::nth_element(sorted, middle);
   const double usual = *middle;
   if (usual == 0) return background;
+  VectorXd energy(of_patch.size());
+  for (Index k = 0; k < energy.size(); ++k) {
+    const std::uint32_t p = tree.patch[static_cast<std::size_t>(k)];
+    energy[k] = matrix.roles().is_source(p) ? of_patch[p] : usual;
+  }
   background.head(energy.size()) =
       (usual / energy.array().max(kLeastEnergy * usual).min(usual)).pow(kDarkPower);
   return background;
 }
 
 std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const MatrixXd& sample,
-                                                const VectorXd& background) {
+                                                const VectorXd& background,
+                                                const PatchRoles& roles) {
   const MatrixXd relative = background.cwiseInverse().asDiagonal() * sample;
   // Lights without any indirect light leave nothing to weigh.
-  const double variance =
-      std::max(kBackground * relative.squaredNorm() / static_cast<double>(relative.rows()),
-               std::numeric_limits<double>::min());
+  const auto positions = static_cast<double>(
+      roles.count(PatchRoles::kSource, static_cast<std::size_t>(relative.rows())));
+  const double variance = std::max(kBackground * relative.squaredNorm() / positions,
+                                   std::numeric_limits<double>::min());
   const SingleThreadedBlas single_threaded;
   std::vector<Principal> principal(tree.clusters.size());
 #pragma omp parallel for schedule(dynamic, 1)

@@ -41,14 +41,15 @@ class ClusterWeight {
 
 /// How strong lights are that the sample does not show, [positions]: 1 where the light of a single
 /// patch reaches others as it usually does, and more where less of it arrives, so that its error
-/// counts beside what does.
+/// counts beside what does; 1 where no light comes from, as patches are no sources.
 Eigen::VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree);
 
 /// The weights of all clusters of `tree`. `sample` [positions][lights] holds a light in each
-/// column, in the coordinates of Yhat, scaled so that all count alike; `background` is as
-/// background_light gives it.
+/// column, in the coordinates of Yhat, of sources alone, scaled so that all count alike;
+/// `background` is as background_light gives it.
 std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree,
                                                 const Eigen::MatrixXd& sample,
-                                                const Eigen::VectorXd& background);
+                                                const Eigen::VectorXd& background,
+                                                const PatchRoles& roles = {});
 
 }  // namespace rebounce

@@ -24,7 +24,8 @@ std::vector<Float3> product(const TransferOperator& transfer, const std::vector<
 LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights)
     : area_(matrix.area().begin(), matrix.area().end()) {
   for (const std::vector<Float3>& light : lights) {
-    if (area_norm(light, area_) > 0) lights_.push_back(light);
+    matrix.roles().keep(PatchRoles::kSource, lights_.emplace_back(light));
+    if (!(area_norm(lights_.back(), area_) > 0)) lights_.pop_back();
   }
   truths_.assign(lights_.size(), std::vector<Float3>(area_.size()));
   for (int channel = 0; channel < kChannelCount; ++channel) {
@@ -32,6 +33,7 @@ LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Fl
       light_channel(matrix, channel, begin, std::min(lights_.size(), begin + kBatch));
     }
   }
+  for (std::vector<Float3>& truth : truths_) matrix.roles().keep(PatchRoles::kReceiver, truth);
   leave_out_dark();
 }
 

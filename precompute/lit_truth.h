@@ -10,7 +10,8 @@
 namespace rebounce {
 
 /// Lights, and what a matrix, taken as exact, makes of them: what operators that are made from it
-/// are judged by.
+/// are judged by. Of the lights what its sources give off, and of the truth what arrives at its
+/// receivers.
 class LitTruth {
  public:
   /// `lights`: what the matrix multiplies, initial exitances [n] in lx. Those from

@@ -7,6 +7,7 @@
 #include "block_tree.h"
 #include "lit_truth.h"
 #include "price_search.h"
+#include "wanted_blocks.h"
 
 namespace rebounce {
 namespace {
@@ -53,7 +54,10 @@ double mean(const std::vector<double>& errors) {
 
 CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patches,
                           const LitTruth& shaping) {
-  CompressionFrame frame{build_cluster_tree(patches, kLeafSize), {}, {}};
+  constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
+  CompressionFrame frame;
+  frame.roles = matrix.roles();
+  frame.tree = build_cluster_tree(patches, kLeafSize, kAlignment, role_groups(frame.roles));
   frame.background = background_light(matrix, frame.tree);
   frame.sample = shaping.normalised_lights(frame.tree.patch,
                                            HierarchicalOperator::position_count(patches.size()));

@@ -16,9 +16,10 @@ struct CompressionFrame {
   ClusterTree tree;
   Eigen::VectorXd background;  ///< as background_light gives it
   Eigen::MatrixXd sample;      ///< the shaping lights, normalised
+  PatchRoles roles;            ///< of the matrix
 
   std::vector<ClusterWeight> weights() const {
-    return make_cluster_weights(tree, sample, background);
+    return make_cluster_weights(tree, sample, background, roles);
   }
 };
 

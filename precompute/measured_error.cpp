@@ -30,8 +30,9 @@ std::vector<double> errors_by_reference(const TransferData& data, const Referenc
     if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
     const auto some = std::span(lights).subspan(
         done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kTogether));
-    const auto truths = reference.indirect_irradiances(some, kReferenceResidual);
+    auto truths = reference.indirect_irradiances(some, kReferenceResidual);
     for (std::size_t k = 0; k < some.size(); ++k) {
+      data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
       if (arrives_nowhere(truths[k], some[k], data.patches.area)) continue;
       data.transfer->apply(some[k], indirect_irradiance, workspace);
       errors.push_back(relative_difference(indirect_irradiance, truths[k], data.patches.area));
@@ -66,9 +67,11 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
     };
     if (!part(0)) throw Cancelled();
     const LightKind kind = kLightKinds[k];
-    const Exitances lights = random_initial_exitances(data, tracer, kind, light_count, seed);
+    const PatchRoles& roles = data.transfer->roles();
+    const Exitances lights =
+        random_initial_exitances(data, tracer, kind, light_count, seed, roles);
     const std::vector<double> errors =
-        exact != nullptr ? LitTruth(DenseMatrix(*exact), lights).errors(*data.transfer)
+        exact != nullptr ? LitTruth(DenseMatrix(*exact, roles), lights).errors(*data.transfer)
                          : errors_by_reference(data, *reference, lights, part);
     if (!errors.empty()) result.push_back(summary(kind, errors));
   }

@@ -32,31 +32,35 @@ void check_residual(double residual, Precision precision) {
 std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
                                                  const TransferData& data, const RayTracer& tracer,
                                                  const BuildSettings& settings,
+                                                 const PatchRoles& roles,
                                                  const Progress& progress) {
   if (settings.operator_kind != OperatorKind::kHierarchical) {
     const bool first_bounce = settings.operator_kind == OperatorKind::kFirstBounce;
     return build_low_rank_transfer(dense, data.exchange,
                                    {settings.rank, *settings.precision, first_bounce}, progress);
   }
-  const DrawnLights lights = draw_fitting_lights(data, tracer, settings.form_factors.seed);
+  const DrawnLights lights = draw_fitting_lights(data, tracer, settings.form_factors.seed, roles);
   return build_hierarchical_transfer(dense, data.patches, lights.view(),
-                                     {settings.tolerance, *settings.precision}, progress);
+                                     {settings.tolerance, *settings.precision}, progress, roles);
 }
 
-/// Compresses the form factors of `data` and measures how well, with data.transfer as it is.
-void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
-                              const BuildSettings& settings, BuildReport& report,
-                              const Progress& progress) {
+/// Compresses the form factors of `data` and measures how well, with an operator of all patches.
+void compress_form_factors_of(TransferData& data, const TransferOperator& transfer,
+                              const RayTracer& tracer, const BuildSettings& settings,
+                              BuildReport& report, const Progress& progress) {
   const std::uint64_t seed = settings.form_factors.seed;
   report.form_factor_tolerance = settings.form_factor_tolerance;
-  const DrawnLights fitting = radiosities_of(draw_fitting_lights(data, tracer, seed), data);
+  const std::vector<Float3>& reflectance = data.patches.reflectance;
+  const DrawnLights drawn = draw_fitting_lights(data, tracer, seed);
+  const DrawnLights fitting{radiosities_of(transfer, reflectance, drawn.shaping),
+                            radiosities_of(transfer, reflectance, drawn.judging)};
   data.compressed_form_factors =
       compress_form_factors(data.exchange, data.patches, fitting.view(),
                             {settings.form_factor_tolerance, Precision::kF16}, progress);
   report.form_factor_error = form_factor_error(
       *data.compressed_form_factors, FormFactorRows(data.exchange, data.patches.area), data.patches,
       radiosities_of(
-          *data.transfer, data.patches.reflectance,
+          transfer, reflectance,
           random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed)));
 }
 
@@ -64,7 +68,9 @@ void compress_form_factors_of(TransferData& data, const RayTracer& tracer,
 void check_operator(TransferData& data, const RayTracer& tracer, const DenseOperator* exact,
                     const BuildSettings& decided, const BuildReport& report, PhaseClock& clock) {
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
-    data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
+    if (data.transfer->roles().all_are_both()) {
+      data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
+    }
     return measure_error(data, tracer, exact, decided.form_factors.seed, part);
   });
   record_build(decided, report, errors, data.record);
@@ -73,7 +79,8 @@ void check_operator(TransferData& data, const RayTracer& tracer, const DenseOper
 }  // namespace
 
 void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
-                              TransferData& data, BuildReport& report, PhaseClock& clock) {
+                              const PatchRoles& roles, TransferData& data, BuildReport& report,
+                              PhaseClock& clock) {
   const bool compressed = decided.operator_kind != OperatorKind::kDense;
   const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
   const auto dense = clock.run("operator", [&](const Progress& part) {
@@ -83,12 +90,13 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
   data.transfer = dense;
   if (compressed) {
     data.transfer = clock.run("compression", [&](const Progress& part) {
-      return compress(*dense, data, tracer, decided, part);
+      return compress(*dense, data, tracer, decided, roles, part);
     });
   }
   if (decided.form_factor_tolerance > 0) {
     clock.run("form factor compression", [&](const Progress& part) {
-      compress_form_factors_of(data, tracer, decided, report, part);
+      const TransferOperator& whole = roles.all_are_both() ? *data.transfer : *dense;
+      compress_form_factors_of(data, whole, tracer, decided, report, part);
       return true;
     });
   }

@@ -3,22 +3,26 @@
 #include "phase_clock.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/patch_roles.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
 
 // The last stage of a build: makes the operator of `data`, whose patches, mesh and form factors are
-// there, measures it, and records it all. `decided`: settings that leave nothing open. Throws Error
-// if the operator fails its own check, Cancelled if asked to stop.
+// there, measures it, and records it all. `decided`: settings that leave nothing open; `roles`: of
+// the patches, other than all of both only if the operator is to be hierarchical. Throws Error if
+// the operator fails its own check, Cancelled if asked to stop.
 
 /// From data.exchange, by a dense inverse.
 void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
-                              TransferData& data, BuildReport& report, PhaseClock& clock);
+                              const PatchRoles& roles, TransferData& data, BuildReport& report,
+                              PhaseClock& clock);
 
 /// From data.links, which stay only if that was asked for: F is compressed, and what is then
 /// solved for is never there as a whole (large_transfer.h). The error is measured against the
 /// links, which know nothing of either compression.
 void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
-                              TransferData& data, BuildReport& report, PhaseClock& clock);
+                              const PatchRoles& roles, TransferData& data, BuildReport& report,
+                              PhaseClock& clock);
 
 }  // namespace rebounce

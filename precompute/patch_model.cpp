@@ -81,6 +81,7 @@ class PatchModelBuilder {
     model_.lightmap_page = scene_.lightmap_page;
     mesh.triangle = std::move(scene_.triangle);
     mesh.triangle_material = std::move(scene_.triangle_material);
+    model_.triangle_mesh = std::move(scene_.triangle_mesh);
     mesh.back_triangle.assign(mesh.triangle.size(), kNone);
     for (const TriangleSides& sides : sides_) kind_.push_back(sides.front);
     surface_of_.resize(mesh.triangle.size());
@@ -115,6 +116,9 @@ class PatchModelBuilder {
       const auto [a, b, c] = mesh.triangle[t];
       mesh.triangle.push_back({back_of(a), back_of(c), back_of(b)});
       mesh.triangle_material.push_back(mesh.triangle_material[t]);
+      if (!model_.triangle_mesh.empty()) {
+        model_.triangle_mesh.push_back(model_.triangle_mesh[t]);
+      }
       kind_.push_back(sides_[t].back);
       surface_of_.push_back(t);
     }
@@ -283,12 +287,14 @@ class PatchModelBuilder {
           std::max({glm::distance(p, q), glm::distance(q, r), glm::distance(r, p)});
       if (glm::length(glm::cross(q - p, r - p)) < thinnest * longest) continue;
       scene_.triangle[kept] = scene_.triangle[t];
+      if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh[kept] = scene_.triangle_mesh[t];
       scene_.triangle_material[kept++] = scene_.triangle_material[t];
     }
     model_.sliver_count = scene_.triangle.size() - kept;
     if (kept == 0) throw Error("scene " + scene_.name + " has nothing but slivers");
     scene_.triangle.resize(kept);
     scene_.triangle_material.resize(kept);
+    if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh.resize(kept);
   }
 
   /// Covered sides show the light of what covers them at their middle.

@@ -43,12 +43,13 @@ Float3 random_direction(std::uint64_t bits) {
   return to_float3(glm::dvec3(r * std::cos(phi), r * std::sin(phi), z));
 }
 
-/// Chooses patches in proportion to their areas.
+/// Chooses sources in proportion to their areas.
 class PatchChoice {
  public:
-  explicit PatchChoice(std::span<const float> area) {
-    for (const float a : area) choice_.add(a);
-    mean_size_ = std::sqrt(choice_.total() / static_cast<double>(area.size()));
+  PatchChoice(std::span<const float> area, const PatchRoles& roles) {
+    for (std::size_t i = 0; i < area.size(); ++i) choice_.add(roles.is_source(i) ? area[i] : 0);
+    const std::size_t count = roles.count(PatchRoles::kSource, area.size());
+    mean_size_ = std::sqrt(choice_.total() / static_cast<double>(count));
   }
 
   std::uint32_t choose(double number) const {
@@ -63,9 +64,9 @@ class PatchChoice {
 };
 
 std::vector<Light> random_spots(const TransferData& data, const RayTracer& tracer, int count,
-                                std::uint64_t seed) {
+                                std::uint64_t seed, const PatchRoles& roles) {
   std::vector<Light> lights =
-      random_point_lights(data, tracer, count, bits_of(LightKind::kSpot, seed, 0));
+      random_point_lights(data, tracer, count, bits_of(LightKind::kSpot, seed, 0), roles);
   for (int k = 0; k < count; ++k) {
     const std::uint64_t bits = bits_of(LightKind::kSpot, seed, k);
     const glm::dvec2 s = unit_square(bits);
@@ -87,8 +88,9 @@ std::vector<Light> random_suns(int count, std::uint64_t seed) {
 }
 
 /// One patch that gives off 1 lx for each of `count` lights.
-std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::uint64_t seed) {
-  const PatchChoice choice(patches.area);
+std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::uint64_t seed,
+                                     const PatchRoles& roles) {
+  const PatchChoice choice(patches.area, roles);
   std::vector<Exitance> exitances(count, Exitance(patches.size(), Float3{0, 0, 0}));
   for (int k = 0; k < count; ++k) {
     exitances[k][choice.choose(unit_square(bits_of(LightKind::kPatch, seed, k)).x)] = {1, 1, 1};
@@ -96,9 +98,11 @@ std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::
   return exitances;
 }
 
-/// Direct light of each of `lights`, and of the sky before them if it has any luminance.
+/// What direct light of each of `lights`, and of the sky before them if it has any luminance, makes
+/// sources give off.
 std::vector<Exitance> lit_by(const TransferData& data, const RayTracer& tracer,
-                             std::span<const Light> lights, const Sky& sky = {}) {
+                             const PatchRoles& roles, std::span<const Light> lights,
+                             const Sky& sky = {}) {
   DirectLighting direct_lighting(data, tracer);
   std::vector<Exitance> exitances;
   const auto add = [&](std::span<const Light> light, const Sky& with_sky) {
@@ -107,6 +111,7 @@ std::vector<Exitance> lit_by(const TransferData& data, const RayTracer& tracer,
     for (std::size_t i = 0; i < exitance.size(); ++i) {
       for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
     }
+    roles.keep(PatchRoles::kSource, exitance);
     if (area_norm(exitance, data.patches.area) > 0) exitances.push_back(std::move(exitance));
   };
   if (sky.luminance > 0) add({}, sky);
@@ -135,11 +140,11 @@ std::string_view name(LightKind kind) {
 }
 
 std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
-                                       std::uint64_t seed) {
+                                       std::uint64_t seed, const PatchRoles& roles) {
   const DisplayMesh& mesh = data.mesh;
   const double open_reach = 0.25 * glm::distance(corner(mesh, false), corner(mesh, true));
   const PatchTriangles triangles(mesh.triangle_patch, data.patches.size());
-  const PatchChoice choice(data.patches.area);
+  const PatchChoice choice(data.patches.area, roles);
   std::vector<Light> lights(count);
   for (int k = 0; k < count; ++k) {
     const std::uint64_t bits = mix_bits(seed + 0x51ED270BULL * k);
@@ -160,19 +165,20 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
 }
 
 std::vector<Exitance> random_initial_exitances(const TransferData& data, const RayTracer& tracer,
-                                               LightKind kind, int count, std::uint64_t seed) {
+                                               LightKind kind, int count, std::uint64_t seed,
+                                               const PatchRoles& roles) {
   switch (kind) {
     case LightKind::kPoint:
-      return lit_by(data, tracer, random_point_lights(data, tracer, count, seed));
+      return lit_by(data, tracer, roles, random_point_lights(data, tracer, count, seed, roles));
     case LightKind::kSpot:
-      return lit_by(data, tracer, random_spots(data, tracer, count, seed));
+      return lit_by(data, tracer, roles, random_spots(data, tracer, count, seed, roles));
     case LightKind::kPatch:
-      return random_patches(data.patches, count, seed);
+      return random_patches(data.patches, count, seed, roles);
     case LightKind::kSky:
       break;
   }
   if (count == 0 || !is_open(data.patches)) return {};
-  return lit_by(data, tracer, random_suns(count - 1, seed), {.luminance = 1});
+  return lit_by(data, tracer, roles, random_suns(count - 1, seed), {.luminance = 1});
 }
 
 bool arrives_nowhere(std::span<const Float3> indirect_irradiance,

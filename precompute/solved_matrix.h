@@ -13,9 +13,9 @@ namespace rebounce {
 /// Yhat as far as its products say; where entries come from is left open.
 class SolvedMatrix : public SymmetricMatrix {
  public:
-  /// `solved` must outlive it; `energies` [n] are those that it estimates.
-  SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies)
-      : solved_(solved), energies_(std::move(energies)) {}
+  /// `solved` must outlive it; `energies` [n] are those that it estimates with these roles.
+  SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies, PatchRoles roles)
+      : SymmetricMatrix(std::move(roles)), solved_(solved), energies_(std::move(energies)) {}
 
   std::span<const float> area() const override { return solved_.area(); }
   std::uint32_t matrix_count() const override { return solved_.matrix_count(); }
@@ -56,12 +56,12 @@ class PanelMatrix final : public SolvedMatrix {
   std::vector<std::uint32_t> place_;            ///< [n] row, and column, of a patch
 };
 
-/// Its entries as an operator has them that was made of it.
+/// Its entries as an operator has them that was made of it, with the roles of that.
 class RoundedMatrix final : public SolvedMatrix {
  public:
   RoundedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies,
                 const HierarchicalOperator::Storage& rounded)
-      : SolvedMatrix(solved, std::move(energies)), rounded_(rounded) {}
+      : SolvedMatrix(solved, std::move(energies), rounded.roles), rounded_(rounded) {}
 
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,

@@ -201,12 +201,15 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
   return result;
 }
 
-Eigen::VectorXd SolvedTransfer::estimated_energies() const {
+Eigen::VectorXd SolvedTransfer::estimated_energies(const PatchRoles& roles) const {
   const auto n = static_cast<Index>(patch().size());
   std::mt19937_64 engine(1);
   Eigen::VectorXd energies = Eigen::VectorXd::Zero(n);
   for (std::uint32_t m = 0; m < matrix_count(); ++m) {
-    const MatrixXf signs = MatrixXf::NullaryExpr(n, kProbeCount, [&] { return sign(engine); });
+    MatrixXf signs = MatrixXf::NullaryExpr(n, kProbeCount, [&] { return sign(engine); });
+    for (Index i = 0; i < n; ++i) {
+      if (!roles.is_receiver(static_cast<std::size_t>(i))) signs.row(i).setZero();
+    }
     energies += multiply(m, signs).cast<double>().rowwise().squaredNorm() / kProbeCount;
   }
   return energies;

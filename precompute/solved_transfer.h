@@ -44,9 +44,10 @@ class SolvedTransfer {
   /// one thread. BLAS must run on one thread. Throws Error likewise.
   Vectors columns(std::uint32_t matrix, std::span<const std::uint32_t> patches) const;
 
-  /// Estimates of the squared norms of the columns, all matrices together, [n] by patch: the mean
-  /// over random vectors of signs s of the squares of Yhat s, whose expectation they are.
-  Eigen::VectorXd estimated_energies() const;
+  /// Estimates of the squared norms of the columns in the rows of receivers, all matrices together,
+  /// [n] by patch: the mean over random vectors of signs s at receivers of the squares of Yhat s,
+  /// whose expectation they are.
+  Eigen::VectorXd estimated_energies(const PatchRoles& roles = {}) const;
 
  private:
   /// The leading eigenvectors V of R G R, nearly.

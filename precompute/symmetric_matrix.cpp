@@ -28,17 +28,27 @@ std::span<const std::uint32_t> part_of(std::span<const std::uint32_t> patches, s
   return patches.subspan(begin, std::min(count, patches.size() - begin));
 }
 
+std::vector<std::uint32_t> with_role(std::span<const std::uint32_t> patches,
+                                     const PatchRoles& roles, std::uint8_t bit) {
+  std::vector<std::uint32_t> chosen;
+  for (const std::uint32_t p : patches) {
+    if (roles.has(p, bit)) chosen.push_back(p);
+  }
+  return chosen;
+}
+
 }  // namespace
 
 Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) const {
   const SingleThreadedBlas single_threaded;
-  const std::size_t n = order.size();
-  Eigen::VectorXd energy = Eigen::VectorXd::Zero(static_cast<Index>(n));
+  const auto sources = with_role(order, roles_, PatchRoles::kSource);
+  const auto receivers = with_role(order, roles_, PatchRoles::kReceiver);
+  Eigen::VectorXd energy = Eigen::VectorXd::Zero(static_cast<Index>(order.size()));
 #pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t column = 0; column < n; column += kTogetherColumns) {
-    const auto columns = part_of(order, column, kTogetherColumns);
-    for (std::size_t row = 0; row < n; row += kTogetherRows) {
-      const auto rows = part_of(order, row, kTogetherRows);
+  for (std::size_t column = 0; column < sources.size(); column += kTogetherColumns) {
+    const auto columns = part_of(sources, column, kTogetherColumns);
+    for (std::size_t row = 0; row < receivers.size(); row += kTogetherRows) {
+      const auto rows = part_of(receivers, row, kTogetherRows);
       MatrixXf part(rows.size(), columns.size());
       for (std::uint32_t m = 0; m < matrix_count(); ++m) {
         entries(m, rows, columns, part);

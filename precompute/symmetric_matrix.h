@@ -4,10 +4,12 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/patch_roles.h"
 
 namespace rebounce {
 
@@ -15,7 +17,12 @@ namespace rebounce {
 /// A^1/2 M A^-1/2. Any number of threads may ask.
 class SymmetricMatrix {
  public:
+  /// Of the matrix, the rows of receivers and the columns of sources are wanted.
+  explicit SymmetricMatrix(PatchRoles roles = {}) : roles_(std::move(roles)) {}
   virtual ~SymmetricMatrix() = default;
+
+  /// Entries and products are nevertheless those of the whole matrix.
+  const PatchRoles& roles() const { return roles_; }
 
   /// [n] m².
   virtual std::span<const float> area() const = 0;
@@ -31,15 +38,20 @@ class SymmetricMatrix {
   /// The product with many vectors at once, x [n][k]. The same bits for any number of threads.
   virtual Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const = 0;
 
-  /// What arrives of the light of each patch alone: the squared norms of the columns, of all
-  /// matrices together, [n] by patch. `order` lists the patches so that neighbours stay together.
+  /// What arrives at receivers of the light of each source alone: the squared norms of the columns,
+  /// of all matrices together, [n] by patch, 0 for others. `order` lists the patches so that
+  /// neighbours stay together.
   virtual Eigen::VectorXd energies(std::span<const std::uint32_t> order) const;
+
+ private:
+  PatchRoles roles_;
 };
 
 /// Yhat, from an operator in f32.
 class DenseMatrix final : public SymmetricMatrix {
  public:
-  explicit DenseMatrix(const DenseOperator& dense) : dense_(dense) {}
+  explicit DenseMatrix(const DenseOperator& dense, PatchRoles roles = {})
+      : SymmetricMatrix(std::move(roles)), dense_(dense) {}
 
   std::span<const float> area() const override { return dense_.storage().area; }
   std::uint32_t matrix_count() const override { return dense_.storage().matrix_count; }

@@ -56,6 +56,8 @@ namespace {
 
 static_assert(sizeof(Float3) == 3 * sizeof(float));
 static_assert(REBOUNCE_SKY_CELL_COUNT == kSkyCellCount);
+static_assert(REBOUNCE_PATCH_RECEIVER == PatchRoles::kReceiver);
+static_assert(REBOUNCE_PATCH_SOURCE == PatchRoles::kSource);
 static_assert(sizeof(SurfaceLight) == 12 * sizeof(float));
 static_assert(sizeof(QuadraticProbeLight) == 27 * sizeof(float));
 static_assert(sizeof(ProbeLight) == 54 * sizeof(float));
@@ -275,6 +277,11 @@ const uint32_t* rebounce_transfer_triangle(const rebounce_transfer* transfer) {
 }
 const uint32_t* rebounce_transfer_triangle_patch(const rebounce_transfer* transfer) {
   return transfer == nullptr ? nullptr : transfer->data->mesh.triangle_patch.data();
+}
+const uint8_t* rebounce_transfer_patch_role(const rebounce_transfer* transfer) {
+  if (transfer == nullptr) return nullptr;
+  const PatchRoles& roles = transfer->data->transfer->roles();
+  return roles.all_are_both() ? nullptr : roles.role.data();
 }
 const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer) {
   return transfer == nullptr ? nullptr : floats(transfer->data->probes.position);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "block_kernels.h"
@@ -223,19 +222,34 @@ HierarchicalOperator::HierarchicalOperator(Storage storage)
   inverse_.reserve(patch_count());
   const float scale = product_scale(storage_.precision);
   for (const std::uint32_t p : storage_.patch) {
-    sqrt_area_.push_back(std::sqrt(storage_.area[p]));
-    inverse_.push_back(scale / sqrt_area_.back());
+    const float root = std::sqrt(storage_.area[p]);
+    sqrt_area_.push_back(roles().is_source(p) ? root : 0);
+    inverse_.push_back(scale / root);
   }
-  std::vector<std::uint32_t> all(patch_count());
-  std::iota(all.begin(), all.end(), 0U);
-  plan_ = std::make_shared<HierarchicalPlan>(storage_, *layout_, std::move(all));
+  plan_ = plan_to(std::vector<bool>(patch_count(), true));
+}
+
+std::shared_ptr<const HierarchicalPlan> HierarchicalOperator::plan_to(
+    const std::vector<bool>& wanted) const {
+  std::vector<std::uint32_t> positions, dark;
+  for (std::uint32_t k = 0; k < patch_count(); ++k) {
+    const std::uint32_t p = storage_.patch[k];
+    if (!wanted[p]) continue;
+    if (roles().is_receiver(p)) {
+      positions.push_back(k);
+    } else {
+      dark.push_back(p);
+    }
+  }
+  return std::make_shared<HierarchicalPlan>(storage_, *layout_, std::move(positions),
+                                            std::move(dark));
 }
 
 std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
          storage_.bases_q16.size_bytes() + storage_.bases_q8.size_bytes() +
          storage_.blocks.size() * sizeof(TransferBlock) +
-         storage_.patch.size() * sizeof(std::uint32_t);
+         storage_.patch.size() * sizeof(std::uint32_t) + storage_.roles.role.size();
 }
 
 std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
@@ -256,6 +270,11 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const BlockKernelSet& kernels = block_kernels();
   const Exchange exchange{storage_.patch, sqrt_area_, inverse_, work};
   const ChannelLanes lanes(storage_.channel_matrix, storage_.matrix_count);
+  for (std::size_t light = 0; light < light_count; ++light) {
+    for (const std::uint32_t p : plan.dark) {
+      indirect_irradiance[light * patch_count() + p] = {0, 0, 0};
+    }
+  }
   const auto apply_phases = [&](const auto& bases, auto multiply_cores, const auto* basis,
                                 const auto* core, float basis_scale) {
     const Phases phases(bases, multiply_cores, basis, core, lanes, basis_scale * basis_scale, work);
@@ -301,11 +320,7 @@ HierarchicalOperator::Receivers HierarchicalOperator::receivers(
     }
     wanted[p] = true;
   }
-  std::vector<std::uint32_t> positions;
-  for (std::uint32_t k = 0; k < patch_count(); ++k) {
-    if (wanted[storage_.patch[k]]) positions.push_back(k);
-  }
-  return Receivers(std::make_shared<HierarchicalPlan>(storage_, *layout_, std::move(positions)));
+  return Receivers(plan_to(wanted));
 }
 
 void HierarchicalOperator::apply_to(const Receivers& receivers,
@@ -321,7 +336,9 @@ void HierarchicalOperator::expand(int channel, std::span<float> transfer) const 
   std::ranges::fill(transfer, 0.0F);
   const auto put = [&](std::size_t i, std::size_t j, double value) {
     const std::size_t row = storage_.patch[i], column = storage_.patch[j];
-    transfer[row * n + column] = static_cast<float>(value * sqrt_area_[j] / sqrt_area_[i]);
+    if (!roles().is_receiver(row) || !roles().is_source(column)) return;
+    transfer[row * n + column] = static_cast<float>(value * std::sqrt(storage_.area[column]) /
+                                                    std::sqrt(storage_.area[row]));
   };
   for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
     const TransferBlock& block = storage_.blocks[b];

@@ -24,12 +24,21 @@ std::vector<std::uint32_t> share_out(const std::vector<Entry>& entries, const We
   return bounds;
 }
 
+/// The positions of patches that are sources.
+std::vector<std::uint32_t> source_positions(const HierarchicalOperator::Storage& storage) {
+  std::vector<std::uint32_t> positions;
+  for (std::uint32_t k = 0; k < storage.patch.size(); ++k) {
+    if (storage.roles.is_source(storage.patch[k])) positions.push_back(k);
+  }
+  return positions;
+}
+
 /// Which runs of kAlignment positions are wanted, and how many of them there are before each.
 class WantedRuns {
  public:
-  WantedRuns(std::span<const std::uint32_t> targets, std::size_t position_count)
+  WantedRuns(std::span<const std::uint32_t> positions, std::size_t position_count)
       : wanted_(position_count / kAlignment), before_(wanted_.size() + 1) {
-    for (const std::uint32_t target : targets) wanted_[target / kAlignment] = true;
+    for (const std::uint32_t position : positions) wanted_[position / kAlignment] = true;
     for (std::size_t k = 0; k < wanted_.size(); ++k) before_[k + 1] = before_[k] + wanted_[k];
   }
   bool any(std::uint32_t begin, std::uint32_t count) const {
@@ -66,6 +75,7 @@ class Planner {
         plan_(plan),
         positions_(HierarchicalOperator::position_count(storage.area.size())),
         wanted_(plan.targets, positions_),
+        lit_(source_positions(storage), positions_),
         in_(layout.coefficient_count),
         out_(layout.coefficient_count) {}
 
@@ -86,9 +96,11 @@ class Planner {
 
  private:
   void add_core(const TransferBlock& block, const Layout::Place& place) {
-    const bool to_rows = wanted_.any(block.row_begin, block.row_count);
+    const bool to_rows = leads({block.column_begin, block.column_count},
+                               {block.row_begin, block.row_count});
     const bool to_columns =
-        !block.on_diagonal() && wanted_.any(block.column_begin, block.column_count);
+        !block.on_diagonal() && leads({block.row_begin, block.row_count},
+                                      {block.column_begin, block.column_count});
     if (!to_rows && !to_columns) return;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
     using Direction = CoreBlock::Direction;
@@ -110,6 +122,15 @@ class Planner {
       add_way(dense, {block.row_begin, core.rows, core.row},
               {block.column_begin, core.columns, core.column});
     }
+  }
+
+  struct Positions {
+    std::uint32_t begin, count;
+  };
+
+  /// Whether a source is here and a target there.
+  bool leads(const Positions& from, const Positions& to) const {
+    return lit_.any(from.begin, from.count) && wanted_.any(to.begin, to.count);
   }
 
   /// What goes into a core and comes out of it; of low rank, whatever the positions.
@@ -276,7 +297,7 @@ class Planner {
   const Layout& layout_;
   Plan& plan_;
   std::size_t positions_;
-  WantedRuns wanted_;
+  WantedRuns wanted_, lit_;
   std::vector<bool> in_, out_;  ///< which coefficients are needed, before and after cores
   std::vector<Plan::DenseEnd> dense_out_;  ///< whole
 };
@@ -285,8 +306,9 @@ class Planner {
 
 HierarchicalPlan::HierarchicalPlan(const HierarchicalOperator::Storage& storage,
                                    const HierarchicalLayout& layout,
-                                   std::vector<std::uint32_t> target_positions)
-    : targets(std::move(target_positions)) {
+                                   std::vector<std::uint32_t> target_positions,
+                                   std::vector<std::uint32_t> dark_patches)
+    : targets(std::move(target_positions)), dark(std::move(dark_patches)) {
   Planner(storage, layout, *this).make();
 }
 

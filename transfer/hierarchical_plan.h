@@ -30,15 +30,17 @@ class HierarchicalPlan {
     std::uint32_t target_count() const { return last_target - first_target; }
   };
 
-  /// Everything that it takes to write the positions `targets`, ascending.
+  /// Everything that it takes to write the positions `targets`, ascending, and to leave the patches
+  /// `dark` without light.
   HierarchicalPlan(const HierarchicalOperator::Storage& storage, const HierarchicalLayout& layout,
-                   std::vector<std::uint32_t> targets);
+                   std::vector<std::uint32_t> targets, std::vector<std::uint32_t> dark);
 
   std::vector<BasisPart> projections;
   std::vector<CoreBlock> cores;
   std::vector<BasisPart> expansions;
   std::vector<DenseEnd> dense_in, dense_out;  ///< those out cut at the arrivals
   std::vector<std::uint32_t> targets;
+  std::vector<std::uint32_t> dark;
   std::vector<Arrival> arrivals;
   /// [first, last) of the parts of about equal work that threads take in turn.
   std::vector<std::uint32_t> projection_parts, core_parts;

@@ -65,6 +65,11 @@ void check_tables(const Storage& storage) {
     if (matrix >= storage.matrix_count) refuse("a channel has no matrix");
   }
   check_permutation(storage.patch, n);
+  try {
+    check_roles(storage.roles, n);
+  } catch (const Error& error) {
+    refuse(error.what());
+  }
   for (const TransferBlock& block : storage.blocks) {
     check_block(block, HierarchicalOperator::position_count(n));
     const bool one_rank = (block.row_rank == 0) != (block.column_rank == 0);

@@ -47,18 +47,19 @@ inline constexpr char kLowRankCore[] = "transfer.low_rank.core";
 inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matrix";
 }  // namespace tensor
 
-/// The tensors of a hierarchical operator.
+/// The tensors of a hierarchical operator; `role` is null where every patch has both roles.
 struct HierarchicalTensors {
-  const char *patch, *blocks, *bases, *values, *channel_matrix;
+  const char *patch, *blocks, *bases, *values, *channel_matrix, *role;
 };
 
 inline constexpr HierarchicalTensors kHierarchicalTransfer = {
     "transfer.hierarchical.patch", "transfer.hierarchical.blocks", "transfer.hierarchical.bases",
-    "transfer.hierarchical.values", "transfer.hierarchical.channel_matrix"};
+    "transfer.hierarchical.values", "transfer.hierarchical.channel_matrix",
+    "transfer.hierarchical.role"};
 inline constexpr HierarchicalTensors kCompressedFormFactors = {
     "form_factor.hierarchical.patch", "form_factor.hierarchical.blocks",
     "form_factor.hierarchical.bases", "form_factor.hierarchical.values",
-    "form_factor.hierarchical.channel_matrix"};
+    "form_factor.hierarchical.channel_matrix", nullptr};
 
 /// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
 /// order.

@@ -269,6 +269,15 @@ void read_integer_bases(const SafetensorsFile& file, const char* name,
   }
 }
 
+/// A file without the tensor has an operator that serves all patches.
+PatchRoles read_roles(const SafetensorsFile& file, const char* name, std::size_t patch_count) {
+  if (name == nullptr || !file.tensors().contains(name)) return {};
+  const auto stored = file.tensor<std::uint8_t>(name, {patch_count});
+  PatchRoles roles;
+  roles.role.assign(stored.begin(), stored.end());
+  return roles;
+}
+
 std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
     const SafetensorsFile& file, const HierarchicalTensors& names, const std::vector<float>& area) {
   HierarchicalOperator::Storage storage;
@@ -278,6 +287,7 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   storage.blocks = read_blocks(file, names.blocks);
   storage.channel_matrix = read_channel_matrix(file, names.channel_matrix, kChannelCount);
   storage.matrix_count = 1 + std::ranges::max(storage.channel_matrix);
+  storage.roles = read_roles(file, names.role, area.size());
   if (file.info(names.values).type == TensorType::kF16) {
     storage.precision = Precision::kF16;
     storage.values_f16 = file.tensor<std::uint16_t>(names.values, {kAnySize}, TensorType::kF16);

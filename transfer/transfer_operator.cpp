@@ -5,6 +5,11 @@
 
 namespace rebounce {
 
+const PatchRoles& TransferOperator::roles() const {
+  static const PatchRoles all_both;
+  return all_both;
+}
+
 std::size_t TransferOperator::batch_workspace_size(std::size_t) const {
   return workspace_size();
 }

@@ -42,6 +42,7 @@ void run(const std::string& path, const CommonOptions& options) {
 nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
   const auto n = static_cast<double>(data.patches.size());
   const BuildRecord& record = data.record;
+  const PatchRoles& roles = data.transfer->roles();
   nlohmann::json info = {{"format_version", kFileFormatVersion},
                          {"generator", record.generator},
                          {"scene", record.scene_name},
@@ -60,6 +61,8 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
                          {"operator", data.transfer->kind()},
                          {"operator_bytes", data.transfer->bytes()},
                          {"bytes_per_patch", static_cast<double>(data.transfer->bytes()) / n},
+                         {"receiver_count", roles.count(PatchRoles::kReceiver, data.patches.size())},
+                         {"source_count", roles.count(PatchRoles::kSource, data.patches.size())},
                          {"file_bytes", file_bytes},
                          {"residual", record.solve_residual},
                          {"tolerance", record.tolerance},

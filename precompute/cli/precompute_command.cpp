@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "commands.h"
 #include "info_json.h"
 #include "output_check.h"
 #include "rebounce/precompute/build.h"
+#include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 #include "rebounce/transfer/transfer_file.h"
@@ -18,6 +20,7 @@ namespace {
 
 struct PrecomputeOptions {
   std::string scene, output, form_factors, operator_kind, precision, quality = "default";
+  std::vector<std::string> receivers, sources;  ///< each a list
   bool tolerance_given = false;
   BuildSettings settings;
   double memory_limit_gib = 0;
@@ -73,6 +76,11 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
       data.transfer->kind(), static_cast<double>(data.transfer->bytes()) / (1 << 20),
       static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
       data.record.solve_residual, data.record.error_mean, data.record.error_max);
+  if (const PatchRoles& roles = data.transfer->roles(); !roles.all_are_both()) {
+    fmt::print("receivers: {} patches, sources: {}\n",
+               roles.count(PatchRoles::kReceiver, report.patch_count),
+               roles.count(PatchRoles::kSource, report.patch_count));
+  }
   if (data.compressed_form_factors) {
     const auto bytes = static_cast<double>(data.compressed_form_factors->bytes());
     fmt::print(
@@ -115,6 +123,12 @@ void take_probes(const std::vector<float>& numbers, ProbeSettings& settings) {
   }
 }
 
+std::vector<std::string> split_lists(const std::vector<std::string>& lists) {
+  std::vector<std::string> entries;
+  for (const std::string& list : lists) std::ranges::move(split_selection(list), std::back_inserter(entries));
+  return entries;
+}
+
 FormFactorQuality quality_named(std::string_view name) {
   if (name == "low") return FormFactorQuality::kLow;
   return name == "high" ? FormFactorQuality::kHigh : FormFactorQuality::kDefault;
@@ -123,6 +137,8 @@ FormFactorQuality quality_named(std::string_view name) {
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
   take_probes(chosen.probes, settings.probes);
+  settings.receivers = split_lists(chosen.receivers);
+  settings.sources = split_lists(chosen.sources);
   if (chosen.form_factors == "pairs") settings.form_factor_kind = FormFactorKind::kPairs;
   if (chosen.form_factors == "links") settings.form_factor_kind = FormFactorKind::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
@@ -243,6 +259,17 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
           "tolerance is 1 % or more; by default f32 for a dense operator, q16 for a hierarchical "
           "one, f16 for others")
       ->check(CLI::IsMember({"f16", "f32", "q16", "q8"}));
+  command
+      .add_option("--receivers", chosen.receivers,
+                  "Surfaces whose indirect light is wanted, and none of others is stored: a list "
+                  "of names of meshes and materials (mesh:NAME or material:NAME for one kind), and "
+                  "boxes in metres, box:X0,Y0,Z0,X1,Y1,Z1; hierarchical only")
+      ->allow_extra_args(false);
+  command
+      .add_option("--sources", chosen.sources,
+                  "Surfaces that lamps may shine on, in the same way: light on others does not "
+                  "bounce; those that emit are sources all the same")
+      ->allow_extra_args(false);
 }
 
 void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {

@@ -95,6 +95,13 @@ const float* rebounce_transfer_vertex_normal(const rebounce_transfer* transfer);
 const uint32_t* rebounce_transfer_triangle(const rebounce_transfer* transfer);       /* [t][3] */
 const uint32_t* rebounce_transfer_triangle_patch(
     const rebounce_transfer* transfer); /* [t], or UINT32_MAX */
+
+/* What the operator does for each patch, of the bits below: it brings indirect light to receivers
+ * alone (others have 0), and bounces the light of sources alone. NULL: every patch is both. */
+#define REBOUNCE_PATCH_RECEIVER 1
+#define REBOUNCE_PATCH_SOURCE 2
+const uint8_t* rebounce_transfer_patch_role(const rebounce_transfer* transfer); /* [n] */
+
 const float* rebounce_transfer_probe_position(const rebounce_transfer* transfer); /* [p][3] m */
 const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer);  /* [p] 0, 1 */
 

@@ -51,6 +51,11 @@ MeanReflectance mean_reflectance(std::span<const Float3> reflectance, std::span<
   return {mean.brightest / total, mean.all / total};
 }
 
+/// One that does not is of no use for a solution on all patches.
+bool serves_all(const std::shared_ptr<const TransferOperator>& transfer) {
+  return transfer != nullptr && transfer->roles().all_are_both();
+}
+
 double product_cost(const TransferOperator* transfer) {
   if (transfer == nullptr) return 0;
   const auto bytes = static_cast<double>(transfer->bytes());
@@ -109,7 +114,7 @@ AutomaticSolver::AutomaticSolver(const SweepableFormFactors& form_factors,
                                  double transfer_error)
     : area_(problem.area.begin(), problem.area.end()),
       reflectance_(problem.reflectance.begin(), problem.reflectance.end()),
-      transfer_(std::move(transfer)),
+      transfer_(serves_all(transfer) ? std::move(transfer) : nullptr),
       gauss_seidel_(form_factors, problem, SweepOrder::kSymmetric),
       conjugate_gradient_(form_factors, problem),
       costs_{.product = product_cost(transfer_.get()),

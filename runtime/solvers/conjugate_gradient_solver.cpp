@@ -40,6 +40,11 @@ ConjugateGradientSolver::ConjugateGradientSolver(
   if (preconditioner_->patch_count() != n) {
     throw Error("solver: form factors and operator differ in their number of patches");
   }
+  if (!preconditioner_->roles().all_are_both()) {
+    throw Error(
+        "solver: preconditioning needs an operator that serves all patches, and this one has "
+        "receivers or sources; go without");
+  }
   transfer_workspace_.resize(preconditioner_->workspace_size());
 }
 

@@ -21,6 +21,11 @@ RefinementSolver::RefinementSolver(const FormFactorOperator& form_factors,
   if (transfer_->patch_count() != patch_count()) {
     throw Error("solver: form factors and operator differ in their number of patches");
   }
+  if (!transfer_->roles().all_are_both()) {
+    throw Error(
+        "solver: refinement needs an operator that serves all patches, and this one has receivers "
+        "or sources; take an iterative method");
+  }
   previous_.resize(patch_count());
   correction_.resize(patch_count());
   transfer_workspace_.resize(transfer_->workspace_size());

@@ -682,6 +682,50 @@ TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
   }
 }
 
+TEST_F(CommandLine, StoresReceiversAndSourcesAlone) {
+  const std::string file = path("box.safetensors"), solution = path("x.csv");
+  const json made = summary_of({"precompute", kScene, "--patches", "600", "--receivers",
+                                "mesh:floor,tall block", "--receivers", "box:0,0,0,1,0.1,1",
+                                "--sources", "ceiling,material:red", "-o", file});
+  EXPECT_EQ(made["operator"], "hierarchical");
+  const json info = summary_of({"info", file});
+  const auto n = info["patch_count"].get<std::size_t>();
+  const auto receivers = info["receiver_count"].get<std::size_t>();
+  EXPECT_GT(receivers, n / 10);
+  EXPECT_LT(receivers, n / 2);
+  EXPECT_GT(info["source_count"].get<std::size_t>(), n / 10);
+  EXPECT_LT(info["source_count"].get<std::size_t>(), n / 2);
+  EXPECT_EQ(info["settings"]["sources"], (json{"ceiling", "material:red"}));
+  EXPECT_EQ(info["settings"]["receivers"].size(), 3U);
+  EXPECT_LT(info["error_mean"].get<double>(), 0.005);
+
+  summary_of({"solve", file, "--lights", kLights, "-o", solution});
+  const Table table = read_csv(solution);
+  const auto lit = static_cast<std::size_t>(std::ranges::count_if(
+      table.rows, [](const std::vector<double>& row) { return row.at(3) != 0; }));
+  EXPECT_EQ(lit, receivers);
+  summary_of({"solve", file, "--lights", kLights, "-o", solution, "--method", "gauss-seidel"});
+  expect_refused({"solve", file, "-o", path("y.csv"), "--method", "refine"}, "receivers or sources");
+  const json whole = summary_of({"info", precompute("whole.safetensors")});
+  EXPECT_EQ(whole["receiver_count"], whole["patch_count"]);
+  EXPECT_EQ(whole["source_count"], whole["patch_count"]);
+}
+
+TEST_F(CommandLine, RefusesReceiversAndSourcesThatAreNotThere) {
+  const auto attempt = [&](const Words& options, const std::string& part) {
+    Words words = {"precompute", kScene, "-o", path("x.safetensors")};
+    words.insert(words.end(), options.begin(), options.end());
+    expect_refused(words, part);
+  };
+  attempt({"--receivers", "flor"}, R"(receivers: the scene has no mesh or material "flor"; there)");
+  attempt({"--receivers", "flor"}, R"("floor")");
+  attempt({"--sources", "floor,mesh:red"}, R"(sources: the scene has no mesh "red")");
+  attempt({"--sources", "box:1,2,3"}, "two corners");
+  attempt({"--sources", "box:9,9,9,10,10,10"}, "nothing that is named has patches");
+  attempt({"--receivers", "floor", "--operator", "dense"}, "hierarchical operators alone");
+  attempt({"--receivers", "floor", "--operator", "low-rank"}, "hierarchical operators alone");
+}
+
 TEST_F(CommandLine, TheShippedScenesAreWhatTheirScriptsMake) {
   // ./dev test installs it; the scenes are shipped, so that nothing else needs it.
   if (std::system("python3 --version >/dev/null 2>&1") != 0) GTEST_SKIP() << "needs python3";

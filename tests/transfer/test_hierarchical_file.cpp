@@ -22,9 +22,10 @@ using test::expect_error;
 
 constexpr std::size_t kPatchCount = 100;
 
-TransferData sample_data(Precision precision) {
+TransferData sample_data(Precision precision, const PatchRoles& roles = {}) {
   TransferData data;
   HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
+  storage.roles = roles;
   if (precision != Precision::kF32) storage = HierarchicalOperator::encode(storage, precision);
   data.patches.area = storage.area;
   data.patches.centroid.assign(kPatchCount, {0, 0, 0});
@@ -67,6 +68,29 @@ TEST(HierarchicalFile, RoundTrips) {
     save_transfer_file(folder / "again", loaded);
     EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
   }
+}
+
+/// Each of the four roles in turn.
+PatchRoles all_roles() {
+  PatchRoles roles;
+  for (std::size_t i = 0; i < kPatchCount; ++i) roles.role.push_back(i % 4);
+  return roles;
+}
+
+TEST(HierarchicalFile, HoldsReceiversAndSources) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kQ16, all_roles()));
+  const TransferData loaded = load_transfer_file(folder / "file");
+  EXPECT_EQ(loaded.transfer->roles(), all_roles());
+  save_transfer_file(folder / "again", loaded);
+  EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
+}
+
+TEST(HierarchicalFile, SaysNothingOfRolesWhereEveryPatchHasBoth) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kQ16));
+  EXPECT_FALSE(SafetensorsFile(folder / "file").tensors().contains("transfer.hierarchical.role"));
+  EXPECT_TRUE(load_transfer_file(folder / "file").transfer->roles().all_are_both());
 }
 
 TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
@@ -165,13 +189,27 @@ class Tampering {
       tensor.bytes = changed_;
     }
     ASSERT_FALSE(changed_.empty()) << name;
+    write();
+  }
+
+  /// Leaves the last byte of a tensor of bytes out.
+  void shorten(const std::string& name) {
+    for (TensorView& tensor : tensors_) {
+      if (tensor.name != "transfer.hierarchical." + name) continue;
+      tensor.bytes = tensor.bytes.first(tensor.bytes.size() - 1);
+      tensor.shape = {tensor.bytes.size()};
+    }
+    write();
+  }
+
+ private:
+  void write() {
     write_safetensors(path_, lay_out_safetensors(tensors_, file_.metadata()));
     std::string bytes = test::read_bytes(path_);
     test::reseal(bytes);
     test::write_bytes(path_, bytes);
   }
 
- private:
   std::filesystem::path path_;
   SafetensorsFile file_;
   std::vector<TensorView> tensors_;
@@ -200,14 +238,23 @@ TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
       {"channel_matrix", 2, 2, "number of values"},
       {"patch", 0, kPatchCount, "not a permutation"},
       {"patch", 0, 0xFFFFFFFF, "not a permutation"},
+      {"role", 7, 0x03040303, "role of patch 30 is 4"},
+      {"role", 24, 0xFF030303, "role of patch 99 is 255"},
   };
   for (const Fault& fault : faults) {
     SCOPED_TRACE(std::string(fault.tensor) + ": " + fault.message);
     const test::TemporaryFolder folder;
-    save_transfer_file(folder / "file", sample_data(Precision::kF16));
+    save_transfer_file(folder / "file", sample_data(Precision::kF16, all_roles()));
     Tampering(folder / "file").set(fault.tensor, fault.entry, fault.value);
     expect_error([&] { load_transfer_file(folder / "file"); }, fault.message);
   }
+}
+
+TEST(HierarchicalFile, RefusesRolesThatAreNotOneForEachPatch) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kF16, all_roles()));
+  Tampering(folder / "file").shorten("role");
+  expect_error([&] { load_transfer_file(folder / "file"); }, "transfer.hierarchical.role");
 }
 
 TEST(HierarchicalFile, SurvivesRandomMutationsUnderAGoodChecksum) {

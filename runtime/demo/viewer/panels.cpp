@@ -39,7 +39,8 @@ std::string name_of(const IndirectMethod& method) {
   return std::string(named->name);
 }
 
-void choose_method(const char* label, bool has_links, IndirectMethod& method) {
+/// Offers what can be done with `data`.
+void choose_method(const char* label, const TransferData& data, IndirectMethod& method) {
   const auto choice = [&](const std::string& name, std::optional<SolveMethod> iteration,
                           bool on_links) {
     const bool is_chosen = method.iteration == iteration && method.on_links == on_links;
@@ -51,10 +52,12 @@ void choose_method(const char* label, bool has_links, IndirectMethod& method) {
   ImGui::SetNextItemWidth(-70);
   if (ImGui::BeginCombo(label, name_of(method).c_str())) {
     choice(kTransferName, std::nullopt, false);
+    const bool serves_all = data.transfer->roles().all_are_both();
     for (const NamedSolveMethod& named : kSolveMethods) {
+      if (needs_operator(named.method) && !serves_all) continue;
       choice(std::string(named.name), named.method, false);
     }
-    if (has_links) choice(kHierarchicalName, std::nullopt, true);
+    if (!data.links.empty()) choice(kHierarchicalName, std::nullopt, true);
     ImGui::EndCombo();
   }
   if (method.iterates()) {
@@ -280,12 +283,12 @@ void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
 
 void Panels::draw_methods(ViewerState& state, const FrameDrawer& frame) const {
   if (!ImGui::CollapsingHeader("Indirect light", ImGuiTreeNodeFlags_DefaultOpen)) return;
-  const bool has_links = !frame.scene().data().links.empty();
-  choose_method(state.is_split ? "left" : "method", has_links, state.methods[0]);
+  const TransferData& data = frame.scene().data();
+  choose_method(state.is_split ? "left" : "method", data, state.methods[0]);
   ImGui::Checkbox("split the screen", &state.is_split);
   if (!state.is_split) return;
   ImGui::SliderFloat("at", &state.split, 0, 1, "%.2f");
-  choose_method("right", has_links, state.methods[1]);
+  choose_method("right", data, state.methods[1]);
 }
 
 void Panels::draw_times(const ViewerState& state) const {

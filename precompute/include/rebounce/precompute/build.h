@@ -68,6 +68,11 @@ struct BuildSettings {
   /// compressed for iterative solvers; 0: they are not, or, where the operator is made from them
   /// (kLinks), to a fifth of its tolerance. Less: more bytes, fewer errors.
   double form_factor_tolerance = 0;
+  /// Whose indirect light is wanted, and what lamps shine on: entries of PatchSelection, or none
+  /// for all patches. Only what the light of sources does to receivers is compressed, checked and
+  /// stored, and from links solved for; light goes by way of all patches nevertheless. What emits
+  /// is a source, named or not. The operator is then hierarchical.
+  std::vector<std::string> receivers, sources;
   std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
   /// With kLinks: folder that what is done of the operator is kept in, so that a build that was
   /// killed has that done when it is started again with the same scene and settings. It stays

@@ -18,9 +18,9 @@ struct DrawnLights {
 };
 
 /// Draws the lights that the operator of a scene is fitted to: points, spots and, where it is open,
-/// suns to shape it, other points to judge it, and for both the light of the scene's own lamps. The
-/// same `seed`, the same lights.
+/// suns to shape it, other points to judge it, and for both the light of the scene's own lamps; all
+/// as far as sources give them off. The same `seed`, the same lights.
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed);
+                                std::uint64_t seed, const PatchRoles& roles = {});
 
 }  // namespace rebounce

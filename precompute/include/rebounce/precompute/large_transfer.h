@@ -14,6 +14,9 @@ namespace rebounce {
 
 struct LargeTransferSettings {
   HierarchicalSettings compression{};  ///< of the result
+  /// What the light of sources does to receivers is solved for and stored: as many columns as there
+  /// are of those, whichever are the fewer.
+  PatchRoles roles{};
   /// Memory that may be taken beside the form factors; 0: as much as it takes.
   std::uint64_t memory_limit_bytes = 0;
   /// Folder that finished panels are kept in, so that a run that was killed goes on where it was;

@@ -20,7 +20,8 @@ struct KindError {
   double bound = 0;  ///< with 95 % probability above those of 1,000 more lights: error_bound.h
 };
 
-/// Measures data.transfer under random lights of every kind that the scene has.
+/// Measures data.transfer under random lights of every kind that the scene has: what its sources
+/// give off, at its receivers.
 ///
 /// With `exact`, the operator in f32 that data.transfer was made from, the truth is what that one
 /// gives, and there are 256 lights of a kind. Without it, the truth is that of ReferenceSolver on

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/patch_roles.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -27,17 +28,18 @@ std::string_view name(LightKind kind);
 
 /// `count` point lights at random places in the free space of the scene: on the way of a
 /// cosine-distributed ray from a random place of the surface to what it hits, between a tenth and
-/// nine tenths of it and, where there is room, a mean patch size off both ends. The same `seed`,
-/// the same lights.
+/// nine tenths of it and, where there is room, a mean patch size off both ends. With `roles`, the
+/// rays begin on sources. The same `seed`, the same lights.
 std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
-                                       std::uint64_t seed);
+                                       std::uint64_t seed, const PatchRoles& roles = {});
 
-/// What `count` random lights of a kind, one at a time, make the patches give off for the first
-/// time: initial exitances [at most count][n] in lx. Those that reach no patch are left out, which
-/// can be all of them.
+/// What `count` random lights of a kind, one at a time, make the sources give off for the first
+/// time: initial exitances [at most count][n] in lx, 0 for other patches. Those that reach none are
+/// left out, which can be all of them.
 std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& data,
                                                           const RayTracer& tracer, LightKind kind,
-                                                          int count, std::uint64_t seed);
+                                                          int count, std::uint64_t seed,
+                                                          const PatchRoles& roles = {});
 
 /// Whether less than a millionth of what a light's patches give off arrives anywhere: the light is
 /// none, of a lamp inside of a box, say, which only what has no front faces sees, and no error can

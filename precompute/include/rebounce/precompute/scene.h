@@ -23,6 +23,11 @@ struct LightmapTexcoord {
   std::uint32_t page = kNone;  ///< the placed mesh whose page that is; kNone: none
 };
 
+/// A mesh where a node places it.
+struct PlacedMesh {
+  std::string mesh_name, node_name;  ///< as the asset has them, either may be empty
+};
+
 /// A static triangle scene in world space: metres, right-handed, +Y up.
 struct Scene {
   std::vector<Float3> position;             ///< [v]
@@ -37,6 +42,8 @@ struct Scene {
 
   std::vector<Uint3> triangle;  ///< [t] counter-clockwise seen from the front (mirrors undone)
   std::vector<std::uint32_t> triangle_material;  ///< [t]
+  std::vector<std::uint32_t> triangle_mesh;      ///< [t] in placed_meshes, or empty: unknown
+  std::vector<PlacedMesh> placed_meshes;
 
   std::vector<Material> materials;  ///< at least one
   std::vector<Texture> textures;

@@ -49,8 +49,9 @@ AutomaticMethod choose_method(const MethodCosts& costs, double change, double er
 /// Belongs to one thread at a time; after construction nothing allocates.
 class AutomaticSolver {
  public:
-  /// `form_factors` must outlive the solver. `transfer` may be null; its `transfer_error` is that
-  /// of BuildRecord::error_mean. Throws Error if sizes differ.
+  /// `form_factors` must outlive the solver. `transfer` may be null, and is not used if it does not
+  /// serve all patches; its `transfer_error` is that of BuildRecord::error_mean. Throws Error if
+  /// sizes differ.
   AutomaticSolver(const SweepableFormFactors& form_factors, const RadiosityProblem& problem,
                   std::shared_ptr<const TransferOperator> transfer, double transfer_error);
 

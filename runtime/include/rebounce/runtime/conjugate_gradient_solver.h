@@ -24,7 +24,8 @@ namespace rebounce {
 /// that is not shows as divergence.
 class ConjugateGradientSolver final : public RadiositySolver {
  public:
-  /// `preconditioner` may be null. Throws Error if its number of patches is another.
+  /// `preconditioner` may be null. Throws Error if its number of patches is another, or it does not
+  /// serve them all.
   ConjugateGradientSolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem,
                           std::shared_ptr<const TransferOperator> preconditioner = nullptr);
 

@@ -14,6 +14,10 @@ namespace rebounce {
 
 /// Relights one scene: direct light, then one product with the stored operator.
 ///
+/// Where that has receivers and sources (TransferOperator::roles of data().transfer), the indirect
+/// irradiance of all other patches than receivers is 0, and their radiosity what they give off the
+/// first time; light on patches that are no sources is shown as direct light and never bounces.
+///
 /// The transfer data are read only and may be shared by any number of engines; an engine is one
 /// light state and belongs to one thread at a time. A copy shares the data, the ray tracer and the
 /// points of the patches and has a light state of its own: that is how many threads relight one

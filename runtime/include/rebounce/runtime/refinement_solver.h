@@ -17,7 +17,7 @@ namespace rebounce {
 /// (J. H. Wilkinson, "Rounding errors in algebraic processes", 1963, for the iteration.)
 class RefinementSolver final : public RadiositySolver {
  public:
-  /// Throws Error if `transfer` is null or has another number of patches.
+  /// Throws Error if `transfer` is null, has another number of patches or does not serve them all.
   RefinementSolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem,
                    std::shared_ptr<const TransferOperator> transfer);
 

@@ -22,8 +22,8 @@ enum class SolveMethod : std::uint8_t {
   kSymmetricGaussSeidel,  ///< likewise
   kConjugateGradient,
   kSouthwell,                        ///< needs FormFactorBlocks
-  kRefine,                           ///< needs the stored operator
-  kPreconditionedConjugateGradient,  ///< needs the stored operator
+  kRefine,                           ///< needs a stored operator that serves all patches
+  kPreconditionedConjugateGradient,  ///< likewise
 };
 
 struct NamedSolveMethod {
@@ -41,6 +41,10 @@ inline constexpr std::array<NamedSolveMethod, 8> kSolveMethods = {{
     {"refine", SolveMethod::kRefine},
     {"preconditioned-conjugate-gradient", SolveMethod::kPreconditionedConjugateGradient},
 }};
+
+constexpr bool needs_operator(SolveMethod method) {
+  return method == SolveMethod::kRefine || method == SolveMethod::kPreconditionedConjugateGradient;
+}
 
 /// Sparse F in the form that `method` is fastest on: rows in blocks where it goes by rows in one
 /// direction, otherwise the symmetric half of them. `area` has n entries in m². Throws Error if the

@@ -47,6 +47,9 @@ struct TransferBlock {
 /// An apply streams through the values: all bases of a cluster of patches are kept together,
 /// whichever blocks they belong to, so that one pass over them takes the light of the cluster to
 /// its coefficients, and another the coefficients back to the light that arrives.
+///
+/// An operator for some receivers and sources has the blocks that these share, whichever way the
+/// light goes; an apply reads them in the ways that are wanted.
 class HierarchicalOperator final : public TransferOperator {
  public:
   /// Clusters begin and end at multiples of this many positions.
@@ -89,7 +92,8 @@ class HierarchicalOperator final : public TransferOperator {
     std::vector<std::uint32_t> patch;                           ///< [n] patch at each position
     std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
     std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
-    std::vector<TransferBlock> blocks;
+    std::vector<TransferBlock> blocks;                          ///< where there is none, Yhat is 0
+    PatchRoles roles;  ///< by patch; entries that no source and receiver share are of no meaning
     Order order = Order::kByBlock;  ///< of the values
     Precision precision = Precision::kF32;
     SharedArray<float> values_f32;          ///< if kF32
@@ -133,8 +137,8 @@ class HierarchicalOperator final : public TransferOperator {
 
   /// Takes over `storage`; values in the order kByBlock are copied into the order kStreamed. Throws
   /// Error if `patch` is not a permutation, a block reaches outside the matrix, is misplaced or has
-  /// a rank above its size, or the values do not fit the blocks. Whether the blocks cover the
-  /// matrix is not looked at.
+  /// a rank above its size, the values do not fit the blocks, or as check_roles does. Whether the
+  /// blocks cover the matrix is not looked at.
   explicit HierarchicalOperator(Storage storage);
 
   const Storage& storage() const { return storage_; }
@@ -142,6 +146,7 @@ class HierarchicalOperator final : public TransferOperator {
   std::size_t patch_count() const override { return storage_.area.size(); }
   std::size_t bytes() const override;
   std::string kind() const override { return "hierarchical"; }
+  const PatchRoles& roles() const override { return storage_.roles; }
   std::size_t workspace_size() const override { return batch_workspace_size(1); }
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
              std::span<float> workspace) const override;
@@ -152,8 +157,8 @@ class HierarchicalOperator final : public TransferOperator {
   void expand(int channel, std::span<float> transfer) const override;
 
   /// Prepares applies to these patches alone, which read only the blocks that reach them or
-  /// neighbours within a run of kAlignment positions. Allocates. Throws Error if a patch does not
-  /// exist.
+  /// neighbours within a run of kAlignment positions. Those that are no receivers of the operator
+  /// get 0. Allocates. Throws Error if a patch does not exist.
   Receivers receivers(std::span<const std::uint32_t> patches) const;
 
   /// Like `apply`, but writes the irradiance [n] of the receivers alone, the same as `apply` would
@@ -162,15 +167,16 @@ class HierarchicalOperator final : public TransferOperator {
                 std::span<Float3> indirect_irradiance, std::span<float> workspace) const;
 
  private:
+  std::shared_ptr<const HierarchicalPlan> plan_to(const std::vector<bool>& wanted) const;
   void run(const HierarchicalPlan& plan, std::size_t light_count,
            std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
            std::span<float> workspace) const;
 
   Storage storage_;
-  std::vector<float> sqrt_area_;  ///< [n] by position
+  std::vector<float> sqrt_area_;  ///< [n] by position, 0 of patches that are no sources
   std::vector<float> inverse_;    ///< of it, times the scale of the products
   std::shared_ptr<const HierarchicalLayout> layout_;
-  std::shared_ptr<const HierarchicalPlan> plan_;  ///< to all patches
+  std::shared_ptr<const HierarchicalPlan> plan_;  ///< to all receivers
 };
 
 }  // namespace rebounce

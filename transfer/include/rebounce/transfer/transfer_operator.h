@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "rebounce/transfer/patch_roles.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
@@ -19,6 +20,10 @@ class TransferOperator {
 
   virtual std::size_t patch_count() const = 0;
 
+  /// Whom it serves: it says nothing of what arrives at patches that are no receivers, nor of what
+  /// the light of patches that are no sources does. By default every patch is both.
+  virtual const PatchRoles& roles() const;
+
   /// Bytes of the stored operator, all three channels.
   virtual std::size_t bytes() const = 0;
 
@@ -30,7 +35,8 @@ class TransferOperator {
   virtual std::size_t workspace_size() const = 0;
 
   /// Writes the indirect irradiance [n][3] in lx that `initial_exitance` [n][3] in lx gives rise
-  /// to. The two must not overlap; `workspace` has at least workspace_size() floats and is
+  /// to: at receivers, of the light of sources; 0 at other patches, and the light of others does
+  /// nothing. The two must not overlap; `workspace` has at least workspace_size() floats and is
   /// overwritten. Neither allocates nor locks; the same bits for any number of OpenMP threads.
   virtual void apply(std::span<const Float3> initial_exitance,
                      std::span<Float3> indirect_irradiance, std::span<float> workspace) const = 0;
