@@ -45,10 +45,10 @@ class BlockTreeCompressor {
                       const std::vector<ClusterWeight>& weights)
       : matrix_(matrix), tree_(tree), weights_(weights) {}
 
-  /// The operator (f32) at a price > 0. Throws Cancelled if asked to stop.
-  HierarchicalOperator::Storage compress(double price, const Progress& progress = {}) const;
+  /// All pieces, with sides of largest_piece at most.
+  std::vector<BlockPiece> pieces() const;
 
-  /// Some pieces of it.
+  /// Some pieces of the operator (f32) at a price > 0. Throws Cancelled if asked to stop.
   BlockPart compress(std::span<const BlockPiece> pieces, double price,
                      const Progress& progress = {}) const;
 
