@@ -231,11 +231,13 @@ class TransferBuild {
   /// With links known, and how long they took to find.
   void estimate_rest(const LinkBuild& links) {
     const LinkedBuild build = linked_build(links.links, model_.patches, links.sky_visibility);
-    const double slowness = report_.seconds.back().second / estimate_links(build).seconds;
-    report_.estimate_after_links =
-        estimate_operator_from_links(build, decided_.memory_limit_bytes);
-    report_.estimate_after_links->seconds *= std::clamp(slowness, 1 / kFastest, kFastest);
-    announce(*report_.estimate_after_links);
+    const double slowness =
+        std::clamp(report_.seconds.back().second / estimate_links(build).seconds, 1 / kFastest,
+                   kFastest);
+    CostEstimate rest = estimate_operator_from_links(build, decided_.memory_limit_bytes);
+    rest.seconds *= slowness;
+    rest.least_seconds = rest.seconds;
+    announce(report_.estimate_after_links.emplace(rest));
   }
 
   const BuildSettings& settings_;

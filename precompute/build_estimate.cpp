@@ -32,10 +32,11 @@ double seconds_of_vertices(std::size_t vertex_count) {
   return static_cast<double>(vertex_count) / 8e4;
 }
 
-// Links of a patch where there are kLinkPatches of them, and how their number grows. Measured in
-// furnished rooms, notes/links.md; bare rooms have a few times fewer, rooms full of small things
-// more.
-constexpr double kLinksPerPatch = 165, kLinkPatches = 4000, kLinkGrowth = 0.32;
+// Links of a patch where there are kLinkPatches of them, and how their number grows: in a bare room
+// and in a furnished one. Measured: notes/links.md, notes/operator.md. Rooms full of small things
+// have more.
+constexpr double kBareLinks = 45;
+constexpr double kFurnishedLinks = 165, kLinkPatches = 4000, kLinkGrowth = 0.32;
 
 // Bytes of a link while they are found, and afterwards with the copy that gathers; bytes of a patch
 // beside them.
@@ -60,22 +61,28 @@ double bytes_beside_transfer(const LinkedBuild& build) {
          kLinkBytes * static_cast<double>(build.link_count);
 }
 
-LinkedBuild furnished(const PatchModel& model) {
-  const auto n = static_cast<double>(model.patches.size());
-  const double links = n * kLinksPerPatch * std::pow(n / kLinkPatches, kLinkGrowth);
-  return {.patch_count = model.patches.size(),
+/// What it would be with so many links to a patch.
+LinkedBuild build_with(double links_per_patch, const PatchTable& patches) {
+  const double links = links_per_patch * static_cast<double>(patches.size());
+  return {.patch_count = patches.size(),
           .link_count = static_cast<std::size_t>(links),
-          .matrix_count = distinct_channels(model.patches.reflectance)};
+          .matrix_count = distinct_channels(patches.reflectance)};
 }
 
 CostEstimate estimate_cost_of_links(const PatchModel& model, std::uint64_t limit_bytes) {
-  const LinkedBuild build = furnished(model);
-  const CostEstimate links = estimate_links(build),
-                     rest = estimate_operator_from_links(build, limit_bytes);
+  const auto n = static_cast<double>(model.patches.size());
+  const double growth = std::pow(n / kLinkPatches, kLinkGrowth);
+  const LinkedBuild furnished = build_with(kFurnishedLinks * growth, model.patches),
+                    bare = build_with(kBareLinks, model.patches);
+  const CostEstimate links = estimate_links(furnished),
+                     rest = estimate_operator_from_links(furnished, limit_bytes);
+  const double vertices = seconds_of_vertices(model.mesh.position.size());
   CostEstimate all;
-  all.patch_count = build.patch_count;
+  all.patch_count = furnished.patch_count;
   all.peak_bytes = std::max(links.peak_bytes, rest.peak_bytes);
-  all.seconds = links.seconds + rest.seconds + seconds_of_vertices(model.mesh.position.size());
+  all.seconds = links.seconds + rest.seconds + vertices;
+  all.least_seconds = estimate_links(bare).seconds +
+                      estimate_operator_from_links(bare, limit_bytes).seconds + vertices;
   return all;
 }
 
@@ -101,6 +108,7 @@ CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings
   estimate.seconds = on_all_processors(factors * settings.form_factors.probe_rays / 1e7 +
                                        2 * n * n * n * matrices / 5e10) +
                      seconds_of_vertices(model.mesh.position.size());
+  estimate.least_seconds = estimate.seconds;
   return estimate;
 }
 
@@ -126,6 +134,7 @@ CostEstimate estimate_links(const LinkedBuild& build) {
   estimate.link_count = build.link_count;
   estimate.peak_bytes = static_cast<std::uint64_t>(kPatchBytes * n + kLinkPeakBytes * links);
   estimate.seconds = on_all_processors(kFindPatch * n + kFindLink * links);
+  estimate.least_seconds = estimate.seconds;
   return estimate;
 }
 
@@ -149,6 +158,7 @@ CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_
                         kCompressPatch * n + kCompressLink * links) +
       large_transfer_seconds(build.patch_count, build.matrix_count, form_factors) /
           plan.thread_count;
+  estimate.least_seconds = estimate.seconds;
   return estimate;
 }
 

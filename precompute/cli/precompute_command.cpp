@@ -38,9 +38,10 @@ std::string rough_time(double seconds) {
 
 std::string described(const CostEstimate& estimate) {
   const bool links_known = estimate.link_count > 0;
-  return fmt::format("{} {}: about {}{} and {:.2g} GiB",
+  const std::string most = rough_time(estimate.seconds), least = rough_time(estimate.least_seconds);
+  return fmt::format("{} {}: about {}{}{} and {:.2g} GiB",
                      links_known ? estimate.link_count : estimate.patch_count,
-                     links_known ? "links" : "patches", rough_time(estimate.seconds),
+                     links_known ? "links" : "patches", least == most ? "" : least + " to ", most,
                      links_known ? " more" : "",
                      static_cast<double>(estimate.peak_bytes) / (1ULL << 30));
 }
@@ -65,7 +66,9 @@ void print_json(const TransferData& data, const BuildReport& report, std::uint64
   summary["rays"] = report.ray_count;
   summary["peak_memory_bytes"] = peak_memory_bytes();
   const auto json_of = [](const CostEstimate& estimate) {
-    return nlohmann::json{{"seconds", estimate.seconds}, {"peak_bytes", estimate.peak_bytes}};
+    return nlohmann::json{{"seconds", estimate.seconds},
+                          {"least_seconds", estimate.least_seconds},
+                          {"peak_bytes", estimate.peak_bytes}};
   };
   summary["estimate"] = json_of(report.estimate);
   if (report.estimate_after_links) {

@@ -82,9 +82,10 @@ struct CostEstimate {
   std::size_t patch_count = 0;
   std::size_t link_count = 0;  ///< 0: not known yet, or there are none
   std::uint64_t peak_bytes = 0;
-  /// Rough: where links are not known yet, those of a furnished room are taken; afterwards it
-  /// follows from their number, and from how long this machine took to find them.
-  double seconds = 0;
+  /// Rough. As long as links are not known, they are taken to be as many as in a furnished room,
+  /// for the least as in a bare one. Afterwards both are the same, and follow from their number and
+  /// from how long it took to find them.
+  double seconds = 0, least_seconds = 0;
 };
 
 struct BuildReport {
