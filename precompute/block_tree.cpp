@@ -240,6 +240,10 @@ std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t larg
   return pieces;
 }
 
+std::vector<BlockPiece> BlockTreeCompressor::pieces() const {
+  return block_pieces(tree_, largest_piece(tree_.clusters.front().count));
+}
+
 BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double price,
                                         const Progress& progress) const {
   const SingleThreadedBlas single_threaded;
@@ -258,12 +262,6 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   BlockPart whole;
   for (BlockPart& part : parts) whole.append(std::move(part));
   return whole;
-}
-
-HierarchicalOperator::Storage BlockTreeCompressor::compress(double price,
-                                                            const Progress& progress) const {
-  const auto pieces = block_pieces(tree_, largest_piece(tree_.clusters.front().count));
-  return assemble(compress(pieces, price, progress));
 }
 
 HierarchicalOperator::Storage BlockTreeCompressor::assemble(BlockPart whole) const {

@@ -48,13 +48,13 @@ class BlockTreeCompressor {
                       const std::vector<ClusterWeight>& weights)
       : matrix_(matrix), tree_(tree), weights_(weights), wanted_(matrix.roles(), tree) {}
 
-  /// The operator (f32) at a price > 0. Throws Cancelled if asked to stop.
-  HierarchicalOperator::Storage compress(double price, const Progress& progress = {}) const;
+  /// All pieces, with sides of largest_piece at most.
+  std::vector<BlockPiece> pieces() const;
 
   /// Whether anything of a piece is wanted.
   bool wants(const BlockPiece& piece) const { return wanted_.wanted(piece.row, piece.column); }
 
-  /// Some pieces of it.
+  /// Some pieces of the operator (f32) at a price > 0. Throws Cancelled if asked to stop.
   BlockPart compress(std::span<const BlockPiece> pieces, double price,
                      const Progress& progress = {}) const;
 

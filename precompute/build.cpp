@@ -25,6 +25,10 @@ namespace {
 // error it has beside its own.
 constexpr double kToleranceOverFormFactors = 5;
 
+// How many times as fast as that of the estimates a machine is taken to be at most, or as slow,
+// whatever it took to find links: that may have been too short to tell.
+constexpr double kFastest = 6;
+
 void describe_patches(const PatchModel& model, BuildReport& report) {
   report.display_triangle_count = model.mesh.triangle.size();
   report.patch_count = model.patches.size();
@@ -64,6 +68,7 @@ double stored_link_error(const FormFactorSettings& settings) {
 
 /// The settings with what was left open decided.
 BuildSettings decide(BuildSettings settings, const PatchModel& model) {
+  settings.memory_limit_bytes = memory_limit_bytes(settings);
   settings.form_factor_kind = choose_form_factors(settings, model);
   const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
   const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
@@ -107,8 +112,12 @@ Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
 /// The offline stage, a step at a time, each with what the steps before have left.
 class TransferBuild {
  public:
-  TransferBuild(const BuildSettings& settings, BuildReport& report, const BuildProgress& progress)
-      : settings_(settings), report_(report), clock_(report, progress) {}
+  TransferBuild(const BuildSettings& settings, BuildReport& report, const BuildProgress& progress,
+                const EstimateListener& on_estimate)
+      : settings_(settings),
+        report_(report),
+        on_estimate_(on_estimate),
+        clock_(report, progress) {}
 
   Scene import_scene(const std::filesystem::path& path) {
     Scene scene =
@@ -129,7 +138,7 @@ class TransferBuild {
   }
 
   /// Throws Error if the rest would need more memory than it may take, or cannot be made as asked.
-  void make_patches(Scene scene, const EstimateListener& on_estimate) {
+  void make_patches(Scene scene) {
     model_ = clock_.run("patches", [&](const Progress& part) {
       return make_patch_model(std::move(scene), settings_.subdivision, part);
     });
@@ -141,8 +150,7 @@ class TransferBuild {
     }
     decided_ = decide(settings_, model_);
     report_.estimate = estimate_cost(model_, decided_);
-    if (on_estimate) on_estimate(report_.estimate);
-    refuse_if_too_large(report_.estimate, memory_limit_bytes(settings_), report_.triangle_count);
+    announce(report_.estimate);
   }
 
   /// Finds what patches exchange; afterwards the patches and the mesh are the data's.
@@ -196,6 +204,12 @@ class TransferBuild {
   TransferData take() { return std::move(data_); }
 
  private:
+  /// Throws Error if what is left needs more memory than it may take.
+  void announce(const CostEstimate& estimate) {
+    if (on_estimate_) on_estimate_(estimate);
+    refuse_if_too_large(estimate, decided_.memory_limit_bytes, report_.triangle_count);
+  }
+
   EscapedLight find_pairs() {
     FormFactors form_factors = clock_.run("form factors", [&](const Progress& part) {
       return compute_form_factors(model_, *tracer_, settings_.form_factors, part);
@@ -223,13 +237,27 @@ class TransferBuild {
     report_.pair_count = build.candidate_count;
     report_.link_count = build.links.pair.size();
     report_.closure = build.closure;
+    if (decided_.operator_kind != OperatorKind::kNoOperator) estimate_rest(build);
     data_.links = std::move(build.links);
     return build;
+  }
+
+  /// With links known, and how long they took to find.
+  void estimate_rest(const LinkBuild& links) {
+    const LinkedBuild build = linked_build(links.links, model_.patches, links.sky_visibility);
+    const double slowness =
+        std::clamp(report_.seconds.back().second / estimate_links(build).seconds, 1 / kFastest,
+                   kFastest);
+    CostEstimate rest = estimate_operator_from_links(build, decided_.memory_limit_bytes);
+    rest.seconds *= slowness;
+    rest.least_seconds = rest.seconds;
+    announce(report_.estimate_after_links.emplace(rest));
   }
 
   const BuildSettings& settings_;
   BuildSettings decided_;  ///< settings_ with what was left open decided
   BuildReport& report_;
+  const EstimateListener& on_estimate_;
   PhaseClock clock_;
   TransferData data_;
   PatchModel model_;
@@ -251,8 +279,8 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
                                  const BuildSettings& settings, BuildReport& report,
                                  const BuildProgress& progress,
                                  const EstimateListener& on_estimate) {
-  TransferBuild build(settings, report, progress);
-  build.make_patches(build.import_scene(scene_path), on_estimate);
+  TransferBuild build(settings, report, progress, on_estimate);
+  build.make_patches(build.import_scene(scene_path));
   build.find_exchange();
   build.make_outputs();
   build.make_operator();

@@ -1,6 +1,7 @@
 #include "build_estimate.h"
 
 #include <fmt/format.h>
+#include <omp.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +9,7 @@
 
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/large_transfer.h"
+#include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -22,38 +24,66 @@ std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
 }
 
-std::uint32_t matrix_count(const PatchTable& patches) {
-  std::array<std::uint32_t, kChannelCount> channel_matrix{};
-  return distinct_channels(patches.reflectance, channel_matrix);
+double on_all_processors(double processor_seconds) {
+  return processor_seconds / omp_get_max_threads();
 }
 
-double seconds_of_vertices(const PatchModel& model) {
-  return static_cast<double>(model.mesh.position.size()) / 8e4;
+double seconds_of_vertices(std::size_t vertex_count) {
+  return static_cast<double>(vertex_count) / 8e4;
 }
 
-// Links of a patch where there are kLinkPatches of them, and how their number grows; bytes of each
-// while they are found, and afterwards with the copy that gathers; bytes of a patch beside them.
-// Measured in furnished rooms, notes/links.md; rooms full of small things have more.
-constexpr double kLinksPerPatch = 165, kLinkPatches = 4000, kLinkGrowth = 0.32;
+// Links of a patch where there are kLinkPatches of them, and how their number grows: in a bare room
+// and in a furnished one. Measured: notes/links.md, notes/operator.md. Rooms full of small things
+// have more.
+constexpr double kBareLinks = 45;
+constexpr double kFurnishedLinks = 165, kLinkPatches = 4000, kLinkGrowth = 0.32;
+
+// Bytes of a link while they are found, and afterwards with the copy that gathers; bytes of a patch
+// beside them.
 constexpr double kLinkPeakBytes = 160, kLinkBytes = 110, kPatchBytes = 8e3;
 
-// Links that are found in a second, and as many that lights are gathered along, to fit to and to
-// check with; seconds of a column of the operator and matrix, by patches. About one slow core.
-constexpr double kLinksPerSecond = 3e4, kColumnSeconds = 4e-7;
+// Processor seconds, of about one slow core; measured: notes/links.md. To find links, by patches
+// and links. To gather eight lights along them once, likewise, for groups that are to be fitted to
+// and measured with, and groups of each kind that the check takes, each so many times. To compress
+// F, likewise. A light drawn, by patches.
+constexpr double kFindPatch = 6e-4, kFindLink = 1.7e-5;
+constexpr double kGatherPatch = 6e-6, kGatherLink = 6e-8;
+constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 8, kCheckGathers = 25;
+constexpr double kCompressPatch = 2.4e-3, kCompressLink = 2.2e-6;
+constexpr double kDrawPatch = 4e-7;
 
-CostEstimate estimate_cost_of_links(const PatchModel& model) {
+// Bytes of a patch of compressed form factors, with no links and for each link of it.
+constexpr double kFormFactorBytes = 570, kFormFactorLinkBytes = 4;
+
+/// Memory of the links and of all else that stays beside build_large_transfer.
+double bytes_beside_transfer(const LinkedBuild& build) {
+  return kPatchBytes * static_cast<double>(build.patch_count) +
+         kLinkBytes * static_cast<double>(build.link_count);
+}
+
+/// What it would be with so many links to a patch.
+LinkedBuild build_with(double links_per_patch, const PatchTable& patches) {
+  const double links = links_per_patch * static_cast<double>(patches.size());
+  return {.patch_count = patches.size(),
+          .link_count = static_cast<std::size_t>(links),
+          .matrix_count = distinct_channels(patches.reflectance)};
+}
+
+CostEstimate estimate_cost_of_links(const PatchModel& model, std::uint64_t limit_bytes) {
   const auto n = static_cast<double>(model.patches.size());
-  const std::uint32_t matrices = matrix_count(model.patches);
-  const double links = n * kLinksPerPatch * std::pow(n / kLinkPatches, kLinkGrowth);
-  const auto transfer =
-      static_cast<double>(large_transfer_peak_bytes(model.patches.size(), matrices));
-  CostEstimate estimate;
-  estimate.patch_count = model.patches.size();
-  estimate.peak_bytes = static_cast<std::uint64_t>(
-      kPatchBytes * n + std::max(kLinkPeakBytes * links, kLinkBytes * links + transfer));
-  estimate.seconds =
-      2 * links / kLinksPerSecond + kColumnSeconds * n * n * matrices + seconds_of_vertices(model);
-  return estimate;
+  const double growth = std::pow(n / kLinkPatches, kLinkGrowth);
+  const LinkedBuild furnished = build_with(kFurnishedLinks * growth, model.patches),
+                    bare = build_with(kBareLinks, model.patches);
+  const CostEstimate links = estimate_links(furnished),
+                     rest = estimate_operator_from_links(furnished, limit_bytes);
+  const double vertices = seconds_of_vertices(model.mesh.position.size());
+  CostEstimate all;
+  all.patch_count = furnished.patch_count;
+  all.peak_bytes = std::max(links.peak_bytes, rest.peak_bytes);
+  all.seconds = links.seconds + rest.seconds + vertices;
+  all.least_seconds = estimate_links(bare).seconds +
+                      estimate_operator_from_links(bare, limit_bytes).seconds + vertices;
+  return all;
 }
 
 }  // namespace
@@ -64,7 +94,7 @@ std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
 
 CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings& settings) {
   const PatchTable& patches = model.patches;
-  const std::uint32_t matrices = matrix_count(patches);
+  const std::uint32_t matrices = distinct_channels(patches.reflectance);
   const auto n = static_cast<double>(patches.size());
   CostEstimate estimate;
   estimate.patch_count = patches.size();
@@ -75,15 +105,66 @@ CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings
       40 * factors,
       8 * factors + static_cast<double>(dense_transfer_peak_bytes(patches.size(), matrices))));
   // Ten million rays and fifty billion operations a second, about one slow core.
-  estimate.seconds = factors * settings.form_factors.probe_rays / 1e7 +
-                     2 * n * n * n * matrices / 5e10 + seconds_of_vertices(model);
+  estimate.seconds = on_all_processors(factors * settings.form_factors.probe_rays / 1e7 +
+                                       2 * n * n * n * matrices / 5e10) +
+                     seconds_of_vertices(model.mesh.position.size());
+  estimate.least_seconds = estimate.seconds;
   return estimate;
 }
 
 CostEstimate estimate_cost(const PatchModel& model, const BuildSettings& settings) {
   return settings.form_factor_kind == FormFactorKind::kLinks
-             ? estimate_cost_of_links(model)
+             ? estimate_cost_of_links(model, memory_limit_bytes(settings))
              : estimate_cost_of_pairs(model, settings);
+}
+
+LinkedBuild linked_build(const FormFactorLinks& links, const PatchTable& patches,
+                         std::span<const float> sky_visibility) {
+  return {.patch_count = patches.size(),
+          .link_count = links.pair.size(),
+          .matrix_count = distinct_channels(patches.reflectance),
+          .open = std::ranges::any_of(sky_visibility, [](float v) { return v > 0; })};
+}
+
+CostEstimate estimate_links(const LinkedBuild& build) {
+  const auto n = static_cast<double>(build.patch_count),
+             links = static_cast<double>(build.link_count);
+  CostEstimate estimate;
+  estimate.patch_count = build.patch_count;
+  estimate.link_count = build.link_count;
+  estimate.peak_bytes = static_cast<std::uint64_t>(kPatchBytes * n + kLinkPeakBytes * links);
+  estimate.seconds = on_all_processors(kFindPatch * n + kFindLink * links);
+  estimate.least_seconds = estimate.seconds;
+  return estimate;
+}
+
+CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  const auto n = static_cast<double>(build.patch_count),
+             links = static_cast<double>(build.link_count);
+  const LargeTransferPlan plan = plan_large_transfer(build.patch_count, build.matrix_count,
+                                                     memory_of_large_transfer(build, limit_bytes));
+  const double kinds = build.open ? 4 : 3;
+  const double gathers = kFitGroups * kFitGathers + kinds * kCheckGroups * kCheckGathers;
+  const double groups = kFitGroups + kinds * kCheckGroups;
+  const double form_factors = kFormFactorBytes * n + kFormFactorLinkBytes * links;
+  CostEstimate estimate;
+  estimate.patch_count = build.patch_count;
+  estimate.link_count = build.link_count;
+  estimate.peak_bytes =
+      static_cast<std::uint64_t>(bytes_beside_transfer(build)) + plan.peak_bytes;
+  estimate.seconds =
+      on_all_processors(gathers * (kGatherPatch * n + kGatherLink * links) +
+                        groups * ReferenceSolver::kTogether * kDrawPatch * n +
+                        kCompressPatch * n + kCompressLink * links) +
+      large_transfer_seconds(build.patch_count, build.matrix_count, form_factors) /
+          plan.thread_count;
+  estimate.least_seconds = estimate.seconds;
+  return estimate;
+}
+
+std::uint64_t memory_of_large_transfer(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  const auto beside = static_cast<std::uint64_t>(bytes_beside_transfer(build));
+  return limit_bytes > beside ? limit_bytes - beside : 1;
 }
 
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,

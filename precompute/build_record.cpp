@@ -60,8 +60,11 @@ std::string settings_json(const BuildSettings& settings) {
 std::string report_json(const BuildReport& report, const std::vector<KindError>& errors) {
   nlohmann::json by_kind = nlohmann::json::object();
   for (const KindError& e : errors) {
-    by_kind[std::string(name(e.kind))] = {
-        {"lights", e.light_count}, {"mean", e.mean}, {"max", e.max}, {"bound", e.bound}};
+    by_kind[std::string(name(e.kind))] = {{"lights", e.light_count},
+                                          {"dark_lights", e.dark_count},
+                                          {"mean", e.mean},
+                                          {"max", e.max},
+                                          {"bound", e.bound}};
   }
   nlohmann::json json{{"triangles", report.triangle_count},
                       {"degenerate_triangles", report.degenerate_triangle_count},
@@ -86,6 +89,8 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
   if (report.form_factor_error) {
     json["form_factor_error_mean"] = report.form_factor_error->mean;
     json["form_factor_error_max"] = report.form_factor_error->max;
+    json["form_factor_error_lights"] = report.form_factor_error->light_count;
+    json["form_factor_error_dark_lights"] = report.form_factor_error->dark_count;
   }
   return json.dump();
 }

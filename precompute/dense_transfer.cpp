@@ -78,6 +78,11 @@ std::uint32_t distinct_channels(std::span<const Float3> reflectance,
   return count;
 }
 
+std::uint32_t distinct_channels(std::span<const Float3> reflectance) {
+  std::array<std::uint32_t, kChannelCount> channel_matrix{};
+  return distinct_channels(reflectance, channel_matrix);
+}
+
 std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
   const std::size_t tiles =
       DenseOperator::tile_count(patch_count) * kTile * kTile * sizeof(float) * matrix_count;

@@ -1,9 +1,11 @@
 #include "rebounce/precompute/form_factor_compression.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "linked_matrix.h"
 #include "matrix_compression.h"
+#include "rebounce/precompute/random_lights.h"
 #include "rebounce/transfer/area_norm.h"
 
 namespace rebounce {
@@ -18,8 +20,17 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
-  return compress_to_tolerance(LinkedMatrix(links, patches), patches, radiosities, settings,
-                               progress);
+  return compress_form_factors(
+      links, std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
+      patches, radiosities, settings, progress);
+}
+
+std::shared_ptr<const HierarchicalOperator> compress_form_factors(
+    const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
+    const PatchTable& patches, const FittingLights& radiosities,
+    const HierarchicalSettings& settings, const Progress& progress) {
+  return compress_to_tolerance(LinkedMatrix(links, std::move(product), patches), patches,
+                               radiosities, settings, progress);
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
@@ -27,15 +38,21 @@ FormFactorError form_factor_error(const HierarchicalOperator& compressed,
                                   std::span<const std::vector<Float3>> radiosities) {
   std::vector<float> workspace(std::max(compressed.workspace_size(), exact.workspace_size()));
   std::vector<Float3> truth(patches.size()), gathered(patches.size());
-  FormFactorError error;
+  std::vector<double> errors;
   for (const std::vector<Float3>& radiosity : radiosities) {
     exact.gather(radiosity, truth, workspace);
+    if (arrives_nowhere(truth, radiosity, patches.area)) continue;
     compressed.apply(radiosity, gathered, workspace);
-    const double e = relative_difference(gathered, truth, patches.area);
-    error.mean += e / static_cast<double>(radiosities.size());
-    error.max = std::max(error.max, e);
+    errors.push_back(relative_difference(gathered, truth, patches.area));
   }
-  return error;
+  FormFactorError result;
+  result.light_count = static_cast<int>(errors.size());
+  result.dark_count = static_cast<int>(radiosities.size() - errors.size());
+  for (const double error : errors) {
+    result.mean += error / static_cast<double>(errors.size());
+    result.max = std::max(result.max, error);
+  }
+  return result;
 }
 
 std::vector<std::vector<Float3>> radiosities_of(

@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <memory>
 
+#include "build_estimate.h"
 #include "build_record.h"
 #include "operator_stage.h"
 #include "rebounce/precompute/dense_transfer.h"
@@ -49,12 +51,12 @@ struct FittedLights {
 };
 
 FittedLights find_lights(const RayTracer& tracer, const TransferData& data,
-                         const PatchRoles& roles, std::uint64_t seed, const Progress& progress) {
+                         const PatchRoles& roles, std::uint64_t seed,
+                         const ReferenceSolver& solver, const Progress& progress) {
   FittedLights lights;
   lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
   const Lights tests =
       random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
-  const ReferenceSolver solver(data.links, data.patches);
   const std::size_t shaping = lights.exitances.shaping.size(),
                     judging = lights.exitances.judging.size();
   const auto all = static_cast<double>(shaping + judging + tests.size());
@@ -78,30 +80,36 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
                               PhaseClock& clock) {
   const PatchTable& patches = data.patches;
   const std::uint64_t seed = decided.form_factors.seed;
+  // Gathered along from the first light to the last check: made once.
+  const auto links =
+      std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
+  const ReferenceSolver reference(links, patches);
   const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
-    return find_lights(tracer, data, roles, seed, part);
+    return find_lights(tracer, data, roles, seed, reference, part);
   });
   data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
-    return compress_form_factors(data.links, patches, lights.radiosities.view(),
+    return compress_form_factors(data.links, links, patches, lights.radiosities.view(),
                                  {decided.form_factor_tolerance, Precision::kF16}, part);
   });
   data.transfer = clock.run("operator", [&](const Progress& part) {
     LargeTransferSettings settings;
     settings.compression = {decided.tolerance, *decided.precision};
     settings.roles = roles;
+    settings.memory_limit_bytes =
+        memory_of_large_transfer(linked_build(data.links, patches, patches.sky_visibility),
+                                 decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;
     return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
                                 settings, part);
   });
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
-    const LinkedFormFactors links(data.links, patches.area, patches.centroid);
     report.form_factor_tolerance = decided.form_factor_tolerance;
     report.form_factor_error =
-        form_factor_error(*data.compressed_form_factors, links, patches, lights.test_radiosities);
+        form_factor_error(*data.compressed_form_factors, *links, patches, lights.test_radiosities);
     if (roles.all_are_both()) {
-      data.record.solve_residual = transfer_residual(*data.transfer, links, patches);
+      data.record.solve_residual = transfer_residual(*data.transfer, *links, patches);
     }
-    return measure_error(data, tracer, nullptr, seed, part);
+    return measure_error(data, tracer, reference, seed, part);
   });
   record_build(decided, report, errors, data.record);
   if (!decided.store_links) data.links = {};

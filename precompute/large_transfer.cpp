@@ -3,18 +3,19 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <optional>
 #include <string_view>
+#include <utility>
 
-#include "block_tree.h"
+#include "first_stage.h"
 #include "matrix_compression.h"
-#include "panel_checkpoint.h"
 #include "progress_part.h"
+#include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/transfer/content_hash.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
 #include "solved_matrix.h"
 #include "solved_transfer.h"
+#include "thread_limit.h"
 
 namespace rebounce {
 namespace {
@@ -26,27 +27,29 @@ constexpr double kResidualPart = 0.2;
 // go about like the root of the price: a quarter of what the second stage may do.
 constexpr double kFinePart = 1.0 / 16;
 
-// The part of the whole time that the first stage takes, roughly.
-constexpr double kFirstStage = 0.7;
+// What is done before the first panel takes as long as so many columns, and the second stage as
+// long as this part of all of them. Measured: notes/operator.md.
+constexpr double kColumnsBefore = 500, kSecondStage = 0.54;
 
-// The part of the time of a panel that its columns take, roughly.
-constexpr double kSolved = 0.8;
-
-// Columns of a panel, and rows of the pieces that it is compressed in. Larger pieces save bytes
-// that the second stage saves anyway, and at so fine a price take several times as long.
-constexpr std::uint32_t kPanelWidth = 512;
+// Products with the form factors that a column takes, and operations a second of a slow core.
+constexpr double kProducts = 5.5, kOperationsPerSecond = 6e10;
 
 // An operator of the first stage, the rounds of the second and what they are judged by, bytes a
 // patch, far on the safe side.
 constexpr std::size_t kOperatorBytes = 48 << 10;
 
-/// Throws Error unless the limit, if there is one, has room for it all.
-void check_memory(std::size_t patch_count, std::size_t matrix_count, std::uint64_t limit) {
-  const std::size_t peak = large_transfer_peak_bytes(patch_count, matrix_count);
-  if (limit == 0 || peak <= limit) return;
+/// All that is done, in columns that are solved for; `first_stage` likewise.
+double work_with(double first_stage, std::size_t patch_count) {
+  return kColumnsBefore + first_stage + kSecondStage * static_cast<double>(patch_count);
+}
+
+/// Throws Error unless the limit, if there is one, has room for a plan.
+void check_memory(std::size_t patch_count, const LargeTransferPlan& plan, std::uint64_t limit) {
+  if (limit == 0 || plan.peak_bytes <= limit) return;
   throw Error("an operator over " + std::to_string(patch_count) + " patches needs " +
-              std::to_string(peak >> 20) +
-              " MiB; raise the memory limit, use fewer threads or ask for fewer patches");
+              std::to_string(plan.peak_bytes >> 20) + " MiB at the least and may have " +
+              std::to_string(limit >> 20) +
+              " MiB; raise the memory limit or ask for fewer patches");
 }
 
 template <typename T>
@@ -57,8 +60,8 @@ void update(ContentHash& hash, std::span<const T> values) {
 }
 
 /// A hash of all that the first stage depends on.
-std::string key_of(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                   const FittingLights& lights, const PatchRoles& roles, double price) {
+std::string first_key(const HierarchicalOperator& form_factors, const PatchTable& patches,
+                      const FittingLights& lights, const PatchRoles& roles, double price) {
   ContentHash hash;
   update(hash, std::span(std::string_view(version())));
   update<double>(hash, {{price, kResidualPart}});
@@ -78,84 +81,79 @@ std::string key_of(const HierarchicalOperator& form_factors, const PatchTable& p
   return hash.text();
 }
 
-/// All pieces of a column of pieces.
-struct Panel {
-  std::uint32_t column = 0;  ///< a cluster
-  std::vector<BlockPiece> pieces;
-};
-
-/// What is wanted of the lower triangle as panels, the longest first.
-std::vector<Panel> make_panels(const ClusterTree& tree, const BlockTreeCompressor& compressor) {
-  std::vector<Panel> panels;
-  for (const BlockPiece& piece : block_pieces(tree, kPanelWidth)) {
-    if (!compressor.wants(piece)) continue;
-    const auto found = std::ranges::find(panels, piece.column, &Panel::column);
-    Panel& panel = found == panels.end() ? panels.emplace_back(Panel{piece.column, {}}) : *found;
-    panel.pieces.push_back(piece);
-  }
-  std::ranges::sort(panels, {},
-                    [&](const Panel& panel) { return tree.clusters[panel.column].begin; });
-  return panels;
-}
-
-/// The first stage: all of Yhat, compressed finely, a panel at a time.
-HierarchicalOperator::Storage compress_panels(PanelMatrix& matrix, const PatchTable& patches,
-                                              std::span<const std::vector<Float3>> shaping,
-                                              double price, const PanelCheckpoint& checkpoint,
-                                              const Progress& progress) {
-  const CompressionFrame frame = compression_frame(matrix, patches, shaping);
-  const std::vector<ClusterWeight> weights = frame.weights();
-  const BlockTreeCompressor compressor(matrix, frame.tree, weights);
-  const std::vector<Panel> panels = make_panels(frame.tree, compressor);
-  BlockPart whole;
-  for (std::size_t k = 0; k < panels.size(); ++k) {
-    const auto count = static_cast<double>(panels.size());
-    const Progress part =
-        part_of(progress, static_cast<double>(k) / count, static_cast<double>(k + 1) / count);
-    std::optional<BlockPart> panel = checkpoint.find(k);
-    if (!panel) {
-      matrix.solve(frame.tree, frame.tree.clusters[panels[k].column], part_of(part, 0, kSolved));
-      panel = compressor.compress(panels[k].pieces, price, part_of(part, kSolved, 1));
-      checkpoint.keep(k, *panel);
-    }
-    whole.append(std::move(*panel));
-    report_progress(part, 1);
-  }
-  return compressor.assemble(std::move(whole));
+/// A hash of all that the second stage depends on; `first`: that of the first.
+std::string second_key(const std::string& first, const FittingLights& lights,
+                       const HierarchicalSettings& settings) {
+  ContentHash hash;
+  update(hash, std::span(std::string_view(first)));
+  update(hash, std::span(&settings.tolerance, 1));
+  update(hash, std::span(std::string_view(precision_name(settings.precision))));
+  for (const std::vector<Float3>& light : lights.judging) update<Float3>(hash, light);
+  return hash.text();
 }
 
 }  // namespace
 
-std::size_t large_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
+LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
+                                      std::uint64_t memory_limit_bytes) {
   constexpr std::size_t kVectors = 8;  // those of the solver, coefficients, entries of F
-  const std::size_t group = kVectors * patch_count * SolvedTransfer::kTogether * sizeof(float);
+  constexpr std::size_t kTogether = SolvedTransfer::kTogether, kWidth = FirstStage::kPanelWidth;
+  const std::size_t group = kVectors * patch_count * kTogether * sizeof(float);
+  const std::size_t panel = patch_count * kWidth * matrix_count * sizeof(float);
   const std::size_t side =
       largest_piece(static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count)));
   const std::size_t piece = side * side * matrix_count * (sizeof(float) + 3 * sizeof(double));
-  const auto threads = static_cast<std::size_t>(omp_get_max_threads());
-  const std::size_t panel = patch_count * kPanelWidth * matrix_count * sizeof(float);
-  return panel + threads * std::max(group, piece) + patch_count * kOperatorBytes;
+  const std::size_t groups_of_panel = matrix_count * kWidth / kTogether;
+
+  LargeTransferPlan plan;
+  for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
+    const auto threads = static_cast<std::size_t>(plan.thread_count);
+    plan.panel_count = (threads + groups_of_panel - 1) / groups_of_panel;
+    plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) +
+                      patch_count * kOperatorBytes;
+    if (memory_limit_bytes == 0 || plan.peak_bytes <= memory_limit_bytes || threads == 1) {
+      return plan;
+    }
+  }
+}
+
+double large_transfer_seconds(std::size_t patch_count, std::size_t matrix_count,
+                              double form_factor_bytes) {
+  // A value of two bytes is multiplied and added twice, there and back.
+  const double column =
+      2 * form_factor_bytes * kProducts / kOperationsPerSecond * static_cast<double>(matrix_count);
+  return column * work_with(FirstStage::usual_work(patch_count), patch_count);
 }
 
 std::shared_ptr<const HierarchicalOperator> build_large_transfer(
     const HierarchicalOperator& form_factors, const PatchTable& patches,
     const FittingLights& lights, const LargeTransferSettings& settings, const Progress& progress) {
+  const LargeTransferPlan plan = plan_large_transfer(
+      patches.size(), distinct_channels(patches.reflectance), settings.memory_limit_bytes);
+  check_memory(patches.size(), plan, settings.memory_limit_bytes);
   const double tolerance = settings.compression.tolerance;
-  const SolvedTransfer solved(form_factors, patches, kResidualPart * tolerance);
-  check_memory(patches.size(), solved.matrix_count(), settings.memory_limit_bytes);
   const double price = kFinePart * first_price(tolerance, patches.size());
-  const PanelCheckpoint checkpoint(settings.checkpoint,
-                                   key_of(form_factors, patches, lights, settings.roles, price));
+  const std::string key = first_key(form_factors, patches, lights, settings.roles, price);
+  const BlockCheckpoint panels(settings.checkpoint, key);
+
+  const ThreadLimit limited(plan.thread_count);
+  const SolvedTransfer solved(form_factors, patches, kResidualPart * tolerance);
   const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
+  double done = 0;
   HierarchicalOperator::Storage fine;
   {
     PanelMatrix matrix(solved, energies, settings.roles);
-    fine = compress_panels(matrix, patches, lights.shaping, price, checkpoint,
-                           part_of(progress, 0, kFirstStage));
+    FirstStage stage(matrix, patches, lights.shaping, price, plan.panel_count, panels);
+    const double all = work_with(stage.work(), patches.size());
+    report_progress(progress, kColumnsBefore / all);
+    done = (kColumnsBefore + stage.work()) / all;
+    fine = stage.run(part_of(progress, kColumnsBefore / all, done));
   }
-  const RoundedMatrix rounded(solved, energies, fine);
+  const RoundedMatrix rounded(solved, energies, std::exchange(fine, {}));
+  const BlockCheckpoint rounds(settings.checkpoint,
+                               second_key(key, lights, settings.compression));
   return compress_to_tolerance(rounded, patches, lights, settings.compression,
-                               part_of(progress, kFirstStage, 1));
+                               part_of(progress, done, 1), rounds);
 }
 
 }  // namespace rebounce

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace rebounce {
 namespace {
@@ -109,9 +110,16 @@ class LinkedMatrix::Filler {
 };
 
 LinkedMatrix::LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches)
+    : LinkedMatrix(
+          links, std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
+          patches) {}
+
+LinkedMatrix::LinkedMatrix(const FormFactorLinks& links,
+                           std::shared_ptr<const LinkedFormFactors> product,
+                           const PatchTable& patches)
     : links_(links),
       patches_(patches),
-      product_(links, patches.area, patches.centroid),
+      product_(std::move(product)),
       position_(patches.size()) {
   for (std::uint32_t k = 0; k < links.patch.size(); ++k) position_[links.patch[k]] = k;
   measure_nodes();
@@ -171,7 +179,7 @@ void LinkedMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::uint32
 
 Eigen::MatrixXf LinkedMatrix::multiply(std::uint32_t /*matrix*/, const Eigen::MatrixXf& x) const {
   const std::size_t n = patches_.size();
-  std::vector<float> workspace(product_.workspace_size());
+  std::vector<float> workspace(product_->workspace_size());
   std::vector<Float3> in(n), out(n);
   Eigen::MatrixXf result(x.rows(), x.cols());
   for (Index begin = 0; begin < x.cols(); begin += kChannelCount) {
@@ -181,7 +189,7 @@ Eigen::MatrixXf LinkedMatrix::multiply(std::uint32_t /*matrix*/, const Eigen::Ma
         in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
       }
     }
-    product_.gather(in, out, workspace);
+    product_->gather(in, out, workspace);
     for (std::size_t i = 0; i < n; ++i) {
       for (Index c = 0; c < count; ++c) {
         result(static_cast<Index>(i), begin + c) = out[i][c] * std::sqrt(patches_.area[i]);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -14,8 +15,12 @@ namespace rebounce {
 /// those that the links stand for; the pairs themselves are nowhere kept.
 class LinkedMatrix final : public SymmetricMatrix {
  public:
-  /// Both must outlive it. Throws Error if the links are not of these patches.
+  /// Links and patches must outlive it. Throws Error if the links are not of these patches.
   LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches);
+
+  /// `product`: the same links as they gather, which others use too.
+  LinkedMatrix(const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
+               const PatchTable& patches);
 
   std::span<const float> area() const override { return patches_.area; }
   std::uint32_t matrix_count() const override { return 1; }
@@ -38,7 +43,7 @@ class LinkedMatrix final : public SymmetricMatrix {
 
   const FormFactorLinks& links_;
   const PatchTable& patches_;
-  LinkedFormFactors product_;
+  std::shared_ptr<const LinkedFormFactors> product_;
   std::vector<std::uint32_t> position_;        ///< [n] of each patch
   std::vector<Node> nodes_;                    ///< [m]
   std::vector<std::uint64_t> incident_begin_;  ///< [m + 1]

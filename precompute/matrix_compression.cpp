@@ -1,5 +1,7 @@
 #include "matrix_compression.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -7,6 +9,7 @@
 #include "block_tree.h"
 #include "lit_truth.h"
 #include "price_search.h"
+#include "progress_part.h"
 #include "wanted_blocks.h"
 
 namespace rebounce {
@@ -19,6 +22,13 @@ constexpr std::uint32_t kLeafSize = 32;
 // than those that it sees may do a little worse.
 constexpr int kMostRounds = 8;
 constexpr double kLeast = 0.72, kAim = 0.76, kMost = 0.8;
+
+// Rounds that the search takes as a rule.
+constexpr int kUsualRounds = 3;
+
+// Pieces of a round that are kept in one file: some seconds of work where pieces are largest, and
+// enough for many threads to share.
+constexpr std::size_t kKeptPieces = 64;
 
 // The largest error may be this many times the tolerance: gates of 0.5 % and 1.5 %.
 constexpr double kLargestOverMean = 3;
@@ -65,6 +75,20 @@ CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patch
   return frame;
 }
 
+/// The part of the whole search that some rounds are: all alike as far as usual, and each beyond
+/// that half of what is left.
+double part_of_search(int rounds) {
+  constexpr double kEach = 1.0 / kUsualRounds;
+  return rounds < kUsualRounds ? rounds * kEach
+                               : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
+}
+
+/// Where what is done of a compression is kept, and under which names.
+struct KeptParts {
+  const BlockCheckpoint& checkpoint;
+  std::string prefix;
+};
+
 /// A compressor with all that it looks at.
 class Compression {
  public:
@@ -73,9 +97,24 @@ class Compression {
         truth_(matrix, with_uniform(patches.size(), shaping)),
         frame_(frame_of(matrix, patches, truth_)) {}
 
-  HierarchicalOperator::Storage at(double price, const Progress& progress) const {
+  HierarchicalOperator::Storage at(double price, const KeptParts& kept,
+                                   const Progress& progress) const {
     const std::vector<ClusterWeight> weights = frame_.weights();
-    return BlockTreeCompressor(matrix_, frame_.tree, weights).compress(price, progress);
+    const BlockTreeCompressor compressor(matrix_, frame_.tree, weights);
+    const std::vector<BlockPiece> pieces = compressor.pieces();
+    const std::size_t together = kept.checkpoint.keeps() ? kKeptPieces : pieces.size();
+    const auto all = static_cast<double>(pieces.size());
+    BlockPart whole;
+    for (std::size_t begin = 0; begin < pieces.size(); begin += together) {
+      const std::size_t end = std::min(pieces.size(), begin + together);
+      const auto some = std::span(pieces).subspan(begin, end - begin);
+      const Progress part = part_of(progress, static_cast<double>(begin) / all, end / all);
+      whole.append(kept.checkpoint.find_or_make(
+          fmt::format("{}_part_{:04}", kept.prefix, begin / together),
+          [&] { return compressor.compress(some, price, part); }));
+      report_progress(part, 1);
+    }
+    return compressor.assemble(std::move(whole));
   }
 
   /// Gives the shaping lights weight by the errors that they have with `transfer`.
@@ -135,12 +174,13 @@ double first_price(double tolerance, std::size_t patch_count) {
 HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
                                               const PatchTable& patches, Exitances shaping,
                                               double price, const Progress& progress) {
-  return Compression(matrix, patches, shaping).at(price, progress);
+  return Compression(matrix, patches, shaping).at(price, {BlockCheckpoint(), {}}, progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
-    const HierarchicalSettings& settings, const Progress& progress) {
+    const HierarchicalSettings& settings, const Progress& progress,
+    const BlockCheckpoint& checkpoint) {
   const LitTruth judging = judging_truth(matrix, lights.judging);
   Compression compression(matrix, patches, lights.shaping);
   const double tolerance = settings.tolerance;
@@ -148,10 +188,10 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});
   Best best(kMost * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
-    Progress part;
-    if (progress) part = [&](double done) { return progress((round + done) / kMostRounds); };
+    const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
+    const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
     const auto candidate = std::make_shared<const HierarchicalOperator>(
-        HierarchicalOperator::encode(compression.at(search.price(), part), settings.precision));
+        HierarchicalOperator::encode(compression.at(search.price(), kept, part), settings.precision));
     const double error = judge(judging.errors(*candidate));
     best.offer(candidate, error);
     search.report(error);

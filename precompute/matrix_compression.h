@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "block_checkpoint.h"
 #include "cluster_tree.h"
 #include "light_weights.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
@@ -36,9 +37,12 @@ HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
                                               std::span<const std::vector<Float3>> shaping,
                                               double price, const Progress& progress = {});
 
-/// Compresses `matrix` to a tolerance as build_hierarchical_transfer does.
+/// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. What each round of the
+/// search does is kept in `checkpoint`, made for all that is given here, and taken from there: the
+/// bits are the same.
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
-    const HierarchicalSettings& settings, const Progress& progress = {});
+    const HierarchicalSettings& settings, const Progress& progress = {},
+    const BlockCheckpoint& checkpoint = {});
 
 }  // namespace rebounce

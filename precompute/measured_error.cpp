@@ -1,8 +1,8 @@
 #include "rebounce/precompute/measured_error.h"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
-#include <optional>
 
 #include "error_bound.h"
 #include "lit_truth.h"
@@ -41,10 +41,35 @@ std::vector<double> errors_by_reference(const TransferData& data, const Referenc
   return errors;
 }
 
-KindError summary(LightKind kind, const std::vector<double>& errors) {
+KindError summary(LightKind kind, std::size_t light_count, const std::vector<double>& errors) {
   const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
-  return {kind, static_cast<int>(errors.size()), sum / static_cast<double>(errors.size()),
-          std::ranges::max(errors), error_bound(errors)};
+  return {kind,
+          static_cast<int>(errors.size()),
+          static_cast<int>(light_count - errors.size()),
+          sum / static_cast<double>(errors.size()),
+          std::ranges::max(errors),
+          error_bound(errors)};
+}
+
+/// The errors of lights, less those from which nothing arrives.
+using ErrorsOf = std::function<std::vector<double>(const Exitances&, const Progress&)>;
+
+std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer, int light_count,
+                               std::uint64_t seed, const ErrorsOf& errors_of,
+                               const Progress& progress) {
+  std::vector<KindError> result;
+  for (std::size_t k = 0; k < kLightKinds.size(); ++k) {
+    const Progress part = [&](double done) {
+      return !progress || progress((k + done) / kLightKinds.size());
+    };
+    if (!part(0)) throw Cancelled();
+    const LightKind kind = kLightKinds[k];
+    const Exitances lights = random_initial_exitances(data, tracer, kind, light_count, seed,
+                                                      data.transfer->roles());
+    const std::vector<double> errors = errors_of(lights, part);
+    if (!errors.empty()) result.push_back(summary(kind, lights.size(), errors));
+  }
+  return result;
 }
 
 }  // namespace
@@ -55,27 +80,21 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
   if (exact == nullptr && data.exchange.empty() && data.links.empty()) {
     throw Error("measured error: there is no truth without pairs or links; store links too");
   }
-  std::optional<ReferenceSolver> reference;
-  if (exact == nullptr) reference.emplace(data);
-  const int light_count = exact != nullptr        ? kLightCount
-                          : data.exchange.empty() ? kLinkedLightCount
-                                                  : kReferenceLightCount;
-  std::vector<KindError> result;
-  for (std::size_t k = 0; k < kLightKinds.size(); ++k) {
-    const Progress part = [&](double done) {
-      return !progress || progress((k + done) / kLightKinds.size());
-    };
-    if (!part(0)) throw Cancelled();
-    const LightKind kind = kLightKinds[k];
-    const PatchRoles& roles = data.transfer->roles();
-    const Exitances lights =
-        random_initial_exitances(data, tracer, kind, light_count, seed, roles);
-    const std::vector<double> errors =
-        exact != nullptr ? LitTruth(DenseMatrix(*exact, roles), lights).errors(*data.transfer)
-                         : errors_by_reference(data, *reference, lights, part);
-    if (!errors.empty()) result.push_back(summary(kind, errors));
-  }
-  return result;
+  if (exact == nullptr) return measure_error(data, tracer, ReferenceSolver(data), seed, progress);
+  const auto errors_of = [&](const Exitances& lights, const Progress&) {
+    return LitTruth(DenseMatrix(*exact, data.transfer->roles()), lights).errors(*data.transfer);
+  };
+  return measure(data, tracer, kLightCount, seed, errors_of, progress);
+}
+
+std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
+                                     const ReferenceSolver& reference, std::uint64_t seed,
+                                     const Progress& progress) {
+  const auto errors_of = [&](const Exitances& lights, const Progress& part) {
+    return errors_by_reference(data, reference, lights, part);
+  };
+  return measure(data, tracer, data.exchange.empty() ? kLinkedLightCount : kReferenceLightCount,
+                 seed, errors_of, progress);
 }
 
 }  // namespace rebounce

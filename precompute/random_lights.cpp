@@ -181,10 +181,10 @@ std::vector<Exitance> random_initial_exitances(const TransferData& data, const R
   return lit_by(data, tracer, roles, random_suns(count - 1, seed), {.luminance = 1});
 }
 
-bool arrives_nowhere(std::span<const Float3> indirect_irradiance,
-                     std::span<const Float3> initial_exitance, std::span<const float> area) {
+bool arrives_nowhere(std::span<const Float3> irradiance, std::span<const Float3> exitance,
+                     std::span<const float> area) {
   constexpr double kDark = 1e-6;
-  return area_norm(indirect_irradiance, area) <= kDark * area_norm(initial_exitance, area);
+  return area_norm(irradiance, area) <= kDark * area_norm(exitance, area);
 }
 
 }  // namespace rebounce

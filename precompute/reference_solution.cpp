@@ -37,12 +37,13 @@ Field<kRows> gather(const FormFactorRows& rows, const Field<kRows>& in) {
 }
 
 template <int kRows>
-Field<kRows> gather(const LinkedFormFactors& links, const Field<kRows>& in) {
+Field<kRows> gather(const std::shared_ptr<const LinkedFormFactors>& links,
+                    const Field<kRows>& in) {
   using Columns = std::array<double, kRows>;
   std::vector<Columns> from(in.cols()), to(in.cols());
   const auto size = static_cast<std::size_t>(in.size());
   std::copy_n(in.data(), size, from.front().data());
-  links.gather(std::span<const Columns>(from), std::span(to));
+  links->gather(std::span<const Columns>(from), std::span(to));
   return Eigen::Map<const Field<kRows>>(to.front().data(), kRows, in.cols());
 }
 
@@ -154,7 +155,8 @@ class ConjugateGradients {
 Form best_form(const TransferData& data) {
   if (!data.exchange.empty()) return FormFactorRows(data.exchange, data.patches.area);
   if (!data.links.empty()) {
-    return LinkedFormFactors(data.links, data.patches.area, data.patches.centroid);
+    return std::make_shared<const LinkedFormFactors>(data.links, data.patches.area,
+                                                     data.patches.centroid);
   }
   return CompressedFormFactors(data.compressed_form_factors);
 }
@@ -203,7 +205,13 @@ ReferenceSolver::ReferenceSolver(const ExchangeMatrix& exchange, const PatchTabl
     : patches_(patches), form_(FormFactorRows(exchange, patches.area)) {}
 
 ReferenceSolver::ReferenceSolver(const FormFactorLinks& links, const PatchTable& patches)
-    : patches_(patches), form_(LinkedFormFactors(links, patches.area, patches.centroid)) {}
+    : ReferenceSolver(
+          std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
+          patches) {}
+
+ReferenceSolver::ReferenceSolver(std::shared_ptr<const LinkedFormFactors> links,
+                                 const PatchTable& patches)
+    : patches_(patches), form_(std::move(links)) {}
 
 ReferenceSolver::ReferenceSolver(const TransferData& data)
     : patches_(data.patches), form_(best_form(data)) {}

@@ -13,28 +13,50 @@ using Eigen::Index;
 
 constexpr auto kTogether = static_cast<std::size_t>(SolvedTransfer::kTogether);
 
+/// Columns that one thread solves for, counted from the first of all.
+struct Group {
+  std::uint32_t matrix;
+  std::size_t begin, count;
+};
+
+/// All columns of `panels` that hold patches, of which there are `patch_count`.
+std::vector<Group> make_groups(std::span<const Cluster> panels, std::size_t patch_count,
+                               std::uint32_t matrix_count) {
+  std::vector<Group> groups;
+  const std::size_t first = panels.front().begin;
+  for (std::uint32_t m = 0; m < matrix_count; ++m) {
+    for (const Cluster& panel : panels) {
+      const std::size_t end = std::min<std::size_t>(panel.begin + panel.count, patch_count);
+      for (std::size_t begin = panel.begin; begin < end; begin += kTogether) {
+        groups.push_back({m, begin - first, std::min(kTogether, end - begin)});
+      }
+    }
+  }
+  return groups;
+}
+
 }  // namespace
 
-void PanelMatrix::solve(const ClusterTree& tree, const Cluster& columns, const Progress& progress) {
-  const auto rows = std::span(tree.patch).subspan(columns.begin);
-  const std::size_t width = std::min<std::size_t>(columns.count, rows.size());
+void PanelMatrix::solve(const ClusterTree& tree, std::span<const Cluster> panels,
+                        const Progress& progress) {
+  const std::vector<Group> groups = make_groups(panels, tree.patch.size(), matrix_count());
+  const auto rows = std::span(tree.patch).subspan(panels.front().begin);
+  const std::size_t width = groups.back().begin + groups.back().count;
   panel_.resize(matrix_count());
   for (auto& part : panel_) part.resize(static_cast<Index>(rows.size()), static_cast<Index>(width));
   place_.assign(tree.patch.size(), kNone);
   for (std::uint32_t k = 0; k < rows.size(); ++k) place_[rows[k]] = k;
 
-  const std::size_t group_count = (width + kTogether - 1) / kTogether;
   const SingleThreadedBlas single_threaded;
   std::exception_ptr failure;
-  ParallelProgress loop(progress, group_count * matrix_count());
+  ParallelProgress loop(progress, groups.size());
 #pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < group_count * matrix_count(); ++k) {
+  for (std::size_t k = 0; k < groups.size(); ++k) {
     if (loop.stopped()) continue;
-    const auto matrix = static_cast<std::uint32_t>(k / group_count);
-    const std::size_t begin = k % group_count * kTogether;
-    const auto group = rows.subspan(begin, std::min(kTogether, width - begin));
+    const auto [matrix, begin, count] = groups[k];
     try {
-      const SolvedTransfer::Vectors solution = solved().columns(matrix, group);
+      const SolvedTransfer::Vectors solution =
+          solved().columns(matrix, rows.subspan(begin, count));
       for (std::size_t i = 0; i < place_.size(); ++i) {
         const std::uint32_t row = place_[solved().patch()[i]];
         if (row == kNone) continue;

@@ -37,22 +37,24 @@ class SolvedMatrix : public SymmetricMatrix {
   Eigen::VectorXd energies_;
 };
 
-/// Its columns, exact, of one panel of patches at a time.
+/// Its columns, exact, of some panels of patches at a time.
 class PanelMatrix final : public SolvedMatrix {
  public:
   using SolvedMatrix::SolvedMatrix;
 
-  /// Solves for the columns of the patches at `columns` of `tree`, in the rows from there to the
-  /// end: the lower triangle. Throws Cancelled if asked to stop.
-  void solve(const ClusterTree& tree, const Cluster& columns, const Progress& progress = {});
+  /// Solves for the columns of the patches at `panels` of `tree`, neighbours in their order, in the
+  /// rows from there to the end: the lower triangle. The bits of a panel do not depend on others.
+  /// Throws Cancelled if asked to stop.
+  void solve(const ClusterTree& tree, std::span<const Cluster> panels,
+             const Progress& progress = {});
 
-  /// Those of rows and columns that the panel has.
+  /// Those of rows and columns that the panels have.
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
 
  private:
-  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, [rows][columns]
+  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, [rows][columns] of all panels
   std::vector<std::uint32_t> place_;            ///< [n] row, and column, of a patch
 };
 

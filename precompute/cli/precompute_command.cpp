@@ -39,6 +39,23 @@ std::string rough_time(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600);
 }
 
+std::string described(const CostEstimate& estimate) {
+  const bool links_known = estimate.link_count > 0;
+  const std::string most = rough_time(estimate.seconds), least = rough_time(estimate.least_seconds);
+  return fmt::format("{} {}: about {}{}{} and {:.2g} GiB",
+                     links_known ? estimate.link_count : estimate.patch_count,
+                     links_known ? "links" : "patches", least == most ? "" : least + " to ", most,
+                     links_known ? " more" : "",
+                     static_cast<double>(estimate.peak_bytes) / (1ULL << 30));
+}
+
+/// What of an error's lights is no part of it.
+std::string left_out(const FormFactorError& error) {
+  return error.dark_count == 0
+             ? ""
+             : fmt::format(", {} from which nothing arrives left out", error.dark_count);
+}
+
 void print_json(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
   nlohmann::json summary = info_json(data, file_bytes);
   nlohmann::json seconds;
@@ -51,8 +68,15 @@ void print_json(const TransferData& data, const BuildReport& report, std::uint64
   summary["seconds"] = seconds;
   summary["rays"] = report.ray_count;
   summary["peak_memory_bytes"] = peak_memory_bytes();
-  summary["estimate"] = {{"seconds", report.estimate.seconds},
-                         {"peak_bytes", report.estimate.peak_bytes}};
+  const auto json_of = [](const CostEstimate& estimate) {
+    return nlohmann::json{{"seconds", estimate.seconds},
+                          {"least_seconds", estimate.least_seconds},
+                          {"peak_bytes", estimate.peak_bytes}};
+  };
+  summary["estimate"] = json_of(report.estimate);
+  if (report.estimate_after_links) {
+    summary["estimate_after_links"] = json_of(*report.estimate_after_links);
+  }
   fmt::print("{}\n", summary.dump(2));
 }
 
@@ -85,9 +109,10 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
     const auto bytes = static_cast<double>(data.compressed_form_factors->bytes());
     fmt::print(
         "compressed form factors: {:.1f} MiB ({:.0f} bytes per patch), error {:.1e} mean, "
-        "{:.1e} max\n",
+        "{:.1e} max over {} lights{}\n",
         bytes / (1 << 20), bytes / static_cast<double>(report.patch_count),
-        report.form_factor_error->mean, report.form_factor_error->max);
+        report.form_factor_error->mean, report.form_factor_error->max,
+        report.form_factor_error->light_count, left_out(*report.form_factor_error));
   }
   std::string times;
   for (const auto& [phase, s] : report.seconds) times += fmt::format("{} {:.1f} s, ", phase, s);
@@ -163,11 +188,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
     data = build_transfer_data(
         chosen.scene, settings, report,
         [&](std::string_view phase, double fraction) { return bar.update(phase, fraction); },
-        [&](const CostEstimate& estimate) {
-          print_note(options, fmt::format("{} patches: about {} and {:.2g} GiB",
-                                          estimate.patch_count, rough_time(estimate.seconds),
-                                          static_cast<double>(estimate.peak_bytes) / (1ULL << 30)));
-        });
+        [&](const CostEstimate& estimate) { print_note(options, described(estimate)); });
   }
   for (const std::string& warning : report.warnings) print_note(options, "warning: " + warning);
   save_transfer_file(chosen.output, data);
@@ -310,7 +331,8 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
   add_output_options(*command, *chosen);
   command
       ->add_option("--memory-limit", chosen->memory_limit_gib,
-                   "Refuse to start what needs more GiB; by default half of the machine's memory")
+                   "Refuse to start what needs more GiB, and do less at a time of an operator from "
+                   "links where it is short; by default half of the machine's memory")
       ->check(CLI::PositiveNumber);
   command->add_option("--checkpoint", chosen->settings.checkpoint,
                       "Folder for what is done of an operator from links: started again, a run "

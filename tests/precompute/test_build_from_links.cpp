@@ -32,24 +32,39 @@ constexpr double kErrorOfLinks = 0.01;
 constexpr double kClosure = 1e-3;
 
 const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
+const std::string kRoom = kScenes + "furnished_room.gltf";
 
 struct Built {
   TransferData data;
   BuildReport report;
 };
 
-Built build_from_links(std::uint64_t memory_limit_bytes = 0,
-                       const std::filesystem::path& checkpoint = {}) {
+BuildSettings settings_from_links() {
   BuildSettings settings;
   settings.subdivision.patch_count = 500;
   settings.form_factor_kind = FormFactorKind::kLinks;
   settings.tolerance = kTolerance;
   settings.store_links = true;
+  return settings;
+}
+
+Built build_from_links(std::uint64_t memory_limit_bytes = 0,
+                       const std::filesystem::path& checkpoint = {}) {
+  BuildSettings settings = settings_from_links();
   settings.memory_limit_bytes = memory_limit_bytes;
   settings.checkpoint = checkpoint;
   Built built;
-  built.data = build_transfer_data(kScenes + "furnished_room.gltf", settings, built.report);
+  built.data = build_transfer_data(kRoom, settings, built.report);
   return built;
+}
+
+/// What the room from links cannot do without, by the estimate before links are known.
+std::uint64_t least_memory() {
+  BuildSettings settings = settings_from_links();
+  settings.memory_limit_bytes = 1;
+  BuildReport report;
+  EXPECT_THROW(build_transfer_data(kRoom, settings, report), Error);
+  return report.estimate.peak_bytes;
 }
 
 /// Form factors alone.
@@ -85,41 +100,45 @@ double mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-TEST(BuildFromLinks, KeepsNoPairs) {
+/// Of the room's operator under lights, whose truth is given.
+std::vector<double> errors_against(const std::vector<std::vector<Float3>>& lights,
+                                   const std::vector<std::vector<Float3>>& truths) {
   const TransferData& data = room().data;
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    errors.push_back(relative_difference(relit(data, lights[k]), truths[k], data.patches.area));
+  }
+  return errors;
+}
+
+// One test: every one is a process, and builds the room for itself.
+TEST(BuildFromLinks, KeepsNoPairsAndIsTheirLightWithTheErrorOnRecord) {
+  const TransferData& data = room().data;
+  const BuildReport& report = room().report;
   EXPECT_TRUE(data.exchange.empty());
   ASSERT_NE(data.compressed_form_factors, nullptr);
   EXPECT_FALSE(data.links.empty());
-  EXPECT_EQ(room().report.form_factor_count, 0U);
-  EXPECT_EQ(room().report.link_count, data.links.pair.size());
-}
+  EXPECT_EQ(report.form_factor_count, 0U);
+  EXPECT_EQ(report.link_count, data.links.pair.size());
 
-TEST(BuildFromLinks, TheErrorOnRecordIsThatAgainstTheLinks) {
-  const TransferData& data = room().data;
+  // The error on record is that against the links.
   EXPECT_GT(data.record.error_mean, 0);
   EXPECT_LE(data.record.error_mean, kTolerance);
+  ASSERT_TRUE(report.form_factor_error);
+  EXPECT_LE(report.form_factor_error->mean, report.form_factor_tolerance);
+  EXPECT_EQ(report.form_factor_error->light_count + report.form_factor_error->dark_count, 16);
   const auto lights = point_lights(data);
-  const auto truths = ReferenceSolver(data.links, data.patches).indirect_irradiances(lights);
-  std::vector<double> errors;
-  for (std::size_t k = 0; k < lights.size(); ++k) {
-    errors.push_back(relative_difference(relit(data, lights[k]), truths[k], data.patches.area));
-  }
-  EXPECT_LT(mean(errors), 1.5 * data.record.error_mean);
-  EXPECT_LT(std::ranges::max(errors), data.record.error_bound);
-}
+  const auto of_links = errors_against(
+      lights, ReferenceSolver(data.links, data.patches).indirect_irradiances(lights));
+  EXPECT_LT(mean(of_links), 1.5 * data.record.error_mean);
+  EXPECT_LT(std::ranges::max(of_links), data.record.error_bound);
 
-TEST(BuildFromLinks, IsTheLightOfPairs) {
   const Built pairs = exchange_of("furnished_room.gltf", FormFactorKind::kPairs, 500);
-  const TransferData& data = room().data;
   ASSERT_EQ(pairs.data.patches.area, data.patches.area);
-  const auto lights = point_lights(data);
-  const auto truths = ReferenceSolver(pairs.data).indirect_irradiances(lights);
-  std::vector<double> errors;
-  for (std::size_t k = 0; k < lights.size(); ++k) {
-    errors.push_back(relative_difference(relit(data, lights[k]), truths[k], data.patches.area));
-  }
-  RecordProperty("error", std::to_string(mean(errors)));
-  EXPECT_LT(mean(errors), data.record.error_mean + kErrorOfLinks);
+  const auto of_pairs =
+      errors_against(lights, ReferenceSolver(pairs.data).indirect_irradiances(lights));
+  RecordProperty("error", std::to_string(mean(of_pairs)));
+  EXPECT_LT(mean(of_pairs), data.record.error_mean + kErrorOfLinks);
 }
 
 TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
@@ -146,21 +165,46 @@ TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
   }
 }
 
-TEST(BuildFromLinks, TheFileIsTheSameForAnyNumberOfThreadsAndWithACheckpoint) {
+TEST(BuildFromLinks, TheFileIsTheSameForAnyThreadsAnyMemoryAndWithACheckpoint) {
   const test::TemporaryFolder folder;
   const int threads = omp_get_max_threads();
   save_transfer_file(folder / "usual", room().data);
-  omp_set_num_threads(threads + 1);
-  save_transfer_file(folder / "other", build_from_links(0, folder / "panels").data);
+  omp_set_num_threads(threads + 3);
+  // Half of what the threads would take.
+  const std::uint64_t limit = least_memory() * 3 / 2;
+  const Built limited = build_from_links(limit, folder / "panels");
   omp_set_num_threads(threads);
+  EXPECT_LE(limited.report.estimate_after_links->peak_bytes, limit);
+  save_transfer_file(folder / "other", limited.data);
   EXPECT_EQ(test::read_bytes(folder / "usual"), test::read_bytes(folder / "other"));
-  EXPECT_FALSE(std::filesystem::is_empty(folder / "panels"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "panels" / "panel_0000"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "panels" / "round_0_part_0000"));
+}
+
+TEST(BuildFromLinks, SaysAgainWhatIsLeftWhenLinksAreKnown) {
+  std::vector<CostEstimate> estimates;
+  BuildReport report;
+  EXPECT_THROW(build_transfer_data(
+                   kRoom, settings_from_links(), report,
+                   [](std::string_view phase, double) { return phase != "fitting lights"; },
+                   [&](const CostEstimate& estimate) { estimates.push_back(estimate); }),
+               Cancelled);
+  ASSERT_EQ(estimates.size(), 2U);
+  EXPECT_EQ(estimates[0].link_count, 0U);
+  EXPECT_EQ(estimates[1].link_count, report.link_count);
+  EXPECT_EQ(estimates[1].patch_count, report.patch_count);
+  EXPECT_GT(estimates[1].seconds, 0);
+  EXPECT_EQ(report.estimate_after_links->seconds, estimates[1].seconds);
 }
 
 TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
-  const std::string refusal = test::error_of([] { build_from_links(1 << 20); });
+  const std::uint64_t least = least_memory();
+  const std::string refusal = test::error_of([&] { build_from_links(1 << 20); });
   EXPECT_NE(refusal.find("500 patches (from "), std::string::npos) << refusal;
-  EXPECT_NE(refusal.find(" need about 0.0"), std::string::npos) << refusal;
+  const std::string need = " need about ";
+  ASSERT_NE(refusal.find(need), std::string::npos) << refusal;
+  const double gib = std::stod(refusal.substr(refusal.find(need) + need.size()));
+  EXPECT_NEAR(gib * (1 << 30), least, 0.01 * least);
   EXPECT_NE(refusal.find("the limit is 0.000977 GiB"), std::string::npos) << refusal;
 }
 
@@ -180,7 +224,7 @@ TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
     return bytes;
   };
   const std::uint64_t pairs = peak_bytes(FormFactorKind::kPairs, 0),
-                      links = peak_bytes(FormFactorKind::kLinks, 0);
+                      links = peak_bytes(FormFactorKind::kLinks, pairs - 1);
   ASSERT_NE(pairs, links);
   EXPECT_EQ(peak_bytes(FormFactorKind::kAutomatic, 0), pairs);
   EXPECT_EQ(peak_bytes(FormFactorKind::kAutomatic, pairs), pairs);

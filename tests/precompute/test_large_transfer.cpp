@@ -8,8 +8,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
+#include <map>
 
+#include "exchange_samples.h"
 #include "expect_error.h"
 #include "matrix_compression.h"
 #include "rebounce/precompute/dense_transfer.h"
@@ -30,41 +31,64 @@ Lights lights_in(const PatchTable& patches, int count, std::uint64_t seed) {
   return test::unshadowed_lights(patches, count, seed, 1.6, 1.2);
 }
 
-/// A room of 4 x 3 x 5 m with a black box.
+/// A room of 4 x 3 x 5 m with a black box. How near its form factors are to the truth is of no
+/// importance here.
 struct Room {
   Room(const Float3& reflectance, std::size_t patch_count) {
     Scene scene = test::room_with_block(reflectance);
     scene.materials.push_back(scene.materials[0]);
     scene.materials[1].base_color = {0, 0, 0};
     test::add_box(scene, {2.5, 0, 3}, {3, 1, 4}, false, 1);
-    PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-    const FormFactors f = compute_form_factors(model, test::make_tracer(model));
+    const PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
+    exchange = compute_form_factors(model, test::make_tracer(model),
+                                    with_quality(FormFactorQuality::kLow))
+                   .exchange;
     patches = model.patches;
-    dense = build_dense_transfer(f.exchange, patches, Precision::kF32);
     shaping = lights_in(patches, 16, 1);
     judging = lights_in(patches, 12, 2);
-    form_factors = std::make_shared<const HierarchicalOperator>(
-        compress_matrix(FormFactorMatrix(f.exchange, patches.area), patches, shaping, kExactPrice));
   }
 
-  static constexpr double kExactPrice = 1e-16;
-
   PatchTable patches;
-  std::shared_ptr<const DenseOperator> dense;
+  ExchangeMatrix exchange;
   std::shared_ptr<const HierarchicalOperator> form_factors;  ///< exact, but for rounding
   Lights shaping, judging;
 
   FittingLights lights() const { return {shaping, judging}; }
 };
 
-const Room& coloured_room() {
-  static const Room room({0.7F, 0.5F, 0.2F}, 900);
+/// With the dense inverse, and with blocks of low rank in the form factors.
+struct ColouredRoom : Room {
+  ColouredRoom() : Room({0.7F, 0.5F, 0.2F}, 700) {
+    constexpr double kExactPrice = 1e-16;
+    dense = build_dense_transfer(exchange, patches, Precision::kF32);
+    form_factors = std::make_shared<const HierarchicalOperator>(
+        compress_matrix(FormFactorMatrix(exchange, patches.area), patches, shaping, kExactPrice));
+  }
+
+  std::shared_ptr<const DenseOperator> dense;
+};
+
+/// One matrix, and so the quicker.
+struct GreyRoom : Room {
+  explicit GreyRoom(std::size_t patch_count) : Room({0.6F, 0.6F, 0.6F}, patch_count) {
+    form_factors = test::dense_blocks(exchange, patches.area);
+  }
+};
+
+const ColouredRoom& coloured_room() {
+  static const ColouredRoom room;
   return room;
 }
 
-/// One matrix, and so the quicker.
-const Room& grey_room() {
-  static const Room room({0.6F, 0.6F, 0.6F}, 1200);
+/// Of two panels.
+const GreyRoom& small_room() {
+  static const GreyRoom room(560);
+  return room;
+}
+
+/// Of four.
+const GreyRoom& large_room() {
+  static const GreyRoom room(1060);
   return room;
 }
 
@@ -77,16 +101,45 @@ std::shared_ptr<const HierarchicalOperator> build(const Room& room,
                               {.compression = kCoarse, .checkpoint = checkpoint}, progress);
 }
 
+/// Of the small room, without interruption.
+const HierarchicalOperator& uninterrupted() {
+  static const auto result = build(small_room());
+  return *result;
+}
+
 void expect_same(const HierarchicalOperator& a, const HierarchicalOperator& b) {
   EXPECT_EQ(a.storage().blocks.size(), b.storage().blocks.size());
   EXPECT_TRUE(std::ranges::equal(a.storage().values_f32, b.storage().values_f32));
 }
 
-std::size_t file_count(const std::filesystem::path& folder) {
-  return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
+using Times = std::map<std::string, std::filesystem::file_time_type>;
+
+/// When the files of a folder were written.
+Times times_in(const std::filesystem::path& folder) {
+  Times times;
+  for (const auto& file : std::filesystem::directory_iterator(folder)) {
+    times[file.path().filename().string()] = file.last_write_time();
+  }
+  return times;
 }
 
-double mean_error(const Room& room, const TransferOperator& transfer, const Lights& lights) {
+/// Builds the small room until that part is kept, and returns what is then there.
+Times build_up_to(const std::filesystem::path& part) {
+  EXPECT_THROW(build(small_room(), part.parent_path(),
+                     [&](double) { return !std::filesystem::exists(part); }),
+               Cancelled);
+  EXPECT_TRUE(std::filesystem::exists(part));
+  return times_in(part.parent_path());
+}
+
+void flip_a_byte(const std::filesystem::path& path) {
+  std::string bytes = test::read_bytes(path);
+  bytes[bytes.size() / 2] ^= 1;
+  test::write_bytes(path, bytes);
+}
+
+double mean_error(const ColouredRoom& room, const TransferOperator& transfer,
+                  const Lights& lights) {
   std::vector<float> workspace(std::max(transfer.workspace_size(), room.dense->workspace_size()));
   std::vector<Float3> result(room.patches.size()), truth(room.patches.size());
   double sum = 0;
@@ -99,12 +152,12 @@ double mean_error(const Room& room, const TransferOperator& transfer, const Ligh
 }
 
 TEST(SolvedTransfer, ColumnsAreThoseOfTheDenseInverse) {
-  const Room& room = coloured_room();
+  const ColouredRoom& room = coloured_room();
   const SingleThreadedBlas single_threaded;
   for (const double residual : {1e-2, 1e-3, 1e-5}) {
     const SolvedTransfer solved(*room.form_factors, room.patches, residual);
     ASSERT_EQ(solved.matrix_count(), 3U);
-    for (const std::size_t begin : {0U, 320U, 832U}) {
+    for (const std::size_t begin : {0U, 320U, 640U}) {
       const std::size_t count = std::min<std::size_t>(40, room.patches.size() - begin);
       const auto patches = solved.patch().subspan(begin, count);
       const SolvedTransfer::Vectors columns = solved.columns(1, patches);
@@ -123,7 +176,7 @@ TEST(SolvedTransfer, ColumnsAreThoseOfTheDenseInverse) {
 }
 
 TEST(SolvedTransfer, ProductsAreThoseOfTheDenseInverse) {
-  const Room& room = coloured_room();
+  const ColouredRoom& room = coloured_room();
   const SolvedTransfer solved(*room.form_factors, room.patches, 1e-6);
   const DenseMatrix dense(*room.dense);
   const Eigen::MatrixXf x = Eigen::MatrixXf::Random(room.patches.size(), 20);
@@ -134,18 +187,18 @@ TEST(SolvedTransfer, ProductsAreThoseOfTheDenseInverse) {
 }
 
 TEST(SolvedTransfer, EstimatesEnergies) {
-  const Room& room = coloured_room();
+  const ColouredRoom& room = coloured_room();
   const SolvedTransfer solved(*room.form_factors, room.patches, 1e-4);
   const Eigen::VectorXd exact = DenseMatrix(*room.dense).energies(solved.patch());
   const Eigen::ArrayXd ratio = solved.estimated_energies().array() / exact.array();
   EXPECT_NEAR(ratio.mean(), 1, 0.03);
-  // Each is off by sqrt(2 / 128), 0.125, or less; the farthest of 900 by four times that.
+  // Each is off by sqrt(2 / 128), 0.125, or less; the farthest of 700 by four times that.
   EXPECT_LT(std::sqrt((ratio - 1).square().mean()), 0.15);
   EXPECT_GT(ratio.minCoeff(), 0.4);
 }
 
 TEST(SolvedTransfer, RefusesFormFactorsThatGainLight) {
-  const Room& room = grey_room();
+  const Room& room = small_room();
   HierarchicalOperator::Storage doubled = room.form_factors->storage();
   std::vector<float> values(doubled.values_f32.begin(), doubled.values_f32.end());
   const HierarchicalLayout layout(doubled);
@@ -156,7 +209,7 @@ TEST(SolvedTransfer, RefusesFormFactorsThatGainLight) {
 }
 
 TEST(LargeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
-  const Room& room = coloured_room();
+  const ColouredRoom& room = coloured_room();
   const HierarchicalSettings settings{.tolerance = 0.005};
   const auto large = build_large_transfer(*room.form_factors, room.patches, room.lights(),
                                           {.compression = settings});
@@ -185,56 +238,101 @@ TEST(LargeTransfer, TakesAFewPatchesAndNoLights) {
   EXPECT_LT(relative_difference(result, truth, model.patches.area), 0.005);
 }
 
-TEST(LargeTransfer, SameBitsForAnyNumberOfThreads) {
-  const Room& room = grey_room();
+TEST(LargeTransfer, SameBitsForAnyNumberOfThreadsAndAnyMemory) {
+  const Room& room = large_room();
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
   const auto one = build(room);
-  omp_set_num_threads(3);
-  const auto three = build(room);
+  omp_set_num_threads(6);
+  const LargeTransferPlan free = plan_large_transfer(room.patches.size(), 1),
+                          least = plan_large_transfer(room.patches.size(), 1, 1);
+  ASSERT_GT(room.patches.size(), 1024U) << "not four panels";
+  ASSERT_EQ(free.panel_count, 2U);
+  ASSERT_EQ(least.panel_count, 1U);
+  const auto six = build(room);
+  const auto limited =
+      build_large_transfer(*room.form_factors, room.patches, room.lights(),
+                           {.compression = kCoarse, .memory_limit_bytes = least.peak_bytes});
+  EXPECT_EQ(omp_get_max_threads(), 6) << "left behind";
   omp_set_num_threads(before);
-  expect_same(*one, *three);
+  expect_same(*one, *six);
+  expect_same(*one, *limited);
 }
 
-TEST(LargeTransfer, GoesOnFromItsCheckpointWithTheSameBits) {
-  const Room& room = grey_room();
+TEST(LargeTransfer, MorePanelsAndThreadsForMoreMemory) {
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(16);
+  for (const std::size_t matrices : {1U, 3U}) {
+    const LargeTransferPlan free = plan_large_transfer(65536, matrices),
+                            least = plan_large_transfer(65536, matrices, 1);
+    EXPECT_EQ(free.thread_count, 16);
+    EXPECT_EQ(free.panel_count, matrices == 1 ? 4U : 2U) << "not enough columns for all threads";
+    EXPECT_EQ(least.thread_count, 1);
+    EXPECT_EQ(least.panel_count, 1U);
+    LargeTransferPlan last = least;
+    int narrowed = 0;
+    for (std::size_t limit = least.peak_bytes; limit < free.peak_bytes; limit += 100 << 20) {
+      const LargeTransferPlan plan = plan_large_transfer(65536, matrices, limit);
+      EXPECT_LE(plan.peak_bytes, limit);
+      EXPECT_GE(plan.thread_count, last.thread_count);
+      EXPECT_GE(plan.panel_count, last.panel_count);
+      narrowed += plan.thread_count > 1 ? 1 : 0;
+      last = plan;
+    }
+    EXPECT_GT(narrowed, 3);
+  }
+  omp_set_num_threads(before);
+}
+
+TEST(LargeTransfer, GoesOnFromItsFirstStageWithTheSameBits) {
   const test::TemporaryFolder folder;
-  const auto panels = folder / "panels";
-  EXPECT_THROW(
-      build(room, panels,
-            [&](double) { return !std::filesystem::exists(panels) || file_count(panels) < 2; }),
-      Cancelled);
-  ASSERT_EQ(file_count(panels), 2U);
-  const auto written = std::filesystem::last_write_time(panels / "panel_0000");
-  const auto resumed = build(room, panels);
-  EXPECT_GT(file_count(panels), 2U);
-  EXPECT_EQ(std::filesystem::last_write_time(panels / "panel_0000"), written) << "done again";
-  expect_same(*resumed, *build(room));
+  Times written = build_up_to(folder / "panel_0000");
+  ASSERT_EQ(written.size(), 1U);
+  expect_same(*build(small_room(), folder.path()), uninterrupted());
+  EXPECT_EQ(times_in(folder.path())["panel_0000"], written["panel_0000"]) << "done again";
+  // Now only the first is missing.
+  std::filesystem::remove(folder / "panel_0000");
+  expect_same(*build(small_room(), folder.path()), uninterrupted());
+}
+
+TEST(LargeTransfer, GoesOnFromItsSecondStageWithTheSameBits) {
+  const test::TemporaryFolder folder;
+  for (const std::string part : {"round_0_part_0000", "round_1_part_0000"}) {
+    const Times written = build_up_to(folder / part);
+    EXPECT_TRUE(written.contains("panel_0001"));
+    expect_same(*build(small_room(), folder.path()), uninterrupted());
+    Times after = times_in(folder.path());
+    for (const auto& [name, time] : written) EXPECT_EQ(after[name], time) << name << " done again";
+    std::filesystem::remove(folder / "round_1_part_0000");
+  }
 }
 
 TEST(LargeTransfer, BeginsAnewWhereTheCheckpointIsOfSomethingElseOrDamaged) {
-  const Room& room = grey_room();
   const test::TemporaryFolder folder;
-  Room darker = room;
+  GreyRoom darker = small_room();
   for (Float3& rho : darker.patches.reflectance) rho[0] = rho[1] = rho[2] = 0.5F * rho[0];
   build(darker, folder.path());
-  const auto expected = build(room);
-  expect_same(*build(room, folder.path()), *expected);
+  expect_same(*build(small_room(), folder.path()), uninterrupted());
 
-  // A byte of one file, and the end of another.
-  std::fstream file(folder / "panel_0000", std::ios::in | std::ios::out | std::ios::binary);
-  file.seekp(5000);
-  file.put('?');
-  file.close();
+  // The same first stage, but another second one.
+  GreyRoom judged_otherwise = small_room();
+  std::swap(judged_otherwise.judging.front(), judged_otherwise.judging.back());
+  const Times before = times_in(folder.path());
+  build(judged_otherwise, folder.path());
+  Times after = times_in(folder.path());
+  EXPECT_EQ(after["panel_0000"], before.at("panel_0000"));
+  EXPECT_NE(after["round_0_part_0000"], before.at("round_0_part_0000"));
+
+  flip_a_byte(folder / "panel_0000");
   std::filesystem::resize_file(folder / "panel_0001", 200);
-  expect_same(*build(room, folder.path()), *expected);
+  flip_a_byte(folder / "round_0_part_0000");
+  expect_same(*build(small_room(), folder.path()), uninterrupted());
 }
 
 TEST(LargeTransfer, StopsWhenAsked) {
-  const test::TemporaryFolder folder;
   for (const double at : {0.0, 0.3, 0.8}) {
     double last = 0;
-    EXPECT_THROW(build(grey_room(), {},
+    EXPECT_THROW(build(small_room(), {},
                        [&](double done) {
                          EXPECT_GE(done, last);
                          last = done;
@@ -245,22 +343,24 @@ TEST(LargeTransfer, StopsWhenAsked) {
 }
 
 TEST(LargeTransfer, RefusesWhatItCannotDo) {
-  const Room& room = grey_room();
-  LargeTransferSettings settings{.compression = kCoarse, .memory_limit_bytes = 1 << 20};
+  const Room& room = small_room();
+  const std::size_t least = plan_large_transfer(room.patches.size(), 1, 1).peak_bytes;
+  LargeTransferSettings settings{.compression = kCoarse, .memory_limit_bytes = least - 1};
   const auto attempt = [&] {
     build_large_transfer(*room.form_factors, room.patches, room.lights(), settings);
   };
   test::expect_error(attempt, "raise the memory limit");
+  test::expect_error(attempt, std::to_string(least >> 20) + " MiB at the least");
   const test::TemporaryFolder folder;
-  std::ofstream(folder / "file") << "no folder";
+  test::write_bytes(folder / "file", "no folder");
   settings = {.compression = kCoarse, .checkpoint = folder / "file"};
   test::expect_error(attempt, "checkpoints");
 }
 
 TEST(LargeTransfer, TakesMemoryInProportionToThePatches) {
-  const double at_64k = static_cast<double>(large_transfer_peak_bytes(65536, 3));
-  EXPECT_NEAR(static_cast<double>(large_transfer_peak_bytes(131072, 3)) / at_64k, 2, 0.3);
-  EXPECT_LT(large_transfer_peak_bytes(2000, 1), large_transfer_peak_bytes(4000, 1));
+  const double at_64k = static_cast<double>(plan_large_transfer(65536, 3).peak_bytes);
+  EXPECT_NEAR(static_cast<double>(plan_large_transfer(131072, 3).peak_bytes) / at_64k, 2, 0.3);
+  EXPECT_LT(plan_large_transfer(2000, 1).peak_bytes, plan_large_transfer(4000, 1).peak_bytes);
 }
 
 }  // namespace

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "exchange_samples.h"
 #include "lit_truth.h"
 #include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/transfer/area_norm.h"
@@ -128,6 +130,48 @@ TEST(LitTruth, LightFromWhichNothingArrivesIsLeftOut) {
   lights[1][n] = {1, 1, 1};
   lights[2][0] = {1, 1, 1};
   EXPECT_EQ(LitTruth(FormFactorMatrix(exchange, area), lights).light_count(), 1U);
+}
+
+/// Three patches of 1 m², of which the last gives next to nothing to the second.
+ExchangeMatrix three_patches(float first_pair, float last_pair) {
+  ExchangeMatrix exchange;
+  exchange.row_begin = SharedArray(std::vector<std::uint64_t>{0, 1, 2, 2});
+  exchange.column = SharedArray(std::vector<std::uint32_t>{1, 2});
+  exchange.exchange_area = SharedArray(std::vector<float>{first_pair, last_pair});
+  return exchange;
+}
+
+TEST(FormFactorError, LeavesOutAndCountsLightsFromWhichNothingArrives) {
+  PatchTable patches;
+  patches.area = {1, 1, 1};
+  patches.centroid.resize(3);
+  const FormFactorRows exact(three_patches(0.3F, 5e-7F), patches.area);
+  const auto compressed = test::dense_blocks(three_patches(0.303F, 1e-12F), patches.area);
+  std::vector<std::vector<Float3>> lights(3, std::vector<Float3>(3, Float3{0, 0, 0}));
+  for (std::size_t k = 0; k < 3; ++k) lights[k][k] = {1, 1, 1};
+  const FormFactorError error = form_factor_error(*compressed, exact, patches, lights);
+  EXPECT_EQ(error.light_count, 2);
+  EXPECT_EQ(error.dark_count, 1) << "the last: all of its light is missed";
+  EXPECT_NEAR(error.mean, 0.01, 1e-5);
+  EXPECT_NEAR(error.max, 0.01, 1e-5);
+  const FormFactorError none = form_factor_error(*compressed, exact, patches, {&lights[2], 1});
+  EXPECT_EQ(none.light_count, 0);
+  EXPECT_EQ(none.dark_count, 1);
+  EXPECT_EQ(none.max, 0);
+}
+
+TEST(MeasuredError, CountsLightsFromWhichNothingArrives) {
+  // A block over much of the floor: lamps in it light nothing but the floor that it stands on.
+  Scene scene = test::empty_scene({0.7F, 0.5F, 0.3F});
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
+  test::add_box(scene, {0.5, 0, 0.5}, {3.5, 1.5, 4.5}, false, 0);
+  const Built built = build(scene, 300);
+  const auto measured = measure_error(built.data, built.tracer, nullptr, kSeed);
+  const auto points = std::ranges::find(measured, LightKind::kPoint, &KindError::kind);
+  ASSERT_NE(points, measured.end());
+  EXPECT_EQ(points->light_count + points->dark_count, 16);
+  EXPECT_GT(points->dark_count, 0);
+  EXPECT_LT(points->max, 1e-5);
 }
 
 TEST(RandomLights, AreTheSameForASeedAndOthersForAnother) {

@@ -73,18 +73,24 @@ struct BuildSettings {
   /// stored, and from links solved for; light goes by way of all patches nevertheless. What emits
   /// is a source, named or not. The operator is then hierarchical.
   std::vector<std::string> receivers, sources;
-  std::uint64_t memory_limit_bytes = 0;  ///< refuse to start what needs more; 0: half the machine's
+  /// Refuse to start what needs more; 0: half the machine's. With kLinks, less of the operator is
+  /// made at a time where it is short: slower, with the same bits.
+  std::uint64_t memory_limit_bytes = 0;
   /// With kLinks: folder that what is done of the operator is kept in, so that a build that was
   /// killed has that done when it is started again with the same scene and settings. It stays
   /// behind. Empty: none.
   std::filesystem::path checkpoint;
 };
 
-/// What the expensive part will take, known before it begins.
+/// What the expensive part, or what is left of it, will take with the threads that there are.
 struct CostEstimate {
   std::size_t patch_count = 0;
+  std::size_t link_count = 0;  ///< 0: not known yet, or there are none
   std::uint64_t peak_bytes = 0;
-  double seconds = 0;  ///< of one processor; rough
+  /// Rough. As long as links are not known, they are taken to be as many as in a furnished room,
+  /// for the least as in a bare one. Afterwards both are the same, and follow from their number and
+  /// from how long it took to find them.
+  double seconds = 0, least_seconds = 0;
 };
 
 struct BuildReport {
@@ -106,12 +112,14 @@ struct BuildReport {
   std::optional<FormFactorError> form_factor_error;
   double form_factor_tolerance = 0;  ///< that they were compressed to
   CostEstimate estimate;
+  std::optional<CostEstimate> estimate_after_links;  ///< of what is left then
 };
 
 /// Called when a phase begins, during it and at its end; returning false stops the build.
 using BuildProgress = std::function<bool(std::string_view phase, double fraction)>;
 
-/// Called once patches are known and before form factors are begun.
+/// Called once patches are known and before form factors are begun, and where an operator is made
+/// from links again when these are found, with what is left.
 using EstimateListener = std::function<void(const CostEstimate&)>;
 
 /// The scene of a file as the offline stage takes it: pieces that are plainly seen from behind are

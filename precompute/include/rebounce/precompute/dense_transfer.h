@@ -27,6 +27,7 @@ std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matri
 /// Number of different reflectance channels, 1 to 3, and which of them each channel uses.
 std::uint32_t distinct_channels(std::span<const Float3> reflectance,
                                 std::array<std::uint32_t, kChannelCount>& channel_matrix);
+std::uint32_t distinct_channels(std::span<const Float3> reflectance);
 
 /// The largest relative area-weighted L2 residual of Y (I - rho F) v = F v over a few random v.
 double transfer_residual(const TransferOperator& transfer, const FormFactorOperator& form_factors,

@@ -14,10 +14,13 @@
 
 namespace rebounce {
 
-/// Relative area-weighted L2 errors of the light that is gathered, F B.
+/// Relative area-weighted L2 errors of the light that is gathered, F B. Lights from which nothing
+/// arrives (arrives_nowhere) have none.
 struct FormFactorError {
   double mean = 0;
   double max = 0;
+  int light_count = 0;  ///< with an error
+  int dark_count = 0;   ///< left out
 };
 
 /// Compresses the form factors as build_hierarchical_transfer compresses Y: G = A^1/2 F A^-1/2, one
@@ -33,6 +36,12 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
 /// matrix. Throws Error if `links` are not of these patches.
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,
+    const HierarchicalSettings& settings, const Progress& progress = {});
+
+/// The same with `product`, those links as they gather, which others use too.
+std::shared_ptr<const HierarchicalOperator> compress_form_factors(
+    const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
+    const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress = {});
 
 /// Errors of `compressed` form factors, against `exact` ones, over these B.

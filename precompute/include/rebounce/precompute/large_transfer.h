@@ -17,17 +17,33 @@ struct LargeTransferSettings {
   /// What the light of sources does to receivers is solved for and stored: as many columns as there
   /// are of those, whichever are the fewer.
   PatchRoles roles{};
-  /// Memory that may be taken beside the form factors; 0: as much as it takes.
+  /// Memory that may be taken beside the form factors; 0: as much as it takes. Less: fewer threads
+  /// and panels at a time, slower, the same bits.
   std::uint64_t memory_limit_bytes = 0;
-  /// Folder that finished panels are kept in, so that a run that was killed goes on where it was;
-  /// empty: none. What was begun from anything else is begun anew. It stays behind: remove it when
-  /// the operator is where it belongs.
+  /// Folder that what is finished is kept in, panels of the first stage and parts of the rounds of
+  /// the second, so that a run that was killed goes on where it was; empty: none. What was begun
+  /// from anything else is begun anew. It stays behind: remove it when the operator is where it
+  /// belongs.
   std::filesystem::path checkpoint{};
 };
 
-/// Bytes that build_large_transfer holds at its peak, form factors not included; in proportion to
-/// the number of patches.
-std::size_t large_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
+/// How much of build_large_transfer is done at the same time.
+struct LargeTransferPlan {
+  int thread_count = 1;
+  std::size_t panel_count = 1;  ///< of 512 columns each, solved for together
+  /// At the peak, form factors not included; in proportion to the number of patches.
+  std::size_t peak_bytes = 0;
+};
+
+/// The plan with the most threads, those of OpenMP at most and one at least, that keeps to a limit
+/// (0: none). Above the limit is only the plan with one thread: less cannot be done with.
+LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
+                                      std::uint64_t memory_limit_bytes = 0);
+
+/// Seconds that build_large_transfer takes of one processor, about a slow one, without a
+/// checkpoint: rough. `form_factor_bytes`: those of the form factors.
+double large_transfer_seconds(std::size_t patch_count, std::size_t matrix_count,
+                              double form_factor_bytes);
 
 /// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
 /// are solved for by conjugate gradients, a panel of neighbouring patches at a time, and each panel
@@ -36,9 +52,9 @@ std::size_t large_transfer_peak_bytes(std::size_t patch_count, std::size_t matri
 ///
 /// `form_factors` are G = A^1/2 F A^-1/2, compressed, f32 or f16 (compress_form_factors): their
 /// error, which must be well below the tolerance, stays in the result and is not part of it. Throws
-/// Error if that is above the memory limit, if F is not a passive exchange
+/// Error if the least that it can do with is above the memory limit, if F is not a passive exchange
 /// (I - R G R not positive definite), or if the checkpoint cannot be written, and Cancelled if
-/// asked to stop. The same bits for any number of threads, and from a checkpoint.
+/// asked to stop. The same bits for any number of threads and memory limit, and from a checkpoint.
 std::shared_ptr<const HierarchicalOperator> build_large_transfer(
     const HierarchicalOperator& form_factors, const PatchTable& patches,
     const FittingLights& lights, const LargeTransferSettings& settings,

@@ -5,6 +5,7 @@
 
 #include "rebounce/precompute/progress.h"
 #include "rebounce/precompute/random_lights.h"
+#include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/transfer_data.h"
@@ -14,7 +15,8 @@ namespace rebounce {
 /// Relative area-weighted L2 errors of the indirect irradiance under random lights of one kind.
 struct KindError {
   LightKind kind = LightKind::kPoint;
-  int light_count = 0;
+  int light_count = 0;  ///< with an error
+  int dark_count = 0;   ///< left out, as nothing of them arrives (arrives_nowhere)
   double mean = 0;
   double max = 0;
   double bound = 0;  ///< with 95 % probability above those of 1,000 more lights: error_bound.h
@@ -29,6 +31,11 @@ struct KindError {
 /// compressed form factors alone, which are a part of what is measured, it would be none.
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const DenseOperator* exact, std::uint64_t seed,
+                                     const Progress& progress = {});
+
+/// The same without `exact`, with a solver that is there, on the pairs or the links of `data`.
+std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
+                                     const ReferenceSolver& reference, std::uint64_t seed,
                                      const Progress& progress = {});
 
 }  // namespace rebounce

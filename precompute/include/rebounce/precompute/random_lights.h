@@ -41,10 +41,14 @@ std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& da
                                                           int count, std::uint64_t seed,
                                                           const PatchRoles& roles = {});
 
-/// Whether less than a millionth of what a light's patches give off arrives anywhere: the light is
+/// Whether of what a light's patches give off a millionth at most arrives anywhere: the light is
 /// none, of a lamp inside of a box, say, which only what has no front faces sees, and no error can
-/// be relative to it. All in lx, [n]; `area` in m².
-bool arrives_nowhere(std::span<const Float3> indirect_irradiance,
-                     std::span<const Float3> initial_exitance, std::span<const float> area);
+/// be relative to it. This is the rule by which such lights are left out of the errors of operators
+/// and of form factors alike.
+///
+/// `exitance` is initial, or the whole radiosity where `irradiance` is what it gathers: for such a
+/// light they are nearly the same. All in lx, [n]; `area` in m².
+bool arrives_nowhere(std::span<const Float3> irradiance, std::span<const Float3> exitance,
+                     std::span<const float> area);
 
 }  // namespace rebounce

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <span>
 #include <variant>
 #include <vector>
@@ -27,7 +28,8 @@ class ReferenceSolver {
   static constexpr int kTogether = 8;
 
   /// What is solved with: F by pairs, as links, or compressed.
-  using Form = std::variant<FormFactorRows, LinkedFormFactors, CompressedFormFactors>;
+  using Form = std::variant<FormFactorRows, std::shared_ptr<const LinkedFormFactors>,
+                            CompressedFormFactors>;
 
   /// Compressed form factors gather in single precision: no solution with them has a smaller
   /// residual than this, whatever is asked for.
@@ -36,6 +38,9 @@ class ReferenceSolver {
   /// `patches` must outlive the solver. Throws Error if sizes do not agree.
   ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches);
   ReferenceSolver(const FormFactorLinks& links, const PatchTable& patches);
+
+  /// With links that others gather along too.
+  ReferenceSolver(std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches);
 
   /// With what `data`, which must outlive the solver, hold F best as: pairs, else links, else
   /// compressed. Throws Error if they hold none of them.

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <omp.h>
+
+#include <algorithm>
+
+namespace rebounce {
+
+/// Lets OpenMP have so many threads at most, for what the thread that makes it begins, for as long
+/// as this lives.
+class ThreadLimit {
+ public:
+  /// `count` > 0.
+  explicit ThreadLimit(int count) : before_(omp_get_max_threads()) {
+    omp_set_num_threads(std::min(count, before_));
+  }
+  ~ThreadLimit() { omp_set_num_threads(before_); }
+  ThreadLimit(const ThreadLimit&) = delete;
+  ThreadLimit& operator=(const ThreadLimit&) = delete;
+
+ private:
+  int before_;
+};
+
+}  // namespace rebounce
