@@ -71,7 +71,7 @@ class SceneBench {
   SceneBench(const std::string& path, std::size_t patch_count, const LargeOptions& options)
       : options_(options) {
     Scene scene = import_gltf(path);
-    make_double_sided(scene, find_inside_out(scene, RayTracer(scene.position, scene.triangle)));
+    make_double_sided(scene, find_inside_out(scene));
     const PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
     const RayTracer tracer = make_surface_tracer(model.mesh);
     data_.patches = model.patches;

@@ -270,8 +270,7 @@ class TransferBuild {
 
 Scene import_usable(const std::filesystem::path& path, double scale) {
   Scene scene = import_gltf(path, scale);
-  const RayTracer tracer(scene.position, scene.triangle);
-  make_double_sided(scene, find_inside_out(scene, tracer));
+  make_double_sided(scene, find_inside_out(scene));
   return scene;
 }
 

@@ -1,11 +1,13 @@
-#include "enclosed_sides.h"
+        if (!small || !open || candidates_#include "enclosed_sides.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "hemisphere_rays.h"
+#include "progress_part.h"
 
 namespace rebounce {
 namespace {
@@ -14,79 +16,87 @@ namespace {
 // these metres: where a person can stand there may be lamps.
 constexpr double kReach = 1.0 / 4, kRoom = 1.5;
 
-/// A look at a side: by how many paths all in all, and how many of them may be out at most, if it
-/// is not to count as lit. More are followed only where that is in doubt.
+// Half of the paths end at each bounce; none is followed for longer than this.
+constexpr int kBounces = 16;
+
+/// A look at a side by itself, by so many paths all in all: it is inside if no more than `inside`
+/// of them are out and lit if no fewer than `lit` are; else it is looked at again.
 struct Look {
-  std::uint32_t paths, most_out;
+  std::uint32_t paths;
+  int inside, lit;
 };
 
-// The last allows 4 %; a side of twice that is taken for inside once in fifty times, one of a
-// quarter is taken for lit once in five hundred.
-constexpr std::array<Look, 4> kLooks{{{4, 1}, {12, 2}, {32, 3}, {128, 5}}};
-
-// So many paths of which none is out are enough.
-constexpr std::uint32_t kClear = 32;
+// A side of whose paths 8 % get out is taken for inside once in nine times, one of 12 % once in
+// fifty; one of 1 % is taken for lit once in five hundred times.
+constexpr std::array<Look, 5> kLooks{
+    {{4, -1, 2}, {12, -1, 3}, {32, 0, 4}, {64, 1, 5}, {128, 5, 6}}};
 
 // Sides of triangles that follow each other, no farther apart than this part of the reach, are
-// first looked at together, by so many paths each: where none is out they are all inside, where
-// this part of them or more is out they are all lit.
+// first judged together: by so many paths in all, then by so many of each side and no fewer than
+// kLeastPaths in all, then by twice as many.
 constexpr std::size_t kGroup = 8;
 constexpr double kGroupReach = 1.0 / 8;
-constexpr std::uint32_t kGroupPaths = 8;
-constexpr double kClearlyLit = 1.0 / 8;
+constexpr std::size_t kFirstPaths = 16, kPathsOfSide = 8, kLeastPaths = 32;
 
-// A group is looked at twice; it is lit already if twice that part of the first paths is out.
-constexpr std::uint32_t kFirstPaths = 16;
+// All of them are lit where this part of the first paths is out, or this of all; all are inside
+// where none is. What is still in doubt then is lit if it has that part out in a group that has more
+// than the last part out, and inside if it has none out in a group that has no more.
+constexpr double kFirstLit = 1.0 / 4, kLit = 1.0 / 8, kFew = 1.0 / 32;
 
 // Of a triangle larger than the square of this part of the reach none may be out of so many paths
 // for each such square, up to a largest number: a wall's triangle may look out from behind a board.
 constexpr double kLarge = 1.0 / 8;
-constexpr std::uint32_t kMostPaths = 2048;
+constexpr std::uint32_t kPathsOfSquare = 32, kMostPaths = 2048;
 
-// Half of the paths end at each bounce; none is followed for longer than this.
-constexpr int kBounces = 16;
+// A ray's id is the number of its path, and above so many bits that of the side in its group.
+constexpr int kPathBits = 16;
+static_assert(kMostPaths <= 1U << kPathBits);
+
+// Groups between two looks at the progress.
+constexpr std::size_t kBatch = 1 << 13;
 
 class EnclosedSides {
  public:
   EnclosedSides(const Scene& scene, const RayTracer& tracer, std::vector<TriangleSides>& sides)
-      : scene_(scene), tracer_(tracer), sides_(sides) {
+      : scene_(scene), tracer_(tracer), sides_(sides), surface_(sides.size()) {
     glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
     for (const Float3& p : scene.position) {
       low = glm::min(low, to_dvec3(p));
       high = glm::max(high, to_dvec3(p));
     }
     reach_ = std::min(kReach * glm::distance(low, high), kRoom);
+#pragma omp parallel for schedule(static)
+    for (std::uint32_t t = 0; t < surface_.size(); ++t) surface_[t] = surface_of(t);
+    group_candidates();
   }
 
-  void run() {
-    group_candidates();
-    const std::size_t group_count = group_begin_.size() - 1;
-    std::vector<std::uint8_t> inside(candidates_.size(), 0);
-#pragma omp parallel
-    {
-      Scratch scratch;
-#pragma omp for schedule(dynamic, 64)
-      for (std::size_t g = 0; g < group_count; ++g) {
-        const std::size_t begin = group_begin_[g], end = group_begin_[g + 1];
-        const Verdict verdict =
-            look_at(std::span(candidates_).subspan(begin, end - begin), scratch);
-        if (verdict == Verdict::kLit) continue;
-        for (std::size_t k = begin; k < end; ++k) {
-          const bool is = verdict == Verdict::kInside || is_inside(candidates_[k], scratch);
-          inside[k] = is ? 1 : 0;
-        }
-      }
-    }
-    for (std::size_t k = 0; k < candidates_.size(); ++k) {
-      if (inside[k] != 0) kind(candidates_[k]) = SideKind::kBuried;
+  void run(const Progress& progress) {
+    const std::size_t count = group_begin_.size() - 1;
+    for (std::size_t begin = 0; begin < count; begin += kBatch) {
+      report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
+      judge_groups(begin, std::min(begin + kBatch, count));
     }
   }
 
  private:
-  enum class Verdict : std::uint8_t { kInside, kLit, kDoubt };
+  enum class Verdict : std::uint8_t { kDoubt, kInside, kLit };
+
+  /// What is known of a side.
+  struct Suspect {
+    std::uint32_t side;
+    std::uint32_t paths = 0;  ///< that were followed
+    int out = 0;              ///< of them
+    Verdict verdict = Verdict::kDoubt;
+  };
+
+  /// What paths meet at a triangle. Backs of one-sided surfaces absorb, and so does what is buried.
+  struct Surface {
+    Float3 normal;  ///< of the front
+    bool emits, front_reflects, back_reflects;
+  };
 
   struct Scratch {
-    std::vector<Ray> rays;  ///< of the paths that go on; their ids are the paths' numbers
+    std::vector<Ray> rays;  ///< of the paths that go on
     std::vector<Hit> hits;
   };
 
@@ -99,93 +109,143 @@ class EnclosedSides {
     return scene_.materials[scene_.triangle_material[t]];
   }
 
-  bool emits(std::uint32_t t) const {
-    return material(t).emitted_luminance != Float3{0, 0, 0};
+  std::array<glm::dvec3, 3> corners(std::uint32_t t) const {
+    const auto [a, b, c] = scene_.triangle[t];
+    return {to_dvec3(scene_.position[a]), to_dvec3(scene_.position[b]),
+            to_dvec3(scene_.position[c])};
+  }
+
+  glm::dvec3 area_vector(std::uint32_t t) const {
+    const auto [p, q, r] = corners(t);
+    return 0.5 * glm::cross(q - p, r - p);
+  }
+
+  /// In such squares as are large.
+  double area(std::uint32_t t) const {
+    const double side = kLarge * reach_;
+    return glm::length(area_vector(t)) / (side * side);
+  }
+
+  Surface surface_of(std::uint32_t t) const {
+    const Material& m = material(t);
+    return {.normal = to_float3(glm::normalize(area_vector(t))),
+            .emits = m.emitted_luminance != Float3{0, 0, 0},
+            .front_reflects = sides_[t].front != SideKind::kBuried,
+            .back_reflects = m.double_sided && sides_[t].back != SideKind::kBuried};
   }
 
   /// Gathers the lit sides of double-sided triangles, fronts first.
   void group_candidates() {
     for (const bool front : {true, false}) {
+      bool open = false;      // others may join the last group
+      glm::dvec3 middle(0);  // of its first triangle
       for (std::uint32_t t = 0; t < sides_.size(); ++t) {
         const std::uint32_t side = 2 * t + (front ? 0 : 1);
         if (kind(side) != SideKind::kLit || !material(t).double_sided) continue;
-        if (!joins_group(side)) {
-          group_begin_.push_back(static_cast<std::uint32_t>(candidates_.size()));
+        const auto [p, q, r] = corners(t);
+        const glm::dvec3 centroid = (p + q + r) / 3.0;
+        const bool small = area(t) <= 1;
+        if (!small || !middle || candidates_.size() - group_begin_.back() == kGroup ||
+            glm::distance(centroid, middle) > kGroupReach * reach_) {
+          group_begin_.push_back(candidates_.size());
+          open = small;
+          middle = centroid;
         }
         candidates_.push_back(side);
       }
     }
-    group_begin_.push_back(static_cast<std::uint32_t>(candidates_.size()));
+    group_begin_.push_back(candidates_.size());
   }
 
-  /// True if a side is like the first of the last group, and there is room for it.
-  bool joins_group(std::uint32_t side) const {
-    if (group_begin_.empty() || candidates_.size() - group_begin_.back() >= kGroup) return false;
-    const std::uint32_t first = candidates_[group_begin_.back()];
-    return first % 2 == side % 2 && area(first / 2) <= 1 && area(side / 2) <= 1 &&
-           glm::distance(centroid(first / 2), centroid(side / 2)) <= kGroupReach * reach_;
-  }
-
-  glm::dvec3 centroid(std::uint32_t t) const {
-    const auto [a, b, c] = scene_.triangle[t];
-    return (to_dvec3(scene_.position[a]) + to_dvec3(scene_.position[b]) +
-            to_dvec3(scene_.position[c])) /
-           3.0;
-  }
-
-  /// Tells what all of a group are, if that is clear.
-  Verdict look_at(std::span<const std::uint32_t> group, Scratch& scratch) const {
-    if (group.size() == 1) return Verdict::kDoubt;
-    const std::size_t count = std::max<std::size_t>(kClear, kGroupPaths * group.size());
-    std::uint32_t out = count_paths_out(group, 0, kFirstPaths, scratch);
-    if (out >= 2 * kClearlyLit * kFirstPaths) return Verdict::kLit;
-    out += count_paths_out(group, kFirstPaths, count, scratch);
-    if (out == 0) return Verdict::kInside;
-    return out >= kClearlyLit * static_cast<double>(count) ? Verdict::kLit : Verdict::kDoubt;
-  }
-
-  /// Tells whether of so many paths that the sides take in turn none gets out.
-  bool is_none_out(std::span<const std::uint32_t> sides, std::size_t count,
-                   Scratch& scratch) const {
-    for (std::size_t begin = 0, end = 4; begin < count; begin = end, end *= 4) {
-      end = std::min(end, count);
-      if (count_paths_out(sides, begin, end, scratch) > 0) return false;
+  /// Judges groups [begin, end), and buries what is inside.
+  void judge_groups(std::size_t begin, std::size_t end) {
+#pragma omp parallel
+    {
+      Scratch scratch;
+      std::vector<Suspect> group;
+#pragma omp for schedule(dynamic, 8)
+      for (std::size_t g = begin; g < end; ++g) {
+        group.clear();
+        for (std::size_t k = group_begin_[g]; k < group_begin_[g + 1]; ++k) {
+          group.push_back({.side = candidates_[k]});
+        }
+        judge(group, scratch);
+        for (const Suspect& suspect : group) {
+          if (suspect.verdict == Verdict::kInside) kind(suspect.side) = SideKind::kBuried;
+        }
+      }
     }
-    return true;
   }
 
-  /// In such squares as are large.
-  double area(std::uint32_t t) const {
-    const auto [a, b, c] = scene_.triangle[t];
-    const glm::dvec3 p = to_dvec3(scene_.position[a]);
-    const glm::dvec3 cross =
-        glm::cross(to_dvec3(scene_.position[b]) - p, to_dvec3(scene_.position[c]) - p);
-    return 0.5 * glm::length(cross) / std::pow(kLarge * reach_, 2);
-  }
-
-  bool is_inside(std::uint32_t side, Scratch& scratch) const {
-    if (const double size = area(side / 2); size > 1) {
-      const auto paths = static_cast<std::size_t>(std::min<double>(kMostPaths, kClear * size));
-      return is_none_out({&side, 1}, paths, scratch);
+  void judge(std::span<Suspect> group, Scratch& scratch) const {
+    if (group.size() > 1) judge_together(group, scratch);
+    for (Suspect& suspect : group) {
+      if (suspect.verdict == Verdict::kDoubt) suspect.verdict = judge_alone(suspect, scratch);
     }
-    std::uint32_t begin = 0, out = 0;
+  }
+
+  /// Judges those sides of a group that are like the others.
+  void judge_together(std::span<Suspect> group, Scratch& scratch) const {
+    const std::size_t enough = std::max(kPathsOfSide, divide_up(kLeastPaths, group.size()));
+    follow(group, divide_up(kFirstPaths, group.size()), scratch);
+    if (part_out(group) >= kFirstLit) return judge_all(group, Verdict::kLit);
+    follow(group, enough, scratch);
+    if (part_out(group) >= kLit) return judge_all(group, Verdict::kLit);
+    if (part_out(group) == 0) return judge_all(group, Verdict::kInside);
+    follow(group, 2 * enough, scratch);
+    const bool few = part_out(group) <= kFew;
+    for (Suspect& suspect : group) {
+      const double part = part_out({&suspect, 1});
+      if (few && part == 0) suspect.verdict = Verdict::kInside;
+      if (!few && part >= kLit) suspect.verdict = Verdict::kLit;
+    }
+  }
+
+  static void judge_all(std::span<Suspect> group, Verdict verdict) {
+    for (Suspect& suspect : group) suspect.verdict = verdict;
+  }
+
+  static std::size_t divide_up(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
+
+  /// The part of all paths of a group that is out.
+  static double part_out(std::span<const Suspect> group) {
+    int out = 0;
+    std::uint32_t paths = 0;
+    for (const Suspect& suspect : group) {
+      out += suspect.out;
+      paths += suspect.paths;
+    }
+    return static_cast<double>(out) / paths;
+  }
+
+  Verdict judge_alone(Suspect& suspect, Scratch& scratch) const {
+    if (const double size = area(suspect.side / 2); size > 1) {
+      return judge_large(suspect, size, scratch);
+    }
     for (const Look& look : kLooks) {
-      out += count_paths_out({&side, 1}, begin, look.paths, scratch);
-      if (out > look.most_out) return false;
-      if (out == 0 && look.paths >= kClear) return true;
-      begin = look.paths;
+      if (look.paths <= suspect.paths) continue;
+      follow({&suspect, 1}, look.paths, scratch);
+      if (suspect.out <= look.inside) return Verdict::kInside;
+      if (suspect.out >= look.lit) break;
     }
-    return true;
+    return Verdict::kLit;
   }
 
-  /// How many of the paths [begin, end) get out, which the sides take in turn.
-  std::uint32_t count_paths_out(std::span<const std::uint32_t> sides, std::size_t begin,
-                                std::size_t end, Scratch& scratch) const {
-    scratch.rays.resize(end - begin);
-    for (std::size_t k = begin; k < end; ++k) {
-      scratch.rays[k - begin] = start_path(sides[k % sides.size()], static_cast<std::uint32_t>(k));
+  Verdict judge_large(Suspect& suspect, double size, Scratch& scratch) const {
+    const auto paths = static_cast<std::size_t>(
+        std::min<double>(kMostPaths, std::ceil(kPathsOfSquare * size)));
+    for (std::size_t end = 4; suspect.out == 0 && suspect.paths < paths; end *= 4) {
+      follow({&suspect, 1}, std::min(end, paths), scratch);
     }
-    std::uint32_t out = 0;
+    return suspect.out == 0 ? Verdict::kInside : Verdict::kLit;
+  }
+
+  /// Follows paths from the sides of a group until there are `paths` of each.
+  void follow(std::span<Suspect> group, std::size_t paths, Scratch& scratch) const {
+    scratch.rays.clear();
+    for (std::uint32_t k = 0; k < group.size(); ++k) {
+      start_paths(group[k], k, paths, scratch.rays);
+    }
     for (int bounce = 0; bounce < kBounces && !scratch.rays.empty(); ++bounce) {
       scratch.hits.resize(scratch.rays.size());
       tracer_.intersect(scratch.rays, scratch.hits);
@@ -193,58 +253,57 @@ class EnclosedSides {
       for (std::size_t k = 0; k < scratch.rays.size(); ++k) {
         const Ray& ray = scratch.rays[k];
         const Hit& hit = scratch.hits[k];
+        Suspect& suspect = group[ray.id >> kPathBits];
         if (is_out(hit)) {
-          ++out;
+          ++suspect.out;
         } else if (reflects(hit)) {
-          const std::uint64_t bits = path_bits(sides[ray.id % sides.size()], ray.id, bounce);
+          const std::uint64_t bits = path_bits(suspect.side, ray.id, bounce);
           if (bits % 2 == 0) scratch.rays[kept++] = reflect(ray, hit, mix_bits(bits));
         }
       }
       scratch.rays.resize(kept);
     }
-    return out;
   }
 
-  static std::uint64_t path_bits(std::uint32_t side, std::uint32_t path, int bounce) {
-    return mix_bits(mix_bits(side) ^ (std::uint64_t{path} << 8 | static_cast<unsigned>(bounce)));
+  static std::uint64_t path_bits(std::uint32_t side, std::uint32_t id, int bounce) {
+    const std::uint64_t path = id % (1U << kPathBits);
+    return mix_bits(mix_bits(side) ^ (path << 8 | static_cast<unsigned>(bounce)));
   }
 
-  Ray start_path(std::uint32_t side, std::uint32_t path) const {
-    std::array<glm::dvec3, 3> corner;
-    for (int k = 0; k < 3; ++k) {
-      corner[k] = to_dvec3(scene_.position[scene_.triangle[side / 2][k]]);
+  /// Appends the first rays of paths [suspect.paths, paths) of side `number` of a group.
+  void start_paths(Suspect& suspect, std::uint32_t number, std::size_t paths,
+                   std::vector<Ray>& rays) const {
+    const std::size_t begin = rays.size();
+    rays.resize(begin + paths - suspect.paths);
+    const std::span<Ray> started = std::span(rays).subspan(begin);
+    const std::uint32_t t = suspect.side / 2;
+    make_hemisphere_rays(corners(t), to_dvec3(normal(t, suspect.side % 2 == 0)), tracer_,
+                         mix_bits(suspect.side), started, suspect.paths);
+    for (Ray& ray : started) {
+      ray.t_far = static_cast<float>(reach_);
+      ray.id = number << kPathBits | suspect.paths++;
     }
-    Ray ray{};
-    make_hemisphere_rays(corner, normal(side / 2, side % 2 == 0), tracer_, mix_bits(side),
-                         {&ray, 1}, path);
-    ray.id = path;
-    return ray;
   }
 
-  glm::dvec3 normal(std::uint32_t t, bool front) const {
-    const auto [a, b, c] = scene_.triangle[t];
-    const glm::dvec3 p = to_dvec3(scene_.position[a]);
-    const glm::dvec3 cross =
-        glm::cross(to_dvec3(scene_.position[b]) - p, to_dvec3(scene_.position[c]) - p);
-    return glm::normalize(cross) * (front ? 1.0 : -1.0);
+  Float3 normal(std::uint32_t t, bool front) const {
+    const Float3& n = surface_[t].normal;
+    return front ? n : Float3{-n[0], -n[1], -n[2]};
   }
 
-  bool is_out(const Hit& hit) const {
-    return hit.triangle == kNone || hit.t > reach_ || emits(hit.triangle);
-  }
+  bool is_out(const Hit& hit) const { return hit.triangle == kNone || surface_[hit.triangle].emits; }
 
-  /// Backs of one-sided surfaces absorb, and so does what is buried already.
   bool reflects(const Hit& hit) const {
-    if (hit.front) return sides_[hit.triangle].front != SideKind::kBuried;
-    return material(hit.triangle).double_sided && sides_[hit.triangle].back != SideKind::kBuried;
+    const Surface& surface = surface_[hit.triangle];
+    return hit.front ? surface.front_reflects : surface.back_reflects;
   }
 
   /// Goes on from where `ray` has met something, in a direction that `bits` choose.
   Ray reflect(const Ray& ray, const Hit& hit, std::uint64_t bits) const {
-    const glm::dvec3 place = to_dvec3(ray.origin) + double{hit.t} * to_dvec3(ray.direction);
-    const glm::dvec3 n = normal(hit.triangle, hit.front);
-    const glm::dvec3 direction = frame_around(n) * square_to_cosine_hemisphere(unit_square(bits));
-    Ray next = make_free_ray({to_float3(place), to_float3(n)}, glm::vec3(direction), tracer_);
+    const glm::vec3 place = to_glm(ray.origin) + hit.t * to_glm(ray.direction);
+    const Float3 n = normal(hit.triangle, hit.front);
+    const glm::vec3 direction = NormalFrame().turn(n, to_cosine_direction(unit_square(bits)));
+    Ray next = make_free_ray({to_float3(place), n}, direction, tracer_);
+    next.t_far = static_cast<float>(reach_);
     next.id = ray.id;
     return next;
   }
@@ -252,16 +311,17 @@ class EnclosedSides {
   const Scene& scene_;
   const RayTracer& tracer_;
   std::vector<TriangleSides>& sides_;
-  double reach_;                            ///< metres
-  std::vector<std::uint32_t> candidates_;   ///< sides
-  std::vector<std::uint32_t> group_begin_;  ///< [g + 1] in candidates_
+  std::vector<Surface> surface_;           ///< [t]
+  double reach_;                           ///< metres
+  std::vector<std::uint32_t> candidates_;  ///< sides
+  std::vector<std::size_t> group_begin_;   ///< [g + 1] in candidates_
 };
 
 }  // namespace
 
 void bury_enclosed_sides(const Scene& scene, const RayTracer& tracer,
-                         std::vector<TriangleSides>& sides) {
-  EnclosedSides(scene, tracer, sides).run();
+                         std::vector<TriangleSides>& sides, const Progress& progress) {
+  EnclosedSides(scene, tracer, sides).run(progress);
 }
 
 }  // namespace rebounce

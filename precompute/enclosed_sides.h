@@ -14,11 +14,14 @@ namespace rebounce {
 /// at every bounce: so a wall that closes a shell, or passes through it, is inside where it is. A
 /// path is out where it meets no surface within 1.5 m or a quarter of the scene's diagonal, or one
 /// that emits; a side of whose paths no more than 4 % get out is inside. So a shell may have
-/// cracks, and a room is none. Four paths tell of most sides that they are not inside, and 64 that
-/// eight close together are; up to 128 are followed only where that is in doubt.
+/// cracks, and a room is none.
 ///
-/// `scene`, `tracer` and `sides` [t] as for find_lit_sides(). Deterministic.
+/// Up to eight sides close together are judged by 16 paths of theirs where these say that they are
+/// lit, by 64 where they are alike; only those that differ from the others, or are in between, by up
+/// to 128 of their own.
+///
+/// `scene`, `tracer` and `sides` [t] as for find_lit_sides(). Deterministic. Throws Cancelled.
 void bury_enclosed_sides(const Scene& scene, const RayTracer& tracer,
-                         std::vector<TriangleSides>& sides);
+                         std::vector<TriangleSides>& sides, const Progress& progress);
 
 }  // namespace rebounce

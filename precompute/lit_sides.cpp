@@ -13,15 +13,17 @@ namespace rebounce {
 namespace {
 
 // A side that sees less than about one part in this many of other surfaces counts as seeing none.
-// Most see one at once: the first batch of rays is small, and each is four times as many as before.
-constexpr std::uint32_t kRaysPerSide = 256, kFirstRays = 4;
+// Most see one at once: the first ray is traced alone, and then as many as make four times as many.
+constexpr std::uint32_t kRaysPerSide = 256, kFirstRays = 1;
 
 // Backs nearer than this part of the scene's diagonal may be of the solid that a side is in; those
 // farther off may be of a room that is lit.
 constexpr double kBuriedReach = 1.0 / 16;
 
-// Triangles between two looks at the progress.
+// Triangles between two looks at the progress, which is this far when sides have been looked at by
+// themselves.
 constexpr std::size_t kBatch = 1 << 15;
+constexpr double kAfterLooking = 0.4;
 
 // Points at which a side is looked at for copies of itself.
 constexpr std::uint32_t kPointsPerSide = 32;
@@ -205,8 +207,9 @@ class LitSides {
 
 std::vector<TriangleSides> find_lit_sides(const Scene& scene, const RayTracer& tracer,
                                           const Progress& progress) {
-  std::vector<TriangleSides> sides = LitSides(scene, tracer).find(progress);
-  bury_enclosed_sides(scene, tracer, sides);
+  std::vector<TriangleSides> sides =
+      LitSides(scene, tracer).find(part_of(progress, 0, kAfterLooking));
+  bury_enclosed_sides(scene, tracer, sides, part_of(progress, kAfterLooking, 1));
   return sides;
 }
 

@@ -12,6 +12,7 @@
 #include "edge_table.h"
 #include "hemisphere_rays.h"
 #include "rebounce/precompute/subdivision.h"
+#include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
 namespace {
@@ -246,7 +247,10 @@ class InsideOutSearch {
 
 }  // namespace
 
-std::vector<InsideOutPiece> find_inside_out(const Scene& scene, const RayTracer& tracer) {
+std::vector<InsideOutPiece> find_inside_out(const Scene& scene) {
+  const auto is_one_sided = [&](std::uint32_t m) { return !scene.materials[m].double_sided; };
+  if (std::ranges::none_of(scene.triangle_material, is_one_sided)) return {};
+  const RayTracer tracer(scene.position, scene.triangle, {}, TreeQuality::kQuick);
   return InsideOutSearch(scene, tracer).run();
 }
 

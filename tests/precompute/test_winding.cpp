@@ -14,15 +14,10 @@ namespace {
 
 constexpr bool kInwards = true, kOutwards = false;
 
-std::vector<InsideOutPiece> find(const Scene& scene) {
-  const RayTracer tracer(scene.position, scene.triangle);
-  return find_inside_out(scene, tracer);
-}
-
 // The triangles of all pieces, ascending.
 std::vector<std::uint32_t> turned(const Scene& scene) {
   std::vector<std::uint32_t> triangles;
-  for (const InsideOutPiece& piece : find(scene)) {
+  for (const InsideOutPiece& piece : find_inside_out(scene)) {
     triangles.insert(triangles.end(), piece.triangle.begin(), piece.triangle.end());
   }
   std::sort(triangles.begin(), triangles.end());
@@ -50,19 +45,19 @@ void flip(Scene& scene, std::uint32_t t) {
 }
 
 TEST(Winding, RoomWithClosedSolidsIsRight) {
-  EXPECT_TRUE(find(furnished_room(kInwards, kOutwards)).empty());
+  EXPECT_TRUE(find_inside_out(furnished_room(kInwards, kOutwards)).empty());
 }
 
 TEST(Winding, EmptyRoomIsRight) {
   Scene scene = test::empty_scene();
   test::add_box(scene, {0, 0, 0}, {5, 3, 4}, kInwards);
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 TEST(Winding, RoomThatFacesOutwardsIsFoundAndItsFurnitureIsNot) {
   const Scene scene = furnished_room(kOutwards, kOutwards);
   EXPECT_EQ(turned(scene), range(0, 12));
-  const auto pieces = find(scene);
+  const auto pieces = find_inside_out(scene);
   ASSERT_EQ(pieces.size(), 1U);
   EXPECT_NEAR(pieces[0].area, 94, 1e-4);
   EXPECT_EQ(pieces[0].front_share, 0);
@@ -94,21 +89,21 @@ TEST(Winding, OuterShellOfARoomIsRight) {
   test::add_box(scene, {-0.2, -0.2, -0.2}, {5.2, 3.2, 4.2}, kOutwards);
   const std::vector<glm::dvec3> ground{{-20, -1, 20}, {20, -1, 20}, {20, -1, -20}, {-20, -1, -20}};
   test::add_polygon(scene, ground);
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 TEST(Winding, PosterOnAWallIsRight) {
   Scene scene = furnished_room(kInwards, kOutwards);
   const std::vector<glm::dvec3> poster{{1, 1, 0.001}, {2, 1, 0.001}, {2, 2, 0.001}, {1, 2, 0.001}};
   test::add_polygon(scene, poster);
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 TEST(Winding, SolidWithoutABottomIsRight) {
   Scene scene = furnished_room(kInwards, kOutwards);
   scene.triangle.erase(scene.triangle.begin() + 16, scene.triangle.begin() + 18);  // its -y face
   scene.triangle_material.resize(scene.triangle.size());
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 TEST(Winding, SecondSidesThatAreCopiesAreRight) {
@@ -118,19 +113,19 @@ TEST(Winding, SecondSidesThatAreCopiesAreRight) {
     scene.triangle_material.push_back(0);
     flip(scene, static_cast<std::uint32_t>(scene.triangle.size() - 1));
   }
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 TEST(Winding, DoubleSidedSurfacesAreRight) {
   Scene scene = furnished_room(kOutwards, kInwards);
   scene.materials[0].double_sided = true;
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 TEST(Winding, IsTheSameEveryTime) {
   const Scene scene = furnished_room(kOutwards, kOutwards);
-  const auto first = find(scene);
-  const auto second = find(scene);
+  const auto first = find_inside_out(scene);
+  const auto second = find_inside_out(scene);
   ASSERT_EQ(first.size(), 1U);
   ASSERT_EQ(second.size(), 1U);
   EXPECT_EQ(first[0].triangle, second[0].triangle);
@@ -139,7 +134,7 @@ TEST(Winding, IsTheSameEveryTime) {
 
 TEST(Winding, OnlyTheTurnedTrianglesBecomeDoubleSided) {
   Scene scene = furnished_room(kOutwards, kOutwards);
-  make_double_sided(scene, find(scene));
+  make_double_sided(scene, find_inside_out(scene));
   ASSERT_EQ(scene.materials.size(), 2U);
   EXPECT_FALSE(scene.materials[0].double_sided);
   EXPECT_TRUE(scene.materials[1].double_sided);
@@ -148,7 +143,7 @@ TEST(Winding, OnlyTheTurnedTrianglesBecomeDoubleSided) {
   }
   ASSERT_EQ(scene.warnings.size(), 1U);
   EXPECT_TRUE(scene.warnings[0].starts_with("12 triangles")) << scene.warnings[0];
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 /// Of the scenes that people made, the breakfast room alone has such pieces: the rubber feet of its
@@ -160,7 +155,7 @@ TEST(Winding, ScenesThatPeopleMadeAreRight) {
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() != ".glb") continue;
     SCOPED_TRACE(entry.path().filename().string());
-    const auto pieces = find(import_gltf(entry.path()));
+    const auto pieces = find_inside_out(import_gltf(entry.path()));
     const bool is_breakfast_room = entry.path().filename() == "16_breakfast_room.glb";
     EXPECT_EQ(pieces.size(), is_breakfast_room ? 4U : 0U);
     for (const InsideOutPiece& piece : pieces) EXPECT_LT(piece.area, 0.01);

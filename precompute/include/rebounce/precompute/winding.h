@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "rebounce/precompute/scene.h"
-#include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
 
@@ -30,8 +29,8 @@ struct InsideOutPiece {
 /// solids, outer shells of rooms, posters on walls are not: their backs are not seen, or their
 /// fronts are too.
 ///
-/// `tracer` holds the scene's triangles in order. Deterministic. Largest piece first.
-std::vector<InsideOutPiece> find_inside_out(const Scene& scene, const RayTracer& tracer);
+/// Deterministic. Largest piece first. Throws Error if there is no memory for a ray tracer.
+std::vector<InsideOutPiece> find_inside_out(const Scene& scene);
 
 /// Gives the triangles of `pieces` double-sided copies of their materials, and the scene a warning
 /// where there are any.
