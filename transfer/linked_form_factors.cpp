@@ -6,8 +6,7 @@
 #include <cstring>
 #include <string>
 
-#include "bfloat16.h"
-#include "link_kernels.h"
+#include "link_gather.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -19,11 +18,6 @@ namespace {
 
 // Trees of fewer nodes than this are walked before threads have met at every level.
 constexpr std::size_t kWorthThreads = 16384;
-
-template <typename Lanes>
-void add(Lanes& to, float factor, const Lanes& from) {
-  for (std::size_t c = 0; c < to.size(); ++c) to[c] += factor * from[c];
-}
 
 std::array<std::uint16_t, 3> bfloat16s(const float* values) {
   return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
@@ -187,22 +181,29 @@ std::size_t LinkedFormFactors::workspace_size() const {
 
 void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
                                std::span<float> workspace) const {
-  assert(in.size() == patch_count() && out.size() == patch_count() &&
-         workspace.size() >= workspace_size());
+  assert(workspace.size() >= workspace_size());
   auto* light = reinterpret_cast<LinkLight*>(workspace.data());
-  LinkLight* arrived = light + node_.size();
-  pull(in, light);
-  gather_nodes(light, arrived);
-  push(arrived, out);
+  gather(in, out, light, light + node_.size(), link_kernels().gather);
 }
 
 template <typename Columns>
 void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
-  assert(in.size() == patch_count() && out.size() == patch_count());
   std::vector<LinkLightOf<Columns>> light(node_.size()), arrived(node_.size());
-  pull(in, light.data());
-  gather_nodes(light.data(), arrived.data());
-  push(arrived.data(), out);
+  gather(in, out, light.data(), arrived.data(), gather_along_links<Columns>);
+}
+
+template <typename Columns, typename Lanes>
+void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out,
+                               LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived,
+                               GatherAlongLinks<Lanes> gather_node) const {
+  assert(in.size() == patch_count() && out.size() == patch_count());
+  pull(in, light);
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t k = 0; k < node_.size(); ++k) {
+    arrived[k] = gather_node(incoming_.data() + incoming_begin_[k],
+                             incoming_begin_[k + 1] - incoming_begin_[k], light);
+  }
+  push(arrived, out);
 }
 
 template <typename Columns, typename Lanes>
@@ -219,43 +220,15 @@ void LinkedFormFactors::pull(std::span<const Columns> in, LinkLightOf<Lanes>* li
       } else {
         for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
           const Node& child = node_[c];
-          add(sum.mean, child.part, light[c].mean);
+          add_scaled(sum.mean, child.part, light[c].mean);
           for (int axis = 0; axis < 3; ++axis) {
-            add(sum.first[axis], child.part, light[c].first[axis]);
-            add(sum.first[axis], child.part * child.from_parent[axis], light[c].mean);
+            add_scaled(sum.first[axis], child.part, light[c].first[axis]);
+            add_scaled(sum.first[axis], child.part * child.from_parent[axis], light[c].mean);
           }
         }
       }
       light[k] = sum;
     }
-  }
-}
-
-template <typename Lanes>
-void LinkedFormFactors::gather_nodes(const LinkLightOf<Lanes>* light,
-                                     LinkLightOf<Lanes>* arrived) const {
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t k = 0; k < node_.size(); ++k) {
-    LinkLightOf<Lanes> sum{};
-    for (std::uint64_t l = incoming_begin_[k]; l < incoming_begin_[k + 1]; ++l) {
-      const IncomingLink& link = incoming_[l];
-      const LinkLightOf<Lanes>& from = light[link.from];
-      add(sum.mean, link.exchange_area, from.mean);
-      for (int axis = 0; axis < 3; ++axis) {
-        add(sum.mean, bfloat16_to_float(link.gradient_from[axis]), from.first[axis]);
-        add(sum.first[axis], bfloat16_to_float(link.gradient_to[axis]), from.mean);
-      }
-    }
-    arrived[k] = sum;
-  }
-}
-
-void LinkedFormFactors::gather_nodes(const LinkLight* light, LinkLight* arrived) const {
-  const LinkKernels& kernels = link_kernels();
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t k = 0; k < node_.size(); ++k) {
-    arrived[k] = kernels.gather(incoming_.data() + incoming_begin_[k],
-                                incoming_begin_[k + 1] - incoming_begin_[k], light);
   }
 }
 
@@ -275,10 +248,10 @@ void LinkedFormFactors::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out
       }
       for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
         const Node& child = node_[c];
-        add(arrived[c].mean, child.part, here.mean);
+        add_scaled(arrived[c].mean, child.part, here.mean);
         for (int axis = 0; axis < 3; ++axis) {
-          add(arrived[c].mean, child.part * child.from_parent[axis], here.first[axis]);
-          add(arrived[c].first[axis], child.part, here.first[axis]);
+          add_scaled(arrived[c].mean, child.part * child.from_parent[axis], here.first[axis]);
+          add_scaled(arrived[c].first[axis], child.part, here.first[axis]);
         }
       }
     }

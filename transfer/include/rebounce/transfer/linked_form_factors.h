@@ -82,13 +82,17 @@ class LinkedFormFactors final : public FormFactorOperator {
   void build_tree(const FormFactorLinks& links, std::span<const float> area,
                   std::span<const Float3> centroid);
   void sort_links(const FormFactorLinks& links);
+
+  /// What arrives at one node along its links.
+  template <typename Lanes>
+  using GatherAlongLinks = LinkLightOf<Lanes> (*)(const IncomingLink* link, std::size_t count,
+                                                  const LinkLightOf<Lanes>* light);
+  /// Pulls, gathers and pushes; `light` and `arrived` are [m].
+  template <typename Columns, typename Lanes>
+  void gather(std::span<const Columns> in, std::span<Columns> out, LinkLightOf<Lanes>* light,
+              LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node) const;
   template <typename Columns, typename Lanes>
   void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const;
-  template <typename Lanes>
-  void gather_nodes(const LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived) const;
-  /// Of one light in single precision, by the widest kernels.
-  void gather_nodes(const LinkLightOf<std::array<float, 4>>* light,
-                    LinkLightOf<std::array<float, 4>>* arrived) const;
   template <typename Lanes, typename Columns>
   void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const;
 
