@@ -53,12 +53,10 @@ std::vector<Node> make_nodes(const FormFactorLinks& links, std::span<const float
                              std::span<const Float3> centroid) {
   const std::size_t m = links.first_child.size();
   std::vector<Node> nodes(m);
-  std::vector<std::uint32_t> begin(m, 0);
+  const std::vector<std::uint32_t> begin = first_positions(links);
   for (std::uint32_t k = 0; k < m; ++k) {
     const std::uint32_t child = links.first_child[k];
     if (child == kNone) continue;
-    begin[child] = begin[k];
-    begin[child + 1] = begin[k] + links.count[child];
     nodes[child].parent = nodes[child + 1].parent = k;
     nodes[child].sibling = child + 1;
     nodes[child + 1].sibling = child;

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "links_by_node.h"
 #include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/transfer_data.h"
 #include "symmetric_matrix.h"
@@ -34,15 +35,13 @@ class LinkedMatrix final : public SymmetricMatrix {
   class Filler;
 
   void measure_nodes();
-  void sort_links();
 
   const FormFactorLinks& links_;
   const PatchTable& patches_;
   LinkedFormFactors product_;
-  std::vector<std::uint32_t> position_;        ///< [n] of each patch
-  std::vector<Node> nodes_;                    ///< [m]
-  std::vector<std::uint64_t> incident_begin_;  ///< [m + 1]
-  std::vector<std::uint32_t> incident_;        ///< links by their nodes, those of a pair twice
+  std::vector<std::uint32_t> position_;  ///< [n] of each patch
+  std::vector<Node> nodes_;              ///< [m]
+  LinksByNode links_of_node_;
 };
 
 }  // namespace rebounce

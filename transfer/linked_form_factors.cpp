@@ -7,6 +7,7 @@
 #include <string>
 
 #include "link_gather.h"
+#include "links_by_node.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -23,16 +24,13 @@ std::array<std::uint16_t, 3> bfloat16s(const float* values) {
   return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
 }
 
-/// Position of the first patch of each node.
-std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
-  std::vector<std::uint32_t> begin(links.first_child.size(), 0);
-  for (std::size_t k = 0; k < begin.size(); ++k) {
-    const std::uint32_t child = links.first_child[k];
-    if (child == kNone) continue;
-    begin[child] = begin[k];
-    begin[child + 1] = begin[k] + links.count[child];
-  }
-  return begin;
+IncomingLink seen_from(std::uint32_t node, const FormFactorLinks& links, std::uint32_t link) {
+  const auto [a, b] = links.pair[link];
+  const float exchange = links.exchange_area[link];
+  const auto of_a = bfloat16s(links.gradient[link].data());
+  const auto of_b = bfloat16s(links.gradient[link].data() + 3);
+  if (a == node) return {of_b, of_a, b, exchange};
+  return {of_a, of_b, a, exchange};
 }
 
 /// Children follow each other level by level, and are as large as their parent together.
@@ -97,6 +95,17 @@ void check_links(const FormFactorLinks& links, std::size_t patch_count) {
   check_values(links);
 }
 
+std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
+  std::vector<std::uint32_t> begin(links.first_child.size(), 0);
+  for (std::size_t k = 0; k < begin.size(); ++k) {
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) continue;
+    begin[child] = begin[k];
+    begin[child + 1] = begin[k] + links.count[child];
+  }
+  return begin;
+}
+
 LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                                      std::span<const Float3> centroid)
     : scale_(links.scale) {
@@ -152,21 +161,14 @@ void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const
 
 /// Every link twice, once for each of its nodes, by the node that gathers.
 void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
-  incoming_begin_.assign(node_.size() + 1, 0);
-  for (const auto& [a, b] : links.pair) {
-    ++incoming_begin_[a + 1];
-    if (a != b) ++incoming_begin_[b + 1];
-  }
-  for (std::size_t k = 0; k < node_.size(); ++k) incoming_begin_[k + 1] += incoming_begin_[k];
-  incoming_.resize(incoming_begin_.back());
-  std::vector<std::uint64_t> next(incoming_begin_.begin(), incoming_begin_.end() - 1);
-  for (std::size_t k = 0; k < links.pair.size(); ++k) {
-    const auto [a, b] = links.pair[k];
-    const float exchange = links.exchange_area[k];
-    const auto of_a = bfloat16s(links.gradient[k].data());
-    const auto of_b = bfloat16s(links.gradient[k].data() + 3);
-    incoming_[next[a]++] = {of_b, of_a, b, exchange};
-    if (a != b) incoming_[next[b]++] = {of_a, of_b, a, exchange};
+  const LinksByNode of_node(node_.size(), links.pair.size(),
+                            [&](std::size_t k) { return links.pair[k]; });
+  incoming_begin_ = of_node.offsets();
+  incoming_.reserve(incoming_begin_.back());
+  for (std::uint32_t node = 0; node < node_.size(); ++node) {
+    for (const std::uint32_t link : of_node[node]) {
+      incoming_.push_back(seen_from(node, links, link));
+    }
   }
 }
 

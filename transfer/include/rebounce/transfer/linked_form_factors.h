@@ -37,6 +37,9 @@ struct FormFactorLinks {
 /// and links between its nodes.
 void check_links(const FormFactorLinks& links, std::size_t patch_count);
 
+/// [m] The position in `links`, which must be checked, of the first patch of each node.
+std::vector<std::uint32_t> first_positions(const FormFactorLinks& links);
+
 /// A link as the node that gathers along it sees it: 20 bytes. Gradients are corrections, and are
 /// kept as bfloat16, the upper half of a float.
 struct IncomingLink {
