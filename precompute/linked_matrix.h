@@ -19,8 +19,6 @@ class LinkedMatrix final : public SymmetricMatrix {
   LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches);
 
   std::span<const float> area() const override { return patches_.area; }
-  std::uint32_t matrix_count() const override { return 1; }
-  std::array<std::uint32_t, kChannelCount> channel_matrix() const override { return {0, 0, 0}; }
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
