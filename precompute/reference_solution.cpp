@@ -230,12 +230,15 @@ std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
   const auto solutions =
       solve(form_, patches_, initial_exitances, residual, Quantity::kIndirectIrradiance);
   std::vector<std::vector<Float3>> result;
-  for (const std::vector<Double3>& h : solutions) {
-    std::vector<Float3>& rounded = result.emplace_back(h.size());
-    std::ranges::transform(h, rounded.begin(), [](const Double3& v) {
-      return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
-    });
-  }
+  for (const std::vector<Double3>& h : solutions) result.push_back(rounded(h));
+  return result;
+}
+
+std::vector<Float3> rounded(std::span<const Double3> solution) {
+  std::vector<Float3> result(solution.size());
+  std::ranges::transform(solution, result.begin(), [](const Double3& v) {
+    return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+  });
   return result;
 }
 
