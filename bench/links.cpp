@@ -199,9 +199,7 @@ class SceneBench {
 
   double gather_error(const LinkedFormFactors& links) const {
     const std::vector<Float3> light = smooth_light();
-    std::vector<Float3> arrived(light.size());
-    std::vector<float> workspace(links.workspace_size());
-    links.gather(light, arrived, workspace);
+    const std::vector<Float3> arrived = gather(links, light);
     double difference = 0, norm = 0;
     for (std::size_t k = 0; k < rows_.patch.size(); ++k) {
       double wanted = 0;

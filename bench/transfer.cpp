@@ -143,17 +143,10 @@ class TransferBenchmark {
   /// H [n] in lx as this entry has it.
   std::vector<Float3> indirect_irradiance(const Entry& entry,
                                           const std::vector<Float3>& light) const {
-    std::vector<Float3> result(light.size());
-    if (entry.transfer) {
-      std::vector<float> workspace(entry.transfer->workspace_size());
-      entry.transfer->apply(light, result, workspace);
-      return result;
-    }
+    if (entry.transfer) return product(*entry.transfer, light);
     entry.method->forget();
     entry.method->run(light, entry.sweeps);
-    std::vector<float> workspace(entry.form_factors->workspace_size());
-    entry.form_factors->gather(entry.method->radiosity(), result, workspace);
-    return result;
+    return gather(*entry.form_factors, entry.method->radiosity());
   }
 
   Errors errors_of(const Entry& entry, const Lights& lights) const {

@@ -204,12 +204,8 @@ class Coarsening {
 
 std::vector<Float3> row_sums(const FormFactorLinks& links, std::span<const float> area,
                              std::span<const Float3> centroid) {
-  const LinkedFormFactors form_factors(links, area, centroid);
-  const std::vector<Float3> ones(area.size(), {1, 1, 1});
-  std::vector<Float3> sums(area.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(ones, sums, workspace);
-  return sums;
+  return gather(LinkedFormFactors(links, area, centroid),
+                std::vector<Float3>(area.size(), {1, 1, 1}));
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ using Field = Eigen::Array<double, kRows, Eigen::Dynamic>;
 
 /// F times `in`.
 template <int kRows>
-Field<kRows> gather(const FormFactorRows& rows, const Field<kRows>& in) {
+Field<kRows> times(const FormFactorRows& rows, const Field<kRows>& in) {
   Field<kRows> out(kRows, in.cols());
 #pragma omp parallel for schedule(dynamic, 64)
   for (Eigen::Index i = 0; i < in.cols(); ++i) {
@@ -37,7 +37,7 @@ Field<kRows> gather(const FormFactorRows& rows, const Field<kRows>& in) {
 }
 
 template <int kRows>
-Field<kRows> gather(const LinkedFormFactors& links, const Field<kRows>& in) {
+Field<kRows> times(const LinkedFormFactors& links, const Field<kRows>& in) {
   using Columns = std::array<double, kRows>;
   std::vector<Columns> from(in.cols()), to(in.cols());
   const auto size = static_cast<std::size_t>(in.size());
@@ -48,7 +48,7 @@ Field<kRows> gather(const LinkedFormFactors& links, const Field<kRows>& in) {
 
 /// Light after light, in single precision.
 template <int kRows>
-Field<kRows> gather(const CompressedFormFactors& compressed, const Field<kRows>& in) {
+Field<kRows> times(const CompressedFormFactors& compressed, const Field<kRows>& in) {
   Field<kRows> out(kRows, in.cols());
   std::vector<Float3> from(in.cols()), to(in.cols());
   std::vector<float> workspace(compressed.workspace_size());
@@ -104,7 +104,7 @@ class ConjugateGradients {
 
   /// F times `in`.
   Field gather(const Field& in) const {
-    return std::visit([&](const auto& form) { return rebounce::gather<kRows>(form, in); }, form_);
+    return std::visit([&](const auto& form) { return times<kRows>(form, in); }, form_);
   }
 
  private:

@@ -43,13 +43,6 @@ class TruthScene {
   std::vector<Light> lights_;
 };
 
-std::vector<Float3> product(const TransferOperator& transfer, std::span<const Float3> exitance) {
-  std::vector<Float3> indirect(exitance.size());
-  std::vector<float> workspace(transfer.workspace_size());
-  transfer.apply(exitance, indirect, workspace);
-  return indirect;
-}
-
 /// H [n] in lx of the same patches with better form factors.
 std::vector<Float3> better_solution(const std::string& scene, const ReportSettings& settings,
                                     std::span<const Float3> exitance,

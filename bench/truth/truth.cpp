@@ -140,10 +140,7 @@ class TruthBench {
     const SolveResult result = solve_radiosity(
         kMethod, *form_factors, {patches.area, patches.reflectance}, exitance, {}, radiosity);
     if (!result.converged) throw Error(options_.scene + ": the solver did not converge");
-    std::vector<Float3> indirect(patches.size());
-    std::vector<float> workspace(form_factors->workspace_size());
-    form_factors->gather(radiosity, indirect, workspace);
-    return indirect;
+    return gather(*form_factors, radiosity);
   }
 
   /// |H - truth| of each patch, as a part of the truth's root mean square.

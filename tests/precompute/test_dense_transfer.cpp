@@ -23,10 +23,7 @@ struct Solved {
   std::shared_ptr<const DenseOperator> transfer;
 
   std::vector<Float3> indirect(const std::vector<Float3>& m0) const {
-    std::vector<Float3> h(m0.size());
-    std::vector<float> workspace(transfer->workspace_size());
-    transfer->apply(m0, h, workspace);
-    return h;
+    return product(*transfer, m0);
   }
 };
 
@@ -106,10 +103,9 @@ TEST(DenseTransfer, CubeRowsOfTheTable) {
     const ExchangeMatrix exchange{SharedArray(begin), SharedArray(column),
                                   SharedArray(exchange_area)};
     const auto transfer = build_dense_transfer(exchange, patches, Precision::kF32);
-    std::vector<Float3> m0(6), h(6);
+    std::vector<Float3> m0(6);
     m0[0] = {1, 1, 1};
-    std::vector<float> workspace(transfer->workspace_size());
-    transfer->apply(m0, h, workspace);
+    const std::vector<Float3> h = product(*transfer, m0);
     // Six-digit form factors, and 1 / (1 - rho) of them.
     const double allowed = 1e-6 / (1 - row.rho);
     EXPECT_NEAR(1 + row.rho * h[0][0], row.top, allowed);

@@ -52,13 +52,6 @@ std::vector<std::vector<Float3>> lights_in(const PatchTable& patches, int count,
   return test::unshadowed_lights(patches, count, seed, 2.2, 0.7);
 }
 
-std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
-  std::vector<Float3> result(light.size());
-  std::vector<float> workspace(transfer.workspace_size());
-  transfer.apply(light, result, workspace);
-  return result;
-}
-
 double mean_error(const Room& room, const TransferOperator& transfer,
                   const std::vector<std::vector<Float3>>& lights) {
   double sum = 0;
@@ -223,7 +216,7 @@ TEST(HierarchicalTransfer, TakesOnePatchAndNoLights) {
   const ExchangeMatrix exchange{SharedArray(std::vector<std::uint64_t>(2)), {}, {}};
   const auto dense = build_dense_transfer(exchange, patches, Precision::kF32);
   const auto transfer = build_hierarchical_transfer(*dense, patches, {}, {});
-  EXPECT_EQ(product(*transfer, {{1, 1, 1}})[0], (Float3{0, 0, 0}));
+  EXPECT_EQ(product(*transfer, std::vector<Float3>{{1, 1, 1}})[0], (Float3{0, 0, 0}));
 }
 
 TEST(HierarchicalTransfer, StopsWhenAsked) {

@@ -87,13 +87,10 @@ std::size_t file_count(const std::filesystem::path& folder) {
 }
 
 double mean_error(const Room& room, const TransferOperator& transfer, const Lights& lights) {
-  std::vector<float> workspace(std::max(transfer.workspace_size(), room.dense->workspace_size()));
-  std::vector<Float3> result(room.patches.size()), truth(room.patches.size());
   double sum = 0;
   for (const auto& light : lights) {
-    transfer.apply(light, result, workspace);
-    room.dense->apply(light, truth, workspace);
-    sum += relative_difference(result, truth, room.patches.area);
+    sum += relative_difference(product(transfer, light), product(*room.dense, light),
+                               room.patches.area);
   }
   return sum / static_cast<double>(lights.size());
 }
@@ -176,13 +173,9 @@ TEST(LargeTransfer, TakesAFewPatchesAndNoLights) {
       compress_matrix(FormFactorMatrix(f.exchange, model.patches.area), model.patches, {}, 1e-16));
   const auto large = build_large_transfer(form_factors, model.patches, {}, {});
   const auto dense = build_dense_transfer(f.exchange, model.patches, Precision::kF32);
-  const std::size_t n = model.patches.size();
-  const std::vector<Float3> light(n, {1, 1, 1});
-  std::vector<Float3> result(n), truth(n);
-  std::vector<float> workspace(std::max(large->workspace_size(), dense->workspace_size()));
-  large->apply(light, result, workspace);
-  dense->apply(light, truth, workspace);
-  EXPECT_LT(relative_difference(result, truth, model.patches.area), 0.005);
+  const std::vector<Float3> light(model.patches.size(), {1, 1, 1});
+  EXPECT_LT(relative_difference(product(*large, light), product(*dense, light), model.patches.area),
+            0.005);
 }
 
 TEST(LargeTransfer, SameBitsForAnyNumberOfThreads) {

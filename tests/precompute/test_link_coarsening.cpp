@@ -54,11 +54,7 @@ Walls two_walls(const std::function<double(double, double)>& exchange) {
 
 std::vector<Float3> gathered(const Walls& walls, const FormFactorLinks& links,
                              const std::vector<Float3>& light) {
-  const LinkedFormFactors form_factors(links, walls.area, walls.centroid);
-  std::vector<Float3> result(light.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(light, result, workspace);
-  return result;
+  return gather(LinkedFormFactors(links, walls.area, walls.centroid), light);
 }
 
 /// Of the symmetric form, Frobenius.

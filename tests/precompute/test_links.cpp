@@ -63,13 +63,6 @@ const Furnished& furnished() {
   return room;
 }
 
-std::vector<Float3> gather(const FormFactorOperator& form_factors, std::span<const Float3> in) {
-  std::vector<Float3> out(in.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(in, out, workspace);
-  return out;
-}
-
 LinkedFormFactors operator_of(const LinkBuild& build, const PatchTable& patches) {
   return {build.links, patches.area, patches.centroid};
 }

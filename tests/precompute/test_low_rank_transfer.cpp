@@ -89,13 +89,6 @@ double least_error(const Eigen::MatrixXd& symmetric, int rank) {
   return std::sqrt(sum);
 }
 
-std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
-  std::vector<Float3> result(light.size());
-  std::vector<float> workspace(transfer.workspace_size());
-  transfer.apply(light, result, workspace);
-  return result;
-}
-
 std::vector<Float3> smooth_light(const PatchTable& patches) {
   std::vector<Float3> light;
   for (const Float3& p : patches.centroid) light.push_back({p[0] + 1, p[1] + 1, p[2] + 1});

@@ -101,9 +101,7 @@ double difference(std::span<const Float3> a, const std::vector<std::array<double
 TEST(CompressedFormFactors, GatherIsTheMatrix) {
   const System system(333, 1, Precision::kF32);
   const CompressedFormFactors form_factors(system.exchange);
-  std::vector<Float3> gathered(333);
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(system.light, gathered, workspace);
+  const std::vector<Float3> gathered = gather(form_factors, system.light);
   std::vector<std::array<double, 3>> expected(333, {0, 0, 0});
   for (std::size_t i = 0; i < 333; ++i) {
     for (std::size_t j = 0; j < 333; ++j) {

@@ -87,9 +87,7 @@ TEST(LinkedFormFactors, GatherIsTheDenseProduct) {
   const FormFactorLinks links = sample_links();
   const LinkedFormFactors form_factors(links, kArea, kCentroid);
   const std::vector<Float3> in = {{1, 0, 2}, {0.5F, 1, 0}, {3, 0, 1}, {0, 2, 4}};
-  std::vector<Float3> out(kPatchCount);
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(in, out, workspace);
+  const std::vector<Float3> out = gather(form_factors, in);
   const auto f = dense_of(links);
   for (std::size_t i = 0; i < kPatchCount; ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
@@ -108,10 +106,7 @@ TEST(LinkedFormFactors, OnePatchIsATree) {
   links.scale = {1};
   const LinkedFormFactors form_factors(links, std::vector<float>{2},
                                        std::vector<Float3>{{1, 1, 1}});
-  std::vector<Float3> in = {{1, 2, 3}}, out(1);
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(in, out, workspace);
-  EXPECT_EQ(out[0], (Float3{0, 0, 0}));
+  EXPECT_EQ(gather(form_factors, std::vector<Float3>{{1, 2, 3}})[0], (Float3{0, 0, 0}));
 }
 
 TEST(LinkedFormFactors, RefuseWhatIsNotATreeWithLinks) {

@@ -82,11 +82,9 @@ TransferData sample_data(Precision precision, bool first_bounce) {
 }
 
 std::vector<Float3> relit(const TransferData& data) {
-  std::vector<Float3> light(kPatchCount), result(kPatchCount);
+  std::vector<Float3> light(kPatchCount);
   for (std::size_t i = 0; i < kPatchCount; ++i) light[i] = {1.0F + i % 7, 2, 0.1F * i};
-  std::vector<float> workspace(data.transfer->workspace_size());
-  data.transfer->apply(light, result, workspace);
-  return result;
+  return product(*data.transfer, light);
 }
 
 TEST(LowRankFile, RoundTrips) {
