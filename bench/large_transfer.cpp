@@ -20,6 +20,7 @@
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/precompute/winding.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/reflection.h"
 #include "single_threaded_blas.h"
 #include "solved_transfer.h"
 
@@ -134,10 +135,7 @@ class SceneBench {
       for (int bounce = 0; bounce < 2; ++bounce) {
         std::vector<Float3> h(m0.size());
         product.gather(b, h, workspace);
-        for (std::size_t i = 0; i < h.size(); ++i) {
-          for (int c = 0; c < kChannelCount; ++c)
-            b[i][c] = m0[i][c] + data_.patches.reflectance[i][c] * h[i][c];
-        }
+        add_reflected(m0, data_.patches.reflectance, h, b);
       }
     }
     return radiosities;

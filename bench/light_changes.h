@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -27,6 +28,9 @@ inline constexpr std::array kMotions = {0.01, 0.05, 0.2};
 std::vector<LightChange> light_changes(const TransferData& data,
                                        std::span<const double> motions = kMotions,
                                        std::uint64_t seed = 1);
+
+/// What the patches give off first, M0 [n] in lx, under one lamp. Throws Error if that is nothing.
+std::vector<Float3> light_of(const Light& lamp, const TransferData& data, DirectLighting& direct);
 
 /// `count` point lights of 1 cd in the free space of the scene (random_point_lights), without those
 /// that light less than a twentieth of its surface, as from inside of a box. The same `seed`, the

@@ -10,6 +10,7 @@
 #include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/reflection.h"
 
 namespace rebounce {
 namespace {
@@ -104,9 +105,7 @@ std::vector<Exitance> lit_by(const TransferData& data, const RayTracer& tracer,
   const auto add = [&](std::span<const Light> light, const Sky& with_sky) {
     Exitance exitance(data.patches.size());
     direct_lighting.compute(light, with_sky, exitance);
-    for (std::size_t i = 0; i < exitance.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
-    }
+    reflect(data.patches.reflectance, exitance);
     if (area_norm(exitance, data.patches.area) > 0) exitances.push_back(std::move(exitance));
   };
   if (sky.luminance > 0) add({}, sky);

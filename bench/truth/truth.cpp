@@ -23,6 +23,7 @@
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/reflection.h"
 #include "reference/compare.h"
 #include "reference/key_light.h"
 
@@ -130,12 +131,7 @@ class TruthBench {
     std::vector<Float3> exitance(patches.size()), radiosity(patches.size());
     DirectLighting(data, tracer, {.points_per_patch = options_.direct_points})
         .compute(setup_.lights, setup_.sky, exitance);
-    for (std::size_t i = 0; i < exitance.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        exitance[i][c] =
-            patches.reflectance[i][c] * exitance[i][c] + patches.emitted_exitance[i][c];
-      }
-    }
+    add_reflected(patches.emitted_exitance, patches.reflectance, exitance, exitance);
     const auto form_factors = make_form_factors(kMethod, data.exchange, patches.area);
     const SolveResult result = solve_radiosity(
         kMethod, *form_factors, {patches.area, patches.reflectance}, exitance, {}, radiosity);

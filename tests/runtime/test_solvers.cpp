@@ -16,6 +16,7 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/reflection.h"
 #include "test_scene_data.h"
 
 namespace rebounce {
@@ -115,11 +116,7 @@ class SeriesOperator final : public TransferOperator {
     std::ranges::copy(initial_exitance, b.begin());
     for (int bounce = 0; bounce < 40; ++bounce) {
       form_factors_.gather(b, indirect_irradiance, workspace.subspan(kChannelCount * n));
-      for (std::size_t i = 0; i < n; ++i) {
-        for (int c = 0; c < kChannelCount; ++c) {
-          b[i][c] = initial_exitance[i][c] + reflectance_[i][c] * indirect_irradiance[i][c];
-        }
-      }
+      add_reflected(initial_exitance, reflectance_, indirect_irradiance, b);
     }
     for (Float3& h : indirect_irradiance) {
       for (float& x : h) x *= scale_;
