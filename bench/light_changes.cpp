@@ -94,8 +94,7 @@ double scene_diagonal(const TransferData& data) {
 
 std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
                                        std::uint64_t seed) {
-  const RayTracer tracer(data.mesh.position,
-                         std::span(data.mesh.triangle).first(data.mesh.surface_count()));
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting direct(data, tracer);
   const double size = scene_diagonal(data);
   const auto [lamp, other] = find_places(data, tracer, 0.2 * size, seed);

@@ -45,8 +45,7 @@ class OfflineStage {
       : scene_(scene),
         options_(options),
         model_(make_patch_model(import_gltf(scene), options.settings.subdivision)),
-        tracer_(model_.mesh.position,
-                std::span(model_.mesh.triangle).first(model_.mesh.surface_count())),
+        tracer_(make_surface_tracer(model_.mesh)),
         matrix_(test_matrix(model_.patches.size())) {}
 
   void measure() {

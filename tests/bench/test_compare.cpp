@@ -37,7 +37,7 @@ struct Furnace {
   }
 
   RayTracer mesh_tracer() const {
-    return {data.mesh.position, std::span(data.mesh.triangle).first(data.mesh.surface_count())};
+    return make_surface_tracer(data.mesh);
   }
 
   std::vector<Float3> uniform(float value) const {

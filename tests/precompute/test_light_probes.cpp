@@ -31,10 +31,6 @@ const TransferData& cornell_box() {
   return data;
 }
 
-RayTracer tracer_of(const TransferData& data) {
-  return {data.mesh.position, std::span(data.mesh.triangle).first(data.mesh.surface_count())};
-}
-
 /// Irradiance at a point in the air by brute force: many cosine-distributed rays, and the
 /// radiosity of what each meets.
 Float3 gather(const TransferData& data, const RayTracer& tracer, std::span<const Float3> radiosity,
@@ -179,7 +175,7 @@ TEST(LightProbes, EveryDirectionIsPatchOrSkyOrBack) {
 TEST(LightProbes, BehindWallsTheyAreNotValid) {
   // Probes outside of the one-sided box see backs.
   const TransferData& data = cornell_box();
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   LightProbes probes;
   const Float3 middle = data.probes.position[1 + 4 * (1 + 3 * 1)];
   probes.position = {middle, {middle[0], middle[1] - 10, middle[2]}};
@@ -189,7 +185,7 @@ TEST(LightProbes, BehindWallsTheyAreNotValid) {
 
 TEST(LightProbes, SameBitsForAnyNumberOfThreads) {
   const TransferData& data = cornell_box();
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   LightProbes probes = place_probes(data.mesh, {.grid = {3, 2, 2}});
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
@@ -209,7 +205,7 @@ TEST(LightProbes, SpacingAndLimits) {
   test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "further apart");
   LightProbes few = place_probes(data.mesh, {.grid = {1, 1, 1}});
   test::expect_error(
-      [&] { trace_probes(data, data.mesh.triangle_patch, tracer_of(data), {.ray_count = 3}, few); },
+      [&] { trace_probes(data, data.mesh.triangle_patch, make_surface_tracer(data.mesh), {.ray_count = 3}, few); },
       "64 rays");
 }
 
