@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
 
 #include "exchange_error.h"
 #include "exchange_reference.h"
 #include "form_factor_scaling.h"
 #include "form_factor_sums.h"
+#include "input.h"
 #include "known_form_factors.h"
 #include "program.h"
 #include "rebounce/precompute/import_gltf.h"
@@ -143,7 +143,7 @@ void measure_sphere(int longitudes, Report& report) {
 class SceneBench {
  public:
   SceneBench(const std::string& path, const Options& options, Report& report)
-      : name_(std::filesystem::path(path).stem().string()),
+      : name_(scene_name(path)),
         options_(options),
         report_(report),
         model_(make_patch_model(import_gltf(path), {.patch_count = options.patch_count})),
@@ -242,7 +242,7 @@ class SceneBench {
 /// From some patches to many, with links; the exponent is over the whole range.
 void measure_growth(const std::string& scene, const Options& options, LinkedForm form,
                     Report& report) {
-  const std::string name = std::filesystem::path(scene).stem().string();
+  const std::string name = scene_name(scene);
   const char* what = form == LinkedForm::kLinks ? "links" : "pairs";
   std::vector<ScalingSample> samples;
   for (const std::size_t count : options.scaling_patches) {

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -64,7 +63,7 @@ class HierarchicalBench {
   HierarchicalBench(const std::string& scene, std::size_t patch_count,
                     const HierarchicalOptions& options)
       : options_(options),
-        scene_(std::filesystem::path(scene).stem().string()),
+        scene_(scene_name(scene)),
         model_(model_of_scene(scene, patch_count)),
         tracer_(make_surface_tracer(model_.mesh)) {
     draw_lights();

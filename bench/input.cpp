@@ -1,7 +1,5 @@
 #include "input.h"
 
-#include <filesystem>
-
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/winding.h"
 #include "rebounce/runtime/ray_tracer.h"
@@ -24,8 +22,12 @@ PatchModel model_of_scene(const std::string& path, std::size_t patch_count) {
   return make_patch_model(std::move(scene), {.patch_count = patch_count});
 }
 
+std::string scene_name(const std::filesystem::path& scene) {
+  return scene.stem().string();
+}
+
 std::string scene_name(const TransferData& data) {
-  return std::filesystem::path(data.record.scene_name).stem().string();
+  return scene_name(data.record.scene_name);
 }
 
 }  // namespace rebounce::bench

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "hierarchical_matrix.h"
+#include "input.h"
 #include "linked_matrix.h"
 #include "program.h"
 #include "rebounce/precompute/dense_transfer.h"
@@ -258,7 +259,7 @@ void run(const LargeOptions& options) {
   for (const std::string& scene : options.scenes) {
     for (const std::size_t patches : options.patches) {
       SceneBench(scene, patches, options)
-          .measure(std::filesystem::path(scene).stem().string(), table);
+          .measure(scene_name(scene), table);
     }
   }
   publish("bench_large", table, options.common);

@@ -226,7 +226,7 @@ void run(const LinksOptions& options) {
   Table table({"scene", "patches", "epsilon", "links", "links / n2", "rays", "/ all pairs",
                "time / all pairs", "error of F", "error of F B"});
   for (const std::string& scene : options.scenes) {
-    const std::string name = std::filesystem::path(scene).stem().string();
+    const std::string name = scene_name(scene);
     for (const std::size_t patches : options.patches) {
       SceneBench bench(scene, patches, options);
       for (const double epsilon : options.epsilons) bench.measure(epsilon, name, table);

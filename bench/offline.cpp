@@ -1,11 +1,11 @@
 // The offline stage by phase, beside what bare Embree and BLAS reach in the same run.
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <optional>
 
 #include "blas_peak.h"
+#include "input.h"
 #include "program.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/import_gltf.h"
@@ -91,7 +91,7 @@ class OfflineStage {
   void row(Table& table, const std::string& what, const Timing& time, const Table::Cell& rate = {},
            const Table::Cell& unit = {}, const Table::Cell& ratio = {},
            const Table::Cell& baseline = {}) const {
-    table.add({std::filesystem::path(scene_).stem().string(), model_.patches.size(), what,
+    table.add({scene_name(scene_), model_.patches.size(), what,
                time.median, time.spread, rate, unit, ratio, baseline});
   }
 

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "console.h"
+#include "input.h"
 #include "program.h"
 #include "rebounce/transfer/error.h"
 #include "report.h"
@@ -95,7 +96,7 @@ void run(const Options& options) {
   for (const std::string& scene : options.scenes) {
     for (const std::size_t patch_count : options.patch_counts) {
       const std::string name =
-          fmt::format("{}-{}", std::filesystem::path(scene).stem().string(), patch_count);
+          fmt::format("{}-{}", scene_name(scene), patch_count);
       PhaseSeconds phases;
       const ReportProgress progress = [&](std::string_view phase, double part) {
         phases.enter(phase);
@@ -104,7 +105,7 @@ void run(const Options& options) {
       const ReportSettings settings = settings_for(options, patch_count);
       const auto begin = std::chrono::steady_clock::now();
       nlohmann::ordered_json json = provenance("bench_report", options.common);
-      json["scene"] = std::filesystem::path(scene).stem().string();
+      json["scene"] = scene_name(scene);
       json["settings"] = json_of(settings, options.quick);
       json.update(measure_scene(scene, settings, options.folder, name, progress));
       const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
