@@ -288,10 +288,7 @@ int main(int argc, char** argv) {
   rebounce::bench::ApplyOptions options;
   CLI::App app("Times a relight beside the bandwidth of memory in the same run.", "bench_apply");
   rebounce::bench::add_input_option(app, options.inputs);
-  app.add_option("--patches", options.settings.subdivision.patch_count,
-                 "Patches of each scene, about")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);
   add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

@@ -174,10 +174,7 @@ int main(int argc, char** argv) {
   rebounce::bench::FrameOptions options;
   CLI::App app("Times the stages of a frame, with 1, 4 and 16 lights.", "bench_frame");
   rebounce::bench::add_input_option(app, options.inputs);
-  app.add_option("--patches", options.settings.subdivision.patch_count,
-                 "Patches of each scene, about")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);
   app.add_option("--probes", options.settings.probes.spacing,
                  "Light probes this many metres apart, of scenes that are built")
       ->check(CLI::PositiveNumber);

@@ -244,8 +244,8 @@ int main(int argc, char** argv) {
   HierarchicalOptions options;
   CLI::App app("Hierarchical radiosity beside sweeps on the form factors of all pairs",
                "bench_hierarchical");
-  app.add_option("scenes", options.scenes, "Scenes (.glb or .gltf)")->required();
-  app.add_option("--patches", options.patches, "Numbers of patches")->capture_default_str();
+  add_scene_option(app, options.scenes);
+  add_patches_option(app, options.patches);
   app.add_option("--epsilon", options.epsilons, "Errors that a link may have")
       ->capture_default_str();
   app.add_option("--coarsen", options.coarsening, "Errors for which links are merged again")

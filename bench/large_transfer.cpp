@@ -270,17 +270,20 @@ void run(const LargeOptions& options) {
 
 int main(int argc, char** argv) {
   rebounce::bench::LargeOptions options;
-  CLI::App app("Builds operators without any matrix of all pairs, and some by way of one.");
-  rebounce::bench::add_input_option(app, options.scenes);
-  app.add_option("--patches", options.patches, "patch counts")->delimiter(',');
-  app.add_option("--tolerance", options.tolerance, "of the operator")->capture_default_str();
-  app.add_option("--form-factor-tolerance", options.form_factor_tolerance, "of compressed F")
+  CLI::App app("Builds operators without any matrix of all pairs, and some by way of one.",
+               "bench_large");
+  rebounce::bench::add_scene_option(app, options.scenes);
+  rebounce::bench::add_patches_option(app, options.patches);
+  app.add_option("--tolerance", options.tolerance, "Error of the operator")->capture_default_str();
+  app.add_option("--form-factor-tolerance", options.form_factor_tolerance, "Error of compressed F")
       ->capture_default_str();
-  app.add_option("--dense-limit", options.dense_limit, "patches with which the dense way is gone")
+  app.add_option("--dense-limit", options.dense_limit,
+                 "Up to this many patches the dense way is gone too")
       ->capture_default_str();
-  app.add_option("--residuals", options.residuals, "residuals to try on some columns")
+  app.add_option("--residuals", options.residuals,
+                 "Residuals to try on some columns, separated by commas")
       ->delimiter(',');
-  app.add_option("--checkpoint", options.checkpoint, "folder for finished panels");
+  app.add_option("--checkpoint", options.checkpoint, "Folder for finished panels");
   rebounce::bench::add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

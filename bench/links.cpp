@@ -241,9 +241,9 @@ void run(const LinksOptions& options) {
 int main(int argc, char** argv) {
   using namespace rebounce::bench;
   LinksOptions options;
-  CLI::App app("Links between sets of patches beside all pairs of patches");
-  app.add_option("scenes", options.scenes, "Scenes (.glb or .gltf)")->required();
-  app.add_option("--patches", options.patches, "Numbers of patches")->capture_default_str();
+  CLI::App app("Links between sets of patches beside all pairs of patches", "bench_links");
+  add_scene_option(app, options.scenes);
+  add_patches_option(app, options.patches);
   app.add_option("--epsilon", options.epsilons, "Errors that a link may have")
       ->capture_default_str();
   app.add_option("--rows", options.row_count, "Rows of F that are found from all pairs")

@@ -158,11 +158,8 @@ int main(int argc, char** argv) {
   rebounce::bench::OfflineOptions options;
   CLI::App app("Times the offline stage by phase, beside bare Embree and BLAS in the same run.",
                "bench_offline");
-  app.add_option("scenes", options.scenes, "Scenes (.glb or .gltf)")->required();
-  app.add_option("--patches", options.settings.subdivision.patch_count,
-                 "Subdivide until there are about this many patches")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  rebounce::bench::add_scene_option(app, options.scenes);
+  rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);
   app.add_option("--ray-limit", options.ray_limit,
                  "Rays that lie ready for bare Embree at most, about 100 bytes each")
       ->check(CLI::Range(1e3, 1e9))

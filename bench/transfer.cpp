@@ -213,11 +213,8 @@ int main(int argc, char** argv) {
   rebounce::bench::TransferOptions options;
   CLI::App app("Compares all kinds of operators by bytes, error and time, on one thread.",
                "bench_transfer");
-  app.add_option("scenes", options.scenes, "Scenes: .glb or .gltf")->required();
-  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
-      ->check(CLI::Range(1, 1000000))
-      ->delimiter(',')
-      ->capture_default_str();
+  rebounce::bench::add_scene_option(app, options.scenes);
+  rebounce::bench::add_patches_option(app, options.patch_counts);
   rebounce::bench::add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

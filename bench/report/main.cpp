@@ -118,10 +118,7 @@ void run(const Options& options) {
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("scenes", options.scenes, "Scenes: .glb or .gltf");
-  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  add_patches_option(app, options.patch_counts);
   app.add_option("-o,--output", options.folder, "Folder for SCENE-PATCHES.json and pictures")
       ->capture_default_str();
   app.add_flag("--quick", options.quick, "A small part of everything");
@@ -136,9 +133,8 @@ void add_options(CLI::App& app, Options& options) {
                  "Timings of each thing; 0: 7, or 3 with --quick")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
-  app.add_option("--threads", options.common.threads, "Threads for all else; 0: one per processor")
-      ->check(CLI::Range(0, 4096))
-      ->capture_default_str();
+  add_threads_option(app, options.common)
+      ->description("Threads for all else; 0: one per processor");
 }
 
 }  // namespace
