@@ -1,8 +1,5 @@
 #include "input.h"
 
-#include "rebounce/precompute/import_gltf.h"
-#include "rebounce/precompute/winding.h"
-#include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::bench {
@@ -16,10 +13,7 @@ TransferData load_or_build(const std::string& input, const BuildSettings& settin
 }
 
 PatchModel model_of_scene(const std::string& path, std::size_t patch_count) {
-  Scene scene = import_gltf(path);
-  const RayTracer tracer(scene.position, scene.triangle);
-  make_double_sided(scene, find_inside_out(scene, tracer));
-  return make_patch_model(std::move(scene), {.patch_count = patch_count});
+  return make_patch_model(import_usable(path, 1), {.patch_count = patch_count});
 }
 
 std::string scene_name(const std::filesystem::path& scene) {

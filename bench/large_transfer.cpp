@@ -16,10 +16,8 @@
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/random_lights.h"
-#include "rebounce/precompute/winding.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/reflection.h"
 #include "single_threaded_blas.h"
@@ -71,9 +69,7 @@ class SceneBench {
  public:
   SceneBench(const std::string& path, std::size_t patch_count, const LargeOptions& options)
       : options_(options) {
-    Scene scene = import_gltf(path);
-    make_double_sided(scene, find_inside_out(scene, RayTracer(scene.position, scene.triangle)));
-    const PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
+    const PatchModel model = model_of_scene(path, patch_count);
     const RayTracer tracer = make_surface_tracer(model.mesh);
     data_.patches = model.patches;
     data_.mesh = model.mesh;
