@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "input.h"
 #include "rebounce/precompute/form_factors.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/links.h"
 #include "timing.h"
 
@@ -27,7 +27,7 @@ double processor_seconds(const rusage& u) {
 
 ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, double epsilon,
                               LinkedForm form) {
-  const PatchModel model = make_patch_model(import_gltf(path), {.patch_count = patch_count});
+  const PatchModel model = model_of_scene(path, patch_count);
   const RayTracer tracer = make_surface_tracer(model.mesh);
   FormFactorSettings settings;
   settings.link_epsilon = epsilon;

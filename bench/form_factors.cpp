@@ -13,7 +13,6 @@
 #include "input.h"
 #include "known_form_factors.h"
 #include "program.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_geometry.h"
 #include "rebounce/runtime/float3_glm.h"
@@ -146,7 +145,7 @@ class SceneBench {
       : name_(scene_name(path)),
         options_(options),
         report_(report),
-        model_(make_patch_model(import_gltf(path), {.patch_count = options.patch_count})),
+        model_(model_of_scene(path, options.patch_count)),
         tracer_(make_surface_tracer(model_.mesh)) {}
 
   void measure_convergence() {

@@ -8,7 +8,6 @@
 #include "input.h"
 #include "program.h"
 #include "rebounce/precompute/build.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/transfer/error.h"
 #include "stage_speed.h"
 #include "tiled_cholesky.h"
@@ -44,7 +43,7 @@ class OfflineStage {
   OfflineStage(const std::string& scene, const OfflineOptions& options)
       : scene_(scene),
         options_(options),
-        model_(make_patch_model(import_gltf(scene), options.settings.subdivision)),
+        model_(model_of_scene(scene, options.settings.subdivision.patch_count)),
         tracer_(make_surface_tracer(model_.mesh)),
         matrix_(test_matrix(model_.patches.size())) {}
 
