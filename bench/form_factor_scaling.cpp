@@ -1,29 +1,14 @@
 #include "form_factor_scaling.h"
 
-#include <sys/resource.h>
-
 #include <cmath>
 
 #include "input.h"
+#include "process_cost.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/links.h"
 #include "timing.h"
 
 namespace rebounce::bench {
-namespace {
-
-rusage usage() {
-  rusage result{};
-  getrusage(RUSAGE_SELF, &result);
-  return result;
-}
-
-double processor_seconds(const rusage& u) {
-  return static_cast<double>(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
-}  // namespace
 
 ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, double epsilon,
                               LinkedForm form) {
@@ -32,7 +17,7 @@ ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, 
   FormFactorSettings settings;
   settings.link_epsilon = epsilon;
   ScalingSample sample{.patch_count = model.patches.size()};
-  const double before = processor_seconds(usage());
+  const double before = processor_seconds();
   sample.wall_seconds = seconds_of([&] {
     if (form == LinkedForm::kLinks) {
       const LinkBuild build = build_links(model, tracer, settings);
@@ -44,8 +29,8 @@ ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, 
       sample.entry_count = f.exchange.column.size();
     }
   });
-  sample.processor_seconds = processor_seconds(usage()) - before;
-  sample.peak_bytes = 1024.0 * static_cast<double>(usage().ru_maxrss);
+  sample.processor_seconds = processor_seconds() - before;
+  sample.peak_bytes = static_cast<double>(peak_memory_bytes());
   return sample;
 }
 

@@ -3,8 +3,6 @@
 
 #include "rebounce/precompute/large_transfer.h"
 
-#include <sys/resource.h>
-
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <numeric>
@@ -12,6 +10,7 @@
 #include "hierarchical_matrix.h"
 #include "input.h"
 #include "linked_matrix.h"
+#include "process_cost.h"
 #include "program.h"
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/fitting_lights.h"
@@ -37,26 +36,8 @@ struct LargeOptions {
   CommonOptions common{.repeats = 1};
 };
 
-double processor_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime);
-}
-
-/// Processor seconds that `work` takes.
-double processor_seconds_of(const std::function<void()>& work) {
-  const double before = processor_seconds();
-  work();
-  return processor_seconds() - before;
-}
-
 double peak_gib() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / (1 << 20);
+  return static_cast<double>(peak_memory_bytes()) / 0x1p30;
 }
 
 using Lights = std::vector<std::vector<Float3>>;
