@@ -3,7 +3,6 @@
 #include "rebounce/precompute/dense_transfer.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <numbers>
 #include <random>
@@ -13,6 +12,7 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -172,12 +172,8 @@ TEST(DenseTransfer, IsLinearInTheLight) {
 TEST(DenseTransfer, SameBitsForAnyNumberOfThreads) {
   PatchModel model = make_patch_model(colourful_room(), {.patch_count = 600});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = build_dense_transfer(f.exchange, model.patches, Precision::kF32);
-  omp_set_num_threads(4);
-  const auto four = build_dense_transfer(f.exchange, model.patches, Precision::kF32);
-  omp_set_num_threads(before);
+  const auto make = [&] { return build_dense_transfer(f.exchange, model.patches, Precision::kF32); };
+  const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_TRUE(std::ranges::equal(one->storage().tiles_f32, four->storage().tiles_f32));
 }
 

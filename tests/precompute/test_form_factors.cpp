@@ -3,7 +3,6 @@
 #include "rebounce/precompute/form_factors.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <numeric>
@@ -11,6 +10,7 @@
 #include "form_factor_sums.h"
 #include "rebounce/transfer/error.h"
 #include "view_factor_table.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -205,12 +205,8 @@ TEST(FormFactors, QualityDecidesRaysAndLeavesTheRest) {
 
 TEST(FormFactors, SameBitsForAnyNumberOfThreads) {
   const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 400});
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const FormFactors one = form_factors_of(model);
-  omp_set_num_threads(3);
-  const FormFactors three = form_factors_of(model);
-  omp_set_num_threads(before);
+  const auto make = [&] { return form_factors_of(model); };
+  const FormFactors one = test::with_threads(1, make), three = test::with_threads(3, make);
   EXPECT_TRUE(std::ranges::equal(one.exchange.column, three.exchange.column));
   EXPECT_TRUE(std::ranges::equal(one.exchange.exchange_area, three.exchange.exchange_area));
   EXPECT_EQ(one.absorbed, three.absorbed);

@@ -3,7 +3,6 @@
 #include "rebounce/precompute/hierarchical_transfer.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
 #include "unshadowed_lights.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -140,14 +140,8 @@ TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
 
 TEST(HierarchicalTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = furnished_room();
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one =
-      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
-  omp_set_num_threads(4);
-  const auto four =
-      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
-  omp_set_num_threads(before);
+  const auto make = [&] { return compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7); };
+  const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_TRUE(std::ranges::equal(one.values_f32, four.values_f32));
   EXPECT_EQ(one.patch, four.patch);
 }

@@ -3,7 +3,6 @@
 #include "rebounce/precompute/large_transfer.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -20,6 +19,7 @@
 #include "temporary_folder.h"
 #include "test_scenes.h"
 #include "unshadowed_lights.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -180,12 +180,8 @@ TEST(LargeTransfer, TakesAFewPatchesAndNoLights) {
 
 TEST(LargeTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = grey_room();
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = build(room);
-  omp_set_num_threads(3);
-  const auto three = build(room);
-  omp_set_num_threads(before);
+  const auto make = [&] { return build(room); };
+  const auto one = test::with_threads(1, make), three = test::with_threads(3, make);
   expect_same(*one, *three);
 }
 

@@ -3,7 +3,6 @@
 #include "rebounce/precompute/links.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +18,7 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "test_scenes.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -277,23 +277,25 @@ TEST(Links, AreDimmedByGlass) {
 TEST(Links, SameBitsForAnyNumberOfThreads) {
   const PatchModel model = model_of(furnished_room(), 300);
   const std::vector<Float3> light = smooth_light(model.patches);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const LinkBuild one = links_of(model);
-  const std::vector<Float3> by_one = gather(operator_of(one, model.patches), light);
-  const FormFactors f_one = form_factors_of(model, kLinkEpsilon);
-  omp_set_num_threads(3);
-  const LinkBuild three = links_of(model);
-  const std::vector<Float3> by_three = gather(operator_of(three, model.patches), light);
-  const FormFactors f_three = form_factors_of(model, kLinkEpsilon);
-  omp_set_num_threads(before);
-  EXPECT_EQ(one.links.pair, three.links.pair);
-  EXPECT_EQ(one.links.exchange_area, three.links.exchange_area);
-  EXPECT_EQ(one.links.gradient, three.links.gradient);
-  EXPECT_EQ(one.links.scale, three.links.scale);
-  EXPECT_EQ(one.ray_count, three.ray_count);
-  EXPECT_EQ(by_one, by_three);
-  EXPECT_TRUE(std::ranges::equal(f_one.exchange.exchange_area, f_three.exchange.exchange_area));
+  struct Made {
+    LinkBuild build;
+    std::vector<Float3> gathered;
+    FormFactors pairs;
+  };
+  const auto make = [&] {
+    Made made{links_of(model), {}, form_factors_of(model, kLinkEpsilon)};
+    made.gathered = gather(operator_of(made.build, model.patches), light);
+    return made;
+  };
+  const Made one = test::with_threads(1, make), three = test::with_threads(3, make);
+  EXPECT_EQ(one.build.links.pair, three.build.links.pair);
+  EXPECT_EQ(one.build.links.exchange_area, three.build.links.exchange_area);
+  EXPECT_EQ(one.build.links.gradient, three.build.links.gradient);
+  EXPECT_EQ(one.build.links.scale, three.build.links.scale);
+  EXPECT_EQ(one.build.ray_count, three.build.ray_count);
+  EXPECT_EQ(one.gathered, three.gathered);
+  EXPECT_TRUE(
+      std::ranges::equal(one.pairs.exchange.exchange_area, three.pairs.exchange.exchange_area));
 }
 
 TEST(Links, StopWhenAskedTo) {

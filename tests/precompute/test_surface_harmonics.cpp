@@ -1,7 +1,6 @@
 #include "rebounce/precompute/surface_harmonics.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <numbers>
@@ -17,6 +16,7 @@
 #include "rebounce/runtime/vertex_light.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -185,14 +185,8 @@ TEST(SurfaceHarmonics, TheFileKeepsThemAndAFrameAllocatesNothing) {
 TEST(SurfaceHarmonics, SameBitsForAnyNumberOfThreads) {
   const TransferData& data = *cornell_box();
   const RayTracer tracer = make_surface_tracer(data.mesh);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const SurfaceHarmonics one =
-      trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64});
-  omp_set_num_threads(4);
-  const SurfaceHarmonics four =
-      trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64});
-  omp_set_num_threads(before);
+  const auto make = [&] { return trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64}); };
+  const SurfaceHarmonics one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_EQ(one.entry_weight, four.entry_weight);
   EXPECT_EQ(one.sky, four.sky);
   test::expect_error(

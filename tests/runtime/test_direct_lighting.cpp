@@ -1,12 +1,12 @@
 #include "rebounce/runtime/direct_lighting.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <numbers>
 
 #include "rebounce/transfer/error.h"
 #include "test_scene_data.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -98,12 +98,8 @@ TEST(DirectLighting, SameBitsForAnyNumberOfThreads) {
   test::add_square(data, 0.5F, 1, 4, true, {0.5F, 0.5F, 0.5F});
   Light lamp;
   lamp.position = {0.2F, 2, 0.1F};
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const std::vector<Float3> one = direct(data, {lamp});
-  omp_set_num_threads(4);
-  const std::vector<Float3> four = direct(data, {lamp});
-  omp_set_num_threads(before);
+  const auto make = [&] { return direct(data, {lamp}); };
+  const std::vector<Float3> one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_EQ(one, four);
 }
 

@@ -1,7 +1,6 @@
 // Every iterative method against dense elimination, on systems made by hand.
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +17,7 @@
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/reflection.h"
 #include "test_scene_data.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -308,16 +308,13 @@ TEST_P(EveryMethod, TakesOtherReflectancesExactly) {
 
 TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
   const Case c = make_case(0.8F);
-  const int threads = omp_get_max_threads();
-  std::vector<Float3> first;
-  for (const int count : {1, 2, 5}) {
-    omp_set_num_threads(count);
+  const auto solve = [&] {
     const auto solver = c.solver(method());
     solver->solve(c.system.initial_exitance, {.max_sweeps = 3, .residual = 0});
-    if (first.empty()) first = copy(solver->radiosity());
-    EXPECT_EQ(first, copy(solver->radiosity())) << count;
-  }
-  omp_set_num_threads(threads);
+    return copy(solver->radiosity());
+  };
+  const std::vector<Float3> one = test::with_threads(1, solve);
+  for (const int count : {2, 5}) EXPECT_EQ(one, test::with_threads(count, solve)) << count;
 }
 
 TEST_P(EveryMethod, ASolveDoesNotAllocate) {

@@ -1,7 +1,6 @@
 #include "rebounce/transfer/dense_operator.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "../../transfer/half_float.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -117,12 +117,8 @@ TEST(DenseOperator, SameBitsForAnyNumberOfThreads) {
   const RandomOperator random(777, 3, 6);
   const DenseOperator op(random.storage);
   const std::vector<Float3> m0 = random_light(777, 2);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const std::vector<Float3> one = apply(op, m0);
-  omp_set_num_threads(5);
-  const std::vector<Float3> five = apply(op, m0);
-  omp_set_num_threads(before);
+  const auto make = [&] { return apply(op, m0); };
+  const std::vector<Float3> one = test::with_threads(1, make), five = test::with_threads(5, make);
   EXPECT_EQ(one, five);
 }
 

@@ -1,7 +1,6 @@
 #include "rebounce/transfer/hierarchical_operator.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +16,7 @@
 #include "hierarchical_samples.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -151,16 +151,11 @@ TEST(HierarchicalOperator, RefusesShortsWhoseSumsCouldOverflow) {
 TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
   const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 6);
   const std::vector<Float3> m0 = random_light(777, 2);
-  const int before = omp_get_max_threads();
   for (const Precision precision : {Precision::kF32, Precision::kQ16}) {
     const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
-    omp_set_num_threads(1);
-    const std::vector<Float3> one = product(op, m0);
-    omp_set_num_threads(5);
-    const std::vector<Float3> five = product(op, m0);
-    EXPECT_EQ(one, five);
+    const auto multiply = [&] { return product(op, m0); };
+    EXPECT_EQ(test::with_threads(1, multiply), test::with_threads(5, multiply));
   }
-  omp_set_num_threads(before);
 }
 
 std::vector<Float3> batch_product(const TransferOperator& op, std::size_t lights,
