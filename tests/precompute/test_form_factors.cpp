@@ -19,15 +19,6 @@ FormFactors form_factors_of(const PatchModel& model, const FormFactorSettings& s
   return compute_form_factors(model, test::make_tracer(model), settings);
 }
 
-/// A room with a block that stands on its floor and one that hangs in the air.
-Scene furnished_room() {
-  Scene scene = test::empty_scene();
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
-  return scene;
-}
-
 TEST(FormFactors, AgreeWithEveryRowOfTheTable) {
   const auto cases =
       test::read_view_factors(REBOUNCE_SOURCE_DIR "/tests/reference/view_factors.tsv");
@@ -60,7 +51,7 @@ TEST(FormFactors, RowsBesideHoveringBlocksAddUpBeforeAnyCorrection) {
 }
 
 TEST(FormFactors, FurnishedRoomIsClosed) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 1200});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 1200});
   const FormFactors f = form_factors_of(model);
   const std::vector<double> sum = test::row_sums_of(model, f);
   for (std::size_t i = 0; i < sum.size(); ++i) {
@@ -74,7 +65,7 @@ TEST(FormFactors, FurnishedRoomIsClosed) {
 }
 
 TEST(FormFactors, EntriesAreSaneAndInOrder) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 800});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 800});
   const FormFactors f = form_factors_of(model);
   ASSERT_EQ(f.exchange.patch_count(), model.patches.size());
   for (std::size_t i = 0; i < model.patches.size(); ++i) {
@@ -204,7 +195,7 @@ TEST(FormFactors, QualityDecidesRaysAndLeavesTheRest) {
 }
 
 TEST(FormFactors, SameBitsForAnyNumberOfThreads) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 400});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 400});
   const auto make = [&] { return form_factors_of(model); };
   const FormFactors one = test::with_threads(1, make), three = test::with_threads(3, make);
   EXPECT_TRUE(std::ranges::equal(one.exchange.column, three.exchange.column));
@@ -213,7 +204,7 @@ TEST(FormFactors, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(FormFactors, AnotherSeedGivesNearlyTheSame) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 400});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 400});
   const FormFactors a = form_factors_of(model, {.seed = 1}),
                     b = form_factors_of(model, {.seed = 2});
   const auto total = [](const FormFactors& f) {
@@ -224,13 +215,13 @@ TEST(FormFactors, AnotherSeedGivesNearlyTheSame) {
 }
 
 TEST(FormFactors, StopsWhenAskedTo) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 400});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 400});
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(compute_form_factors(model, tracer, {}, [](double) { return false; }), Cancelled);
 }
 
 TEST(FormFactors, RefuseSettingsOutOfRange) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 50});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 50});
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(compute_form_factors(model, tracer, {.probe_rays = 0}), Error);
   EXPECT_THROW(compute_form_factors(model, tracer, {.full_rays = 257}), Error);

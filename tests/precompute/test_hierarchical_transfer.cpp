@@ -29,20 +29,10 @@ Room make_room(const Scene& scene, std::size_t patch_count) {
   return {model.patches, build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
 }
 
-/// A room with a black, a coloured and a raised box.
-Scene furnished_scene(bool grey) {
-  Scene scene = test::empty_scene(grey ? Float3{0.6F, 0.6F, 0.6F} : Float3{0.7F, 0.5F, 0.2F});
-  scene.materials.resize(3, scene.materials[0]);
-  scene.materials[1].base_color = {0, 0, 0};
-  if (!grey) scene.materials[2].base_color = {0.1F, 0.3F, 0.9F};
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 1);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false, 2);
-  return scene;
-}
-
+/// Coloured walls, a black block, another colour.
 const Room& furnished_room() {
-  static const Room room = make_room(furnished_scene(false), 1500);
+  static const Room room = make_room(
+      test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.1F, 0.3F, 0.9F}), 1500);
   return room;
 }
 
@@ -166,7 +156,8 @@ TEST(HierarchicalTransfer, BlackLampsAreCarriedWhereTheyAreNamed) {
 }
 
 TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
-  const Room room = make_room(furnished_scene(true), 800);
+  constexpr Float3 kGrey = {0.6F, 0.6F, 0.6F};
+  const Room room = make_room(test::furnished_room(kGrey, {0, 0, 0}, kGrey), 800);
   const HierarchicalOperator grey(
       compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7));
   EXPECT_EQ(grey.storage().matrix_count, 1U);

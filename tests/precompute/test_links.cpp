@@ -29,15 +29,6 @@ Scene empty_room() {
   return scene;
 }
 
-/// A room with a block that stands on its floor and one that hangs in the air.
-Scene furnished_room() {
-  Scene scene = test::empty_scene();
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
-  return scene;
-}
-
 PatchModel model_of(const Scene& scene, std::size_t patch_count = 600) {
   return make_patch_model(scene, {.patch_count = patch_count});
 }
@@ -53,7 +44,7 @@ FormFactors form_factors_of(const PatchModel& model, double epsilon) {
 
 /// What several tests look at, made once: the furnished room, its links and all its pairs.
 struct Furnished {
-  PatchModel model = model_of(furnished_room());
+  PatchModel model = model_of(test::furnished_room());
   LinkBuild build = links_of(model);
   FormFactors pairs = form_factors_of(model, 0);
 };
@@ -172,7 +163,7 @@ TEST(Links, ExpandToAllPairs) {
 
 TEST(Links, WithoutErrorAreAllPairs) {
   // But for what hemisphere rays add to pairs that are partly hidden.
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const FormFactors pairs = form_factors_of(model, 0), links = form_factors_of(model, 1e-30);
   const std::vector<Float3> light = smooth_light(model.patches);
   const auto gathered = [&](const FormFactors& f) {
@@ -197,7 +188,7 @@ TEST(Links, SmallerErrorsAreSmaller) {
 }
 
 TEST(Links, WeightsDecideWhereErrorsMatter) {
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const std::vector<float> ones(model.patches.size(), 1.0F), fewer(model.patches.size(), 0.1F);
   const std::size_t unweighted = links_of(model).links.pair.size();
   EXPECT_EQ(links_of(model, kLinkEpsilon, ones).links.pair.size(), unweighted);
@@ -275,7 +266,7 @@ TEST(Links, AreDimmedByGlass) {
 }
 
 TEST(Links, SameBitsForAnyNumberOfThreads) {
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const std::vector<Float3> light = smooth_light(model.patches);
   struct Made {
     LinkBuild build;
@@ -299,7 +290,7 @@ TEST(Links, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(Links, StopWhenAskedTo) {
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(
       build_links(model, tracer, {.link_epsilon = kLinkEpsilon}, {}, [](double) { return false; }),
@@ -307,7 +298,7 @@ TEST(Links, StopWhenAskedTo) {
 }
 
 TEST(Links, RefuseSettingsOutOfRange) {
-  const PatchModel model = model_of(furnished_room(), 50);
+  const PatchModel model = model_of(test::furnished_room(), 50);
   const RayTracer tracer = test::make_tracer(model);
   const std::vector<float> few(3, 1.0F);
   EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 0}), Error);

@@ -107,4 +107,26 @@ inline Scene room_with_block(const Float3& reflectance) {
   return scene;
 }
 
+/// The room with a block that stands on its floor and one that hangs in the air.
+inline Scene furnished_room(const Float3& reflectance = {0.5F, 0.5F, 0.5F}) {
+  Scene scene = empty_scene(reflectance);
+  add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
+  add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
+  return scene;
+}
+
+/// The same with materials 1 and 2 for the blocks.
+inline Scene furnished_room(const Float3& walls, const Float3& standing, const Float3& hanging) {
+  constexpr std::size_t kBox = 12;  // triangles
+  Scene scene = furnished_room(walls);
+  scene.materials.resize(3, scene.materials[0]);
+  scene.materials[1].base_color = standing;
+  scene.materials[2].base_color = hanging;
+  for (std::size_t t = kBox; t < 3 * kBox; ++t) {
+    scene.triangle_material[t] = static_cast<std::uint32_t>(t / kBox);
+  }
+  return scene;
+}
+
 }  // namespace rebounce::test
