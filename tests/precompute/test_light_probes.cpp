@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <numbers>
 
+#include "built_scene.h"
 #include "expect_error.h"
-#include "rebounce/precompute/build.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/probe_light.h"
@@ -23,10 +23,7 @@ const TransferData& cornell_box() {
     BuildSettings settings;
     settings.subdivision.patch_count = 600;
     settings.probes.grid = {4, 3, 4};
-    BuildReport report;
-    return build_transfer_data(
-        std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests/scenes/cornell_box.gltf", settings,
-        report);
+    return test::built_scene("cornell_box.gltf", settings);
   }();
   return data;
 }

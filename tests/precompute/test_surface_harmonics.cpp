@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "allocation_counter.h"
+#include "built_scene.h"
 #include "expect_error.h"
-#include "rebounce/precompute/build.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
@@ -26,10 +26,7 @@ const std::shared_ptr<const TransferData>& cornell_box() {
     BuildSettings settings;
     settings.subdivision.patch_count = 600;
     settings.surface_harmonics.ray_count = 512;
-    BuildReport report;
-    return std::make_shared<const TransferData>(build_transfer_data(
-        std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests/scenes/cornell_box.gltf", settings,
-        report));
+    return std::make_shared<const TransferData>(test::built_scene("cornell_box.gltf", settings));
   }();
   return data;
 }
