@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "precompute/scene_data.h"
 #include "precompute/test_scenes.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/reconstruction_weights.h"
@@ -20,10 +21,8 @@ struct Furnace {
     scene.materials[0].emitted_luminance = {0.318309886F, 0.318309886F, 0.318309886F};
     test::add_box(scene, {0, 0, 0}, {3, 2, 2}, true);
     if (with_box) add_box_without_underside();
-    PatchModel model = make_patch_model(scene, {.patch_count = 200});
-    data.patches = std::move(model.patches);
-    data.patches.absorbed.assign(data.patches.size(), 0.0F);
-    data.mesh = std::move(model.mesh);
+    const PatchModel model = make_patch_model(scene, {.patch_count = 200});
+    data = test::data_of(model);
     compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, mesh_tracer(),
                                    data.mesh);
   }

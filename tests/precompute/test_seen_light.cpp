@@ -15,6 +15,7 @@
 #include "rebounce/runtime/sky_model.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/runtime/surface_light.h"
+#include "scene_data.h"
 #include "seen_patch.h"
 #include "test_scenes.h"
 
@@ -31,9 +32,8 @@ struct SeenScene {
 
   SeenScene(Scene scene, std::size_t patch_count) {
     PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
-    data.patches = std::move(model.patches);
-    data.mesh = std::move(model.mesh);
     shown_patch = std::move(model.shown_patch);
+    data = test::data_of(std::move(model));
   }
 
   RayTracer tracer() const { return make_surface_tracer(data.mesh); }

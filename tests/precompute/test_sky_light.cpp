@@ -11,6 +11,7 @@
 #include "rebounce/runtime/polygon_form_factor.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/runtime/sky_model.h"
+#include "scene_data.h"
 #include "test_scenes.h"
 
 namespace rebounce {
@@ -25,11 +26,7 @@ struct OpenScene {
   OpenScene(Scene scene, std::size_t patch_count) {
     PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
     FormFactors factors = compute_form_factors(model, test::make_tracer(model));
-    data.patches = std::move(model.patches);
-    data.patches.sky_visibility = std::move(factors.sky_visibility);
-    data.patches.absorbed = std::move(factors.absorbed);
-    data.sky_cells = std::move(factors.sky_cells);
-    data.mesh = std::move(model.mesh);
+    data = test::data_of(std::move(model), std::move(factors));
   }
 
   std::vector<Float3> irradiance(const Sky& sky) const {
