@@ -28,11 +28,8 @@ struct Furnace {
   }
 
   void add_box_without_underside() {
-    const auto first = static_cast<std::ptrdiff_t>(scene.triangle.size());
     test::add_box(scene, {1, 0.5, 0}, {1.8, 1.2, 0.9}, false);
-    // The fifth of its faces, of two triangles each.
-    scene.triangle.erase(scene.triangle.begin() + first + 8, scene.triangle.begin() + first + 10);
-    scene.triangle_material.resize(scene.triangle.size());
+    test::remove_face(scene, test::Face::kLowZ, 1);
   }
 
   RayTracer mesh_tracer() const {

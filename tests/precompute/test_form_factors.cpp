@@ -87,8 +87,7 @@ TEST(FormFactors, OpeningsAndBackFacesAreAccountedFor) {
   Scene scene = test::empty_scene();
   scene.materials.resize(2, scene.materials[0]);
   test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);
-  scene.triangle.erase(scene.triangle.begin() + 6, scene.triangle.begin() + 8);  // +y
-  scene.triangle_material.assign(scene.triangle.size(), 0);
+  test::remove_face(scene, test::Face::kHighY);
   scene.triangle_material[4] = scene.triangle_material[5] = 1;  // -y
   const PatchModel model = make_patch_model(scene, {.patch_count = 500});
   const FormFactors f = form_factors_of(model);

@@ -47,8 +47,10 @@ inline void add_polygon(Scene& scene, std::span<const glm::dvec3> corner,
   }
 }
 
-/// The six faces of the box [low, high], in the order -x +x -y +y -z +z; `inwards` makes a room of
-/// it.
+/// The faces of a box in the order in which they are added, two triangles each.
+enum class Face : std::uint8_t { kLowX, kHighX, kLowY, kHighY, kLowZ, kHighZ };
+
+/// The six faces of the box [low, high]; `inwards` makes a room of it.
 inline void add_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high, bool inwards,
                     std::uint32_t material = 0) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -66,6 +68,16 @@ inline void add_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high,
       add_polygon(scene, corner, material);
     }
   }
+}
+
+/// Removes a face of one of the boxes that a scene consists of; of several the last first.
+inline void remove_face(Scene& scene, Face face, std::size_t box = 0) {
+  const auto first = static_cast<std::ptrdiff_t>(12 * box + 2 * static_cast<std::size_t>(face));
+  const auto remove = [first](auto& of_triangle) {
+    of_triangle.erase(of_triangle.begin() + first, of_triangle.begin() + first + 2);
+  };
+  remove(scene.triangle);
+  remove(scene.triangle_material);
 }
 
 /// A ball of radius 1 around the origin, of longitudes and latitudes; `inwards` makes a dome of it.

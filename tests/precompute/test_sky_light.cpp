@@ -42,9 +42,7 @@ const OpenScene& open_box() {
   static const OpenScene box = [] {
     Scene scene = test::empty_scene();
     test::add_box(scene, {-1, 0, -1}, {1, 1, 1}, true);
-    // Faces come as -x +x -y +y -z +z, two triangles each.
-    scene.triangle.erase(scene.triangle.begin() + 6, scene.triangle.begin() + 8);
-    scene.triangle_material.resize(scene.triangle.size());
+    test::remove_face(scene, test::Face::kHighY);
     return OpenScene(std::move(scene), 400);
   }();
   return box;
