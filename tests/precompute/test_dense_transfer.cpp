@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <numbers>
-#include <random>
 
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/reference_solution.h"
@@ -13,6 +12,7 @@
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
 #include "with_threads.h"
+#include "random_light.h"
 
 namespace rebounce {
 namespace {
@@ -47,14 +47,6 @@ Scene colourful_room() {
   test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 1);
   test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false, 2);
   return scene;
-}
-
-std::vector<Float3> random_light(std::size_t n, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<float> uniform(0, 1);
-  std::vector<Float3> light(n);
-  for (Float3& v : light) v = {uniform(engine), uniform(engine), uniform(engine)};
-  return light;
 }
 
 TEST(DenseTransfer, FurnaceIsUniform) {
@@ -136,7 +128,7 @@ TEST(DenseTransfer, AgreesWithGaussSeidelInDoublePrecision) {
   const Solved solved = solve(colourful_room(), 900);
   const ReferenceSolver reference(solved.exchange, solved.patches);
   for (int light = 0; light < 8; ++light) {
-    std::vector<Float3> m0 = random_light(solved.patches.size(), light);
+    std::vector<Float3> m0 = test::random_light(solved.patches.size(), light);
     if (light % 2 == 1) {  // a single patch, of each kind in turn
       const std::size_t lit = (97 * static_cast<std::size_t>(light)) % m0.size();
       m0.assign(m0.size(), {0, 0, 0});
@@ -156,8 +148,8 @@ TEST(DenseTransfer, SatisfiesItsEquation) {
 
 TEST(DenseTransfer, IsLinearInTheLight) {
   const Solved solved = solve(colourful_room(), 300);
-  const std::vector<Float3> a = random_light(solved.patches.size(), 1),
-                            b = random_light(solved.patches.size(), 2);
+  const std::vector<Float3> a = test::random_light(solved.patches.size(), 1),
+                            b = test::random_light(solved.patches.size(), 2);
   std::vector<Float3> sum(a.size()), separate(a.size());
   const std::vector<Float3> ha = solved.indirect(a), hb = solved.indirect(b);
   for (std::size_t i = 0; i < a.size(); ++i) {

@@ -14,6 +14,7 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
+#include "plain_data.h"
 
 namespace rebounce {
 namespace {
@@ -135,16 +136,8 @@ TEST(LinkedFormFactors, RefuseWhatIsNotATreeWithLinks) {
 }
 
 TransferData sample_data() {
-  TransferData data;
-  data.patches.area = kArea;
+  TransferData data = test::plain_data(kArea);
   data.patches.centroid = kCentroid;
-  data.patches.normal.assign(kPatchCount, {0, 1, 0});
-  data.patches.reflectance.assign(kPatchCount, {0.5F, 0.25F, 0.5F});
-  data.patches.emitted_exitance.assign(kPatchCount, {0, 0, 0});
-  data.patches.sky_visibility.assign(kPatchCount, 0.0F);
-  data.patches.absorbed.assign(kPatchCount, 0.0F);
-  data.mesh.weight_begin = {0};
-  data.exchange = {SharedArray(std::vector<std::uint64_t>(kPatchCount + 1)), {}, {}};
   HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 1, 5);
   storage.area = kArea;
   data.transfer = std::make_shared<const HierarchicalOperator>(std::move(storage));

@@ -13,6 +13,7 @@
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 #include "transfer_file_tampering.h"
+#include "plain_data.h"
 
 namespace rebounce {
 namespace {
@@ -62,15 +63,7 @@ ExchangeMatrix chain() {
 }
 
 TransferData sample_data(Precision precision, bool first_bounce) {
-  TransferData data;
-  data.patches.area.assign(kPatchCount, 0.25F);
-  data.patches.centroid.assign(kPatchCount, {0, 0, 0});
-  data.patches.normal.assign(kPatchCount, {0, 1, 0});
-  data.patches.reflectance.assign(kPatchCount, {0.5F, 0.25F, 0.5F});
-  data.patches.emitted_exitance.assign(kPatchCount, {0, 0, 0});
-  data.patches.sky_visibility.assign(kPatchCount, 0.0F);
-  data.patches.absorbed.assign(kPatchCount, 0.0F);
-  data.mesh.weight_begin = {0};
+  TransferData data = test::plain_data(std::vector<float>(kPatchCount, 0.25F));
   data.exchange = chain();
   std::shared_ptr<const FormFactorOperator> form_factors;
   if (first_bounce) {
