@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <numbers>
 
+#include "brute_force.h"
 #include "built_scene.h"
 #include "expect_error.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/probe_light.h"
-#include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 
@@ -28,32 +28,6 @@ const TransferData& cornell_box() {
   return data;
 }
 
-/// Irradiance at a point in the air by brute force: many cosine-distributed rays, and the
-/// radiosity of what each meets.
-Float3 gather(const TransferData& data, const RayTracer& tracer, std::span<const Float3> radiosity,
-              const Float3& position, const Float3& normal) {
-  constexpr int kRays = 1 << 14;
-  std::vector<Ray> rays(kRays);
-  std::vector<Hit> hits(kRays);
-  const glm::dmat3 frame = frame_around(to_dvec3(normal));
-  for (std::uint32_t k = 0; k < kRays; ++k) {
-    rays[k] = Ray{};
-    rays[k].origin = position;
-    rays[k].direction = to_float3(frame * square_to_cosine_hemisphere(r2_point(k, {0.3, 0.7})));
-    rays[k].t_near = 0;
-    rays[k].t_far = std::numeric_limits<float>::infinity();
-  }
-  tracer.intersect(rays, hits);
-  glm::dvec3 sum(0);
-  for (const Hit& hit : hits) {
-    if (hit.triangle == kNone) continue;
-    const std::uint32_t side = hit.front ? hit.triangle : data.mesh.back_triangle[hit.triangle];
-    if (side == kNone || data.mesh.triangle_patch[side] == kNone) continue;
-    sum += to_dvec3(radiosity[data.mesh.triangle_patch[side]]);
-  }
-  return to_float3(sum / static_cast<double>(kRays));
-}
-
 /// The relative error of the irradiance in six directions at every valid probe.
 double error_of_probes(const Engine& engine) {
   const TransferData& data = engine.data();
@@ -66,7 +40,7 @@ double error_of_probes(const Engine& engine) {
       Float3 normal{0, 0, 0};
       normal[static_cast<std::size_t>(axis / 2)] = axis % 2 == 0 ? 1.0F : -1.0F;
       const Float3 truth =
-          gather(data, engine.tracer(), engine.radiosity(), data.probes.position[p], normal);
+          to_float3(test::irradiance_at(engine, data.probes.position[p], normal, 1 << 14));
       const Float3 found = probe_irradiance(light[p], normal);
       for (int c = 0; c < kChannelCount; ++c) {
         difference += (found[c] - truth[c]) * (found[c] - truth[c]);
