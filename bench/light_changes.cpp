@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <glm/glm.hpp>
-#include <limits>
 
 #include "rebounce/precompute/random_lights.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
@@ -83,20 +83,11 @@ bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to) {
   return !is_occluded(ray[0]);
 }
 
-double scene_diagonal(const TransferData& data) {
-  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
-  for (const Float3& p : data.mesh.position) {
-    low = glm::min(low, to_dvec3(p));
-    high = glm::max(high, to_dvec3(p));
-  }
-  return glm::length(high - low);
-}
-
 std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
                                        std::uint64_t seed) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting direct(data, tracer);
-  const double size = scene_diagonal(data);
+  const double size = box_around(data.mesh.position).diagonal();
   const auto [lamp, other] = find_places(data, tracer, 0.2 * size, seed);
   const std::vector<Float3> before = light_of(lamp, data, direct);
   std::vector<LightChange> changes = {{"from zero", {}, before}};

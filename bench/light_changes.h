@@ -41,7 +41,4 @@ std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& 
 /// True if nothing stands between two places.
 bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to);
 
-/// Length of the diagonal of the scene's bounding box, metres.
-double scene_diagonal(const TransferData& data);
-
 }  // namespace rebounce::bench

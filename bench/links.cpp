@@ -11,6 +11,7 @@
 #include "program.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_geometry.h"
+#include "rebounce/runtime/box.h"
 #include "row_targets.h"
 #include "shadow_rays.h"
 #include "timing.h"
@@ -179,13 +180,8 @@ class SceneBench {
   }
 
   std::vector<Float3> smooth_light() const {
-    glm::dvec3 low(1e30), high(-1e30);
-    for (const Float3& p : model_.patches.centroid) {
-      for (int k = 0; k < 3; ++k) {
-        low[k] = std::min<double>(low[k], p[k]);
-        high[k] = std::max<double>(high[k], p[k]);
-      }
-    }
+    const Box box = box_around(model_.patches.centroid);
+    const glm::dvec3 low(box.low), high(box.high);
     std::vector<Float3> light;
     for (const Float3& p : model_.patches.centroid) {
       double sum = 1;

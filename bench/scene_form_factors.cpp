@@ -7,6 +7,7 @@
 #include "exchange_reference.h"
 #include "input.h"
 #include "named_quality.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "stage_speed.h"
 
@@ -72,11 +73,8 @@ void SceneFormFactors::measure_speed(double ray_limit, int repeats) {
 
 /// Two and a half waves across the scene's diagonal, on top of a constant.
 std::vector<double> SceneFormFactors::smooth_light() const {
-  glm::dvec3 low(1e30), high(-1e30);
-  for (const Float3& c : model_.patches.centroid) {
-    low = glm::min(low, to_dvec3(c));
-    high = glm::max(high, to_dvec3(c));
-  }
+  const Box box = box_around(model_.patches.centroid);
+  const glm::dvec3 low(box.low), high(box.high);
   std::vector<double> light;
   for (const Float3& c : model_.patches.centroid) {
     const glm::dvec3 x = (to_dvec3(c) - low) / glm::max(high - low, glm::dvec3(1e-9));

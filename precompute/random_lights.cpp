@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <limits>
 #include <numbers>
 
 #include "hemisphere_rays.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/transfer/area_norm.h"
@@ -27,14 +27,6 @@ constexpr double kLeastPart = 0.1;
 /// Lights of different kinds are drawn apart from the same seed.
 std::uint64_t bits_of(LightKind kind, std::uint64_t seed, int k) {
   return mix_bits(mix_bits(seed + static_cast<std::uint64_t>(kind)) + 0x51ED270BULL * k);
-}
-
-glm::dvec3 corner(const DisplayMesh& mesh, bool high) {
-  glm::dvec3 result = to_dvec3(mesh.position.front());
-  for (const Float3& p : mesh.position) {
-    result = high ? glm::max(result, to_dvec3(p)) : glm::min(result, to_dvec3(p));
-  }
-  return result;
 }
 
 Float3 random_direction(std::uint64_t bits) {
@@ -136,7 +128,7 @@ std::string_view name(LightKind kind) {
 std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
                                        std::uint64_t seed) {
   const DisplayMesh& mesh = data.mesh;
-  const double open_reach = 0.25 * glm::distance(corner(mesh, false), corner(mesh, true));
+  const double open_reach = 0.25 * box_around(mesh.position).diagonal();
   const PatchTriangles triangles(mesh.triangle_patch, data.patches.size());
   const PatchChoice choice(data.patches.area);
   std::vector<Light> lights(count);
