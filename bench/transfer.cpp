@@ -59,7 +59,7 @@ struct Errors {
   double mean = 0, max = 0;
 };
 
-/// One row: a product, or some sweeps of Gauss-Seidel.
+/// One row: a product, or some sweeps of Gauss-Seidel, forward or symmetric.
 struct Entry {
   std::string name, form{};
   std::size_t bytes = 0;  ///< that a product or a sweep reads
@@ -114,11 +114,13 @@ class TransferBenchmark {
 
   void add(const Contestant& contestant) {
     const bool compressed = contestant.form.starts_with("compressed");
+    const bool relaxes = contestant.method == SolveMethod::kGaussSeidel ||
+                         contestant.method == SolveMethod::kSymmetricGaussSeidel;
     if (contestant.product) {
       const auto stored =
           std::ranges::find(contenders_.operators, contestant.transfer, &StoredOperator::name);
       add(contestant, 0).transfer = stored->transfer.get();
-    } else if (contestant.method == SolveMethod::kGaussSeidel && compressed) {
+    } else if (relaxes && compressed) {
       for (int sweeps = 1; sweeps <= kMostSweeps; ++sweeps) {
         add(contestant, sweeps).form_factors = contenders_.form(contestant.form).get();
       }
