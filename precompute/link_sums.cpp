@@ -25,16 +25,6 @@ struct Moments {
   glm::dvec3 first{0};
 };
 
-/// The largest error of a row sum, of all rows or of those whose target is certain.
-double largest_error(std::span<const double> sum, std::span<const RowTarget> target, bool certain) {
-  double largest = 0;
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    if (certain && target[i].deviation > 0) continue;
-    largest = std::max(largest, std::abs(sum[i] - target[i].sum));
-  }
-  return largest;
-}
-
 double least_factor(const RowTarget& target) {
   return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
 }
@@ -137,7 +127,7 @@ LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
   std::vector<double>&factor = result.factor, &row = result.row_sum;
   factor.assign(target.size(), 1.0);
   row = gather_links(tree, links, factor);
-  result.closure.row_sum_error_before = largest_error(row, target, /*certain=*/false);
+  result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
   const std::vector<double> wanted = wanted_sums(row, target);
   for (int step = 0; step < kScalingSteps; ++step) {
     double worst = 0;
@@ -151,7 +141,7 @@ LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
     row = scaled_row_sums(tree, links, factor);
   }
   row = scaled_row_sums(tree, links, factor);
-  result.closure.row_sum_error_after = largest_error(row, target, /*certain=*/true);
+  result.closure.row_sum_error_after = largest_row_error(row, target, /*certain=*/true);
   result.closure.relative_change = relative_change(tree, links, factor);
   return result;
 }
