@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstring>
 #include <string>
 
 #include "link_gather.h"
@@ -136,7 +135,14 @@ void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const
     }
     node.area = static_cast<float>(sum[k][3]);
   }
-  for (std::size_t k = 0; k < m; ++k) {
+  place_children(sum);
+  find_levels();
+}
+
+/// Where children lie in their parent; `sum` has the area times the centre of each node, and the
+/// area.
+void LinkedFormFactors::place_children(std::span<const std::array<double, 4>> sum) {
+  for (std::size_t k = 0; k < node_.size(); ++k) {
     if (node_[k].patch != kNone) continue;
     for (std::uint32_t c = node_[k].first_child; c < node_[k].first_child + 2; ++c) {
       node_[c].part = static_cast<float>(sum[c][3] / sum[k][3]);
@@ -146,17 +152,19 @@ void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const
       }
     }
   }
-  level_begin_ = {0};
-  for (std::size_t begin_of_next = 1; begin_of_next < m;) {
-    // The next level begins with the first child of the first node of this one that has any.
-    level_begin_.push_back(static_cast<std::uint32_t>(begin_of_next));
-    std::size_t end = begin_of_next;
-    for (std::size_t k = level_begin_[level_begin_.size() - 2]; k < begin_of_next; ++k) {
-      if (node_[k].patch == kNone) end += 2;
+}
+
+/// The root, then its children, then theirs.
+void LinkedFormFactors::find_levels() {
+  level_begin_ = {0, 1};
+  while (level_begin_.back() < node_.size()) {
+    const std::uint32_t begin = level_begin_[level_begin_.size() - 2], end = level_begin_.back();
+    std::uint32_t next_end = end;
+    for (std::uint32_t k = begin; k < end; ++k) {
+      if (node_[k].patch == kNone) next_end += 2;
     }
-    begin_of_next = end;
+    level_begin_.push_back(next_end);
   }
-  level_begin_.push_back(static_cast<std::uint32_t>(m));
 }
 
 /// Every link twice, once for each of its nodes, by the node that gathers.

@@ -84,6 +84,8 @@ class LinkedFormFactors final : public FormFactorOperator {
 
   void build_tree(const FormFactorLinks& links, std::span<const float> area,
                   std::span<const Float3> centroid);
+  void place_children(std::span<const std::array<double, 4>> sum);
+  void find_levels();
   void sort_links(const FormFactorLinks& links);
 
   /// What arrives at one node along its links.
