@@ -9,14 +9,14 @@ namespace rebounce {
 ///
 /// Jacobi's method is the same iteration: a flat patch does not see itself, so that the diagonal
 /// of I - rho F is 1. The error shrinks per sweep by max(rho) or better.
-class GatheringSolver final : public RadiositySolver {
+class GatheringSolver : public RadiositySolver {
  public:
   GatheringSolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem)
       : RadiositySolver(form_factors, problem) {}
 
  private:
   void begin(bool /*cold*/) override {}
-  SweepReport sweep() override { return gather_sweep(); }
+  SweepReport sweep() override;
 };
 
 }  // namespace rebounce
