@@ -4,7 +4,7 @@
 
 namespace rebounce {
 
-/// Gathering (seed, chapter 6): B <- M0 + rho F B, every patch at once from the values before, one
+/// Gathering (Burenius, chapter 6): B <- M0 + rho F B, every patch at once from the values before, one
 /// more bounce per sweep.
 ///
 /// Jacobi's method is the same iteration: a flat patch does not see itself, so that the diagonal
