@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <functional>
 
+#include "dense_kernels.h"
 #include "input.h"
-#include "instruction_sets.h"
 #include "light_changes.h"
 #include "program.h"
 #include "read_buffer.h"
@@ -191,7 +191,7 @@ class ApplyBenchmark {
     const Precision precision = dense.storage().precision;
     add_read(precision == Precision::kF16 ? read_f16_ : read_f32_, dense.bytes());
     add_product("apply dense", precision_name(precision), dense);
-    for (const DenseKernels* kernels : available_kernels()) add_tiles(dense, *kernels);
+    for (const DenseKernels* kernels : dense_kernel_sets()) add_tiles(dense, *kernels);
   }
 
   void add_tiles(const DenseOperator& dense, const DenseKernels& kernels) {

@@ -4,29 +4,21 @@
 #include "link_gather.h"
 
 namespace rebounce {
-namespace {
-
-const LinkKernels& pick_link_kernels() {
-#if defined(__x86_64__)
-  switch (widest_instruction_set()) {
-    case InstructionSet::kAvx512:
-      return kLinkKernelsAvx512;
-    case InstructionSet::kAvx2:
-      return kLinkKernelsAvx2;
-    case InstructionSet::kPortable:
-      break;
-  }
-#endif
-  return kLinkKernelsPortable;
-}
-
-}  // namespace
 
 const LinkKernels kLinkKernelsPortable = {"portable", gather_along_links<ColorLanes>};
 
+std::span<const LinkKernels* const> link_kernel_sets() {
+#if defined(__x86_64__)
+  static const std::array kSets = {&kLinkKernelsPortable, &kLinkKernelsAvx2, &kLinkKernelsAvx512};
+#else
+  static const std::array kSets = {&kLinkKernelsPortable};
+#endif
+  return runnable(kSets);
+}
+
 const LinkKernels& link_kernels() {
-  static const LinkKernels& kernels = pick_link_kernels();
-  return kernels;
+  static const LinkKernels& widest = *link_kernel_sets().back();
+  return widest;
 }
 
 }  // namespace rebounce

@@ -172,11 +172,7 @@ void check_kernels(const DenseKernels& kernels) {
 }
 
 TEST(DenseKernels, EveryInstructionSetAgrees) {
-  check_kernels(kDenseKernelsPortable);
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) check_kernels(kDenseKernelsAvx2);
-  if (__builtin_cpu_supports("avx512f")) check_kernels(kDenseKernelsAvx512);
-#endif
+  for (const DenseKernels* kernels : dense_kernel_sets()) check_kernels(*kernels);
 }
 
 TEST(HalfFloat, ConvertsThereAndBack) {

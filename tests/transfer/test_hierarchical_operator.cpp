@@ -10,7 +10,6 @@
 
 #include "../../transfer/block_kernels.h"
 #include "../../transfer/half_float.h"
-#include "../../transfer/instruction_set.h"
 #include "allocation_counter.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
@@ -534,18 +533,8 @@ void check_kernels(const BlockKernelSet& kernels) {
   check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
 }
 
-std::vector<const BlockKernelSet*> runnable_kernels() {
-  std::vector<const BlockKernelSet*> sets{&kBlockKernelsPortable};
-#if defined(__x86_64__)
-  const InstructionSet widest = widest_instruction_set();
-  if (widest >= InstructionSet::kAvx2) sets.push_back(&kBlockKernelsAvx2);
-  if (widest >= InstructionSet::kAvx512) sets.push_back(&kBlockKernelsAvx512);
-#endif
-  return sets;
-}
-
 TEST(BlockKernels, EveryInstructionSetAgrees) {
-  for (const BlockKernelSet* set : runnable_kernels()) check_kernels(*set);
+  for (const BlockKernelSet* set : block_kernel_sets()) check_kernels(*set);
 }
 
 /// What comes of x by way of coefficients and back: those, and the light.
@@ -566,7 +555,7 @@ TEST(BlockKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
   Random random;
   const std::vector<float> x = random.floats(3 * kStride);
   const std::vector<float> expected = there_and_back(kBlockKernelsPortable, plain, x);
-  for (const BlockKernelSet* set : runnable_kernels()) {
+  for (const BlockKernelSet* set : block_kernel_sets()) {
     EXPECT_EQ(there_and_back(*set, plain, x), expected) << set->instruction_set;
   }
 }
@@ -577,7 +566,7 @@ TEST(BlockKernels, SumsOfIntegersHaveRoomForTheLargest) {
   const PlainBasis plain{std::vector<float>(kRank * kSize, kLargest), kRank, kSize, 0};
   // Just below a power of two: it becomes the largest integer that there is.
   const float light = std::nextafter(1.0F, 0.0F);
-  for (const BlockKernelSet* set : runnable_kernels()) {
+  for (const BlockKernelSet* set : block_kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
     const std::vector<float> result =
         there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
@@ -590,7 +579,7 @@ TEST(BlockKernels, SumsOfIntegersHaveRoomForTheLargest) {
 TEST(BlockKernels, NoLightStaysNone) {
   const PlainBasis plain = integer_basis(7, 48);
   for (const float light : {0.0F, 1e-42F}) {
-    for (const BlockKernelSet* set : runnable_kernels()) {
+    for (const BlockKernelSet* set : block_kernel_sets()) {
       const std::vector<float> result =
           there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
       for (const float value : result) EXPECT_LE(std::abs(value), 1e-20F);
