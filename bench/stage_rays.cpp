@@ -1,6 +1,7 @@
 #include "stage_rays.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "escape.h"
 #include "raw_exchange.h"
