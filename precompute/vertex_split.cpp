@@ -7,6 +7,7 @@
 
 #include "element_neighbours.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -81,7 +82,7 @@ class VertexSplitter {
     const std::uint32_t third = a != v && a != u ? a : b != v && b != u ? b : c;
     const auto at = [&](std::uint32_t k) { return to_dvec3(mesh_.position[k]); };
     const glm::dvec3 on_edge = glm::mix(at(v), at(u), kAlongEdge);
-    const glm::dvec3 normal = glm::normalize(glm::cross(at(b) - at(a), at(c) - at(a)));
+    const glm::dvec3 normal = front_normal(corners_of(mesh_, t));
     return {to_float3(glm::mix(on_edge, at(third), kAwayFromEdge)), to_float3(normal)};
   }
 

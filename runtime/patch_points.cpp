@@ -4,6 +4,7 @@
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 
@@ -26,8 +27,8 @@ PatchSurface::PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_
 }
 
 void PatchSurface::add(const DisplayMesh& mesh, std::uint32_t triangle) {
-  const auto corner = [&](int k) { return to_dvec3(mesh.position[mesh.triangle[triangle][k]]); };
-  const glm::dvec3 a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
+  const auto [a, b, c] = corners_of(mesh, triangle);
+  const glm::dvec3 ab = b - a, ac = c - a;
   const glm::dvec3 cross = glm::cross(ab, ac);
   const std::span<const std::uint8_t> map = mesh.opacity.of_triangle(triangle);
   add_places(map, glm::length(cross));

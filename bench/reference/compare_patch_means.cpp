@@ -60,7 +60,7 @@ class PatchTriangles {
   void append_points(std::uint32_t patch, std::uint32_t count, std::uint64_t seed,
                      std::vector<SurfacePoint>& points) const {
     CumulativeChoice choice;
-    for (const std::uint32_t t : triangles_[patch]) choice.add(corners(t).area());
+    for (const std::uint32_t t : triangles_[patch]) choice.add(area_of(corners_of(mesh_, t)));
     for (std::uint32_t r = 0; r < kReplicateCount; ++r) {
       const glm::dvec2 shift = unit_square(mix_bits(mix_bits(seed ^ mix_bits(patch)) + r));
       for (std::uint32_t k = 0; k < count; ++k) {
@@ -72,12 +72,11 @@ class PatchTriangles {
   }
 
  private:
-  TriangleCorners corners(std::uint32_t t) const { return {mesh_.position, mesh_.triangle[t]}; }
-
   SurfacePoint point_on(std::uint32_t t, const glm::dvec2& square) const {
     const glm::dvec2 b = square_to_triangle(square);
-    return {.position = to_float3(corners(t).at(b)),
-            .normal = to_float3(corners(t).front_normal()),
+    const TriangleCorners corners = corners_of(mesh_, t);
+    return {.position = to_float3(point_at(corners, b)),
+            .normal = to_float3(front_normal(corners)),
             .triangle = t,
             .barycentric = {static_cast<float>(b.x), static_cast<float>(b.y)}};
   }

@@ -23,7 +23,7 @@ double lit_area(const Scene& scene, std::span<const TriangleSides> sides) {
   const SceneSurface surface(scene);
   double area = 0;
   for (std::uint32_t t = 0; t < sides.size(); ++t) {
-    area += surface.corners(t).area() * sides[t].patch_count();
+    area += area_of(surface.corners(t)) * sides[t].patch_count();
   }
   return area;
 }
