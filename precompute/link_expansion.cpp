@@ -15,8 +15,9 @@ class LinkExpansion {
       : tree_(tree),
         shadow_rays_(shadow_rays),
         links_(links),
-        of_node_(tree.nodes().size(), links.size(),
-                 [&](std::size_t k) { return std::array{links[k].a, links[k].b}; }) {
+        of_node_(links_by_node(tree.nodes().size(), links.size(), [&](std::size_t k) {
+          return std::array{links[k].a, links[k].b};
+        })) {
     find_parents();
   }
 

@@ -110,8 +110,8 @@ LinkedMatrix::LinkedMatrix(const FormFactorLinks& links, const PatchTable& patch
       patches_(patches),
       product_(links, patches.area, patches.centroid),
       position_(patches.size()),
-      links_of_node_(links.first_child.size(), links.pair.size(),
-                     [&](std::size_t k) { return links.pair[k]; }) {
+      links_of_node_(links_by_node(links.first_child.size(), links.pair.size(),
+                                   [&](std::size_t k) { return links.pair[k]; })) {
   for (std::uint32_t k = 0; k < links.patch.size(); ++k) position_[links.patch[k]] = k;
   measure_nodes();
 }

@@ -10,17 +10,11 @@ namespace rebounce {
 
 PatchTriangles::PatchTriangles(std::span<const std::uint32_t> triangle_patch,
                                std::size_t patch_count)
-    : begin_(patch_count + 1, 0) {
-  for (const std::uint32_t patch : triangle_patch) {
-    if (patch != kNone) ++begin_[patch + 1];
-  }
-  for (std::size_t i = 0; i < patch_count; ++i) begin_[i + 1] += begin_[i];
-  triangle_.resize(begin_.back());
-  std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
-  for (std::uint32_t t = 0; t < triangle_patch.size(); ++t) {
-    if (triangle_patch[t] != kNone) triangle_[next[triangle_patch[t]]++] = t;
-  }
-}
+    : of_patch_(patch_count, [&](const auto& add) {
+        for (std::uint32_t t = 0; t < triangle_patch.size(); ++t) {
+          if (triangle_patch[t] != kNone) add(triangle_patch[t], t);
+        }
+      }) {}
 
 PatchSurface::PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles) {
   for (const std::uint32_t t : triangles) add(mesh, t);
