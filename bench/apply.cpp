@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <functional>
 
+#include "dense_kernels.h"
 #include "input.h"
-#include "instruction_sets.h"
+#include "light_changes.h"
 #include "program.h"
 #include "read_buffer.h"
 #include "rebounce/precompute/build.h"
@@ -16,7 +17,6 @@
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 #include "tile_product.h"
@@ -49,16 +49,8 @@ std::shared_ptr<const DenseOperator> to_f16(const DenseOperator& dense) {
 /// The light that the patches send out first under one point light in the free space of the scene.
 std::vector<Float3> light_one_lamp(const TransferData& data) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
-  const std::vector<Light> lamp = random_point_lights(data, tracer, 1, 1);
-  std::vector<Float3> exitance(data.patches.size());
-  DirectLighting(data, tracer).compute(lamp, {}, exitance);
-  for (std::size_t i = 0; i < exitance.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
-  }
-  if (area_norm(exitance, data.patches.area) == 0) {
-    throw Error("the test lamp lights nothing; the scene must have lit patches that reflect");
-  }
-  return exitance;
+  DirectLighting direct(data, tracer);
+  return light_of(random_point_lights(data, tracer, 1, 1).front(), data, direct);
 }
 
 /// Something to time, with what the table says about it.
@@ -199,7 +191,7 @@ class ApplyBenchmark {
     const Precision precision = dense.storage().precision;
     add_read(precision == Precision::kF16 ? read_f16_ : read_f32_, dense.bytes());
     add_product("apply dense", precision_name(precision), dense);
-    for (const DenseKernels* kernels : available_kernels()) add_tiles(dense, *kernels);
+    for (const DenseKernels* kernels : dense_kernel_sets()) add_tiles(dense, *kernels);
   }
 
   void add_tiles(const DenseOperator& dense, const DenseKernels& kernels) {
@@ -296,10 +288,7 @@ int main(int argc, char** argv) {
   rebounce::bench::ApplyOptions options;
   CLI::App app("Times a relight beside the bandwidth of memory in the same run.", "bench_apply");
   rebounce::bench::add_input_option(app, options.inputs);
-  app.add_option("--patches", options.settings.subdivision.patch_count,
-                 "Patches of each scene, about")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);
   add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include "rebounce/transfer/reflection.h"
+
 namespace rebounce::bench {
 namespace {
 
@@ -18,11 +20,7 @@ Lights bounced_lights(const Lights& lights, const FormFactorOperator& form_facto
     std::vector<Float3>& radiosity = radiosities.emplace_back(initial);
     for (int bounce = 0; bounce < kBounces; ++bounce) {
       form_factors.gather(radiosity, arrived, workspace);
-      for (std::size_t i = 0; i < arrived.size(); ++i) {
-        for (std::size_t c = 0; c < kChannelCount; ++c) {
-          radiosity[i][c] = initial[i][c] + patches.reflectance[i][c] * arrived[i][c];
-        }
-      }
+      add_reflected(initial, patches.reflectance, arrived, radiosity);
     }
   }
   return radiosities;

@@ -1,38 +1,35 @@
 #include "form_factor_scaling.h"
 
-#include <sys/resource.h>
-
 #include <cmath>
 
+#include "input.h"
+#include "process_cost.h"
 #include "rebounce/precompute/form_factors.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/links.h"
 #include "timing.h"
 
 namespace rebounce::bench {
 namespace {
 
-rusage usage() {
-  rusage result{};
-  getrusage(RUSAGE_SELF, &result);
-  return result;
-}
+/// What finding F with links took, from patches to form factors: no import, no operator.
+struct ScalingSample {
+  std::size_t patch_count = 0;
+  double wall_seconds = 0;
+  double processor_seconds = 0;  ///< of all threads, which others on the machine disturb less
+  std::uint64_t ray_count = 0;
+  std::uint64_t entry_count = 0;  ///< links, or pairs of patches that they were expanded to
+  double peak_bytes = 0;          ///< of the process so far: go from few patches to many
+};
 
-double processor_seconds(const rusage& u) {
-  return static_cast<double>(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
-         1e-6 * static_cast<double>(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
-}  // namespace
-
+/// Finds F of the scene at `path` with about `patch_count` patches and links of `epsilon`.
 ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, double epsilon,
                               LinkedForm form) {
-  const PatchModel model = make_patch_model(import_gltf(path), {.patch_count = patch_count});
+  const PatchModel model = model_of_scene(path, patch_count);
   const RayTracer tracer = make_surface_tracer(model.mesh);
   FormFactorSettings settings;
   settings.link_epsilon = epsilon;
   ScalingSample sample{.patch_count = model.patches.size()};
-  const double before = processor_seconds(usage());
+  const double before = processor_seconds();
   sample.wall_seconds = seconds_of([&] {
     if (form == LinkedForm::kLinks) {
       const LinkBuild build = build_links(model, tracer, settings);
@@ -44,14 +41,41 @@ ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, 
       sample.entry_count = f.exchange.column.size();
     }
   });
-  sample.processor_seconds = processor_seconds(usage()) - before;
-  sample.peak_bytes = 1024.0 * static_cast<double>(usage().ru_maxrss);
+  sample.processor_seconds = processor_seconds() - before;
+  sample.peak_bytes = static_cast<double>(peak_memory_bytes());
   return sample;
 }
 
+/// The exponent x with which processor seconds grow from `few` to `many` as patches^x.
 double scaling_exponent(const ScalingSample& few, const ScalingSample& many) {
   return std::log(many.processor_seconds / few.processor_seconds) /
          std::log(static_cast<double>(many.patch_count) / static_cast<double>(few.patch_count));
+}
+
+}  // namespace
+
+void measure_growth(const std::string& path, std::span<const std::size_t> patch_counts,
+                    double epsilon, LinkedForm form, AskedTable& report) {
+  const std::string name = scene_name(path);
+  const char* what = form == LinkedForm::kLinks ? "links" : "pairs";
+  std::vector<ScalingSample> samples;
+  for (const std::size_t count : patch_counts) {
+    const ScalingSample s = measure_scaling(path, count, epsilon, form);
+    const auto add = [&](const std::string& measure, double value, double asked = 0) {
+      report.at_most(name, s.patch_count, what, measure, value, asked);
+    };
+    add("processor seconds of F", s.processor_seconds);
+    add("seconds of F", s.wall_seconds);
+    add("rays per patch", static_cast<double>(s.ray_count) / static_cast<double>(s.patch_count));
+    add("entries per patch",
+        static_cast<double>(s.entry_count) / static_cast<double>(s.patch_count));
+    add("peak memory, GiB", s.peak_bytes / 0x1p30, 12);
+    samples.push_back(s);
+  }
+  if (samples.size() < 2) return;
+  report.at_most(name, samples.back().patch_count, what,
+                 "exponent from " + std::to_string(samples.front().patch_count) + " patches",
+                 scaling_exponent(samples.front(), samples.back()), 1.35);
 }
 
 }  // namespace rebounce::bench

@@ -1,29 +1,21 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 
-namespace rebounce::bench {
+#include "asked_table.h"
 
-/// What finding F with links took, from patches to form factors: no import, no operator.
-struct ScalingSample {
-  std::size_t patch_count = 0;
-  double wall_seconds = 0;
-  double processor_seconds = 0;  ///< of all threads, which others on the machine disturb less
-  std::uint64_t ray_count = 0;
-  std::uint64_t entry_count = 0;  ///< links, or pairs of patches that they were expanded to
-  double peak_bytes = 0;          ///< of the process so far: go from few patches to many
-};
+namespace rebounce::bench {
 
 /// What F is kept as.
 enum class LinkedForm : std::uint8_t { kLinks, kPairs };
 
-/// Finds F of the scene at `path` with about `patch_count` patches and links of `epsilon`.
-ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, double epsilon,
-                              LinkedForm form);
-
-/// The exponent x with which processor seconds grow from `few` to `many` as patches^x.
-double scaling_exponent(const ScalingSample& few, const ScalingSample& many);
+/// Measures what finding F with links of `epsilon` takes, from patches to form factors, of the
+/// scene at `path` with about as many patches as each of `patch_counts`, ascending; the exponent
+/// with which processor seconds grow is over the whole range. Throws Error if the scene cannot be
+/// used.
+void measure_growth(const std::string& path, std::span<const std::size_t> patch_counts,
+                    double epsilon, LinkedForm form, AskedTable& report);
 
 }  // namespace rebounce::bench

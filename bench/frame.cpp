@@ -3,12 +3,11 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 
+#include "input.h"
 #include "program.h"
-#include "rebounce/precompute/build.h"
-#include "rebounce/precompute/measured_error.h"
+#include "rebounce/precompute/random_lights.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/octahedral_map.h"
 #include "rebounce/runtime/probe_irradiance.h"
@@ -16,7 +15,6 @@
 #include "rebounce/runtime/surface_light.h"
 #include "rebounce/runtime/texel_light.h"
 #include "rebounce/runtime/vertex_light.h"
-#include "rebounce/transfer/transfer_file.h"
 #include "timing.h"
 
 namespace rebounce::bench {
@@ -31,14 +29,6 @@ struct FrameOptions {
   BuildSettings settings;
   CommonOptions common{.repeats = 31};
 };
-
-TransferData load_or_build(const std::string& input, const BuildSettings& settings) {
-  if (std::filesystem::path(input).extension() == ".safetensors") {
-    return load_transfer_file(input);
-  }
-  BuildReport report;
-  return build_transfer_data(input, settings, report);
-}
 
 /// Lights in two places each, so that every run finds them moved.
 class MovingLights {
@@ -99,10 +89,8 @@ class FrameBenchmark {
     add("radiosity", {}, [this] { engine_.compute_radiosity(); });
     add_outputs();
     const std::vector<Timing> timings = time_interleaved(cases_, {.rounds = options_.repeats});
-    const std::string scene =
-        std::filesystem::path(engine_.data().record.scene_name).stem().string();
     for (std::size_t k = 0; k < cases_.size(); ++k) {
-      table.add({scene, engine_.data().patches.size(), threads, names_[k].first, names_[k].second,
+      table.add({scene_name(engine_.data()), engine_.data().patches.size(), threads, names_[k].first, names_[k].second,
                  timings[k].median * 1e6, timings[k].spread});
     }
   }
@@ -197,10 +185,7 @@ int main(int argc, char** argv) {
   rebounce::bench::FrameOptions options;
   CLI::App app("Times the stages of a frame, with 1, 4 and 16 lights.", "bench_frame");
   rebounce::bench::add_input_option(app, options.inputs);
-  app.add_option("--patches", options.settings.subdivision.patch_count,
-                 "Patches of each scene, about")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);
   app.add_option("--probes", options.settings.probes.spacing,
                  "Light probes this many metres apart, of scenes that are built")
       ->check(CLI::PositiveNumber);

@@ -3,7 +3,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -70,7 +69,7 @@ class HierarchicalBench {
   HierarchicalBench(const std::string& scene, std::size_t patch_count,
                     const HierarchicalOptions& options)
       : options_(options),
-        scene_(std::filesystem::path(scene).stem().string()),
+        scene_(scene_name(scene)),
         model_(model_of_scene(scene, patch_count)),
         tracer_(make_surface_tracer(model_.mesh)) {
     draw_lights();
@@ -283,8 +282,8 @@ int main(int argc, char** argv) {
   HierarchicalOptions options;
   CLI::App app("Hierarchical radiosity beside sweeps on the form factors of all pairs",
                "bench_hierarchical");
-  app.add_option("scenes", options.scenes, "Scenes (.glb or .gltf)")->required();
-  app.add_option("--patches", options.patches, "Numbers of patches")->capture_default_str();
+  add_scene_option(app, options.scenes);
+  add_patches_option(app, options.patches);
   app.add_option("--epsilon", options.epsilons, "Errors that a link may have")
       ->capture_default_str();
   app.add_option("--coarsen", options.coarsening, "Errors for which links are merged again")

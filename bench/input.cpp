@@ -16,8 +16,12 @@ PatchModel model_of_scene(const std::string& path, std::size_t patch_count) {
   return make_patch_model(import_usable(path, 1), {.patch_count = patch_count});
 }
 
+std::string scene_name(const std::filesystem::path& scene) {
+  return scene.stem().string();
+}
+
 std::string scene_name(const TransferData& data) {
-  return std::filesystem::path(data.record.scene_name).stem().string();
+  return scene_name(data.record.scene_name);
 }
 
 }  // namespace rebounce::bench

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "rebounce/precompute/build.h"
@@ -14,7 +15,8 @@ TransferData load_or_build(const std::string& input, const BuildSettings& settin
 /// The patches of a scene, made as load_or_build makes them. Throws Error if it cannot.
 PatchModel model_of_scene(const std::string& path, std::size_t patch_count);
 
-/// Name of the scene, without its extension.
+/// Name of a scene's file, without folder and extension.
+std::string scene_name(const std::filesystem::path& scene);
 std::string scene_name(const TransferData& data);
 
 }  // namespace rebounce::bench

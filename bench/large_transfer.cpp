@@ -3,24 +3,23 @@
 
 #include "rebounce/precompute/large_transfer.h"
 
-#include <sys/resource.h>
-
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <numeric>
 
 #include "bounced_light.h"
 #include "hierarchical_matrix.h"
+#include "input.h"
 #include "linked_matrix.h"
+#include "process_cost.h"
 #include "program.h"
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/random_lights.h"
-#include "rebounce/precompute/winding.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/reflection.h"
 #include "single_threaded_blas.h"
 #include "solved_transfer.h"
 
@@ -38,26 +37,8 @@ struct LargeOptions {
   CommonOptions common{.repeats = 1};
 };
 
-double processor_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime);
-}
-
-/// Processor seconds that `work` takes.
-double processor_seconds_of(const std::function<void()>& work) {
-  const double before = processor_seconds();
-  work();
-  return processor_seconds() - before;
-}
-
 double peak_gib() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / (1 << 20);
+  return static_cast<double>(peak_memory_bytes()) / 0x1p30;
 }
 
 using Lights = std::vector<std::vector<Float3>>;
@@ -70,9 +51,7 @@ class SceneBench {
  public:
   SceneBench(const std::string& path, std::size_t patch_count, const LargeOptions& options)
       : options_(options) {
-    Scene scene = import_gltf(path);
-    make_double_sided(scene, find_inside_out(scene));
-    const PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
+    const PatchModel model = model_of_scene(path, patch_count);
     const RayTracer tracer = make_surface_tracer(model.mesh);
     data_.patches = model.patches;
     data_.mesh = model.mesh;
@@ -242,7 +221,7 @@ void run(const LargeOptions& options) {
   for (const std::string& scene : options.scenes) {
     for (const std::size_t patches : options.patches) {
       SceneBench(scene, patches, options)
-          .measure(std::filesystem::path(scene).stem().string(), table);
+          .measure(scene_name(scene), table);
     }
   }
   publish("bench_large", table, options.common);
@@ -253,17 +232,20 @@ void run(const LargeOptions& options) {
 
 int main(int argc, char** argv) {
   rebounce::bench::LargeOptions options;
-  CLI::App app("Builds operators without any matrix of all pairs, and some by way of one.");
-  rebounce::bench::add_input_option(app, options.scenes);
-  app.add_option("--patches", options.patches, "patch counts")->delimiter(',');
-  app.add_option("--tolerance", options.tolerance, "of the operator")->capture_default_str();
-  app.add_option("--form-factor-tolerance", options.form_factor_tolerance, "of compressed F")
+  CLI::App app("Builds operators without any matrix of all pairs, and some by way of one.",
+               "bench_large");
+  rebounce::bench::add_scene_option(app, options.scenes);
+  rebounce::bench::add_patches_option(app, options.patches);
+  app.add_option("--tolerance", options.tolerance, "Error of the operator")->capture_default_str();
+  app.add_option("--form-factor-tolerance", options.form_factor_tolerance, "Error of compressed F")
       ->capture_default_str();
-  app.add_option("--dense-limit", options.dense_limit, "patches with which the dense way is gone")
+  app.add_option("--dense-limit", options.dense_limit,
+                 "Up to this many patches the dense way is gone too")
       ->capture_default_str();
-  app.add_option("--residuals", options.residuals, "residuals to try on some columns")
+  app.add_option("--residuals", options.residuals,
+                 "Residuals to try on some columns, separated by commas")
       ->delimiter(',');
-  app.add_option("--checkpoint", options.checkpoint, "folder for finished panels");
+  app.add_option("--checkpoint", options.checkpoint, "Folder for finished panels");
   rebounce::bench::add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <glm/glm.hpp>
-#include <limits>
 
 #include "rebounce/precompute/random_lights.h"
-#include "rebounce/runtime/direct_lighting.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/reflection.h"
 
 namespace rebounce::bench {
 namespace {
@@ -50,6 +50,16 @@ double lit_part(const TransferData& data, std::span<const Float3> irradiance) {
 
 }  // namespace
 
+std::vector<Float3> light_of(const Light& lamp, const TransferData& data, DirectLighting& direct) {
+  std::vector<Float3> exitance(data.patches.size());
+  direct.compute({&lamp, 1}, {}, exitance);
+  reflect(data.patches.reflectance, exitance);
+  if (area_norm(exitance, data.patches.area) == 0) {
+    throw Error("the test lamp lights nothing; the scene must have lit patches that reflect");
+  }
+  return exitance;
+}
+
 std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
                                      std::uint64_t seed) {
   constexpr double kLeastLit = 0.05;
@@ -73,40 +83,19 @@ bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to) {
   return !is_occluded(ray[0]);
 }
 
-double scene_diagonal(const TransferData& data) {
-  glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
-  for (const Float3& p : data.mesh.position) {
-    low = glm::min(low, to_dvec3(p));
-    high = glm::max(high, to_dvec3(p));
-  }
-  return glm::length(high - low);
-}
-
 std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
                                        std::uint64_t seed) {
-  const RayTracer tracer(data.mesh.position,
-                         std::span(data.mesh.triangle).first(data.mesh.surface_count()));
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting direct(data, tracer);
-  const auto light = [&](const Light& lamp) {
-    std::vector<Float3> exitance(data.patches.size());
-    direct.compute({&lamp, 1}, {}, exitance);
-    for (std::size_t i = 0; i < exitance.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
-    }
-    if (area_norm(exitance, data.patches.area) == 0) {
-      throw Error("the test lamp lights nothing; the scene must have lit patches that reflect");
-    }
-    return exitance;
-  };
-  const double size = scene_diagonal(data);
+  const double size = box_around(data.mesh.position).diagonal();
   const auto [lamp, other] = find_places(data, tracer, 0.2 * size, seed);
-  const std::vector<Float3> before = light(lamp);
+  const std::vector<Float3> before = light_of(lamp, data, direct);
   std::vector<LightChange> changes = {{"from zero", {}, before}};
   for (const double part : motions) {
-    changes.push_back(
-        {fmt::format("moved {:g} %", 100 * part), before, light(moved(lamp, other, part * size))});
+    changes.push_back({fmt::format("moved {:g} %", 100 * part), before,
+                       light_of(moved(lamp, other, part * size), data, direct)});
   }
-  changes.push_back({"switched", before, light(other)});
+  changes.push_back({"switched", before, light_of(other, data, direct)});
   return changes;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -28,6 +29,9 @@ std::vector<LightChange> light_changes(const TransferData& data,
                                        std::span<const double> motions = kMotions,
                                        std::uint64_t seed = 1);
 
+/// What the patches give off first, M0 [n] in lx, under one lamp. Throws Error if that is nothing.
+std::vector<Float3> light_of(const Light& lamp, const TransferData& data, DirectLighting& direct);
+
 /// `count` point lights of 1 cd in the free space of the scene (random_point_lights), without those
 /// that light less than a twentieth of its surface, as from inside of a box. The same `seed`, the
 /// same lamps. Throws Error if there are none.
@@ -36,8 +40,5 @@ std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& 
 
 /// True if nothing stands between two places.
 bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to);
-
-/// Length of the diagonal of the scene's bounding box, metres.
-double scene_diagonal(const TransferData& data);
 
 }  // namespace rebounce::bench

@@ -11,6 +11,7 @@
 #include "program.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_geometry.h"
+#include "rebounce/runtime/box.h"
 #include "row_targets.h"
 #include "shadow_rays.h"
 #include "timing.h"
@@ -179,13 +180,8 @@ class SceneBench {
   }
 
   std::vector<Float3> smooth_light() const {
-    glm::dvec3 low(1e30), high(-1e30);
-    for (const Float3& p : model_.patches.centroid) {
-      for (int k = 0; k < 3; ++k) {
-        low[k] = std::min<double>(low[k], p[k]);
-        high[k] = std::max<double>(high[k], p[k]);
-      }
-    }
+    const Box box = box_around(model_.patches.centroid);
+    const glm::dvec3 low(box.low), high(box.high);
     std::vector<Float3> light;
     for (const Float3& p : model_.patches.centroid) {
       double sum = 1;
@@ -199,9 +195,7 @@ class SceneBench {
 
   double gather_error(const LinkedFormFactors& links) const {
     const std::vector<Float3> light = smooth_light();
-    std::vector<Float3> arrived(light.size());
-    std::vector<float> workspace(links.workspace_size());
-    links.gather(light, arrived, workspace);
+    const std::vector<Float3> arrived = gather(links, light);
     double difference = 0, norm = 0;
     for (std::size_t k = 0; k < rows_.patch.size(); ++k) {
       double wanted = 0;
@@ -228,7 +222,7 @@ void run(const LinksOptions& options) {
   Table table({"scene", "patches", "epsilon", "links", "links / n2", "rays", "/ all pairs",
                "time / all pairs", "error of F", "error of F B"});
   for (const std::string& scene : options.scenes) {
-    const std::string name = std::filesystem::path(scene).stem().string();
+    const std::string name = scene_name(scene);
     for (const std::size_t patches : options.patches) {
       SceneBench bench(scene, patches, options);
       for (const double epsilon : options.epsilons) bench.measure(epsilon, name, table);
@@ -243,9 +237,9 @@ void run(const LinksOptions& options) {
 int main(int argc, char** argv) {
   using namespace rebounce::bench;
   LinksOptions options;
-  CLI::App app("Links between sets of patches beside all pairs of patches");
-  app.add_option("scenes", options.scenes, "Scenes (.glb or .gltf)")->required();
-  app.add_option("--patches", options.patches, "Numbers of patches")->capture_default_str();
+  CLI::App app("Links between sets of patches beside all pairs of patches", "bench_links");
+  add_scene_option(app, options.scenes);
+  add_patches_option(app, options.patches);
   app.add_option("--epsilon", options.epsilons, "Errors that a link may have")
       ->capture_default_str();
   app.add_option("--rows", options.row_count, "Rows of F that are found from all pairs")

@@ -1,14 +1,13 @@
 // The offline stage by phase, beside what bare Embree and BLAS reach in the same run.
 
 #include <algorithm>
-#include <filesystem>
 #include <map>
 #include <optional>
 
 #include "blas_peak.h"
+#include "input.h"
 #include "program.h"
 #include "rebounce/precompute/build.h"
-#include "rebounce/precompute/import_gltf.h"
 #include "rebounce/transfer/error.h"
 #include "stage_speed.h"
 #include "tiled_cholesky.h"
@@ -44,9 +43,8 @@ class OfflineStage {
   OfflineStage(const std::string& scene, const OfflineOptions& options)
       : scene_(scene),
         options_(options),
-        model_(make_patch_model(import_gltf(scene), options.settings.subdivision)),
-        tracer_(model_.mesh.position,
-                std::span(model_.mesh.triangle).first(model_.mesh.surface_count())),
+        model_(model_of_scene(scene, options.settings.subdivision.patch_count)),
+        tracer_(make_surface_tracer(model_.mesh)),
         matrix_(test_matrix(model_.patches.size())) {}
 
   void measure() {
@@ -92,7 +90,7 @@ class OfflineStage {
   void row(Table& table, const std::string& what, const Timing& time, const Table::Cell& rate = {},
            const Table::Cell& unit = {}, const Table::Cell& ratio = {},
            const Table::Cell& baseline = {}) const {
-    table.add({std::filesystem::path(scene_).stem().string(), model_.patches.size(), what,
+    table.add({scene_name(scene_), model_.patches.size(), what,
                time.median, time.spread, rate, unit, ratio, baseline});
   }
 
@@ -159,11 +157,8 @@ int main(int argc, char** argv) {
   rebounce::bench::OfflineOptions options;
   CLI::App app("Times the offline stage by phase, beside bare Embree and BLAS in the same run.",
                "bench_offline");
-  app.add_option("scenes", options.scenes, "Scenes (.glb or .gltf)")->required();
-  app.add_option("--patches", options.settings.subdivision.patch_count,
-                 "Subdivide until there are about this many patches")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  rebounce::bench::add_scene_option(app, options.scenes);
+  rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);
   app.add_option("--ray-limit", options.ray_limit,
                  "Rays that lie ready for bare Embree at most, about 100 bytes each")
       ->check(CLI::Range(1e3, 1e9))

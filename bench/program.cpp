@@ -13,6 +13,8 @@ namespace {
 
 constexpr int kBadInput = 1, kUsage = 2;
 
+const CLI::Range kPatches(1, 1000000);
+
 }  // namespace
 
 void write_text(const std::filesystem::path& path, const std::string& text) {
@@ -37,19 +39,40 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
   app.add_option("--repeats", options.repeats, "Measurements of each thing")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  app.add_option("--threads", options.threads, "Threads to use; 0: one per processor")
-      ->check(CLI::Range(0, 4096))
-      ->capture_default_str();
+  add_threads_option(app, options);
   app.add_option("--json", options.json, "Write the results to this file, as JSON");
   app.add_option("--csv", options.csv, "Write the results to this file, as CSV");
+}
+
+CLI::Option* add_threads_option(CLI::App& app, CommonOptions& options) {
+  return app.add_option("--threads", options.threads, "Threads to use; 0: one per processor")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
 }
 
 int thread_count(const CommonOptions& options) {
   return options.threads > 0 ? options.threads : omp_get_num_procs();
 }
 
+void add_scene_option(CLI::App& app, std::vector<std::string>& scenes) {
+  app.add_option("scenes", scenes, "Scenes (.glb or .gltf)")->required();
+}
+
 void add_input_option(CLI::App& app, std::vector<std::string>& inputs) {
   app.add_option("inputs", inputs, "Transfer files, or scenes to build them from")->required();
+}
+
+void add_patch_option(CLI::App& app, std::size_t& patch_count) {
+  app.add_option("--patches", patch_count, "Patches of each scene, about")
+      ->check(kPatches)
+      ->capture_default_str();
+}
+
+void add_patches_option(CLI::App& app, std::vector<std::size_t>& patch_counts) {
+  app.add_option("--patches", patch_counts, "Numbers of patches, separated by commas")
+      ->delimiter(',')
+      ->check(kPatches)
+      ->capture_default_str();
 }
 
 void run_at_thread_counts(const CommonOptions& options, const std::function<void(int)>& work) {

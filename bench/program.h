@@ -20,6 +20,9 @@ struct CommonOptions {
 /// Adds them; the default of `repeats` is what `options` holds.
 void add_common_options(CLI::App& app, CommonOptions& options);
 
+/// Adds the number of threads alone.
+CLI::Option* add_threads_option(CLI::App& app, CommonOptions& options);
+
 /// Number of threads that `options` asks for.
 int thread_count(const CommonOptions& options);
 
@@ -28,8 +31,17 @@ int thread_count(const CommonOptions& options);
 int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
                 const std::function<void()>& work);
 
+/// Adds the scenes that a benchmark is to run on.
+void add_scene_option(CLI::App& app, std::vector<std::string>& scenes);
+
 /// Adds the transfer files or scenes that a benchmark is to run on.
 void add_input_option(CLI::App& app, std::vector<std::string>& inputs);
+
+/// Adds about how many patches a scene is to have.
+void add_patch_option(CLI::App& app, std::size_t& patch_count);
+
+/// Adds about how many patches a scene is to have in one run after the other.
+void add_patches_option(CLI::App& app, std::vector<std::size_t>& patch_counts);
 
 /// Runs `work`(threads) with one thread and with as many as `options` asks for, and leaves OpenMP
 /// with those.

@@ -251,10 +251,7 @@ int main(int argc, char** argv) {
   CLI::App app("Times sweeps and solves of the iterative methods on each form of F.",
                "bench_solvers");
   rebounce::bench::add_input_option(app, options.inputs);
-  app.add_option("--patches", options.settings.subdivision.patch_count,
-                 "Patches of each scene, about")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);
   app.add_option("--form-factor-tolerance", options.settings.form_factor_tolerance,
                  "Error of the compressed form factors, where the input holds none")
       ->check(CLI::Range(1e-5, 0.5))

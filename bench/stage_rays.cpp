@@ -1,6 +1,7 @@
 #include "stage_rays.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "escape.h"
 #include "raw_exchange.h"
@@ -9,57 +10,83 @@
 namespace rebounce::bench {
 namespace {
 
-std::uint64_t hidden_among(std::span<const Ray> rays) {
-  return static_cast<std::uint64_t>(std::ranges::count_if(rays, is_occluded));
-}
+class StageRayMaker {
+ public:
+  StageRayMaker(const PatchModel& model, const RayTracer& tracer,
+                const FormFactorSettings& settings)
+      : model_(model),
+        tracer_(tracer),
+        settings_(settings),
+        patch_triangles_(model.mesh.triangle_patch, model.patches.size()),
+        geometry_(model, tracer),
+        shadow_rays_(geometry_, settings.seed, settings.kernel_tolerance) {}
+
+  StageRays run(std::uint32_t row_step) {
+    for (std::uint32_t row = 0; row < geometry_.patch_count(); row += row_step) {
+      add_shadow_rays(row);
+      add_escape_rays(row);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  void add_shadow_rays(std::uint32_t row) {
+    const auto is_fine = [&](std::uint32_t column) {
+      return !is_coarse_pair(geometry_, row, column);
+    };
+    shadow_rays_.find_facing(row, facing_, is_fine);
+    shadow_rays_.make_probe_rays(row, facing_, settings_.probe_rays, rays_);
+    add_shadow_stream();
+    std::vector<FacingPatch> mixed, large_mixed;
+    const auto probe_rays = static_cast<std::size_t>(settings_.probe_rays);
+    for (std::size_t p = 0; p < facing_.size(); ++p) {
+      const auto agreement =
+          ShadowRays::agreement(std::span(rays_).subspan(p * probe_rays, probe_rays),
+                                std::span(transmitted_).subspan(p * probe_rays, probe_rays));
+      if (agreement != ShadowRays::Agreement::kMixed) continue;
+      (is_large_pair(geometry_, row, facing_[p]) ? large_mixed : mixed).push_back(facing_[p]);
+    }
+    shadow_rays_.make_rays(row, mixed, settings_.full_rays, rays_);
+    add_shadow_stream();
+    shadow_rays_.make_rays(row, large_mixed, kLargeFactor * settings_.full_rays, rays_);
+    add_shadow_stream();
+  }
+
+  /// Of rays_, which are traced to know what they meet.
+  void add_shadow_stream() {
+    result_.shadow.push_back(rays_);
+    result_.shadow_count += rays_.size();
+    transmitted_.resize(rays_.size());
+    tracer_.transmittance(rays_, PassageDetail::kTriangle, transmitted_);
+    result_.hidden_count +=
+        static_cast<std::uint64_t>(std::ranges::count_if(rays_, is_occluded));
+  }
+
+  void add_escape_rays(std::uint32_t row) {
+    measure_escape(model_, patch_triangles_[row], row, tracer_, settings_.hemisphere_rays,
+                   settings_.seed, escape_);
+    result_.escape.push_back(escape_.rays);
+    result_.escape_count += escape_.rays.size();
+  }
+
+  const PatchModel& model_;
+  const RayTracer& tracer_;
+  const FormFactorSettings& settings_;
+  PatchTriangles patch_triangles_;
+  PatchGeometry geometry_;
+  ShadowRays shadow_rays_;
+  std::vector<FacingPatch> facing_;
+  std::vector<Ray> rays_;
+  std::vector<float> transmitted_;
+  EscapeScratch escape_;
+  StageRays result_;
+};
 
 }  // namespace
 
 StageRays make_stage_rays(const PatchModel& model, const RayTracer& tracer,
                           const FormFactorSettings& settings, std::uint32_t row_step) {
-  const PatchTriangles patch_triangles(model.mesh.triangle_patch, model.patches.size());
-  const PatchGeometry geometry(model, tracer);
-  const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
-  StageRays result;
-  std::vector<FacingPatch> facing, mixed, large_mixed;
-  std::vector<Ray> rays;
-  std::vector<float> transmitted;
-  EscapeScratch escape;
-  const auto add_shadow_stream = [&](std::uint32_t row, const std::vector<FacingPatch>& pairs,
-                                     int count, bool probe) {
-    if (probe) {
-      shadow_rays.make_probe_rays(row, pairs, count, rays);
-    } else {
-      shadow_rays.make_rays(row, pairs, count, rays);
-    }
-    result.shadow.push_back(rays);
-    result.shadow_count += rays.size();
-    transmitted.resize(rays.size());
-    tracer.transmittance(rays, PassageDetail::kTriangle, transmitted);
-    result.hidden_count += hidden_among(rays);
-  };
-  for (std::uint32_t row = 0; row < geometry.patch_count(); row += row_step) {
-    shadow_rays.find_facing(
-        row, facing, [&](std::uint32_t column) { return !is_coarse_pair(geometry, row, column); });
-    add_shadow_stream(row, facing, settings.probe_rays, true);
-    mixed.clear();
-    large_mixed.clear();
-    const auto probe_rays = static_cast<std::size_t>(settings.probe_rays);
-    for (std::size_t p = 0; p < facing.size(); ++p) {
-      const auto agreement =
-          ShadowRays::agreement(std::span(rays).subspan(p * probe_rays, probe_rays),
-                                std::span(transmitted).subspan(p * probe_rays, probe_rays));
-      if (agreement != ShadowRays::Agreement::kMixed) continue;
-      (is_large_pair(geometry, row, facing[p]) ? large_mixed : mixed).push_back(facing[p]);
-    }
-    add_shadow_stream(row, mixed, settings.full_rays, false);
-    add_shadow_stream(row, large_mixed, kLargeFactor * settings.full_rays, false);
-    measure_escape(model, patch_triangles[row], row, tracer, settings.hemisphere_rays,
-                   settings.seed, escape);
-    result.escape.push_back(escape.rays);
-    result.escape_count += escape.rays.size();
-  }
-  return result;
+  return StageRayMaker(model, tracer, settings).run(row_step);
 }
 
 }  // namespace rebounce::bench

@@ -59,7 +59,7 @@ struct Errors {
   double mean = 0, max = 0;
 };
 
-/// One row: a product, or some sweeps of Gauss-Seidel.
+/// One row: a product, or some sweeps of Gauss-Seidel, forward or symmetric.
 struct Entry {
   std::string name, form{};
   std::size_t bytes = 0;  ///< that a product or a sweep reads
@@ -114,11 +114,13 @@ class TransferBenchmark {
 
   void add(const Contestant& contestant) {
     const bool compressed = contestant.form.starts_with("compressed");
+    const bool relaxes = contestant.method == SolveMethod::kGaussSeidel ||
+                         contestant.method == SolveMethod::kSymmetricGaussSeidel;
     if (contestant.product) {
       const auto stored =
           std::ranges::find(contenders_.operators, contestant.transfer, &StoredOperator::name);
       add(contestant, 0).transfer = stored->transfer.get();
-    } else if (contestant.method == SolveMethod::kGaussSeidel && compressed) {
+    } else if (relaxes && compressed) {
       for (int sweeps = 1; sweeps <= kMostSweeps; ++sweeps) {
         add(contestant, sweeps).form_factors = contenders_.form(contestant.form).get();
       }
@@ -143,17 +145,10 @@ class TransferBenchmark {
   /// H [n] in lx as this entry has it.
   std::vector<Float3> indirect_irradiance(const Entry& entry,
                                           const std::vector<Float3>& light) const {
-    std::vector<Float3> result(light.size());
-    if (entry.transfer) {
-      std::vector<float> workspace(entry.transfer->workspace_size());
-      entry.transfer->apply(light, result, workspace);
-      return result;
-    }
+    if (entry.transfer) return product(*entry.transfer, light);
     entry.method->forget();
     entry.method->run(light, entry.sweeps);
-    std::vector<float> workspace(entry.form_factors->workspace_size());
-    entry.form_factors->gather(entry.method->radiosity(), result, workspace);
-    return result;
+    return gather(*entry.form_factors, entry.method->radiosity());
   }
 
   Errors errors_of(const Entry& entry, const Lights& lights) const {
@@ -220,11 +215,8 @@ int main(int argc, char** argv) {
   rebounce::bench::TransferOptions options;
   CLI::App app("Compares all kinds of operators by bytes, error and time, on one thread.",
                "bench_transfer");
-  app.add_option("scenes", options.scenes, "Scenes: .glb or .gltf")->required();
-  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
-      ->check(CLI::Range(1, 1000000))
-      ->delimiter(',')
-      ->capture_default_str();
+  rebounce::bench::add_scene_option(app, options.scenes);
+  rebounce::bench::add_patches_option(app, options.patch_counts);
   rebounce::bench::add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

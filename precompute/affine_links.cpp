@@ -34,12 +34,10 @@ std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<con
                                      std::span<const Float3> centroid) {
   const std::size_t m = links.first_child.size();
   std::vector<NodeSpread> nodes(m);
-  std::vector<std::uint32_t> begin(m, 0);
+  const std::vector<std::uint32_t> begin = first_positions(links);
   for (std::uint32_t k = 0; k < m; ++k) {
     const std::uint32_t child = links.first_child[k];
     if (child == kNone) continue;
-    begin[child] = begin[k];
-    begin[child + 1] = begin[k] + links.count[child];
     nodes[child].parent = nodes[child + 1].parent = k;
     nodes[child].sibling = child + 1;
     nodes[child + 1].sibling = child;
@@ -85,15 +83,13 @@ void append_link(const AffineLink& link, FormFactorLinks& links) {
 
 std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,
                             std::span<const Float3> centroid) {
-  const LinkedFormFactors form_factors(links, area, centroid);
-  const std::vector<Float3> ones(area.size(), {1, 1, 1});
-  std::vector<Float3> sums(area.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(ones, sums, workspace);
-  std::vector<float> result;
-  result.reserve(sums.size());
-  for (const Float3& sum : sums) result.push_back(sum[0]);
-  return result;
+  std::vector<float> sums;
+  sums.reserve(area.size());
+  for (const Float3& sum : gather(LinkedFormFactors(links, area, centroid),
+                                  std::vector<Float3>(area.size(), {1, 1, 1}))) {
+    sums.push_back(sum[0]);
+  }
+  return sums;
 }
 
 void scale_rows(std::span<const float> target, std::span<const float> area,

@@ -1,27 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/glm.hpp>
-#include <limits>
 #include <vector>
 
+#include "rebounce/runtime/box.h"
+
 namespace rebounce {
-
-/// An axis-aligned box; an empty one meets nothing.
-struct Box {
-  glm::vec3 low{std::numeric_limits<float>::infinity()};
-  glm::vec3 high{-std::numeric_limits<float>::infinity()};
-
-  void add(const glm::vec3& point) {
-    low = glm::min(low, point);
-    high = glm::max(high, point);
-  }
-  /// True if they have a point in common.
-  bool meets(const Box& other) const {
-    return glm::all(glm::lessThanEqual(low, other.high)) &&
-           glm::all(glm::lessThanEqual(other.low, high));
-  }
-};
 
 /// A binary tree over boxes that finds those that meet another. Immutable, usable from any number
 /// of threads.

@@ -11,7 +11,8 @@ using Vector = std::vector<double>;
 
 constexpr int kPassCount = 8;        // entries at their bounds leave a rest for the next pass
 constexpr int kMaxIterations = 500;  // of conjugate gradients; some 20 to 60 are usual
-constexpr double kResidual = 1e-11;  // relative; row sums are wanted to 1e-6
+constexpr double kClosed = 1e-6;     // row sums nearer to their targets than this are there
+constexpr double kResidual = 1e-11;  // relative, for that
 constexpr float kLeastPart = 0.5F, kGreatestPart = 1.5F;
 
 double dot(const Vector& a, const Vector& b) {
@@ -82,12 +83,43 @@ class NormalEquations {
   Vector diagonal_;
 };
 
-double largest_certain_error(const Vector& sum, std::span<const RowTarget> target) {
-  double largest = 0;
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    if (target[i].deviation == 0) largest = std::max(largest, std::abs(sum[i] - target[i].sum));
+using Areas = std::vector<std::vector<float>>;
+
+Areas exchange_areas(const ExchangeRows& rows) {
+  Areas areas(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (const ExchangeEntry& entry : rows[i]) areas[i].push_back(entry.exchange_area);
   }
-  return largest;
+  return areas;
+}
+
+/// Changes each entry by its variance times the multipliers of its row and column, as far as its
+/// bounds let it.
+void give_way(const Vector& multiplier, const Areas& original, ExchangeRows& rows) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t k = 0; k < rows[i].size(); ++k) {
+      ExchangeEntry& entry = rows[i][k];
+      const double both = multiplier[i] + (entry.column == i ? 0 : multiplier[entry.column]);
+      const double wanted = entry.exchange_area + entry.variance() * both;
+      const float least = kLeastPart * original[i][k];
+      const float most = std::max(kGreatestPart * original[i][k], entry.unoccluded_area);
+      entry.exchange_area = std::clamp(static_cast<float>(wanted), least, most);
+      if (wanted < least || wanted > most) entry.visibility_variance = 0;  // gives way no further
+    }
+  }
+}
+
+/// |S' - S| / |S|, Frobenius, of the upper triangle.
+double relative_change(const ExchangeRows& rows, const Areas& original) {
+  double change = 0, norm = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t k = 0; k < rows[i].size(); ++k) {
+      const double s = original[i][k], d = rows[i][k].exchange_area - s;
+      change += d * d;
+      norm += s * s;
+    }
+  }
+  return norm > 0 ? std::sqrt(change / norm) : 0;
 }
 
 }  // namespace
@@ -104,49 +136,31 @@ std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> a
   return sum;
 }
 
+double largest_row_error(std::span<const double> sum, std::span<const RowTarget> target,
+                         bool certain) {
+  double largest = 0;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    if (certain && target[i].deviation > 0) continue;
+    largest = std::max(largest, std::abs(sum[i] - target[i].sum));
+  }
+  return largest;
+}
+
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
                               std::span<const RowTarget> target) {
-  std::vector<std::vector<float>> original(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    for (const ExchangeEntry& entry : rows[i]) original[i].push_back(entry.exchange_area);
-  }
-
+  const Areas original = exchange_areas(rows);
   ClosureReport report;
   Vector sum = row_sums(rows, area);
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    report.row_sum_error_before =
-        std::max(report.row_sum_error_before, std::abs(sum[i] - target[i].sum));
-  }
-
+  report.row_sum_error_before = largest_row_error(sum, target, /*certain=*/false);
   Vector rest(rows.size());
   for (int pass = 0; pass < kPassCount; ++pass) {
     for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = area[i] * (target[i].sum - sum[i]);
-    const Vector multiplier = NormalEquations(rows, area, target).solve(rest);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      for (std::size_t k = 0; k < rows[i].size(); ++k) {
-        ExchangeEntry& entry = rows[i][k];
-        const double both = multiplier[i] + (entry.column == i ? 0 : multiplier[entry.column]);
-        const double wanted = entry.exchange_area + entry.variance() * both;
-        const float least = kLeastPart * original[i][k];
-        const float most = std::max(kGreatestPart * original[i][k], entry.unoccluded_area);
-        entry.exchange_area = std::clamp(static_cast<float>(wanted), least, most);
-        if (wanted < least || wanted > most) entry.visibility_variance = 0;  // gives way no further
-      }
-    }
+    give_way(NormalEquations(rows, area, target).solve(rest), original, rows);
     sum = row_sums(rows, area);
-    if (largest_certain_error(sum, target) < 1e-6) break;
+    if (largest_row_error(sum, target, /*certain=*/true) < kClosed) break;
   }
-
-  report.row_sum_error_after = largest_certain_error(sum, target);
-  double change = 0, norm = 0;
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    for (std::size_t k = 0; k < rows[i].size(); ++k) {
-      const double s = original[i][k], d = rows[i][k].exchange_area - s;
-      change += d * d;
-      norm += s * s;
-    }
-  }
-  report.relative_change = norm > 0 ? std::sqrt(change / norm) : 0;
+  report.row_sum_error_after = largest_row_error(sum, target, /*certain=*/true);
+  report.relative_change = relative_change(rows, original);
   return report;
 }
 

@@ -32,6 +32,10 @@ struct RowTarget {
 /// The row sums of F that `rows` amount to; `area` [n] in m².
 std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> area);
 
+/// The largest error of a row sum, of all rows or of those whose target is certain.
+double largest_row_error(std::span<const double> sum, std::span<const RowTarget> target,
+                         bool certain);
+
 /// Corrects the exchange areas so that rows add up to their targets, reciprocity untouched.
 ///
 /// Minimises sum (S' - S)² / variance + sum over i of (row sum of F' - target)² / deviation² over

@@ -9,6 +9,7 @@
 
 #include "box_tree.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -16,17 +17,12 @@ namespace {
 // Lines this many tolerances apart are one: two would leave a strip of slivers between them.
 constexpr double kSameLine = 8;
 
-using Corners = std::array<glm::dvec3, 3>;
+using Corners = TriangleCorners;
 using Heights = std::array<double, 3>;      // of the corners of a triangle above a plane, metres
 using Segment = std::array<glm::dvec3, 2>;  // its ends
 
 /// Edges by their ends, the lower first, and of how many triangles each is one.
 using Outline = std::map<std::array<Float3, 2>, int>;
-
-Corners corners_of(const Scene& scene, std::uint32_t t) {
-  const auto [a, b, c] = scene.triangle[t];
-  return {to_dvec3(scene.position[a]), to_dvec3(scene.position[b]), to_dvec3(scene.position[c])};
-}
 
 double longest_edge(const Corners& p) {
   return std::max(
@@ -82,7 +78,7 @@ class ContactFinder {
   /// Contacts of triangle t with the large triangles number `near`.
   std::vector<ContactLine> lines_on(std::uint32_t t, const std::vector<std::uint32_t>& near) const {
     const Corners p = corners_of(scene_, t);
-    const glm::dvec3 normal = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
+    const glm::dvec3 normal = front_normal(p);
     const bool both_sides = scene_.materials[scene_.triangle_material[t]].double_sided;
     std::vector<ContactLine> lines;
     Outline outline;

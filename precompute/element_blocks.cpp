@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <numeric>
 #include <span>
 
 #include "progress_part.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
@@ -70,13 +70,9 @@ class BlockMerging {
       begin_.push_back(static_cast<std::uint32_t>(end));
       return;
     }
-    glm::vec3 low(std::numeric_limits<float>::max()), high = -low;
-    for (std::size_t k = begin; k < end; ++k) {
-      const glm::vec3 p = to_glm(scene_.elements.centroid(order_[k]));
-      low = glm::min(low, p);
-      high = glm::max(high, p);
-    }
-    const glm::vec3 size = high - low;
+    Box box;
+    for (std::size_t k = begin; k < end; ++k) box.add(to_glm(scene_.elements.centroid(order_[k])));
+    const glm::vec3 size = box.extent();
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     const std::size_t middle = begin + (end - begin) / 2;
     const auto at = [&](std::size_t k) { return order_.begin() + static_cast<std::ptrdiff_t>(k); };

@@ -7,6 +7,7 @@
 #include "matrix_compression.h"
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/reflection.h"
 
 namespace rebounce {
 
@@ -63,10 +64,7 @@ std::vector<std::vector<Float3>> radiosities_of(
   std::vector<std::vector<Float3>> radiosities;
   for (const std::vector<Float3>& m0 : initial_exitances) {
     transfer.apply(m0, indirect, workspace);
-    std::vector<Float3>& radiosity = radiosities.emplace_back(m0);
-    for (std::size_t i = 0; i < radiosity.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) radiosity[i][c] += reflectance[i][c] * indirect[i][c];
-    }
+    add_reflected(m0, reflectance, indirect, radiosities.emplace_back(m0.size()));
   }
   return radiosities;
 }

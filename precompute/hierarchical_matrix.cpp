@@ -38,9 +38,6 @@ void product(bool transposed, Index rows, Index columns, const float* matrix, co
 }  // namespace
 
 struct HierarchicalMatrix::Places {
-  struct Place {
-    std::uint32_t position, index;
-  };
   std::vector<Place> place;  ///< by position
 
   Places(std::span<const std::uint32_t> patches, std::span<const std::uint32_t> position) {
@@ -121,41 +118,49 @@ void HierarchicalMatrix::entries(std::uint32_t matrix, std::span<const std::uint
   for (const std::uint32_t b : blocks) add_block(matrix, b, row_places, column_places, entries);
 }
 
-void HierarchicalMatrix::add_block(std::uint32_t matrix, std::size_t index, const Places& rows,
-                                   const Places& columns, Eigen::Ref<MatrixXf> entries) const {
+MatrixXf HierarchicalMatrix::block_entries(std::uint32_t matrix, std::size_t index,
+                                           std::span<const Place> rows,
+                                           std::span<const Place> columns) const {
   const TransferBlock& block = storage_.blocks[index];
-  const HierarchicalLayout::Place& place = layout_.places[index];
+  MatrixXf entries(rows.size(), columns.size());
+  if (block.kind == TransferBlock::Kind::kDense) {
+    const ConstMap whole(core(matrix, index), block.row_count, block.column_count);
+    for (Index j = 0; j < entries.cols(); ++j) {
+      for (Index i = 0; i < entries.rows(); ++i) {
+        entries(i, j) =
+            whole(rows[i].position - block.row_begin, columns[j].position - block.column_begin);
+      }
+    }
+    return entries;
+  }
   // Rows [rank][size] of a basis at some of its positions.
   const auto some = [&](const HierarchicalLayout::End& end, std::uint32_t rank, std::uint32_t begin,
-                        std::uint32_t size, std::span<const Places::Place> where) {
+                        std::uint32_t size, std::span<const Place> where) {
     const ConstMap whole(basis(end), rank, size);
     Vectors part(rank, static_cast<Index>(where.size()));
     for (Index k = 0; k < part.cols(); ++k) part.col(k) = whole.col(where[k].position - begin);
     return part;
   };
+  const HierarchicalLayout::Place& place = layout_.places[index];
+  const Vectors u = some(place.row, block.row_rank, block.row_begin, block.row_count, rows);
+  const Vectors v =
+      some(place.column, block.column_rank, block.column_begin, block.column_count, columns);
+  const MatrixXf right = ConstMap(core(matrix, index), block.row_rank, block.column_rank) * v;
+  entries.noalias() = u.transpose() * right;
+  return entries;
+}
+
+void HierarchicalMatrix::add_block(std::uint32_t matrix, std::size_t index, const Places& rows,
+                                   const Places& columns, Eigen::Ref<MatrixXf> entries) const {
+  const TransferBlock& block = storage_.blocks[index];
   const auto add = [&](bool mirrored) {
     const auto at_rows = mirrored ? rows.within(block.column_begin, block.column_count)
                                   : rows.within(block.row_begin, block.row_count);
     const auto at_columns = mirrored ? columns.within(block.row_begin, block.row_count)
                                      : columns.within(block.column_begin, block.column_count);
     if (at_rows.empty() || at_columns.empty()) return;
-    const auto &upper = mirrored ? at_columns : at_rows, &lower = mirrored ? at_rows : at_columns;
-    MatrixXf part(upper.size(), lower.size());
-    if (block.kind == TransferBlock::Kind::kDense) {
-      const ConstMap whole(core(matrix, index), block.row_count, block.column_count);
-      for (Index j = 0; j < part.cols(); ++j) {
-        for (Index i = 0; i < part.rows(); ++i) {
-          part(i, j) =
-              whole(upper[i].position - block.row_begin, lower[j].position - block.column_begin);
-        }
-      }
-    } else {
-      const Vectors u = some(place.row, block.row_rank, block.row_begin, block.row_count, upper);
-      const Vectors v =
-          some(place.column, block.column_rank, block.column_begin, block.column_count, lower);
-      const MatrixXf right = ConstMap(core(matrix, index), block.row_rank, block.column_rank) * v;
-      part.noalias() = u.transpose() * right;
-    }
+    const MatrixXf part = mirrored ? block_entries(matrix, index, at_columns, at_rows)
+                                   : block_entries(matrix, index, at_rows, at_columns);
     for (std::size_t j = 0; j < at_columns.size(); ++j) {
       for (std::size_t i = 0; i < at_rows.size(); ++i) {
         const auto r = static_cast<Index>(i), c = static_cast<Index>(j);

@@ -40,10 +40,17 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   void multiply(std::uint32_t matrix, const Vectors& x, Vectors& y, Workspace& workspace) const;
 
  private:
-  /// A list of patches by position.
+  /// Where a patch of a list is, and which of them it is.
+  struct Place {
+    std::uint32_t position, index;
+  };
+  /// Such a list by position.
   struct Places;
 
   void sort_blocks();
+  /// The entries of a block in some of its rows and columns.
+  Eigen::MatrixXf block_entries(std::uint32_t matrix, std::size_t block,
+                                std::span<const Place> rows, std::span<const Place> columns) const;
   void add_block(std::uint32_t matrix, std::size_t block, const Places& rows, const Places& columns,
                  Eigen::Ref<Eigen::MatrixXf> entries) const;
   void multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,

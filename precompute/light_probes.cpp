@@ -7,6 +7,7 @@
 #include <string>
 
 #include "harmonic_view.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
@@ -78,11 +79,7 @@ void append(const std::optional<View>& seen, LightProbes& probes) {
 }  // namespace
 
 LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings) {
-  glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
-  for (const Float3& p : mesh.position) {
-    low = glm::min(low, to_glm(p));
-    high = glm::max(high, to_glm(p));
-  }
+  const auto [low, high] = box_around(mesh.position);
   LightProbes probes;
   double total = 1;
   std::array<double, 3> count{};

@@ -10,6 +10,7 @@
 
 #include "page_packing.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -136,10 +137,7 @@ class LightmapPlacer {
   }
 
   double area_in_world(std::uint32_t t) const {
-    const auto [a, b, c] = mesh().triangle[t];
-    const glm::dvec3 origin = to_dvec3(mesh().position[a]);
-    return 0.5 * glm::length(glm::cross(to_dvec3(mesh().position[b]) - origin,
-                                        to_dvec3(mesh().position[c]) - origin));
+    return rebounce::area_of(corners_of(mesh(), t));
   }
 
   /// The side of surface triangle `t` that has texels; kNone if neither sees anything.

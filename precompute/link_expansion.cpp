@@ -1,7 +1,9 @@
 #include "link_expansion.h"
 
 #include <algorithm>
+#include <array>
 
+#include "links_by_node.h"
 #include "rebounce/precompute/parallel_progress.h"
 
 namespace rebounce {
@@ -10,9 +12,13 @@ namespace {
 class LinkExpansion {
  public:
   LinkExpansion(const LinkTree& tree, const ShadowRays& shadow_rays, std::span<const Link> links)
-      : tree_(tree), shadow_rays_(shadow_rays), links_(links) {
+      : tree_(tree),
+        shadow_rays_(shadow_rays),
+        links_(links),
+        of_node_(links_by_node(tree.nodes().size(), links.size(), [&](std::size_t k) {
+          return std::array{links[k].a, links[k].b};
+        })) {
     find_parents();
-    sort_by_node();
   }
 
   ExchangeRows run(const Progress& progress) const {
@@ -39,26 +45,11 @@ class LinkExpansion {
     }
   }
 
-  void sort_by_node() {
-    begin_.assign(tree_.nodes().size() + 1, 0);
-    for (const Link& link : links_) {
-      ++begin_[link.a + 1];
-      if (link.a != link.b) ++begin_[link.b + 1];
-    }
-    for (std::size_t k = 1; k < begin_.size(); ++k) begin_[k] += begin_[k - 1];
-    of_node_.resize(begin_.back());
-    std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
-    for (std::uint32_t k = 0; k < links_.size(); ++k) {
-      of_node_[next[links_[k].a]++] = k;
-      if (links_[k].a != links_[k].b) of_node_[next[links_[k].b]++] = k;
-    }
-  }
-
   void expand_row(std::uint32_t leaf, std::vector<ExchangeEntry>& row) const {
     const std::uint32_t i = tree_.leaf_patch(tree_[leaf]);
     for (std::uint32_t node = leaf; node != kNone; node = parent_[node]) {
-      for (std::uint64_t k = begin_[node]; k < begin_[node + 1]; ++k) {
-        const Link& link = links_[of_node_[k]];
+      for (const std::uint32_t k : of_node_[node]) {
+        const Link& link = links_[k];
         if (link.exchange_area <= 0) continue;
         const LinkNode& other = tree_[link.a == node ? link.b : link.a];
         for (const std::uint32_t j : tree_.patches(other)) {
@@ -84,9 +75,8 @@ class LinkExpansion {
   const LinkTree& tree_;
   const ShadowRays& shadow_rays_;
   const std::span<const Link> links_;
+  LinksByNode of_node_;
   std::vector<std::uint32_t> parent_;
-  std::vector<std::uint64_t> begin_;    ///< [nodes + 1] of a node's links in of_node_
-  std::vector<std::uint32_t> of_node_;  ///< links of each node, node by node
 };
 
 }  // namespace

@@ -25,18 +25,65 @@ struct Moments {
   glm::dvec3 first{0};
 };
 
-/// The largest error of a row sum, of all rows or of those whose target is certain.
-double largest_error(std::span<const double> sum, std::span<const RowTarget> target, bool certain) {
-  double largest = 0;
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    if (certain && target[i].deviation > 0) continue;
-    largest = std::max(largest, std::abs(sum[i] - target[i].sum));
-  }
-  return largest;
-}
-
 double least_factor(const RowTarget& target) {
   return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
+}
+
+/// The mean of `x` over each node.
+std::vector<Moments> pull(const LinkTree& tree, std::span<const double> x) {
+  const auto nodes = tree.nodes();
+  std::vector<Moments> mean(nodes.size());
+  for (std::size_t k = nodes.size(); k-- > 0;) {
+    const LinkNode& node = nodes[k];
+    if (node.is_leaf()) {
+      mean[k].sum = x[tree.leaf_patch(node)];
+      continue;
+    }
+    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+      const double part = nodes[c].area / node.area;
+      mean[k].sum += part * mean[c].sum;
+      mean[k].first += part * (mean[c].first + mean[c].sum * (nodes[c].center - node.center));
+    }
+  }
+  return mean;
+}
+
+/// What arrives at each node along its links.
+std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<const Link> links) {
+  std::vector<Moments> arrived(mean.size());
+  const auto add = [&](std::uint32_t to, std::uint32_t from, double exchange,
+                       const Float3& gradient_to, const Float3& gradient_from) {
+    arrived[to].sum +=
+        exchange * mean[from].sum + glm::dot(to_dvec3(gradient_from), mean[from].first);
+    arrived[to].first += mean[from].sum * to_dvec3(gradient_to);
+  };
+  for (const Link& link : links) {
+    add(link.a, link.b, link.exchange_area, link.gradient_a, link.gradient_b);
+    if (link.a == link.b) continue;
+    add(link.b, link.a, link.exchange_area, link.gradient_b, link.gradient_a);
+  }
+  return arrived;
+}
+
+/// What arrives at each of `patch_count` patches, with all nodes that it is part of.
+std::vector<double> push(const LinkTree& tree, std::vector<Moments> arrived,
+                         std::size_t patch_count) {
+  const auto nodes = tree.nodes();
+  std::vector<double> out(patch_count);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const LinkNode& node = nodes[k];
+    if (node.is_leaf()) {
+      out[tree.leaf_patch(node)] = arrived[k].sum / node.area;
+      continue;
+    }
+    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+      const double part = nodes[c].area / node.area;
+      arrived[c].sum +=
+          part * (arrived[k].sum + glm::dot(arrived[k].first, nodes[c].center - node.center));
+      arrived[c].first += part * arrived[k].first;
+    }
+  }
+  return out;
 }
 
 /// The targets, drawn to the sums that are there by as much as they are uncertain.
@@ -88,47 +135,7 @@ double relative_change(const LinkTree& tree, std::span<const Link> links,
 
 std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> links,
                                  std::span<const double> x) {
-  const auto nodes = tree.nodes();
-  std::vector<Moments> mean(nodes.size()), arrived(nodes.size());
-  for (std::size_t k = nodes.size(); k-- > 0;) {
-    const LinkNode& node = nodes[k];
-    if (node.is_leaf()) {
-      mean[k].sum = x[tree.leaf_patch(node)];
-      continue;
-    }
-    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
-      const double part = nodes[c].area / node.area;
-      mean[k].sum += part * mean[c].sum;
-      mean[k].first += part * (mean[c].first + mean[c].sum * (nodes[c].center - node.center));
-    }
-  }
-  const auto add = [&](std::uint32_t to, std::uint32_t from, double exchange,
-                       const Float3& gradient_to, const Float3& gradient_from) {
-    arrived[to].sum +=
-        exchange * mean[from].sum + glm::dot(to_dvec3(gradient_from), mean[from].first);
-    arrived[to].first += mean[from].sum * to_dvec3(gradient_to);
-  };
-  for (const Link& link : links) {
-    add(link.a, link.b, link.exchange_area, link.gradient_a, link.gradient_b);
-    if (link.a == link.b) continue;
-    add(link.b, link.a, link.exchange_area, link.gradient_b, link.gradient_a);
-  }
-  std::vector<double> out(x.size());
-  for (std::size_t k = 0; k < nodes.size(); ++k) {
-    const LinkNode& node = nodes[k];
-    if (node.is_leaf()) {
-      const std::uint32_t patch = tree.leaf_patch(node);
-      out[patch] = arrived[k].sum / node.area;
-      continue;
-    }
-    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
-      const double part = nodes[c].area / node.area;
-      arrived[c].sum +=
-          part * (arrived[k].sum + glm::dot(arrived[k].first, nodes[c].center - node.center));
-      arrived[c].first += part * arrived[k].first;
-    }
-  }
-  return out;
+  return push(tree, gather_nodes(pull(tree, x), links), x.size());
 }
 
 LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
@@ -137,7 +144,7 @@ LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
   std::vector<double>&factor = result.factor, &row = result.row_sum;
   factor.assign(target.size(), 1.0);
   row = gather_links(tree, links, factor);
-  result.closure.row_sum_error_before = largest_error(row, target, /*certain=*/false);
+  result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
   const std::vector<double> wanted = wanted_sums(row, target);
   for (int step = 0; step < kScalingSteps; ++step) {
     double worst = 0;
@@ -151,7 +158,7 @@ LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
     row = scaled_row_sums(tree, links, factor);
   }
   row = scaled_row_sums(tree, links, factor);
-  result.closure.row_sum_error_after = largest_error(row, target, /*certain=*/true);
+  result.closure.row_sum_error_after = largest_row_error(row, target, /*certain=*/true);
   result.closure.relative_change = relative_change(tree, links, factor);
   return result;
 }

@@ -68,10 +68,7 @@ class LinkedMatrix::Filler {
 
   void visit(std::uint32_t node, Range near) {
     if (near.empty()) return;
-    for (std::uint64_t k = matrix_.incident_begin_[node]; k < matrix_.incident_begin_[node + 1];
-         ++k) {
-      follow(matrix_.incident_[k], node, near);
-    }
+    for (const std::uint32_t link : matrix_.links_of_node_[node]) follow(link, node, near);
     const std::uint32_t child = matrix_.links_.first_child[node];
     if (child == kNone) return;
     const std::uint32_t second = matrix_.nodes_[child + 1].begin;
@@ -120,25 +117,22 @@ LinkedMatrix::LinkedMatrix(const FormFactorLinks& links,
     : links_(links),
       patches_(patches),
       product_(std::move(product)),
-      position_(patches.size()) {
+      position_(patches.size()),
+      links_of_node_(links_by_node(links.first_child.size(), links.pair.size(),
+                                   [&](std::size_t k) { return links.pair[k]; })) {
   for (std::uint32_t k = 0; k < links.patch.size(); ++k) position_[links.patch[k]] = k;
   measure_nodes();
-  sort_links();
 }
 
 void LinkedMatrix::measure_nodes() {
   const std::size_t m = links_.first_child.size();
+  const std::vector<std::uint32_t> begin = first_positions(links_);
   nodes_.resize(m);
-  for (std::size_t k = 0; k < m; ++k) {
-    nodes_[k].count = links_.count[k];
-    const std::uint32_t child = links_.first_child[k];
-    if (child == kNone) continue;
-    nodes_[child].begin = nodes_[k].begin;
-    nodes_[child + 1].begin = nodes_[k].begin + links_.count[child];
-  }
   std::vector<std::array<double, 3>> moment(m);
   for (std::size_t k = m; k-- > 0;) {
     Node& node = nodes_[k];
+    node.begin = begin[k];
+    node.count = links_.count[k];
     const std::uint32_t child = links_.first_child[k];
     const std::uint32_t patch = links_.patch[node.begin];
     node.area = child == kNone ? patches_.area[patch] : nodes_[child].area + nodes_[child + 1].area;
@@ -147,22 +141,6 @@ void LinkedMatrix::measure_nodes() {
                                        : moment[child][axis] + moment[child + 1][axis];
       node.center[axis] = static_cast<float>(moment[k][axis] / node.area);
     }
-  }
-}
-
-void LinkedMatrix::sort_links() {
-  incident_begin_.assign(nodes_.size() + 1, 0);
-  for (const auto& [a, b] : links_.pair) {
-    ++incident_begin_[a + 1];
-    if (a != b) ++incident_begin_[b + 1];
-  }
-  for (std::size_t k = 0; k < nodes_.size(); ++k) incident_begin_[k + 1] += incident_begin_[k];
-  incident_.resize(incident_begin_.back());
-  std::vector<std::uint64_t> next(incident_begin_.begin(), incident_begin_.end() - 1);
-  for (std::uint32_t k = 0; k < links_.pair.size(); ++k) {
-    const auto [a, b] = links_.pair[k];
-    incident_[next[a]++] = k;
-    if (a != b) incident_[next[b]++] = k;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "links_by_node.h"
 #include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/transfer_data.h"
 #include "symmetric_matrix.h"
@@ -23,8 +24,6 @@ class LinkedMatrix final : public SymmetricMatrix {
                const PatchTable& patches);
 
   std::span<const float> area() const override { return patches_.area; }
-  std::uint32_t matrix_count() const override { return 1; }
-  std::array<std::uint32_t, kChannelCount> channel_matrix() const override { return {0, 0, 0}; }
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
@@ -39,15 +38,13 @@ class LinkedMatrix final : public SymmetricMatrix {
   class Filler;
 
   void measure_nodes();
-  void sort_links();
 
   const FormFactorLinks& links_;
   const PatchTable& patches_;
   std::shared_ptr<const LinkedFormFactors> product_;
-  std::vector<std::uint32_t> position_;        ///< [n] of each patch
-  std::vector<Node> nodes_;                    ///< [m]
-  std::vector<std::uint64_t> incident_begin_;  ///< [m + 1]
-  std::vector<std::uint32_t> incident_;        ///< links by their nodes, those of a pair twice
+  std::vector<std::uint32_t> position_;  ///< [n] of each patch
+  std::vector<Node> nodes_;              ///< [m]
+  LinksByNode links_of_node_;
 };
 
 }  // namespace rebounce

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <functional>
-#include <limits>
 
 #include "enclosed_sides.h"
 #include "hemisphere_rays.h"
 #include "progress_part.h"
+#include "rebounce/runtime/box.h"
 
 namespace rebounce {
 namespace {
@@ -33,14 +33,10 @@ constexpr std::uint32_t kRaysPerContact = 64;
 
 class LitSides {
  public:
-  LitSides(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer) {
-    glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
-    for (const Float3& p : scene.position) {
-      low = glm::min(low, to_dvec3(p));
-      high = glm::max(high, to_dvec3(p));
-    }
-    buried_reach_ = kBuriedReach * glm::distance(low, high);
-  }
+  LitSides(const Scene& scene, const RayTracer& tracer)
+      : scene_(scene),
+        tracer_(tracer),
+        buried_reach_(kBuriedReach * box_around(scene.position).diagonal()) {}
 
   std::vector<TriangleSides> find(const Progress& progress) {
     const std::size_t count = scene_.triangle.size();
@@ -199,7 +195,7 @@ class LitSides {
 
   const Scene& scene_;
   const RayTracer& tracer_;
-  double buried_reach_ = 0;  ///< metres
+  double buried_reach_;  ///< metres
   std::vector<TriangleSides> sides_;
 };
 

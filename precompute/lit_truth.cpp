@@ -12,13 +12,6 @@ namespace {
 // Lights that the matrix is read for at a time.
 constexpr std::size_t kBatch = 64;
 
-std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
-  std::vector<float> workspace(transfer.workspace_size());
-  std::vector<Float3> result(light.size());
-  transfer.apply(light, result, workspace);
-  return result;
-}
-
 }  // namespace
 
 LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights)

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -13,11 +14,6 @@ constexpr int kStepCount = 2;
 // Weights that are added before those of the same patch are put together: a patch may have a
 // hundred thousand triangles.
 constexpr std::size_t kMostPending = 4096;
-
-double triangle_area(const DisplayMesh& mesh, std::uint32_t t) {
-  const auto at = [&](int k) { return to_dvec3(mesh.position[mesh.triangle[t][k]]); };
-  return 0.5 * glm::length(glm::cross(at(1) - at(0), at(2) - at(0)));
-}
 
 /// Puts the weights into ascending order and those of the same patch together.
 void collect(VertexWeights& weight) {
@@ -44,11 +40,11 @@ VertexWeights shown_mean(const DisplayMesh& mesh, std::span<const std::uint32_t>
                          const std::vector<VertexWeights>& weight) {
   const auto is_good = [&](const PatchWeight& w) { return good[w.patch] != 0; };
   double area = 0;
-  for (const std::uint32_t t : triangles) area += triangle_area(mesh, t);
+  for (const std::uint32_t t : triangles) area += area_of(corners_of(mesh, t));
   VertexWeights mean;
   std::size_t collected = 0;
   for (const std::uint32_t t : triangles) {
-    const double part = triangle_area(mesh, t) / (3 * area);
+    const double part = area_of(corners_of(mesh, t)) / (3 * area);
     for (const std::uint32_t v : mesh.triangle[t]) {
       if (weight[v].empty() || !std::ranges::all_of(weight[v], is_good)) return {};
       append(mean, part, weight[v]);

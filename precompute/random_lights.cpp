@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <limits>
 #include <numbers>
 
 #include "hemisphere_rays.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/reflection.h"
 
 namespace rebounce {
 namespace {
@@ -26,14 +27,6 @@ constexpr double kLeastPart = 0.1;
 /// Lights of different kinds are drawn apart from the same seed.
 std::uint64_t bits_of(LightKind kind, std::uint64_t seed, int k) {
   return mix_bits(mix_bits(seed + static_cast<std::uint64_t>(kind)) + 0x51ED270BULL * k);
-}
-
-glm::dvec3 corner(const DisplayMesh& mesh, bool high) {
-  glm::dvec3 result = to_dvec3(mesh.position.front());
-  for (const Float3& p : mesh.position) {
-    result = high ? glm::max(result, to_dvec3(p)) : glm::min(result, to_dvec3(p));
-  }
-  return result;
 }
 
 Float3 random_direction(std::uint64_t bits) {
@@ -108,9 +101,7 @@ std::vector<Exitance> lit_by(const TransferData& data, const RayTracer& tracer,
   const auto add = [&](std::span<const Light> light, const Sky& with_sky) {
     Exitance exitance(data.patches.size());
     direct_lighting.compute(light, with_sky, exitance);
-    for (std::size_t i = 0; i < exitance.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
-    }
+    reflect(data.patches.reflectance, exitance);
     roles.keep(PatchRoles::kSource, exitance);
     if (area_norm(exitance, data.patches.area) > 0) exitances.push_back(std::move(exitance));
   };
@@ -142,7 +133,7 @@ std::string_view name(LightKind kind) {
 std::vector<Light> random_point_lights(const TransferData& data, const RayTracer& tracer, int count,
                                        std::uint64_t seed, const PatchRoles& roles) {
   const DisplayMesh& mesh = data.mesh;
-  const double open_reach = 0.25 * glm::distance(corner(mesh, false), corner(mesh, true));
+  const double open_reach = 0.25 * box_around(mesh.position).diagonal();
   const PatchTriangles triangles(mesh.triangle_patch, data.patches.size());
   const PatchChoice choice(data.patches.area, roles);
   std::vector<Light> lights(count);

@@ -13,6 +13,7 @@
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -48,11 +49,6 @@ constexpr double kMostNegative = 0.5;
 /// How a triangle lies among the surfaces close above it.
 enum class Exposure : std::uint8_t { kOpen, kMixed, kCovered };
 
-std::array<glm::dvec3, 3> corners_of(const DisplayMesh& mesh, const Uint3& t) {
-  return {to_dvec3(mesh.position[t[0]]), to_dvec3(mesh.position[t[1]]),
-          to_dvec3(mesh.position[t[2]])};
-}
-
 Ray segment_ray(const Float3& from, const Float3& to) {
   Ray ray{};
   ray.origin = from;
@@ -64,7 +60,7 @@ Ray segment_ray(const Float3& from, const Float3& to) {
 
 /// Looks straight up from four points of the triangle, and between their upper ends. The rays are
 /// as long as suits a triangle of `least_size` metres at least.
-Exposure find_exposure(const std::array<glm::dvec3, 3>& p, double least_size,
+Exposure find_exposure(const TriangleCorners& p, double least_size,
                        const RayTracer& tracer) {
   const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
   const glm::dvec3 normal = glm::normalize(cross);
@@ -164,8 +160,7 @@ class ReconstructionWeights {
     double area = 0;
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
       if (mesh_.triangle_patch[t] == kNone) continue;
-      const std::array<glm::dvec3, 3> p = corners_of(mesh_, mesh_.triangle[t]);
-      area += 0.5 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+      area += area_of(corners_of(mesh_, t));
     }
     return std::sqrt(area / static_cast<double>(std::max<std::size_t>(absorbed_.size(), 1)));
   }
@@ -183,8 +178,8 @@ class ReconstructionWeights {
       std::array<double, 3> area{};
       glm::dvec3 moment(0);
       for (const std::uint32_t t : triangles_[i]) {
-        const std::array<glm::dvec3, 3> p = corners_of(mesh_, mesh_.triangle[t]);
-        const double size = 0.5 * glm::length(glm::cross(p[1] - p[0], p[2] - p[0]));
+        const TriangleCorners p = corners_of(mesh_, t);
+        const double size = area_of(p);
         area[static_cast<std::size_t>(find_exposure(p, least_size, tracer_))] += size;
         moment += size / 3 * (p[0] + p[1] + p[2]);
       }
@@ -204,7 +199,7 @@ class ReconstructionWeights {
     std::vector<double> largest(receivers_.size(), 0.0);
     std::vector<float> size_sum(receivers_.size(), 0.0F), count(receivers_.size(), 0.0F);
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
-      const std::array<glm::dvec3, 3> p = corners_of(mesh_, mesh_.triangle[t]);
+      const TriangleCorners p = corners_of(mesh_, t);
       const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double area = glm::length(cross);
       const std::uint32_t patch = shown_patch_[t];

@@ -21,7 +21,7 @@ using Field = Eigen::Array<double, kRows, Eigen::Dynamic>;
 
 /// F times `in`.
 template <int kRows>
-Field<kRows> gather(const FormFactorRows& rows, const Field<kRows>& in) {
+Field<kRows> times(const FormFactorRows& rows, const Field<kRows>& in) {
   Field<kRows> out(kRows, in.cols());
 #pragma omp parallel for schedule(dynamic, 64)
   for (Eigen::Index i = 0; i < in.cols(); ++i) {
@@ -37,8 +37,8 @@ Field<kRows> gather(const FormFactorRows& rows, const Field<kRows>& in) {
 }
 
 template <int kRows>
-Field<kRows> gather(const std::shared_ptr<const LinkedFormFactors>& links,
-                    const Field<kRows>& in) {
+Field<kRows> times(const std::shared_ptr<const LinkedFormFactors>& links,
+                   const Field<kRows>& in) {
   using Columns = std::array<double, kRows>;
   std::vector<Columns> from(in.cols()), to(in.cols());
   const auto size = static_cast<std::size_t>(in.size());
@@ -49,7 +49,7 @@ Field<kRows> gather(const std::shared_ptr<const LinkedFormFactors>& links,
 
 /// Light after light, in single precision.
 template <int kRows>
-Field<kRows> gather(const CompressedFormFactors& compressed, const Field<kRows>& in) {
+Field<kRows> times(const CompressedFormFactors& compressed, const Field<kRows>& in) {
   Field<kRows> out(kRows, in.cols());
   std::vector<Float3> from(in.cols()), to(in.cols());
   std::vector<float> workspace(compressed.workspace_size());
@@ -105,7 +105,7 @@ class ConjugateGradients {
 
   /// F times `in`.
   Field gather(const Field& in) const {
-    return std::visit([&](const auto& form) { return rebounce::gather<kRows>(form, in); }, form_);
+    return std::visit([&](const auto& form) { return times<kRows>(form, in); }, form_);
   }
 
  private:
@@ -238,12 +238,15 @@ std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
   const auto solutions =
       solve(form_, patches_, initial_exitances, residual, Quantity::kIndirectIrradiance);
   std::vector<std::vector<Float3>> result;
-  for (const std::vector<Double3>& h : solutions) {
-    std::vector<Float3>& rounded = result.emplace_back(h.size());
-    std::ranges::transform(h, rounded.begin(), [](const Double3& v) {
-      return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
-    });
-  }
+  for (const std::vector<Double3>& h : solutions) result.push_back(rounded(h));
+  return result;
+}
+
+std::vector<Float3> rounded(std::span<const Double3> solution) {
+  std::vector<Float3> result(solution.size());
+  std::ranges::transform(solution, result.begin(), [](const Double3& v) {
+    return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+  });
   return result;
 }
 

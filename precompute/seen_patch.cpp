@@ -1,6 +1,7 @@
 #include "seen_patch.h"
 
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -11,11 +12,7 @@ std::uint32_t side_of(const DisplayMesh& mesh, std::uint32_t triangle, bool fron
 
 /// Unit, on the side that was hit.
 glm::dvec3 normal_at(const DisplayMesh& mesh, const Hit& hit) {
-  const auto corner = [&](int k) {
-    return to_dvec3(mesh.position[mesh.triangle[hit.triangle][k]]);
-  };
-  const glm::dvec3 normal =
-      glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+  const glm::dvec3 normal = front_normal(corners_of(mesh, hit.triangle));
   return hit.front ? normal : -normal;
 }
 

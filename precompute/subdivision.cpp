@@ -8,6 +8,7 @@
 
 #include "conforming_mesh.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -116,11 +117,7 @@ double mean_patch_size(const Scene& scene, std::span<const std::uint8_t> patches
                        std::size_t patch_count) {
   double area = 0;
   for (std::size_t t = 0; t < scene.triangle.size(); ++t) {
-    const auto [a, b, c] = scene.triangle[t];
-    const glm::dvec3 p = to_dvec3(scene.position[a]);
-    area +=
-        0.5 * patches_per_triangle[t] *
-        glm::length(glm::cross(to_dvec3(scene.position[b]) - p, to_dvec3(scene.position[c]) - p));
+    area += patches_per_triangle[t] * area_of(corners_of(scene, t));
   }
   return std::sqrt(area / static_cast<double>(std::max<std::size_t>(patch_count, 1)));
 }

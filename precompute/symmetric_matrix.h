@@ -26,8 +26,9 @@ class SymmetricMatrix {
 
   /// [n] m².
   virtual std::span<const float> area() const = 0;
-  virtual std::uint32_t matrix_count() const = 0;
-  virtual std::array<std::uint32_t, kChannelCount> channel_matrix() const = 0;
+  /// Distinct matrices, and which of them each channel has: by default one for all channels.
+  virtual std::uint32_t matrix_count() const { return 1; }
+  virtual std::array<std::uint32_t, kChannelCount> channel_matrix() const { return {0, 0, 0}; }
 
   /// Writes the entries between two lists of patches without repetitions, which are the same or
   /// have none in common; `entries` is [rows][columns]. BLAS must run on one thread.
@@ -73,8 +74,6 @@ class FormFactorMatrix final : public SymmetricMatrix {
   FormFactorMatrix(const ExchangeMatrix& exchange, std::span<const float> area);
 
   std::span<const float> area() const override { return area_; }
-  std::uint32_t matrix_count() const override { return 1; }
-  std::array<std::uint32_t, kChannelCount> channel_matrix() const override { return {0, 0, 0}; }
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;

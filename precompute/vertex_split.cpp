@@ -7,6 +7,8 @@
 
 #include "element_neighbours.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
+#include "rebounce/transfer/grouped.h"
 
 namespace rebounce {
 namespace {
@@ -18,30 +20,25 @@ constexpr double kAlongEdge = 0.25, kAwayFromEdge = 0.1;
 /// The display triangles around each vertex, in ascending order.
 class VertexTriangles {
  public:
-  explicit VertexTriangles(const DisplayMesh& mesh) : begin_(mesh.position.size() + 1, 0) {
-    for (const Uint3& corner : mesh.triangle) {
-      for (const std::uint32_t v : corner) ++begin_[v + 1];
-    }
-    for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
-    triangle_.resize(begin_.back());
-    std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
-    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
-      for (const std::uint32_t v : mesh.triangle[t]) triangle_[next[v]++] = t;
-    }
-  }
+  explicit VertexTriangles(const DisplayMesh& mesh)
+      : of_vertex_(mesh.position.size(), [&](const auto& add) {
+          for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+            for (const std::uint32_t v : mesh.triangle[t]) add(v, t);
+          }
+        }) {}
 
   /// The part for vertex `v` of a list with an entry for each triangle of each vertex.
   template <typename List>
   auto of(List& list, std::uint32_t v) const {
-    return std::span(list).subspan(begin_[v], begin_[v + 1] - begin_[v]);
+    return std::span(list).subspan(of_vertex_.offsets()[v], of_vertex_[v].size());
   }
 
-  std::span<const std::uint32_t> operator[](std::uint32_t v) const { return of(triangle_, v); }
+  std::span<const std::uint32_t> operator[](std::uint32_t v) const { return of_vertex_[v]; }
 
-  std::size_t corner_count() const { return triangle_.size(); }
+  std::size_t corner_count() const { return of_vertex_.size(); }
 
  private:
-  std::vector<std::uint32_t> begin_, triangle_;
+  Grouped<std::uint32_t> of_vertex_;
 };
 
 class VertexSplitter {
@@ -81,7 +78,7 @@ class VertexSplitter {
     const std::uint32_t third = a != v && a != u ? a : b != v && b != u ? b : c;
     const auto at = [&](std::uint32_t k) { return to_dvec3(mesh_.position[k]); };
     const glm::dvec3 on_edge = glm::mix(at(v), at(u), kAlongEdge);
-    const glm::dvec3 normal = glm::normalize(glm::cross(at(b) - at(a), at(c) - at(a)));
+    const glm::dvec3 normal = front_normal(corners_of(mesh_, t));
     return {to_float3(glm::mix(on_edge, at(third), kAwayFromEdge)), to_float3(normal)};
   }
 

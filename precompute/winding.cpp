@@ -13,6 +13,7 @@
 #include "hemisphere_rays.h"
 #include "rebounce/precompute/subdivision.h"
 #include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -33,18 +34,6 @@ constexpr double kLeastBackCoverage = 0.02;
 
 // Fronts of which fewer see something belong to a scene without exchange of light.
 constexpr double kNoExchange = 1e-3;
-
-using Corners = std::array<glm::dvec3, 3>;
-
-Corners corners_of(const Scene& scene, std::uint32_t t) {
-  const Uint3& corner = scene.triangle[t];
-  return {to_dvec3(scene.position[corner[0]]), to_dvec3(scene.position[corner[1]]),
-          to_dvec3(scene.position[corner[2]])};
-}
-
-glm::dvec3 area_vector(const Corners& corner) {
-  return glm::cross(corner[1] - corner[0], corner[2] - corner[0]) / 2.0;
-}
 
 class DisjointSets {
  public:
@@ -112,7 +101,7 @@ class Sights {
     area_end_.reserve(scene.triangle.size());
     double sum = 0;
     for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
-      sum += glm::length(area_vector(corners_of(scene, t))) * (is_double_sided(t) ? 2 : 1);
+      sum += area_of(corners_of(scene, t)) * (is_double_sided(t) ? 2 : 1);
       area_end_.push_back(sum);
     }
   }
@@ -151,8 +140,8 @@ class Sights {
     const double place = (k + 0.5) * area_per_ray();
     const auto end = std::upper_bound(area_end_.begin(), area_end_.end() - 1, place);
     t = static_cast<std::uint32_t>(end - area_end_.begin());
-    const Corners corner = corners_of(scene_, t);
-    glm::dvec3 normal = glm::normalize(area_vector(corner)) * (from_front ? 1.0 : -1.0);
+    const TriangleCorners corner = corners_of(scene_, t);
+    glm::dvec3 normal = front_normal(corner) * (from_front ? 1.0 : -1.0);
     if (is_double_sided(t) && k % 2 == 1) normal = -normal;
     Ray ray;
     make_hemisphere_rays(corner, normal, tracer_, mix_bits(k), {&ray, 1});
@@ -180,7 +169,7 @@ class InsideOutSearch {
     coincident_ = find_coincident(scene, place);
     for (std::uint32_t t = 0; t < piece_.size(); ++t) {
       Exposure& exposure = exposure_[piece_[t]];
-      exposure.area += glm::length(area_vector(corners_of(scene, t)));
+      exposure.area += area_of(corners_of(scene, t));
       if (!sights_.is_double_sided(t) && !coincident_[t]) exposure.may_be_turned = true;
     }
   }

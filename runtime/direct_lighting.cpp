@@ -4,9 +4,9 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <limits>
 
 #include "prepared_light.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
@@ -27,20 +27,6 @@ constexpr float kLampGap = 1e-4F;
 struct Receiver {
   glm::vec3 position;  ///< moved off the surface
   glm::vec3 normal;    ///< unit
-};
-
-/// The box around the points of a block.
-struct Box {
-  glm::vec3 low{std::numeric_limits<float>::max()}, high{std::numeric_limits<float>::lowest()};
-
-  void add(const glm::vec3& p) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  float distance_squared(const glm::vec3& p) const {
-    const glm::vec3 apart = glm::max(glm::max(low - p, p - high), glm::vec3(0));
-    return glm::dot(apart, apart);
-  }
 };
 
 /// Collects shadow rays and adds the light of those that get through to their patches, in turn.

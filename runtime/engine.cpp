@@ -5,6 +5,7 @@
 
 #include "rebounce/runtime/emitting_material.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/reflection.h"
 
 namespace rebounce {
 namespace {
@@ -81,13 +82,8 @@ void Engine::set_emission_scale(std::uint32_t material, const Float3& scale) {
 }
 
 void Engine::compute_initial_exitance() {
-  const PatchTable& patches = data_->patches;
-  for (std::size_t i = 0; i < patches.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      initial_exitance_[i][c] =
-          patches.reflectance[i][c] * direct_irradiance_[i][c] + emitted_exitance_[i][c];
-    }
-  }
+  add_reflected(emitted_exitance_, data_->patches.reflectance, direct_irradiance_,
+                initial_exitance_);
 }
 
 void Engine::apply_transfer() {
@@ -95,13 +91,7 @@ void Engine::apply_transfer() {
 }
 
 void Engine::compute_radiosity() {
-  const PatchTable& patches = data_->patches;
-  for (std::size_t i = 0; i < patches.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      radiosity_[i][c] =
-          initial_exitance_[i][c] + patches.reflectance[i][c] * indirect_irradiance_[i][c];
-    }
-  }
+  add_reflected(initial_exitance_, data_->patches.reflectance, indirect_irradiance_, radiosity_);
 }
 
 }  // namespace rebounce

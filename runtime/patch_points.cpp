@@ -4,30 +4,25 @@
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 
 PatchTriangles::PatchTriangles(std::span<const std::uint32_t> triangle_patch,
                                std::size_t patch_count)
-    : begin_(patch_count + 1, 0) {
-  for (const std::uint32_t patch : triangle_patch) {
-    if (patch != kNone) ++begin_[patch + 1];
-  }
-  for (std::size_t i = 0; i < patch_count; ++i) begin_[i + 1] += begin_[i];
-  triangle_.resize(begin_.back());
-  std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
-  for (std::uint32_t t = 0; t < triangle_patch.size(); ++t) {
-    if (triangle_patch[t] != kNone) triangle_[next[triangle_patch[t]]++] = t;
-  }
-}
+    : of_patch_(patch_count, [&](const auto& add) {
+        for (std::uint32_t t = 0; t < triangle_patch.size(); ++t) {
+          if (triangle_patch[t] != kNone) add(triangle_patch[t], t);
+        }
+      }) {}
 
 PatchSurface::PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles) {
   for (const std::uint32_t t : triangles) add(mesh, t);
 }
 
 void PatchSurface::add(const DisplayMesh& mesh, std::uint32_t triangle) {
-  const auto corner = [&](int k) { return to_dvec3(mesh.position[mesh.triangle[triangle][k]]); };
-  const glm::dvec3 a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
+  const auto [a, b, c] = corners_of(mesh, triangle);
+  const glm::dvec3 ab = b - a, ac = c - a;
   const glm::dvec3 cross = glm::cross(ab, ac);
   const std::span<const std::uint8_t> map = mesh.opacity.of_triangle(triangle);
   add_places(map, glm::length(cross));

@@ -8,23 +8,6 @@
 #include "vector_portable.h"
 
 namespace rebounce {
-namespace {
-
-const BlockKernelSet& pick_block_kernels() {
-#if defined(__x86_64__)
-  switch (widest_instruction_set()) {
-    case InstructionSet::kAvx512:
-      return kBlockKernelsAvx512;
-    case InstructionSet::kAvx2:
-      return kBlockKernelsAvx2;
-    case InstructionSet::kPortable:
-      break;
-  }
-#endif
-  return kBlockKernelsPortable;
-}
-
-}  // namespace
 
 ChannelLanes::ChannelLanes(const std::array<std::uint32_t, kChannelCount>& channel_matrix,
                            std::uint32_t matrices)
@@ -38,9 +21,18 @@ ChannelLanes::ChannelLanes(const std::array<std::uint32_t, kChannelCount>& chann
 
 const BlockKernelSet kBlockKernelsPortable = make_block_kernels<Vector4, Shorts8>("portable");
 
+std::span<const BlockKernelSet* const> block_kernel_sets() {
+#if defined(__x86_64__)
+  static const std::array kSets = {&kBlockKernelsPortable, &kBlockKernelsAvx2, &kBlockKernelsAvx512};
+#else
+  static const std::array kSets = {&kBlockKernelsPortable};
+#endif
+  return runnable(kSets);
+}
+
 const BlockKernelSet& block_kernels() {
-  static const BlockKernelSet& kernels = pick_block_kernels();
-  return kernels;
+  static const BlockKernelSet& widest = *block_kernel_sets().back();
+  return widest;
 }
 
 }  // namespace rebounce

@@ -97,7 +97,8 @@ extern const BlockKernelSet kBlockKernelsPortable;
 extern const BlockKernelSet kBlockKernelsAvx2;
 extern const BlockKernelSet kBlockKernelsAvx512;
 
-/// The widest kernels that this processor runs.
+/// The kernels that this processor runs, narrowest first, and the widest of them.
+std::span<const BlockKernelSet* const> block_kernel_sets();
 const BlockKernelSet& block_kernels();
 
 }  // namespace rebounce

@@ -5,29 +5,21 @@
 #include "vector_portable.h"
 
 namespace rebounce {
-namespace {
-
-const DenseKernels& pick_dense_kernels() {
-#if defined(__x86_64__)
-  switch (widest_instruction_set()) {
-    case InstructionSet::kAvx512:
-      return kDenseKernelsAvx512;
-    case InstructionSet::kAvx2:
-      return kDenseKernelsAvx2;
-    case InstructionSet::kPortable:
-      break;
-  }
-#endif
-  return kDenseKernelsPortable;
-}
-
-}  // namespace
 
 const DenseKernels kDenseKernelsPortable = make_dense_kernels<Vector4>("portable");
 
+std::span<const DenseKernels* const> dense_kernel_sets() {
+#if defined(__x86_64__)
+  static const std::array kSets = {&kDenseKernelsPortable, &kDenseKernelsAvx2, &kDenseKernelsAvx512};
+#else
+  static const std::array kSets = {&kDenseKernelsPortable};
+#endif
+  return runnable(kSets);
+}
+
 const DenseKernels& dense_kernels() {
-  static const DenseKernels& kernels = pick_dense_kernels();
-  return kernels;
+  static const DenseKernels& widest = *dense_kernel_sets().back();
+  return widest;
 }
 
 }  // namespace rebounce

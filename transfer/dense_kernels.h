@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace rebounce {
 
@@ -28,7 +29,8 @@ extern const DenseKernels kDenseKernelsPortable;
 extern const DenseKernels kDenseKernelsAvx2;
 extern const DenseKernels kDenseKernelsAvx512;
 
-/// The widest kernels that this processor runs.
+/// The kernels that this processor runs, narrowest first, and the widest of them.
+std::span<const DenseKernels* const> dense_kernel_sets();
 const DenseKernels& dense_kernels();
 
 }  // namespace rebounce

@@ -4,6 +4,7 @@
 #include <cassert>
 
 #include "gather_kernels.h"
+#include "planes.h"
 
 namespace rebounce {
 
@@ -61,10 +62,7 @@ void ExchangeBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
   const std::size_t n = patch_count(), stride = plane_size(), planes = kChannelCount * stride;
   assert(in.size() == n && out.size() == n && workspace.size() >= workspace_size());
   float* const x = workspace.data();
-  for (int c = 0; c < kChannelCount; ++c) {
-    for (std::size_t i = 0; i < n; ++i) x[c * stride + i] = in[i][c];
-    std::fill(x + c * stride + n, x + (c + 1) * stride, 0.0F);
-  }
+  to_planes(in, stride, x);
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t s = 0; s < kSlotCount; ++s) {
     float* const y = x + (1 + s) * planes;

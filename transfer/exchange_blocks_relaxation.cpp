@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "gather_kernels.h"
+#include "planes.h"
 #include "rebounce/transfer/exchange_blocks.h"
 
 namespace rebounce {
@@ -24,10 +25,7 @@ class ExchangeRelaxation final : public Relaxation {
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     problem_ = problem;
-    for (int c = 0; c < kChannelCount; ++c) {
-      for (std::size_t i = 0; i < radiosity.size(); ++i)
-        radiosity_[c * stride_ + i] = radiosity[i][c];
-    }
+    to_planes(radiosity, stride_, radiosity_.data());
     known_ = Known::kNothing;
   }
 
@@ -36,7 +34,7 @@ class ExchangeRelaxation final : public Relaxation {
   }
 
   void end(std::span<Float3> radiosity) const override {
-    for (std::size_t i = 0; i < radiosity.size(); ++i) radiosity[i] = values_at(radiosity_, i);
+    from_planes(radiosity_.data(), stride_, radiosity);
   }
 
   int reads_per_sweep(SweepOrder order) const override {
@@ -143,7 +141,7 @@ class ExchangeRelaxation final : public Relaxation {
 
   void spread(const FormFactorBlock* blocks, const std::uint32_t* position, std::size_t count,
               std::size_t row, std::size_t slot) {
-    gather_kernels().spread(blocks, position, count, values_at(radiosity_, row).data(),
+    gather_kernels().spread(blocks, position, count, radiosity_at(row).data(),
                             upper_.data() + slot * kChannelCount * stride_, stride_);
   }
 
@@ -165,8 +163,8 @@ class ExchangeRelaxation final : public Relaxation {
     return changed_squared;
   }
 
-  Float3 values_at(const std::vector<float>& planes, std::size_t i) const {
-    return {planes[i], planes[stride_ + i], planes[2 * stride_ + i]};
+  Float3 radiosity_at(std::size_t i) const {
+    return {radiosity_[i], radiosity_[stride_ + i], radiosity_[2 * stride_ + i]};
   }
 
   const ExchangeBlocks& exchange_;

@@ -1,10 +1,10 @@
 #include "rebounce/transfer/form_factor_blocks.h"
 
-#include <algorithm>
 #include <array>
 #include <cassert>
 
 #include "gather_kernels.h"
+#include "planes.h"
 
 namespace rebounce {
 namespace {
@@ -73,21 +73,13 @@ double FormFactorBlocks::fill() const {
 }
 
 void FormFactorBlocks::to_planes(std::span<const Float3> values, std::span<float> planes) const {
-  const std::size_t n = patch_count(), stride = plane_size();
-  assert(values.size() == n && planes.size() >= kChannelCount * stride);
-  for (int c = 0; c < kChannelCount; ++c) {
-    float* plane = planes.data() + c * stride;
-    for (std::size_t i = 0; i < n; ++i) plane[i] = values[i][c];
-    std::fill(plane + n, plane + stride, 0.0F);
-  }
+  assert(values.size() == patch_count() && planes.size() >= kChannelCount * plane_size());
+  rebounce::to_planes(values, plane_size(), planes.data());
 }
 
 void FormFactorBlocks::from_planes(std::span<const float> planes, std::span<Float3> values) const {
-  const std::size_t n = patch_count(), stride = plane_size();
-  assert(values.size() == n && planes.size() >= kChannelCount * stride);
-  for (std::size_t i = 0; i < n; ++i) {
-    for (int c = 0; c < kChannelCount; ++c) values[i][c] = planes[c * stride + i];
-  }
+  assert(values.size() == patch_count() && planes.size() >= kChannelCount * plane_size());
+  rebounce::from_planes(planes.data(), plane_size(), values);
 }
 
 void FormFactorBlocks::gather(std::span<const Float3> in, std::span<Float3> out,

@@ -5,22 +5,21 @@
 #include "vector_portable.h"
 
 namespace rebounce {
-namespace {
-
-const GatherKernels& pick_gather_kernels() {
-#if defined(__x86_64__)
-  if (widest_instruction_set() >= InstructionSet::kAvx2) return kGatherKernelsAvx2;
-#endif
-  return kGatherKernelsPortable;
-}
-
-}  // namespace
 
 const GatherKernels kGatherKernelsPortable = make_gather_kernels<Vector4>("portable");
 
+std::span<const GatherKernels* const> gather_kernel_sets() {
+#if defined(__x86_64__)
+  static const std::array kSets = {&kGatherKernelsPortable, &kGatherKernelsAvx2};
+#else
+  static const std::array kSets = {&kGatherKernelsPortable};
+#endif
+  return runnable(kSets);
+}
+
 const GatherKernels& gather_kernels() {
-  static const GatherKernels& kernels = pick_gather_kernels();
-  return kernels;
+  static const GatherKernels& widest = *gather_kernel_sets().back();
+  return widest;
 }
 
 }  // namespace rebounce

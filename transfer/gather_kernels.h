@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "rebounce/transfer/form_factor_blocks.h"
 
@@ -38,7 +39,8 @@ struct GatherKernels {
 extern const GatherKernels kGatherKernelsPortable;
 extern const GatherKernels kGatherKernelsAvx2;
 
-/// The widest kernels that this processor runs.
+/// The kernels that this processor runs, narrowest first, and the widest of them.
+std::span<const GatherKernels* const> gather_kernel_sets();
 const GatherKernels& gather_kernels();
 
 }  // namespace rebounce

@@ -275,6 +275,18 @@ Storage without_values(const Storage& exact, Precision precision) {
   return storage;
 }
 
+/// An operator in f32 with integers for its bases, kept as `bases`.
+template <typename Integer>
+Storage encode_integers(const Storage& storage, Precision precision,
+                        SharedArray<Integer> Storage::*bases) {
+  const Storage exact = HierarchicalOperator::stream(storage);
+  Storage integers = without_values(exact, precision);
+  IntegerEncoder<Integer> encoder(exact, integers);
+  integers.*bases = encoder.take_bases();
+  integers.values_f16 = encoder.take_cores();
+  return integers;
+}
+
 }  // namespace
 
 std::uint64_t TransferBlock::value_count(std::uint32_t matrix_count) const {
@@ -332,21 +344,11 @@ Storage HierarchicalOperator::encode_half(const Storage& storage) {
 }
 
 Storage HierarchicalOperator::encode_shorts(const Storage& storage) {
-  const Storage exact = stream(storage);
-  Storage shorts = without_values(exact, Precision::kQ16);
-  IntegerEncoder<std::int16_t> encoder(exact, shorts);
-  shorts.bases_q16 = encoder.take_bases();
-  shorts.values_f16 = encoder.take_cores();
-  return shorts;
+  return encode_integers(storage, Precision::kQ16, &Storage::bases_q16);
 }
 
 Storage HierarchicalOperator::encode_bytes(const Storage& storage) {
-  const Storage exact = stream(storage);
-  Storage bytes = without_values(exact, Precision::kQ8);
-  IntegerEncoder<std::int8_t> encoder(exact, bytes);
-  bytes.bases_q8 = encoder.take_bases();
-  bytes.values_f16 = encoder.take_cores();
-  return bytes;
+  return encode_integers(storage, Precision::kQ8, &Storage::bases_q8);
 }
 
 Storage HierarchicalOperator::encode(const Storage& storage, Precision precision) {

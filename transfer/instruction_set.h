@@ -1,6 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace rebounce {
 
@@ -13,5 +17,12 @@ enum class InstructionSet : std::uint8_t {
 
 /// The widest that this processor has.
 InstructionSet widest_instruction_set();
+
+/// Of kernels for each instruction set, in their order, those that this processor runs.
+template <typename Kernels, std::size_t kCount>
+std::span<const Kernels* const> runnable(const std::array<const Kernels*, kCount>& kernels) {
+  const std::size_t count = static_cast<std::size_t>(widest_instruction_set()) + 1;
+  return std::span(kernels).first(std::min(count, kCount));
+}
 
 }  // namespace rebounce

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 
 #include "rebounce/transfer/linked_form_factors.h"
 
@@ -33,7 +34,8 @@ extern const LinkKernels kLinkKernelsPortable;
 extern const LinkKernels kLinkKernelsAvx2;
 extern const LinkKernels kLinkKernelsAvx512;
 
-/// The widest kernels that this processor runs.
+/// The kernels that this processor runs, narrowest first, and the widest of them.
+std::span<const LinkKernels* const> link_kernel_sets();
 const LinkKernels& link_kernels();
 
 }  // namespace rebounce

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstring>
 #include <string>
 
-#include "bfloat16.h"
-#include "link_kernels.h"
+#include "link_gather.h"
+#include "links_by_node.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -20,25 +19,17 @@ namespace {
 // Trees of fewer nodes than this are walked before threads have met at every level.
 constexpr std::size_t kWorthThreads = 16384;
 
-template <typename Lanes>
-void add(Lanes& to, float factor, const Lanes& from) {
-  for (std::size_t c = 0; c < to.size(); ++c) to[c] += factor * from[c];
-}
-
 std::array<std::uint16_t, 3> bfloat16s(const float* values) {
   return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
 }
 
-/// Position of the first patch of each node.
-std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
-  std::vector<std::uint32_t> begin(links.first_child.size(), 0);
-  for (std::size_t k = 0; k < begin.size(); ++k) {
-    const std::uint32_t child = links.first_child[k];
-    if (child == kNone) continue;
-    begin[child] = begin[k];
-    begin[child + 1] = begin[k] + links.count[child];
-  }
-  return begin;
+IncomingLink seen_from(std::uint32_t node, const FormFactorLinks& links, std::uint32_t link) {
+  const auto [a, b] = links.pair[link];
+  const float exchange = links.exchange_area[link];
+  const auto of_a = bfloat16s(links.gradient[link].data());
+  const auto of_b = bfloat16s(links.gradient[link].data() + 3);
+  if (a == node) return {of_b, of_a, b, exchange};
+  return {of_a, of_b, a, exchange};
 }
 
 /// Children follow each other level by level, and are as large as their parent together.
@@ -103,6 +94,17 @@ void check_links(const FormFactorLinks& links, std::size_t patch_count) {
   check_values(links);
 }
 
+std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
+  std::vector<std::uint32_t> begin(links.first_child.size(), 0);
+  for (std::size_t k = 0; k < begin.size(); ++k) {
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) continue;
+    begin[child] = begin[k];
+    begin[child + 1] = begin[k] + links.count[child];
+  }
+  return begin;
+}
+
 LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                                      std::span<const Float3> centroid)
     : scale_(links.scale) {
@@ -133,7 +135,14 @@ void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const
     }
     node.area = static_cast<float>(sum[k][3]);
   }
-  for (std::size_t k = 0; k < m; ++k) {
+  place_children(sum);
+  find_levels();
+}
+
+/// Where children lie in their parent; `sum` has the area times the centre of each node, and the
+/// area.
+void LinkedFormFactors::place_children(std::span<const std::array<double, 4>> sum) {
+  for (std::size_t k = 0; k < node_.size(); ++k) {
     if (node_[k].patch != kNone) continue;
     for (std::uint32_t c = node_[k].first_child; c < node_[k].first_child + 2; ++c) {
       node_[c].part = static_cast<float>(sum[c][3] / sum[k][3]);
@@ -143,36 +152,31 @@ void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const
       }
     }
   }
-  level_begin_ = {0};
-  for (std::size_t begin_of_next = 1; begin_of_next < m;) {
-    // The next level begins with the first child of the first node of this one that has any.
-    level_begin_.push_back(static_cast<std::uint32_t>(begin_of_next));
-    std::size_t end = begin_of_next;
-    for (std::size_t k = level_begin_[level_begin_.size() - 2]; k < begin_of_next; ++k) {
-      if (node_[k].patch == kNone) end += 2;
+}
+
+/// The root, then its children, then theirs.
+void LinkedFormFactors::find_levels() {
+  level_begin_ = {0, 1};
+  while (level_begin_.back() < node_.size()) {
+    const std::uint32_t begin = level_begin_[level_begin_.size() - 2], end = level_begin_.back();
+    std::uint32_t next_end = end;
+    for (std::uint32_t k = begin; k < end; ++k) {
+      if (node_[k].patch == kNone) next_end += 2;
     }
-    begin_of_next = end;
+    level_begin_.push_back(next_end);
   }
-  level_begin_.push_back(static_cast<std::uint32_t>(m));
 }
 
 /// Every link twice, once for each of its nodes, by the node that gathers.
 void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
-  incoming_begin_.assign(node_.size() + 1, 0);
-  for (const auto& [a, b] : links.pair) {
-    ++incoming_begin_[a + 1];
-    if (a != b) ++incoming_begin_[b + 1];
-  }
-  for (std::size_t k = 0; k < node_.size(); ++k) incoming_begin_[k + 1] += incoming_begin_[k];
-  incoming_.resize(incoming_begin_.back());
-  std::vector<std::uint64_t> next(incoming_begin_.begin(), incoming_begin_.end() - 1);
-  for (std::size_t k = 0; k < links.pair.size(); ++k) {
-    const auto [a, b] = links.pair[k];
-    const float exchange = links.exchange_area[k];
-    const auto of_a = bfloat16s(links.gradient[k].data());
-    const auto of_b = bfloat16s(links.gradient[k].data() + 3);
-    incoming_[next[a]++] = {of_b, of_a, b, exchange};
-    if (a != b) incoming_[next[b]++] = {of_a, of_b, a, exchange};
+  const LinksByNode of_node = links_by_node(node_.size(), links.pair.size(),
+                                            [&](std::size_t k) { return links.pair[k]; });
+  incoming_begin_ = of_node.offsets();
+  incoming_.reserve(incoming_begin_.back());
+  for (std::uint32_t node = 0; node < node_.size(); ++node) {
+    for (const std::uint32_t link : of_node[node]) {
+      incoming_.push_back(seen_from(node, links, link));
+    }
   }
 }
 
@@ -187,22 +191,29 @@ std::size_t LinkedFormFactors::workspace_size() const {
 
 void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
                                std::span<float> workspace) const {
-  assert(in.size() == patch_count() && out.size() == patch_count() &&
-         workspace.size() >= workspace_size());
+  assert(workspace.size() >= workspace_size());
   auto* light = reinterpret_cast<LinkLight*>(workspace.data());
-  LinkLight* arrived = light + node_.size();
-  pull(in, light);
-  gather_nodes(light, arrived);
-  push(arrived, out);
+  gather(in, out, light, light + node_.size(), link_kernels().gather);
 }
 
 template <typename Columns>
 void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
-  assert(in.size() == patch_count() && out.size() == patch_count());
   std::vector<LinkLightOf<Columns>> light(node_.size()), arrived(node_.size());
-  pull(in, light.data());
-  gather_nodes(light.data(), arrived.data());
-  push(arrived.data(), out);
+  gather(in, out, light.data(), arrived.data(), gather_along_links<Columns>);
+}
+
+template <typename Columns, typename Lanes>
+void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out,
+                               LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived,
+                               GatherAlongLinks<Lanes> gather_node) const {
+  assert(in.size() == patch_count() && out.size() == patch_count());
+  pull(in, light);
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t k = 0; k < node_.size(); ++k) {
+    arrived[k] = gather_node(incoming_.data() + incoming_begin_[k],
+                             incoming_begin_[k + 1] - incoming_begin_[k], light);
+  }
+  push(arrived, out);
 }
 
 template <typename Columns, typename Lanes>
@@ -219,43 +230,15 @@ void LinkedFormFactors::pull(std::span<const Columns> in, LinkLightOf<Lanes>* li
       } else {
         for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
           const Node& child = node_[c];
-          add(sum.mean, child.part, light[c].mean);
+          add_scaled(sum.mean, child.part, light[c].mean);
           for (int axis = 0; axis < 3; ++axis) {
-            add(sum.first[axis], child.part, light[c].first[axis]);
-            add(sum.first[axis], child.part * child.from_parent[axis], light[c].mean);
+            add_scaled(sum.first[axis], child.part, light[c].first[axis]);
+            add_scaled(sum.first[axis], child.part * child.from_parent[axis], light[c].mean);
           }
         }
       }
       light[k] = sum;
     }
-  }
-}
-
-template <typename Lanes>
-void LinkedFormFactors::gather_nodes(const LinkLightOf<Lanes>* light,
-                                     LinkLightOf<Lanes>* arrived) const {
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t k = 0; k < node_.size(); ++k) {
-    LinkLightOf<Lanes> sum{};
-    for (std::uint64_t l = incoming_begin_[k]; l < incoming_begin_[k + 1]; ++l) {
-      const IncomingLink& link = incoming_[l];
-      const LinkLightOf<Lanes>& from = light[link.from];
-      add(sum.mean, link.exchange_area, from.mean);
-      for (int axis = 0; axis < 3; ++axis) {
-        add(sum.mean, bfloat16_to_float(link.gradient_from[axis]), from.first[axis]);
-        add(sum.first[axis], bfloat16_to_float(link.gradient_to[axis]), from.mean);
-      }
-    }
-    arrived[k] = sum;
-  }
-}
-
-void LinkedFormFactors::gather_nodes(const LinkLight* light, LinkLight* arrived) const {
-  const LinkKernels& kernels = link_kernels();
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t k = 0; k < node_.size(); ++k) {
-    arrived[k] = kernels.gather(incoming_.data() + incoming_begin_[k],
-                                incoming_begin_[k + 1] - incoming_begin_[k], light);
   }
 }
 
@@ -275,10 +258,10 @@ void LinkedFormFactors::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out
       }
       for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
         const Node& child = node_[c];
-        add(arrived[c].mean, child.part, here.mean);
+        add_scaled(arrived[c].mean, child.part, here.mean);
         for (int axis = 0; axis < 3; ++axis) {
-          add(arrived[c].mean, child.part * child.from_parent[axis], here.first[axis]);
-          add(arrived[c].first[axis], child.part, here.first[axis]);
+          add_scaled(arrived[c].mean, child.part * child.from_parent[axis], here.first[axis]);
+          add_scaled(arrived[c].first[axis], child.part, here.first[axis]);
         }
       }
     }

@@ -1,7 +1,6 @@
 #include "rebounce/transfer/transfer_operator.h"
 
 #include <cassert>
-#include <vector>
 
 namespace rebounce {
 
@@ -36,6 +35,14 @@ void TransferOperator::expand(int channel, std::span<float> transfer) const {
     unit[j][channel] = 0;
     for (std::size_t i = 0; i < n; ++i) transfer[i * n + j] = column[i][channel];
   }
+}
+
+std::vector<Float3> product(const TransferOperator& transfer,
+                            std::span<const Float3> initial_exitance) {
+  std::vector<Float3> indirect_irradiance(initial_exitance.size());
+  std::vector<float> workspace(transfer.workspace_size());
+  transfer.apply(initial_exitance, indirect_irradiance, workspace);
+  return indirect_irradiance;
 }
 
 }  // namespace rebounce

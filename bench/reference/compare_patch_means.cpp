@@ -2,6 +2,7 @@
 
 #include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/error.h"
 #include "reference/compare.h"
@@ -43,15 +44,11 @@ std::vector<ChosenPatch> choose_patches(std::span<const float> area, std::size_t
   return chosen;
 }
 
-/// The display triangles of the patches.
-class PatchTriangles {
+/// Points on the display triangles of the patches.
+class PatchSampler {
  public:
-  explicit PatchTriangles(const TransferData& data)
-      : mesh_(data.mesh), triangles_(data.patches.size()) {
-    for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
-      if (mesh_.triangle_patch[t] != kNone) triangles_[mesh_.triangle_patch[t]].push_back(t);
-    }
-  }
+  explicit PatchSampler(const TransferData& data)
+      : mesh_(data.mesh), triangles_(data.mesh.triangle_patch, data.patches.size()) {}
 
   bool has_any(std::uint32_t patch) const { return !triangles_[patch].empty(); }
 
@@ -60,7 +57,7 @@ class PatchTriangles {
   void append_points(std::uint32_t patch, std::uint32_t count, std::uint64_t seed,
                      std::vector<SurfacePoint>& points) const {
     CumulativeChoice choice;
-    for (const std::uint32_t t : triangles_[patch]) choice.add(corners(t).area());
+    for (const std::uint32_t t : triangles_[patch]) choice.add(area_of(corners_of(mesh_, t)));
     for (std::uint32_t r = 0; r < kReplicateCount; ++r) {
       const glm::dvec2 shift = unit_square(mix_bits(mix_bits(seed ^ mix_bits(patch)) + r));
       for (std::uint32_t k = 0; k < count; ++k) {
@@ -72,18 +69,17 @@ class PatchTriangles {
   }
 
  private:
-  TriangleCorners corners(std::uint32_t t) const { return {mesh_.position, mesh_.triangle[t]}; }
-
   SurfacePoint point_on(std::uint32_t t, const glm::dvec2& square) const {
     const glm::dvec2 b = square_to_triangle(square);
-    return {.position = to_float3(corners(t).at(b)),
-            .normal = to_float3(corners(t).front_normal()),
+    const TriangleCorners corners = corners_of(mesh_, t);
+    return {.position = to_float3(point_at(corners, b)),
+            .normal = to_float3(front_normal(corners)),
             .triangle = t,
             .barycentric = {static_cast<float>(b.x), static_cast<float>(b.y)}};
   }
 
   const DisplayMesh& mesh_;
-  std::vector<std::vector<std::uint32_t>> triangles_;
+  PatchTriangles triangles_;
 };
 
 struct PatchMean {
@@ -117,11 +113,11 @@ PatchComparison compare_patch_means(const TransferData& data,
                                     const PatchComparisonSettings& settings,
                                     const Progress& progress) {
   check(data, indirect_irradiance);
-  const PatchTriangles triangles(data);
+  const PatchSampler sampler(data);
   std::vector<ChosenPatch> chosen =
       choose_patches(data.patches.area, settings.patch_count, settings.seed);
   const std::size_t left_out =
-      std::erase_if(chosen, [&](const ChosenPatch& c) { return !triangles.has_any(c.patch); });
+      std::erase_if(chosen, [&](const ChosenPatch& c) { return !sampler.has_any(c.patch); });
   if (chosen.empty()) throw Error("comparison of patch means: no patch has a triangle");
 
   const std::uint32_t per_replicate =
@@ -130,7 +126,7 @@ PatchComparison compare_patch_means(const TransferData& data,
   std::vector<SurfacePoint> points;
   points.reserve(chosen.size() * per_patch);
   for (const ChosenPatch& c : chosen) {
-    triangles.append_points(c.patch, per_replicate, settings.seed, points);
+    sampler.append_points(c.patch, per_replicate, settings.seed, points);
   }
   const IrradianceEstimate estimate = reference::indirect_irradiance(
       lit_scene, points, settings.samples_per_point, settings.seed, progress);

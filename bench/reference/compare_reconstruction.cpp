@@ -23,16 +23,6 @@ struct MeshPoint {
   glm::dvec3 weight;  ///< barycentric, of its three vertices
 };
 
-/// The weights of the vertices of `corners` at `p`, which lies on the triangle.
-glm::dvec3 barycentric_weights(const TriangleCorners& corners, const glm::dvec3& p) {
-  const glm::dvec3 ab = corners.b - corners.a, ac = corners.c - corners.a, ap = p - corners.a;
-  const glm::dvec3 normal = glm::cross(ab, ac);
-  const double squared = glm::dot(normal, normal);
-  const double v = glm::dot(glm::cross(ap, ac), normal) / squared;
-  const double w = glm::dot(glm::cross(ab, ap), normal) / squared;
-  return {1 - v - w, v, w};
-}
-
 /// Finds points of the scene on the display mesh.
 class MeshLocator {
  public:
@@ -48,17 +38,15 @@ class MeshLocator {
     std::uint32_t found = kNone;
     for (const CoincidentSide& side : sides_) {
       const std::uint32_t t = side.front ? side.triangle : mesh_.back_triangle[side.triangle];
-      const glm::dvec3 normal = corners(t).front_normal();
+      const glm::dvec3 normal = front_normal(corners_of(mesh_, t));
       if (glm::dot(normal, to_dvec3(point.normal)) < kSameSideCosine) continue;
       if (found == kNone || mesh_.triangle_patch[found] == kNone) found = t;
     }
     if (found == kNone) return {};
-    return MeshPoint{found, barycentric_weights(corners(found), to_dvec3(point.position))};
+    return MeshPoint{found, weights_at(corners_of(mesh_, found), to_dvec3(point.position))};
   }
 
  private:
-  TriangleCorners corners(std::uint32_t t) const { return {mesh_.position, mesh_.triangle[t]}; }
-
   const DisplayMesh& mesh_;
   const RayTracer& tracer_;
   std::vector<Hit> hits_;

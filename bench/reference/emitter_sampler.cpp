@@ -28,7 +28,7 @@ EmitterSampler::EmitterSampler(const SceneSurface& surface)
     const double luminance = mean_luminance(surface, t);
     if (!(luminance > 0)) continue;
     emitters_.push_back(t);
-    choice_.add(luminance * surface.corners(t).area());
+    choice_.add(luminance * area_of(surface.corners(t)));
     area_density_[t] = luminance;
   }
   for (const std::uint32_t t : emitters_) area_density_[t] /= choice_.total();
@@ -38,7 +38,7 @@ EmitterPoint EmitterSampler::sample(double choice, const glm::dvec2& square) con
   const std::uint32_t triangle = emitters_[choice_.choose(choice).index];
   const glm::dvec2 barycentric = square_to_triangle(square);
   const TriangleCorners corners = surface_->corners(triangle);
-  return {triangle, barycentric, corners.at(barycentric), corners.front_normal()};
+  return {triangle, barycentric, point_at(corners, barycentric), front_normal(corners)};
 }
 
 }  // namespace rebounce::reference

@@ -1,9 +1,9 @@
 #include "reference/key_light.h"
 
 #include <algorithm>
-#include <limits>
 #include <numbers>
 
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
 #include "reference/scene_surface.h"
@@ -19,20 +19,11 @@ constexpr std::uint32_t kClearanceRays = 64;
 // A lamp counts as close to a surface within this part of the scene's diagonal.
 constexpr double kCloseness = 0.08;
 
-double diagonal(const Scene& scene) {
-  glm::dvec3 low(std::numeric_limits<double>::max()), high(-low);
-  for (const Float3& p : scene.position) {
-    low = glm::min(low, to_dvec3(p));
-    high = glm::max(high, to_dvec3(p));
-  }
-  return glm::distance(low, high);
-}
-
 double lit_area(const Scene& scene, std::span<const TriangleSides> sides) {
   const SceneSurface surface(scene);
   double area = 0;
   for (std::uint32_t t = 0; t < sides.size(); ++t) {
-    area += surface.corners(t).area() * sides[t].patch_count();
+    area += area_of(surface.corners(t)) * sides[t].patch_count();
   }
   return area;
 }
@@ -103,7 +94,7 @@ double clearance(const Float3& place, const RayTracer& tracer, double reach) {
 
 Light make_key_light(const Scene& scene, const RayTracer& tracer,
                      std::span<const TriangleSides> sides, std::uint64_t seed) {
-  const double size = diagonal(scene);
+  const double size = box_around(scene.position).diagonal();
   const auto receivers = sample_surface(scene, sides, kReceivers, seed);
   const auto candidates = make_candidates(sample_surface(scene, sides, kCandidates, seed + 1),
                                           tracer, 0.5 * size, seed);

@@ -218,7 +218,7 @@ class PathTracer {
     }
     const TriangleCorners corners = surface_.corners(hit.triangle);
     const glm::dvec2 barycentric(hit.u, hit.v);
-    const glm::dvec3 normal = corners.front_normal() * (hit.front ? 1.0 : -1.0);
+    const glm::dvec3 normal = front_normal(corners) * (hit.front ? 1.0 : -1.0);
     add_emission(ray, hit, normal, path);
 
     path.throughput *= surface_.reflectance(hit.triangle, barycentric);
@@ -230,7 +230,7 @@ class PathTracer {
       if (path.numbers.survival >= survival) return false;
       path.throughput /= survival;
     }
-    path.origin = tracer_.offset_point(to_float3(corners.at(barycentric)), to_float3(normal));
+    path.origin = tracer_.offset_point(to_float3(point_at(corners, barycentric)), to_float3(normal));
     path.normal = normal;
     return true;
   }

@@ -16,23 +16,6 @@ glm::dvec3 interpolate(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec
 
 }  // namespace
 
-TriangleCorners::TriangleCorners(std::span<const Float3> position, const Uint3& triangle)
-    : a(to_dvec3(position[triangle[0]])),
-      b(to_dvec3(position[triangle[1]])),
-      c(to_dvec3(position[triangle[2]])) {}
-
-glm::dvec3 TriangleCorners::at(const glm::dvec2& barycentric) const {
-  return interpolate(a, b, c, barycentric);
-}
-
-glm::dvec3 TriangleCorners::front_normal() const {
-  return glm::normalize(glm::cross(b - a, c - a));
-}
-
-double TriangleCorners::area() const {
-  return 0.5 * glm::length(glm::cross(b - a, c - a));
-}
-
 glm::dvec3 SceneSurface::reflectance(std::uint32_t triangle, const glm::dvec2& barycentric) const {
   const Material& m = material(triangle);
   const Uint3& corner = scene_->triangle[triangle];

@@ -5,21 +5,9 @@
 #include <span>
 
 #include "rebounce/precompute/scene.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce::reference {
-
-/// Three corners, counter-clockwise from the front.
-struct TriangleCorners {
-  glm::dvec3 a, b, c;
-
-  TriangleCorners(std::span<const Float3> position, const Uint3& triangle);
-
-  /// The point with weights `barycentric` of the second and third corner.
-  glm::dvec3 at(const glm::dvec2& barycentric) const;
-
-  glm::dvec3 front_normal() const;  ///< unit; not finite for a triangle without area
-  double area() const;              ///< m²
-};
 
 /// Geometry and material of a scene at a point of a triangle, every texel by itself.
 class SceneSurface {
@@ -28,9 +16,7 @@ class SceneSurface {
   explicit SceneSurface(const Scene& scene) : scene_(&scene) {}
 
   const Scene& scene() const { return *scene_; }
-  TriangleCorners corners(std::uint32_t triangle) const {
-    return {scene_->position, scene_->triangle[triangle]};
-  }
+  TriangleCorners corners(std::uint32_t triangle) const { return corners_of(*scene_, triangle); }
   const Material& material(std::uint32_t triangle) const {
     return scene_->materials[scene_->triangle_material[triangle]];
   }

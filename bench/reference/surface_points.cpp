@@ -12,8 +12,8 @@ namespace {
 SurfacePoint point_on(const SceneSurface& surface, std::uint32_t triangle, bool front,
                       const glm::dvec2& barycentric) {
   const TriangleCorners corners = surface.corners(triangle);
-  return {.position = to_float3(corners.at(barycentric)),
-          .normal = to_float3(corners.front_normal() * (front ? 1.0 : -1.0)),
+  return {.position = to_float3(point_at(corners, barycentric)),
+          .normal = to_float3(front_normal(corners) * (front ? 1.0 : -1.0)),
           .triangle = triangle,
           .barycentric = {static_cast<float>(barycentric.x), static_cast<float>(barycentric.y)}};
 }
@@ -28,7 +28,7 @@ std::vector<SurfacePoint> sample_surface(const Scene& scene, std::span<const Tri
   const SceneSurface surface(scene);
   CumulativeChoice choice;  // front and back of each triangle
   for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
-    const double area = surface.corners(t).area();
+    const double area = area_of(surface.corners(t));
     choice.add(sides[t].front == SideKind::kLit ? area : 0);
     choice.add(sides[t].back == SideKind::kLit ? area : 0);
   }

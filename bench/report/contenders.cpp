@@ -5,8 +5,8 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 
+#include "process_cost.h"
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
@@ -21,17 +21,6 @@
 
 namespace rebounce::bench {
 namespace {
-
-/// As Linux counts it for this program alone; what getrusage says is at least what the program that
-/// started this one had. 0 where it cannot be known.
-std::size_t peak_memory_bytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string word; status >> word;) {
-    std::size_t kibibytes = 0;
-    if (word == "VmHWM:" && status >> kibibytes) return kibibytes * 1024;
-  }
-  return 0;
-}
 
 /// Sweeps on bases of 16-bit integers are a little faster, but round light by 3e-4.
 Precision form_factor_precision(double tolerance) {

@@ -8,6 +8,7 @@
 #include "in_parallel.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/reflection.h"
 #include "reflected_light.h"
 
 namespace rebounce::bench {
@@ -31,15 +32,9 @@ LitFrames light_frames(const Contenders& contenders, const LightPath& path,
   for (const std::vector<Light>& lights : path.frames) {
     std::vector<Float3> exitance(data.patches.size()), radiosity(data.patches.size());
     direct.compute(lights, {}, exitance);
-    for (std::size_t i = 0; i < exitance.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) exitance[i][c] *= data.patches.reflectance[i][c];
-    }
+    reflect(data.patches.reflectance, exitance);
     data.transfer->apply(exitance, radiosity, workspace);
-    for (std::size_t i = 0; i < exitance.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        radiosity[i][c] = exitance[i][c] + data.patches.reflectance[i][c] * radiosity[i][c];
-      }
-    }
+    add_reflected(exitance, data.patches.reflectance, radiosity, radiosity);
     lit.initial_exitance.push_back(std::move(exitance));
     lit.truth.push_back(std::move(radiosity));
   }

@@ -54,12 +54,8 @@ void solve_truths(const TransferData& data, std::vector<LightCase>& cases,
   const Progress part = [&](double done) { return progress("reference", done); };
   in_parallel(cases.size(), part, [&](std::size_t k) {
     LightCase& lit = cases[k];
-    const auto solution =
-        (lit.change == kRepainted ? other : usual).radiosity(lit.after, kReferenceResidual);
-    for (const ReferenceSolver::Double3& b : solution) {
-      lit.truth.push_back(
-          {static_cast<float>(b[0]), static_cast<float>(b[1]), static_cast<float>(b[2])});
-    }
+    const ReferenceSolver& solver = lit.change == kRepainted ? other : usual;
+    lit.truth = rounded(solver.radiosity(lit.after, kReferenceResidual));
   });
 }
 

@@ -7,6 +7,7 @@
 
 #include "light_changes.h"
 #include "rebounce/demo/light_motion.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce::bench {
@@ -27,7 +28,7 @@ class Places {
   Places(const TransferData& data, const RayTracer& tracer, std::uint64_t seed)
       : tracer_(tracer),
         lamps_(lamps_in_the_open(data, tracer, kPlaces, seed)),
-        diagonal_(scene_diagonal(data)) {}
+        diagonal_(box_around(data.mesh.position).diagonal()) {}
 
   const Light& lamp(std::size_t k) const { return lamps_[k % lamps_.size()]; }
   double diagonal() const { return diagonal_; }

@@ -3,14 +3,14 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <chrono>
 #include <filesystem>
 
 #include "console.h"
+#include "input.h"
+#include "phase_seconds.h"
 #include "program.h"
-#include "rebounce/transfer/error.h"
 #include "report.h"
+#include "timing.h"
 
 namespace rebounce::bench {
 namespace {
@@ -50,40 +50,26 @@ nlohmann::ordered_json json_of(const ReportSettings& settings, bool quick) {
           {"ranks", settings.ranks}};
 }
 
-/// Wall-clock seconds by phase, in the order of their beginnings: what a measurement takes itself.
-class PhaseSeconds {
- public:
-  void enter(std::string_view phase) {
-    const auto now = std::chrono::steady_clock::now();
-    if (phase_ < seconds_.size()) {
-      if (seconds_[phase_].first == phase) return;
-      add_until(now);
-    }
-    begin_ = now;
-    const auto found = std::ranges::find(seconds_, phase, &Seconds::first);
-    phase_ = static_cast<std::size_t>(found - seconds_.begin());
-    if (found == seconds_.end()) seconds_.emplace_back(phase, 0.0);
-  }
-
-  nlohmann::ordered_json finish() {
-    add_until(std::chrono::steady_clock::now());
-    nlohmann::ordered_json json;
-    for (const auto& [phase, seconds] : seconds_) json[phase] = seconds;
-    return json;
-  }
-
- private:
-  using Seconds = std::pair<std::string, double>;
-
-  void add_until(std::chrono::steady_clock::time_point now) {
-    const std::chrono::duration<double> passed = now - begin_;
-    if (phase_ < seconds_.size()) seconds_[phase_].second += passed.count();
-  }
-
-  std::vector<Seconds> seconds_;
-  std::size_t phase_ = 0;
-  std::chrono::steady_clock::time_point begin_;
-};
+/// Measures one scene with one number of patches into files of their own.
+void measure(const std::string& scene, std::size_t patch_count, const Options& options,
+             cli::ProgressBar& bar) {
+  const std::string name = fmt::format("{}-{}", scene_name(scene), patch_count);
+  PhaseSeconds phases;
+  const ReportProgress progress = [&](std::string_view phase, double part) {
+    phases.enter(phase);
+    return bar.update(fmt::format("{}: {}", name, phase), part);
+  };
+  const ReportSettings settings = settings_for(options, patch_count);
+  nlohmann::ordered_json json = provenance("bench_report", options.common);
+  json["scene"] = scene_name(scene);
+  json["settings"] = json_of(settings, options.quick);
+  const double seconds = seconds_of([&] {
+    json.update(measure_scene(scene, settings, options.folder, name, progress));
+  });
+  json["seconds"] = seconds;
+  json["seconds_by_phase"] = phases.finish();
+  write_text(std::filesystem::path(options.folder) / (name + ".json"), json.dump(1) + "\n");
+}
 
 void run(const Options& options) {
   if (options.describe) {
@@ -94,33 +80,14 @@ void run(const Options& options) {
   std::filesystem::create_directories(options.folder);
   for (const std::string& scene : options.scenes) {
     for (const std::size_t patch_count : options.patch_counts) {
-      const std::string name =
-          fmt::format("{}-{}", std::filesystem::path(scene).stem().string(), patch_count);
-      PhaseSeconds phases;
-      const ReportProgress progress = [&](std::string_view phase, double part) {
-        phases.enter(phase);
-        return bar.update(fmt::format("{}: {}", name, phase), part);
-      };
-      const ReportSettings settings = settings_for(options, patch_count);
-      const auto begin = std::chrono::steady_clock::now();
-      nlohmann::ordered_json json = provenance("bench_report", options.common);
-      json["scene"] = std::filesystem::path(scene).stem().string();
-      json["settings"] = json_of(settings, options.quick);
-      json.update(measure_scene(scene, settings, options.folder, name, progress));
-      const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
-      json["seconds"] = seconds.count();
-      json["seconds_by_phase"] = phases.finish();
-      write_text(std::filesystem::path(options.folder) / (name + ".json"), json.dump(1) + "\n");
+      measure(scene, patch_count, options, bar);
     }
   }
 }
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("scenes", options.scenes, "Scenes: .glb or .gltf");
-  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
+  add_patches_option(app, options.patch_counts);
   app.add_option("-o,--output", options.folder, "Folder for SCENE-PATCHES.json and pictures")
       ->capture_default_str();
   app.add_flag("--quick", options.quick, "A small part of everything");
@@ -135,9 +102,8 @@ void add_options(CLI::App& app, Options& options) {
                  "Timings of each thing; 0: 7, or 3 with --quick")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
-  app.add_option("--threads", options.common.threads, "Threads for all else; 0: one per processor")
-      ->check(CLI::Range(0, 4096))
-      ->capture_default_str();
+  add_threads_option(app, options.common)
+      ->description("Threads for all else; 0: one per processor");
 }
 
 }  // namespace

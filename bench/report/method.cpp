@@ -4,6 +4,7 @@
 #include <array>
 
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/reflection.h"
 
 namespace rebounce::bench {
 namespace {
@@ -24,11 +25,7 @@ class ProductMethod final : public Method {
   using Method::run;
   void run(std::span<const Float3> initial_exitance, int /*sweeps*/, double /*residual*/) override {
     transfer_.apply(initial_exitance, radiosity_, workspace_);
-    for (std::size_t i = 0; i < radiosity_.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        radiosity_[i][c] = initial_exitance[i][c] + reflectance_[i][c] * radiosity_[i][c];
-      }
-    }
+    add_reflected(initial_exitance, reflectance_, radiosity_, radiosity_);
   }
   std::span<const Float3> radiosity() const override { return radiosity_; }
   bool iterates() const override { return false; }

@@ -61,20 +61,12 @@ class Painter {
   void save_method(std::span<const Float3> indirect, const std::string& tag,
                    DrawnMethod& method) const {
     const Picture picture = draw(indirect);
-    method.error = relative_difference(indirect, truth_, data_.patches.area);
+    method.error = error(indirect);
     method.picture = save(picture, tag);
     method.difference = save(difference(picture, reference_), tag + "-difference");
   }
 
-  /// F B [n] in lx.
-  std::vector<Float3> gather(const FormFactorOperator& form,
-                             std::span<const Float3> radiosity) const {
-    std::vector<Float3> indirect(radiosity.size());
-    std::vector<float> workspace(form.workspace_size());
-    form.gather(radiosity, indirect, workspace);
-    return indirect;
-  }
-
+  /// Of H [n] in lx.
   double error(std::span<const Float3> indirect) const {
     return relative_difference(indirect, truth_, data_.patches.area);
   }
@@ -105,6 +97,35 @@ class Painter {
   Picture reference_;
 };
 
+/// What Gauss-Seidel makes of the time that the inverse takes, on the compressed form of F on which
+/// it gets nearest.
+struct BestSweeps {
+  DrawnMethod method;
+  std::vector<Float3> indirect_irradiance;
+};
+
+BestSweeps find_best_sweeps(const Contenders& contenders,
+                            const std::vector<Contestant>& contestants,
+                            const std::vector<RunTime>& times, double time,
+                            const Painter& painter) {
+  BestSweeps best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < contestants.size(); ++k) {
+    const Contestant& contestant = contestants[k];
+    if (contestant.name.find(kGaussSeidel) == std::string::npos) continue;
+    if (contestant.form == kExactRows || contestant.form == kExactHalf) continue;  // too slow
+    const int sweeps = std::max(1, times[k].sweeps_within(time));
+    const auto method = contestant.make(contenders);
+    method->run(painter.initial_exitance(), sweeps);
+    auto gathered = gather(*contenders.form(contestant.form), method->radiosity());
+    if (painter.error(gathered) >= least) continue;
+    least = painter.error(gathered);
+    best = {{.name = contestant.name + ", " + contestant.form, .sweeps = sweeps},
+            std::move(gathered)};
+  }
+  return best;
+}
+
 }  // namespace
 
 Pictures draw_pictures(const Contenders& contenders, const std::vector<Contestant>& contestants,
@@ -119,32 +140,16 @@ Pictures draw_pictures(const Contenders& contenders, const std::vector<Contestan
   const auto inverse =
       std::ranges::find(contestants, contenders.operators.front().name, &Contestant::transfer);
   pictures.time = times[inverse - contestants.begin()].start;
-  const TransferOperator& transfer = *contenders.operators.front().transfer;
-  std::vector<Float3> indirect(painter.initial_exitance().size());
-  std::vector<float> workspace(transfer.workspace_size());
-  transfer.apply(painter.initial_exitance(), indirect, workspace);
-  DrawnMethod product{.name = inverse->name + ", " + inverse->transfer};
-  painter.save_method(indirect, "inverse", product);
-  pictures.methods.push_back(product);
+  const std::vector<Float3> indirect =
+      product(*contenders.operators.front().transfer, painter.initial_exitance());
+  DrawnMethod by_inverse{.name = inverse->name + ", " + inverse->transfer};
+  painter.save_method(indirect, "inverse", by_inverse);
+  pictures.methods.push_back(by_inverse);
 
   if (!progress("pictures", 0.5)) throw Cancelled();
-  DrawnMethod best;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < contestants.size(); ++k) {
-    const Contestant& contestant = contestants[k];
-    if (contestant.name.find(kGaussSeidel) == std::string::npos) continue;
-    if (contestant.form == kExactRows || contestant.form == kExactHalf) continue;  // too slow
-    const int sweeps = std::max(1, times[k].sweeps_within(pictures.time));
-    const auto method = contestant.make(contenders);
-    method->run(painter.initial_exitance(), sweeps);
-    auto gathered = painter.gather(*contenders.form(contestant.form), method->radiosity());
-    if (painter.error(gathered) >= least) continue;
-    least = painter.error(gathered);
-    best = {.name = contestant.name + ", " + contestant.form, .sweeps = sweeps};
-    indirect = std::move(gathered);
-  }
-  painter.save_method(indirect, kGaussSeidel, best);
-  pictures.methods.push_back(best);
+  BestSweeps best = find_best_sweeps(contenders, contestants, times, pictures.time, painter);
+  painter.save_method(best.indirect_irradiance, kGaussSeidel, best.method);
+  pictures.methods.push_back(best.method);
   return pictures;
 }
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "rebounce/precompute/import_gltf.h"
+#include "rebounce/precompute/build.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/runtime/engine.h"
@@ -25,7 +25,7 @@ constexpr double kFineKernel = 1e-5;
 class TruthScene {
  public:
   explicit TruthScene(const std::string& path)
-      : scene_(import_gltf(path)),
+      : scene_(import_usable(path, 1)),
         tracer_(reference::make_scene_tracer(scene_)),
         sides_(find_lit_sides(scene_, tracer_)),
         lights_{reference::make_key_light(scene_, tracer_, sides_)} {}
@@ -42,13 +42,6 @@ class TruthScene {
   std::vector<TriangleSides> sides_;
   std::vector<Light> lights_;
 };
-
-std::vector<Float3> product(const TransferOperator& transfer, std::span<const Float3> exitance) {
-  std::vector<Float3> indirect(exitance.size());
-  std::vector<float> workspace(transfer.workspace_size());
-  transfer.apply(exitance, indirect, workspace);
-  return indirect;
-}
 
 /// H [n] in lx of the same patches with better form factors.
 std::vector<Float3> better_solution(const std::string& scene, const ReportSettings& settings,

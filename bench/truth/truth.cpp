@@ -2,17 +2,15 @@
 // number of patches each.
 
 #include <fmt/format.h>
-#include <omp.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <memory>
 
 #include "console.h"
 #include "light_file.h"
+#include "program.h"
 #include "rebounce/demo/camera.h"
 #include "rebounce/demo/image_file.h"
 #include "rebounce/demo/picture.h"
@@ -23,13 +21,12 @@
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/reflection.h"
 #include "reference/compare.h"
 #include "reference/key_light.h"
 
 namespace rebounce {
 namespace {
-
-constexpr int kBadInput = 1, kUsage = 2;
 
 struct Options {
   std::string scene, lights, csv, patch_csv, error_picture;
@@ -39,6 +36,7 @@ struct Options {
   std::uint32_t samples = 512;
   int direct_points = DirectLightingSettings{}.points_per_patch;
   reference::PatchComparisonSettings patch_comparison;
+  bench::CommonOptions common;
 };
 
 /// One row of the result.
@@ -130,20 +128,12 @@ class TruthBench {
     std::vector<Float3> exitance(patches.size()), radiosity(patches.size());
     DirectLighting(data, tracer, {.points_per_patch = options_.direct_points})
         .compute(setup_.lights, setup_.sky, exitance);
-    for (std::size_t i = 0; i < exitance.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        exitance[i][c] =
-            patches.reflectance[i][c] * exitance[i][c] + patches.emitted_exitance[i][c];
-      }
-    }
+    add_reflected(patches.emitted_exitance, patches.reflectance, exitance, exitance);
     const auto form_factors = make_form_factors(kMethod, data.exchange, patches.area);
     const SolveResult result = solve_radiosity(
         kMethod, *form_factors, {patches.area, patches.reflectance}, exitance, {}, radiosity);
     if (!result.converged) throw Error(options_.scene + ": the solver did not converge");
-    std::vector<Float3> indirect(patches.size());
-    std::vector<float> workspace(form_factors->workspace_size());
-    form_factors->gather(radiosity, indirect, workspace);
-    return indirect;
+    return gather(*form_factors, radiosity);
   }
 
   /// |H - truth| of each patch, as a part of the truth's root mean square.
@@ -279,10 +269,7 @@ void run(const Options& options) {
 
 void add_options(CLI::App& app, Options& options) {
   app.add_option("scene", options.scene, "Scene: .glb or .gltf")->required();
-  app.add_option("--patches", options.patch_counts, "Numbers of patches, separated by commas")
-      ->delimiter(',')
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  bench::add_patches_option(app, options.patch_counts);
   auto* lights = app.add_option("--lights", options.lights,
                                 "Lights: .json, or a .glb that has some; by default the scene's");
   app.add_flag("--key-light", options.key_light, "One point light at a place found for it")
@@ -312,10 +299,7 @@ void add_options(CLI::App& app, Options& options) {
                  "Table to write of the compared patches, for the last number of patches");
   app.add_option("--error-picture", options.error_picture,
                  "Picture (.png) of where the patch means err, for the last number of patches");
-  app.add_option_function<int>(
-         "--threads", [](int threads) { omp_set_num_threads(threads); },
-         "Threads to use; by default one per processor")
-      ->check(CLI::Range(1, 4096));
+  bench::add_threads_option(app, options.common);
 }
 
 }  // namespace
@@ -326,14 +310,6 @@ int main(int argc, char** argv) {
   rebounce::Options options;
   CLI::App app("The pipeline's indirect light against a path tracer's.", "bench_truth");
   rebounce::add_options(app, options);
-  try {
-    app.parse(argc, argv);
-    rebounce::run(options);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : rebounce::kUsage;
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "bench_truth: {}\n", error.what());
-    return rebounce::kBadInput;
-  }
-  return 0;
+  return rebounce::bench::run_program(app, argc, argv, options.common,
+                                      [&] { rebounce::run(options); });
 }

@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "rebounce/precompute/light_probes.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/box.h"
 
 namespace rebounce::cli {
 namespace {
@@ -15,20 +14,6 @@ namespace {
 constexpr float kPlace = 0.5F, kSwing = 0.3F, kLargestRadius = 0.1F;
 constexpr float kApparentRadius = 0.07F;  // of the way from the camera
 constexpr float kProbeCount = 600;
-
-struct Box {
-  glm::vec3 low, high;
-};
-
-Box box_around(const DisplayMesh& mesh) {
-  Box box{glm::vec3(std::numeric_limits<float>::max()),
-          glm::vec3(std::numeric_limits<float>::lowest())};
-  for (const Float3& p : mesh.position) {
-    box.low = glm::min(box.low, to_glm(p));
-    box.high = glm::max(box.high, to_glm(p));
-  }
-  return box;
-}
 
 /// Metres along the unit `direction` from `origin` to where the box begins and ends; as 0 and 0
 /// where the line misses it.
@@ -54,11 +39,11 @@ float free_way(const RayTracer& tracer, const glm::vec3& origin, const glm::vec3
 }  // namespace
 
 ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const TransferData& data) {
-  const Box box = box_around(data.mesh);
+  const Box box = box_around(data.mesh.position);
   const glm::vec3 eye = to_glm(camera.position), ahead = -to_glm(camera.backward);
   const auto [begin, end] = way_through(box, eye, ahead);
   // A camera that looks past the scene has the sphere as far away as the scene is large.
-  const float most = end > 0 ? end : glm::length(box.high - box.low);
+  const float most = end > 0 ? end : glm::length(box.extent());
   const float way = free_way(tracer, eye, ahead, most) - begin;
   const glm::vec3 middle = eye + (begin + kPlace * way) * ahead;
   ViewerSphere sphere{
@@ -77,8 +62,8 @@ ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const T
 }
 
 LightProbes make_probes_for_view(const TransferData& data) {
-  const Box box = box_around(data.mesh);
-  const glm::vec3 extent = box.high - box.low;
+  const Box box = box_around(data.mesh.position);
+  const glm::vec3 extent = box.extent();
   // A scene that is flat still has probes no closer than this.
   const float least = glm::length(extent) / 32;
   ProbeSettings settings;

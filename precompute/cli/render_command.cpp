@@ -26,6 +26,29 @@ struct RenderOptions {
   bool key_light = false;
 };
 
+/// Of each patch, against double precision.
+std::vector<float> errors_of(const Engine& engine) {
+  const TransferData& data = engine.data();
+  const ReferenceSolver solver(data);
+  return patch_errors(engine.indirect_irradiance(),
+                      solver.indirect_irradiance(engine.initial_exitance()), data.patches.area);
+}
+
+void print_summary(const Picture& picture, std::span<const float> error,
+                   const RenderOptions& chosen, const CommonOptions& options) {
+  if (options.json) {
+    nlohmann::json summary = {{"width", picture.width},
+                              {"height", picture.height},
+                              {"show", chosen.show},
+                              {"exposure", picture.exposure}};
+    if (!error.empty()) summary["error_max"] = *std::ranges::max_element(error);
+    fmt::print("{}\n", summary.dump(2));
+  } else if (!options.quiet) {
+    fmt::print("{}: {}x{}, exposure {:+.2f} EV\n", chosen.output, picture.width, picture.height,
+               picture.exposure);
+  }
+}
+
 void run(const RenderOptions& chosen, const CommonOptions& options) {
   PictureSettings settings;
   std::tie(settings.width, settings.height) = parse_size(chosen.size);
@@ -44,11 +67,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   settings.camera = choose_camera(chosen.camera, engine);
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
   std::vector<float> error;
-  if (settings.show == Show::kError) {
-    const ReferenceSolver solver(*data);
-    error = patch_errors(engine.indirect_irradiance(),
-                         solver.indirect_irradiance(engine.initial_exitance()), data->patches.area);
-  }
+  if (settings.show == Show::kError) error = errors_of(engine);
 
   PictureLight light;
   light.lights = setup.lights;
@@ -58,18 +77,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   light.error = error;
   const Picture picture = render_picture(*data, engine.tracer(), light, settings);
   write_png(chosen.output, tone_map(picture));
-
-  nlohmann::json summary = {{"width", picture.width},
-                            {"height", picture.height},
-                            {"show", chosen.show},
-                            {"exposure", picture.exposure}};
-  if (!error.empty()) summary["error_max"] = *std::ranges::max_element(error);
-  if (options.json) {
-    fmt::print("{}\n", summary.dump(2));
-  } else if (!options.quiet) {
-    fmt::print("{}: {}x{}, exposure {:+.2f} EV\n", chosen.output, picture.width, picture.height,
-               picture.exposure);
-  }
+  print_summary(picture, error, chosen, options);
 }
 
 }  // namespace

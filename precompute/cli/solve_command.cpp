@@ -55,14 +55,6 @@ double median_microseconds(const Work& work) {
   return times[times.size() / 2];
 }
 
-std::vector<Float3> gather(const FormFactorOperator& form_factors,
-                           const std::vector<Float3>& radiosity) {
-  std::vector<Float3> gathered(radiosity.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(radiosity, gathered, workspace);
-  return gathered;
-}
-
 Solution solve_by_transfer(Engine& engine) {
   Solution solution;
   solution.microseconds = median_microseconds([&] {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "display_surface.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/box.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -20,19 +20,8 @@ constexpr float kRoomFov = 65 * kPi / 180;     // vertical: wide, as a room want
 constexpr float kOutsideFov = 40 * kPi / 180;  // vertical: a box seen through its open side
 constexpr int kProbeColumns = 16, kProbeRows = 12;
 
-struct Box {
-  glm::vec3 low{std::numeric_limits<float>::max()};
-  glm::vec3 high{std::numeric_limits<float>::lowest()};
-  float diagonal() const { return glm::length(high - low); }
-};
-
-Box bounds_of(const DisplayMesh& mesh) {
-  Box box;
-  for (const Float3& position : mesh.position) {
-    box.low = glm::min(box.low, to_glm(position));
-    box.high = glm::max(box.high, to_glm(position));
-  }
-  return box;
+float diagonal(const Box& box) {
+  return glm::length(box.extent());
 }
 
 std::vector<Ray> probe_rays(const Camera& camera) {
@@ -133,7 +122,7 @@ std::vector<Camera> views_from_inside(const Box& box) {
           const float angle = 2 * kPi * static_cast<float>(k) / kHeadings;
           const glm::vec3 ahead(std::sin(angle), 0, -std::cos(angle));
           views.push_back(
-              look_at(to_float3(eye), to_float3(eye + box.diagonal() * ahead), kRoomFov));
+              look_at(to_float3(eye), to_float3(eye + diagonal(box) * ahead), kRoomFov));
         }
       }
     }
@@ -150,7 +139,7 @@ std::vector<Camera> views_from_outside(const Box& box) {
     const float distance = half_extent / std::tan(0.5F * kOutsideFov) + 0.5F * size[axis];
     for (const float side : {1.0F, -1.0F}) {
       glm::vec3 eye = center;
-      eye[axis] += side * (distance + 0.01F * box.diagonal());
+      eye[axis] += side * (distance + 0.01F * diagonal(box));
       views.push_back(look_at(to_float3(eye), to_float3(center), kOutsideFov));
     }
   }
@@ -184,14 +173,14 @@ Camera look_at(const Float3& position, const Float3& target, float vertical_fov)
 Camera fit_camera(const TransferData& data, const RayTracer& tracer,
                   std::span<const Float3> radiosity) {
   if (data.mesh.position.empty()) return look_at({0, 0, 1}, {0, 0, 0}, kRoomFov);
-  const Box box = bounds_of(data.mesh);
+  const Box box = box_around(data.mesh.position);
   std::vector<Camera> views = views_from_outside(box);
   for (const Camera& view : views_from_inside(box)) views.push_back(view);
   const std::vector<bool> lit = lit_patches(data, radiosity);
   const Camera* best = &views.front();
   float best_score = -1;
   for (const Camera& view : views) {
-    const float value = score(view, data, tracer, lit, box.diagonal());
+    const float value = score(view, data, tracer, lit, diagonal(box));
     if (value > best_score) {
       best_score = value;
       best = &view;

@@ -4,32 +4,13 @@
 #include <cmath>
 
 #include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/triangle.h"
 
 namespace rebounce {
 namespace {
 
 // Layers that a camera ray may pass; more than any sensible scene has.
 constexpr int kMaxPassedLayers = 256;
-
-struct Corners {
-  glm::dvec3 a, b, c;
-};
-
-Corners corners_of(const DisplayMesh& mesh, std::uint32_t triangle) {
-  const auto at = [&](int k) {
-    return glm::dvec3(to_glm(mesh.position[mesh.triangle[triangle][k]]));
-  };
-  return {at(0), at(1), at(2)};
-}
-
-// Barycentric weights of `p`, which lies on the triangle.
-glm::vec3 barycentric(const Corners& t, const glm::dvec3& p) {
-  const glm::dvec3 normal = glm::cross(t.b - t.a, t.c - t.a);
-  const double area = std::max(glm::dot(normal, normal), 1e-300);
-  const double v = glm::dot(glm::cross(p - t.a, t.c - t.a), normal) / area;
-  const double w = glm::dot(glm::cross(t.b - t.a, p - t.a), normal) / area;
-  return {1 - v - w, v, w};
-}
 
 glm::vec3 unit_or(const glm::vec3& v, const glm::vec3& otherwise) {
   const float length = glm::length(v);
@@ -42,8 +23,7 @@ float texcoord_per_metre(const DisplayMesh& mesh, std::span<const Float2> texcoo
   const Uint3& corner = mesh.triangle[triangle];
   const glm::vec2 a = to_glm(texcoord[corner[0]]);
   const glm::vec2 e1 = to_glm(texcoord[corner[1]]) - a, e2 = to_glm(texcoord[corner[2]]) - a;
-  const Corners t = corners_of(mesh, triangle);
-  const double area = glm::length(glm::cross(t.b - t.a, t.c - t.a));
+  const double area = 2 * area_of(corners_of(mesh, triangle));
   return area > 0 ? static_cast<float>(std::sqrt(std::abs(e1.x * e2.y - e1.y * e2.x) / area)) : 0;
 }
 
@@ -65,12 +45,12 @@ SurfacePoint DisplaySurface::point_on(std::uint32_t triangle, const glm::vec3& w
   const DisplayMesh& m = mesh();
   // In double precision: the error of the point must not exceed the rounding of its coordinates,
   // or offset_point could leave it on the wrong side.
-  const Corners t = corners_of(m, triangle);
+  const TriangleCorners t = corners_of(m, triangle);
   const double v = weight.y, w = weight.z;
   SurfacePoint point{.triangle = triangle, .weight = weight};
-  point.position = glm::vec3((1 - v - w) * t.a + v * t.b + w * t.c);
+  point.position = glm::vec3((1 - v - w) * t[0] + v * t[1] + w * t[2]);
   point.geometric_normal =
-      unit_or(glm::vec3(glm::normalize(glm::cross(t.b - t.a, t.c - t.a))), glm::vec3(0, 1, 0));
+      unit_or(glm::vec3(front_normal(t)), glm::vec3(0, 1, 0));
   const Uint3& corner = m.triangle[triangle];
   point.shading_normal =
       unit_or(weight.x * to_glm(m.normal[corner[0]]) + weight.y * to_glm(m.normal[corner[1]]) +
@@ -82,11 +62,11 @@ SurfacePoint DisplaySurface::point_on(std::uint32_t triangle, const glm::vec3& w
 SurfacePoint DisplaySurface::point_at(const Hit& hit) const {
   const glm::vec3 weight(1 - hit.u - hit.v, hit.u, hit.v);
   if (hit.front) return point_on(hit.triangle, weight);
-  const Corners front = corners_of(mesh(), hit.triangle);
-  const glm::dvec3 p = (1.0 - hit.u - hit.v) * front.a + static_cast<double>(hit.u) * front.b +
-                       static_cast<double>(hit.v) * front.c;
+  const auto [a, b, c] = corners_of(mesh(), hit.triangle);
+  const glm::dvec3 p = (1.0 - hit.u - hit.v) * a + static_cast<double>(hit.u) * b +
+                       static_cast<double>(hit.v) * c;
   const std::uint32_t back = mesh().back_triangle[hit.triangle];
-  return point_on(back, barycentric(corners_of(mesh(), back), p));
+  return point_on(back, glm::vec3(weights_at(corners_of(mesh(), back), p)));
 }
 
 const Material& DisplaySurface::material_of(const SurfacePoint& point) const {

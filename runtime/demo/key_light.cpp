@@ -1,12 +1,11 @@
 #include "rebounce/demo/key_light.h"
 
 #include <algorithm>
-#include <limits>
 #include <numbers>
 #include <numeric>
 #include <vector>
 
-#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/box.h"
 
 namespace rebounce {
 namespace {
@@ -33,15 +32,6 @@ std::vector<std::size_t> spread_patches(const PatchTable& patches, std::size_t c
 
 Float3 above(const PatchTable& patches, std::size_t patch, const RayTracer& tracer) {
   return tracer.offset_point(patches.centroid[patch], patches.normal[patch]);
-}
-
-float diagonal(const PatchTable& patches) {
-  glm::vec3 low(std::numeric_limits<float>::max()), high(-low);
-  for (const Float3& p : patches.centroid) {
-    low = glm::min(low, to_glm(p));
-    high = glm::max(high, to_glm(p));
-  }
-  return glm::distance(low, high);
 }
 
 // Half way from each patch to what is opposite, or up to `reach`.
@@ -88,7 +78,7 @@ float merit(const Float3& place, std::span<const std::size_t> receivers, const P
 
 Light make_key_light(const TransferData& data, const RayTracer& tracer) {
   const PatchTable& patches = data.patches;
-  const float size = diagonal(patches);
+  const float size = glm::length(box_around(patches.centroid).extent());
   const std::vector<std::size_t> receivers = spread_patches(patches, kReceivers);
   const double area = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
   Light light;

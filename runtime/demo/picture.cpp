@@ -378,11 +378,7 @@ float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
 }
 
 std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
-  std::vector<Float3> irradiance(data.patches.size());
-  const auto form_factors = make_form_factors(SolveMethod::kGathering, data);
-  std::vector<float> workspace(form_factors->workspace_size());
-  form_factors->gather(data.patches.emitted_exitance, irradiance, workspace);
-  return irradiance;
+  return gather(*make_form_factors(SolveMethod::kGathering, data), data.patches.emitted_exitance);
 }
 
 }  // namespace rebounce

@@ -8,6 +8,7 @@
 
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/reflection.h"
 
 namespace rebounce {
 namespace {
@@ -147,11 +148,7 @@ double AutomaticSolver::change_of(std::span<const Float3> initial_exitance) cons
 
 void AutomaticSolver::multiply(std::span<const Float3> initial_exitance) {
   transfer_->apply(initial_exitance, radiosity_, workspace_);
-  for (std::size_t i = 0; i < radiosity_.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      radiosity_[i][c] = initial_exitance[i][c] + reflectance_[i][c] * radiosity_[i][c];
-    }
-  }
+  add_reflected(initial_exitance, reflectance_, radiosity_, radiosity_);
 }
 
 RadiositySolver& AutomaticSolver::solver_for(AutomaticMethod method) {

@@ -68,15 +68,6 @@ double RadiositySolver::compute_residual() {
   return area_norm(residual_, area_);
 }
 
-RadiositySolver::SweepReport RadiositySolver::gather_sweep() {
-  const double norm = compute_residual();
-  for (std::size_t i = 0; i < radiosity_.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) radiosity_[i][c] += residual_[i][c];
-  }
-  // What is left is rho F times the residual, and |F| <= 1 in the area-weighted norm.
-  return {.residual = max_reflectance_ * norm};
-}
-
 void RadiositySolver::check(std::span<const Float3> initial_exitance,
                             const SolveSettings& settings) const {
   if (initial_exitance.size() != area_.size()) {

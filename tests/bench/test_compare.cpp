@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "precompute/scene_data.h"
 #include "precompute/test_scenes.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/reconstruction_weights.h"
@@ -20,24 +21,19 @@ struct Furnace {
     scene.materials[0].emitted_luminance = {0.318309886F, 0.318309886F, 0.318309886F};
     test::add_box(scene, {0, 0, 0}, {3, 2, 2}, true);
     if (with_box) add_box_without_underside();
-    PatchModel model = make_patch_model(scene, {.patch_count = 200});
-    data.patches = std::move(model.patches);
-    data.patches.absorbed.assign(data.patches.size(), 0.0F);
-    data.mesh = std::move(model.mesh);
+    const PatchModel model = make_patch_model(scene, {.patch_count = 200});
+    data = test::data_of(model);
     compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, mesh_tracer(),
                                    data.mesh);
   }
 
   void add_box_without_underside() {
-    const auto first = static_cast<std::ptrdiff_t>(scene.triangle.size());
     test::add_box(scene, {1, 0.5, 0}, {1.8, 1.2, 0.9}, false);
-    // The fifth of its faces, of two triangles each.
-    scene.triangle.erase(scene.triangle.begin() + first + 8, scene.triangle.begin() + first + 10);
-    scene.triangle_material.resize(scene.triangle.size());
+    test::remove_face(scene, test::Face::kLowZ, 1);
   }
 
   RayTracer mesh_tracer() const {
-    return {data.mesh.position, std::span(data.mesh.triangle).first(data.mesh.surface_count())};
+    return make_surface_tracer(data.mesh);
   }
 
   std::vector<Float3> uniform(float value) const {

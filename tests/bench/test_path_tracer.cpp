@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <array>
@@ -16,6 +15,7 @@
 #include "rebounce/transfer/error.h"
 #include "reference/path_tracer.h"
 #include "reference/scene_surface.h"
+#include "with_threads.h"
 
 namespace rebounce::reference {
 namespace {
@@ -372,12 +372,8 @@ void expect_same_bits(const IrradianceEstimate& a, const IrradianceEstimate& b) 
 
 TEST(Determinism, SameBitsForAnyNumberOfThreads) {
   const Room room;
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const IrradianceEstimate one = measure(room.scene, room.points, 64, room.lamps);
-  omp_set_num_threads(2);
-  const IrradianceEstimate two = measure(room.scene, room.points, 64, room.lamps);
-  omp_set_num_threads(threads);
+  const auto make = [&] { return measure(room.scene, room.points, 64, room.lamps); };
+  const IrradianceEstimate one = test::with_threads(1, make), two = test::with_threads(2, make);
   expect_same_bits(one, two);
   const IrradianceEstimate other = measure(room.scene, room.points, 64, room.lamps, {}, 2);
   EXPECT_NE(one.mean, other.mean);

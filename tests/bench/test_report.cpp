@@ -22,6 +22,7 @@
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/compressed_form_factors.h"
+#include "rebounce/transfer/reflection.h"
 #include "reflected_light.h"
 #include "report_settings.h"
 #include "temporary_folder.h"
@@ -97,12 +98,7 @@ class QuickReport : public testing::Test {
   }
 
   static std::vector<Float3> truth(const std::vector<Float3>& light) {
-    std::vector<Float3> result;
-    for (const auto& b : ReferenceSolver(data_->exchange, data_->patches).radiosity(light)) {
-      result.push_back(
-          {static_cast<float>(b[0]), static_cast<float>(b[1]), static_cast<float>(b[2])});
-    }
-    return result;
+    return rounded(ReferenceSolver(data_->exchange, data_->patches).radiosity(light));
   }
 
   static double error(std::span<const Float3> radiosity, std::span<const Float3> truth,
@@ -198,9 +194,7 @@ TEST_F(QuickReport, FramesAreThoseOfAWarmSolver) {
   for (const std::vector<Light>& lights : path->frames) {
     std::vector<Float3> light(data_->patches.size());
     direct.compute(lights, {}, light);
-    for (std::size_t i = 0; i < light.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) light[i][c] *= data_->patches.reflectance[i][c];
-    }
+    reflect(data_->patches.reflectance, light);
     const std::vector<Float3> exact = multiply(*data_->transfer, light);
     if (errors.empty()) solver->start_from(exact);
     solver->solve(

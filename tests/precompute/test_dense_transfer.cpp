@@ -3,16 +3,16 @@
 #include "rebounce/precompute/dense_transfer.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <numbers>
-#include <random>
 
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
+#include "with_threads.h"
+#include "random_light.h"
 
 namespace rebounce {
 namespace {
@@ -23,10 +23,7 @@ struct Solved {
   std::shared_ptr<const DenseOperator> transfer;
 
   std::vector<Float3> indirect(const std::vector<Float3>& m0) const {
-    std::vector<Float3> h(m0.size());
-    std::vector<float> workspace(transfer->workspace_size());
-    transfer->apply(m0, h, workspace);
-    return h;
+    return product(*transfer, m0);
   }
 };
 
@@ -50,14 +47,6 @@ Scene colourful_room() {
   test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 1);
   test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false, 2);
   return scene;
-}
-
-std::vector<Float3> random_light(std::size_t n, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<float> uniform(0, 1);
-  std::vector<Float3> light(n);
-  for (Float3& v : light) v = {uniform(engine), uniform(engine), uniform(engine)};
-  return light;
 }
 
 TEST(DenseTransfer, FurnaceIsUniform) {
@@ -106,10 +95,9 @@ TEST(DenseTransfer, CubeRowsOfTheTable) {
     const ExchangeMatrix exchange{SharedArray(begin), SharedArray(column),
                                   SharedArray(exchange_area)};
     const auto transfer = build_dense_transfer(exchange, patches, Precision::kF32);
-    std::vector<Float3> m0(6), h(6);
+    std::vector<Float3> m0(6);
     m0[0] = {1, 1, 1};
-    std::vector<float> workspace(transfer->workspace_size());
-    transfer->apply(m0, h, workspace);
+    const std::vector<Float3> h = product(*transfer, m0);
     // Six-digit form factors, and 1 / (1 - rho) of them.
     const double allowed = 1e-6 / (1 - row.rho);
     EXPECT_NEAR(1 + row.rho * h[0][0], row.top, allowed);
@@ -140,7 +128,7 @@ TEST(DenseTransfer, AgreesWithGaussSeidelInDoublePrecision) {
   const Solved solved = solve(colourful_room(), 900);
   const ReferenceSolver reference(solved.exchange, solved.patches);
   for (int light = 0; light < 8; ++light) {
-    std::vector<Float3> m0 = random_light(solved.patches.size(), light);
+    std::vector<Float3> m0 = test::random_light(solved.patches.size(), light);
     if (light % 2 == 1) {  // a single patch, of each kind in turn
       const std::size_t lit = (97 * static_cast<std::size_t>(light)) % m0.size();
       m0.assign(m0.size(), {0, 0, 0});
@@ -160,8 +148,8 @@ TEST(DenseTransfer, SatisfiesItsEquation) {
 
 TEST(DenseTransfer, IsLinearInTheLight) {
   const Solved solved = solve(colourful_room(), 300);
-  const std::vector<Float3> a = random_light(solved.patches.size(), 1),
-                            b = random_light(solved.patches.size(), 2);
+  const std::vector<Float3> a = test::random_light(solved.patches.size(), 1),
+                            b = test::random_light(solved.patches.size(), 2);
   std::vector<Float3> sum(a.size()), separate(a.size());
   const std::vector<Float3> ha = solved.indirect(a), hb = solved.indirect(b);
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -176,12 +164,8 @@ TEST(DenseTransfer, IsLinearInTheLight) {
 TEST(DenseTransfer, SameBitsForAnyNumberOfThreads) {
   PatchModel model = make_patch_model(colourful_room(), {.patch_count = 600});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = build_dense_transfer(f.exchange, model.patches, Precision::kF32);
-  omp_set_num_threads(4);
-  const auto four = build_dense_transfer(f.exchange, model.patches, Precision::kF32);
-  omp_set_num_threads(before);
+  const auto make = [&] { return build_dense_transfer(f.exchange, model.patches, Precision::kF32); };
+  const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_TRUE(std::ranges::equal(one->storage().tiles_f32, four->storage().tiles_f32));
 }
 

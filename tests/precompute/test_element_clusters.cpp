@@ -1,13 +1,13 @@
 #include "rebounce/precompute/element_clusters.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <random>
 
 #include "rebounce/precompute/subdivision.h"
 #include "test_scenes.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -198,12 +198,8 @@ TEST(ElementClusters, ManyElementsMakeTheSamePatchesOnAnyNumberOfThreads) {
   Scene scene = test::empty_scene();
   test::add_box(scene, {0, 0, 0}, {5, 3, 4}, true);
   subdivide(scene, std::vector<std::uint8_t>(scene.triangle.size(), 1), {.patch_count = 80000});
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const PatchModel alone = make_patch_model(scene, {.patch_count = 1000});
-  omp_set_num_threads(3);
-  const PatchModel shared = make_patch_model(scene, {.patch_count = 1000});
-  omp_set_num_threads(threads);
+  const auto make = [&] { return make_patch_model(scene, {.patch_count = 1000}); };
+  const PatchModel alone = test::with_threads(1, make), shared = test::with_threads(3, make);
   EXPECT_EQ(alone.patches.size(), 1000U);
   EXPECT_EQ(alone.mesh.triangle_patch, shared.mesh.triangle_patch);
   EXPECT_EQ(alone.patches.centroid, shared.patches.centroid);

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "rebounce/precompute/build.h"
+#include "built_scene.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/vertex_light.h"
 
@@ -17,10 +17,7 @@ const std::shared_ptr<const TransferData>& cornell_box() {
   static const auto data = [] {
     BuildSettings settings;
     settings.subdivision.patch_count = 500;
-    BuildReport report;
-    return std::make_shared<const TransferData>(build_transfer_data(
-        std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests/scenes/cornell_box.gltf", settings,
-        report));
+    return std::make_shared<const TransferData>(test::built_scene("cornell_box.gltf", settings));
   }();
   return data;
 }

@@ -3,7 +3,6 @@
 #include "rebounce/precompute/form_factors.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <numeric>
@@ -11,21 +10,13 @@
 #include "form_factor_sums.h"
 #include "rebounce/transfer/error.h"
 #include "view_factor_table.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
 
 FormFactors form_factors_of(const PatchModel& model, const FormFactorSettings& settings = {}) {
   return compute_form_factors(model, test::make_tracer(model), settings);
-}
-
-/// A room with a block that stands on its floor and one that hangs in the air.
-Scene furnished_room() {
-  Scene scene = test::empty_scene();
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
-  return scene;
 }
 
 TEST(FormFactors, AgreeWithEveryRowOfTheTable) {
@@ -60,7 +51,7 @@ TEST(FormFactors, RowsBesideHoveringBlocksAddUpBeforeAnyCorrection) {
 }
 
 TEST(FormFactors, FurnishedRoomIsClosed) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 1200});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 1200});
   const FormFactors f = form_factors_of(model);
   const std::vector<double> sum = test::row_sums_of(model, f);
   for (std::size_t i = 0; i < sum.size(); ++i) {
@@ -74,7 +65,7 @@ TEST(FormFactors, FurnishedRoomIsClosed) {
 }
 
 TEST(FormFactors, EntriesAreSaneAndInOrder) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 800});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 800});
   const FormFactors f = form_factors_of(model);
   ASSERT_EQ(f.exchange.patch_count(), model.patches.size());
   for (std::size_t i = 0; i < model.patches.size(); ++i) {
@@ -96,8 +87,7 @@ TEST(FormFactors, OpeningsAndBackFacesAreAccountedFor) {
   Scene scene = test::empty_scene();
   scene.materials.resize(2, scene.materials[0]);
   test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);
-  scene.triangle.erase(scene.triangle.begin() + 6, scene.triangle.begin() + 8);  // +y
-  scene.triangle_material.assign(scene.triangle.size(), 0);
+  test::remove_face(scene, test::Face::kHighY);
   scene.triangle_material[4] = scene.triangle_material[5] = 1;  // -y
   const PatchModel model = make_patch_model(scene, {.patch_count = 500});
   const FormFactors f = form_factors_of(model);
@@ -204,20 +194,16 @@ TEST(FormFactors, QualityDecidesRaysAndLeavesTheRest) {
 }
 
 TEST(FormFactors, SameBitsForAnyNumberOfThreads) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 400});
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const FormFactors one = form_factors_of(model);
-  omp_set_num_threads(3);
-  const FormFactors three = form_factors_of(model);
-  omp_set_num_threads(before);
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 400});
+  const auto make = [&] { return form_factors_of(model); };
+  const FormFactors one = test::with_threads(1, make), three = test::with_threads(3, make);
   EXPECT_TRUE(std::ranges::equal(one.exchange.column, three.exchange.column));
   EXPECT_TRUE(std::ranges::equal(one.exchange.exchange_area, three.exchange.exchange_area));
   EXPECT_EQ(one.absorbed, three.absorbed);
 }
 
 TEST(FormFactors, AnotherSeedGivesNearlyTheSame) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 400});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 400});
   const FormFactors a = form_factors_of(model, {.seed = 1}),
                     b = form_factors_of(model, {.seed = 2});
   const auto total = [](const FormFactors& f) {
@@ -228,13 +214,13 @@ TEST(FormFactors, AnotherSeedGivesNearlyTheSame) {
 }
 
 TEST(FormFactors, StopsWhenAskedTo) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 400});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 400});
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(compute_form_factors(model, tracer, {}, [](double) { return false; }), Cancelled);
 }
 
 TEST(FormFactors, RefuseSettingsOutOfRange) {
-  const PatchModel model = make_patch_model(furnished_room(), {.patch_count = 50});
+  const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 50});
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(compute_form_factors(model, tracer, {.probe_rays = 0}), Error);
   EXPECT_THROW(compute_form_factors(model, tracer, {.full_rays = 257}), Error);

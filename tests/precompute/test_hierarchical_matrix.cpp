@@ -3,7 +3,6 @@
 #include "hierarchical_matrix.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 
 #include "hierarchical_samples.h"
 #include "single_threaded_blas.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -73,12 +73,8 @@ TEST_P(HierarchicalMatrixOf, ProductsAreThoseOfItsEntries) {
 
 TEST_P(HierarchicalMatrixOf, SameBitsForAnyNumberOfThreads) {
   const Eigen::MatrixXf x = Eigen::MatrixXf::Random(kPatchCount, 100);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const Eigen::MatrixXf one = matrix.multiply(0, x);
-  omp_set_num_threads(4);
-  const Eigen::MatrixXf four = matrix.multiply(0, x);
-  omp_set_num_threads(before);
+  const auto make = [&] { return matrix.multiply(0, x); };
+  const Eigen::MatrixXf one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_EQ(one, four);
 }
 

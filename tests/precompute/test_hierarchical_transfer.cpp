@@ -3,7 +3,6 @@
 #include "rebounce/precompute/hierarchical_transfer.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
 #include "unshadowed_lights.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -29,20 +29,10 @@ Room make_room(const Scene& scene, std::size_t patch_count) {
   return {model.patches, build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
 }
 
-/// A room with a black, a coloured and a raised box.
-Scene furnished_scene(bool grey) {
-  Scene scene = test::empty_scene(grey ? Float3{0.6F, 0.6F, 0.6F} : Float3{0.7F, 0.5F, 0.2F});
-  scene.materials.resize(3, scene.materials[0]);
-  scene.materials[1].base_color = {0, 0, 0};
-  if (!grey) scene.materials[2].base_color = {0.1F, 0.3F, 0.9F};
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 1);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false, 2);
-  return scene;
-}
-
+/// Coloured walls, a black block, another colour.
 const Room& furnished_room() {
-  static const Room room = make_room(furnished_scene(false), 1500);
+  static const Room room = make_room(
+      test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.1F, 0.3F, 0.9F}), 1500);
   return room;
 }
 
@@ -50,13 +40,6 @@ const Room& furnished_room() {
 std::vector<std::vector<Float3>> lights_in(const PatchTable& patches, int count,
                                            std::uint64_t seed) {
   return test::unshadowed_lights(patches, count, seed, 2.2, 0.7);
-}
-
-std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
-  std::vector<Float3> result(light.size());
-  std::vector<float> workspace(transfer.workspace_size());
-  transfer.apply(light, result, workspace);
-  return result;
 }
 
 double mean_error(const Room& room, const TransferOperator& transfer,
@@ -147,14 +130,8 @@ TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
 
 TEST(HierarchicalTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = furnished_room();
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one =
-      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
-  omp_set_num_threads(4);
-  const auto four =
-      compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
-  omp_set_num_threads(before);
+  const auto make = [&] { return compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7); };
+  const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_TRUE(std::ranges::equal(one.values_f32, four.values_f32));
   EXPECT_EQ(one.patch, four.patch);
 }
@@ -179,7 +156,8 @@ TEST(HierarchicalTransfer, BlackLampsAreCarriedWhereTheyAreNamed) {
 }
 
 TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
-  const Room room = make_room(furnished_scene(true), 800);
+  constexpr Float3 kGrey = {0.6F, 0.6F, 0.6F};
+  const Room room = make_room(test::furnished_room(kGrey, {0, 0, 0}, kGrey), 800);
   const HierarchicalOperator grey(
       compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7));
   EXPECT_EQ(grey.storage().matrix_count, 1U);
@@ -223,7 +201,7 @@ TEST(HierarchicalTransfer, TakesOnePatchAndNoLights) {
   const ExchangeMatrix exchange{SharedArray(std::vector<std::uint64_t>(2)), {}, {}};
   const auto dense = build_dense_transfer(exchange, patches, Precision::kF32);
   const auto transfer = build_hierarchical_transfer(*dense, patches, {}, {});
-  EXPECT_EQ(product(*transfer, {{1, 1, 1}})[0], (Float3{0, 0, 0}));
+  EXPECT_EQ(product(*transfer, std::vector<Float3>{{1, 1, 1}})[0], (Float3{0, 0, 0}));
 }
 
 TEST(HierarchicalTransfer, StopsWhenAsked) {

@@ -6,14 +6,14 @@
 #include <algorithm>
 #include <numbers>
 
+#include "brute_force.h"
+#include "built_scene.h"
 #include "expect_error.h"
-#include "rebounce/precompute/build.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/octahedral_map.h"
 #include "rebounce/runtime/probe_irradiance.h"
 #include "rebounce/runtime/probe_light.h"
-#include "rebounce/runtime/sampling.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 
@@ -25,42 +25,9 @@ const TransferData& cornell_box() {
     BuildSettings settings;
     settings.subdivision.patch_count = 600;
     settings.probes.grid = {4, 3, 4};
-    BuildReport report;
-    return build_transfer_data(
-        std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests/scenes/cornell_box.gltf", settings,
-        report);
+    return test::built_scene("cornell_box.gltf", settings);
   }();
   return data;
-}
-
-RayTracer tracer_of(const TransferData& data) {
-  return {data.mesh.position, std::span(data.mesh.triangle).first(data.mesh.surface_count())};
-}
-
-/// Irradiance at a point in the air by brute force: many cosine-distributed rays, and the
-/// radiosity of what each meets.
-Float3 gather(const TransferData& data, const RayTracer& tracer, std::span<const Float3> radiosity,
-              const Float3& position, const Float3& normal) {
-  constexpr int kRays = 1 << 14;
-  std::vector<Ray> rays(kRays);
-  std::vector<Hit> hits(kRays);
-  const glm::dmat3 frame = frame_around(to_dvec3(normal));
-  for (std::uint32_t k = 0; k < kRays; ++k) {
-    rays[k] = Ray{};
-    rays[k].origin = position;
-    rays[k].direction = to_float3(frame * square_to_cosine_hemisphere(r2_point(k, {0.3, 0.7})));
-    rays[k].t_near = 0;
-    rays[k].t_far = std::numeric_limits<float>::infinity();
-  }
-  tracer.intersect(rays, hits);
-  glm::dvec3 sum(0);
-  for (const Hit& hit : hits) {
-    if (hit.triangle == kNone) continue;
-    const std::uint32_t side = hit.front ? hit.triangle : data.mesh.back_triangle[hit.triangle];
-    if (side == kNone || data.mesh.triangle_patch[side] == kNone) continue;
-    sum += to_dvec3(radiosity[data.mesh.triangle_patch[side]]);
-  }
-  return to_float3(sum / static_cast<double>(kRays));
 }
 
 /// Relative L2 errors of the irradiance in many directions at every valid probe.
@@ -83,7 +50,7 @@ ProbeErrors errors_of_probes(const Engine& engine) {
     if (probes.valid[p] == 0) continue;
     for (std::size_t k = 0; k < normals.size(); ++k) {
       const Float3 truth =
-          gather(data, engine.tracer(), engine.radiosity(), probes.position[p], normals[k]);
+          to_float3(test::irradiance_at(engine, probes.position[p], normals[k], 1 << 14));
       const Float3 by_harmonics = probe_irradiance(light[p], normals[k]);
       const Float3& found = irradiance[p * normals.size() + k];
       for (int c = 0; c < kChannelCount; ++c) {
@@ -195,7 +162,7 @@ TEST(LightProbes, EveryDirectionIsPatchOrSkyOrBack) {
 TEST(LightProbes, BehindWallsTheyAreNotValid) {
   // Probes outside of the one-sided box see backs.
   const TransferData& data = cornell_box();
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   LightProbes probes;
   const Float3 middle = data.probes.position[1 + 4 * (1 + 3 * 1)];
   probes.position = {middle, {middle[0], middle[1] - 10, middle[2]}};
@@ -205,7 +172,7 @@ TEST(LightProbes, BehindWallsTheyAreNotValid) {
 
 TEST(LightProbes, SameBitsForAnyNumberOfThreads) {
   const TransferData& data = cornell_box();
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   LightProbes probes = place_probes(data.mesh, {.grid = {3, 2, 2}});
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
@@ -225,7 +192,7 @@ TEST(LightProbes, SpacingAndLimits) {
   test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "further apart");
   LightProbes few = place_probes(data.mesh, {.grid = {1, 1, 1}});
   test::expect_error(
-      [&] { trace_probes(data, data.mesh.triangle_patch, tracer_of(data), {.ray_count = 3}, few); },
+      [&] { trace_probes(data, data.mesh.triangle_patch, make_surface_tracer(data.mesh), {.ray_count = 3}, few); },
       "64 rays");
 }
 

@@ -9,6 +9,7 @@
 #include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/patch_points.h"
+#include "scene_data.h"
 #include "test_scenes.h"
 
 namespace rebounce {
@@ -216,11 +217,8 @@ TEST(LightThroughSurfaces, LampsShineThroughGlass) {
   make_glass(scene, 0.75F);
   add_square(scene, 1, 0, true, kWall);
   add_square(scene, 4, 0.5, true, kPane);
-  PatchModel model = make_patch_model(scene, {.patch_count = 60});
-  TransferData data;
-  data.patches = model.patches;
-  data.patches.sky_visibility.resize(model.patches.size());
-  data.mesh = model.mesh;
+  const PatchModel model = make_patch_model(scene, {.patch_count = 60});
+  const TransferData data = test::data_of(model);
   Light sun;
   sun.type = LightType::kDirectional;
   sun.intensity = 100;

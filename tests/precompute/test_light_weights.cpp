@@ -22,8 +22,6 @@ class KnownMatrix final : public SymmetricMatrix {
       : entries_(std::move(entries)), area_(entries_.rows(), 1) {}
 
   std::span<const float> area() const override { return area_; }
-  std::uint32_t matrix_count() const override { return 1; }
-  std::array<std::uint32_t, kChannelCount> channel_matrix() const override { return {0, 0, 0}; }
   void entries(std::uint32_t /*matrix*/, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<MatrixXf> entries) const override {

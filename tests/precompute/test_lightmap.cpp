@@ -7,13 +7,13 @@
 #include <cmath>
 
 #include "allocation_counter.h"
+#include "brute_force.h"
 #include "expect_error.h"
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
-#include "rebounce/runtime/sampling.h"
 #include "rebounce/runtime/texel_light.h"
 #include "rebounce/runtime/vertex_light.h"
 #include "unwrapped_room.h"
@@ -66,27 +66,10 @@ PatchPoint place_of(const TransferData& data, std::size_t k) {
           to_float3(glm::normalize(glm::cross(at(b) - at(a), at(c) - at(a))))};
 }
 
-/// F B at a point, by brute force: cosine-distributed rays and the radiosity of what each meets.
+/// F B at a point, by brute force.
 glm::dvec3 gather(const Engine& engine, const PatchPoint& point) {
-  constexpr int kRays = 1024;
-  const DisplayMesh& mesh = engine.data().mesh;
-  std::vector<Ray> rays(kRays);
-  std::vector<Hit> hits(kRays);
-  const glm::dmat3 frame = frame_around(to_dvec3(point.normal));
-  for (std::uint32_t k = 0; k < kRays; ++k) {
-    rays[k] = Ray{};
-    rays[k].origin = engine.tracer().offset_point(point.position, point.normal);
-    rays[k].direction = to_float3(frame * square_to_cosine_hemisphere(r2_point(k, {0.3, 0.7})));
-    rays[k].t_near = 0;
-    rays[k].t_far = std::numeric_limits<float>::infinity();
-  }
-  engine.tracer().intersect(rays, hits);
-  glm::dvec3 sum(0);
-  for (const Hit& hit : hits) {
-    if (hit.triangle == kNone || !hit.front || mesh.triangle_patch[hit.triangle] == kNone) continue;
-    sum += to_dvec3(engine.radiosity()[mesh.triangle_patch[hit.triangle]]);
-  }
-  return sum / static_cast<double>(kRays);
+  const Float3 origin = engine.tracer().offset_point(point.position, point.normal);
+  return test::irradiance_at(engine, origin, point.normal, 1024);
 }
 
 Engine lit_room() {

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "expect_error.h"
+#include "rebounce/precompute/links.h"
+#include "test_scenes.h"
 
 namespace rebounce {
 namespace {
@@ -54,11 +56,7 @@ Walls two_walls(const std::function<double(double, double)>& exchange) {
 
 std::vector<Float3> gathered(const Walls& walls, const FormFactorLinks& links,
                              const std::vector<Float3>& light) {
-  const LinkedFormFactors form_factors(links, walls.area, walls.centroid);
-  std::vector<Float3> result(light.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(light, result, workspace);
-  return result;
+  return gather(LinkedFormFactors(links, walls.area, walls.centroid), light);
 }
 
 /// Of the symmetric form, Frobenius.
@@ -108,6 +106,60 @@ TEST(LinkCoarsening, KeepsRowSums) {
   const std::vector<Float3> ones(walls.area.size(), {1, 1, 1});
   const auto a = gathered(walls, walls.links, ones), b = gathered(walls, coarse, ones);
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(b[i][0] / a[i][0], 1, 1e-3);
+}
+
+/// Two closed rooms with a wall of 10 cm between them, and links of the pairs in each.
+struct TwoRooms {
+  PatchModel model = make_patch_model(scene(), {.patch_count = 600});
+  FormFactorLinks links =
+      build_links(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}).links;
+
+  static Scene scene() {
+    Scene scene = test::empty_scene();
+    test::add_box(scene, {0, 0, 0}, {3, 3, 3}, true);
+    test::add_box(scene, {3.1, 0, 0}, {6.1, 3, 3}, true);
+    return scene;
+  }
+
+  bool is_in_first_room(std::size_t patch) const {
+    return model.patches.centroid[patch][0] < 3.05F;
+  }
+
+  FormFactorLinks coarser(double epsilon) const {
+    return coarsen_links(links, model.patches.area, model.patches.centroid, epsilon);
+  }
+
+  std::vector<Float3> gathered(const FormFactorLinks& by, const std::vector<Float3>& light) const {
+    return gather(LinkedFormFactors(by, model.patches.area, model.patches.centroid), light);
+  }
+};
+
+TEST(LinkCoarsening, CarriesNothingThroughAWall) {
+  const TwoRooms rooms;
+  std::vector<Float3> light(rooms.model.patches.size(), {0, 0, 0});
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    if (rooms.is_in_first_room(i)) light[i] = {1, 1, 1};
+  }
+  for (const double part : {kLinkCoarsening, 1.0}) {
+    const FormFactorLinks coarse = rooms.coarser(part * kLinkEpsilon);
+    ASSERT_LT(coarse.pair.size(), rooms.links.pair.size() / 2);
+    const std::vector<Float3> arrived = rooms.gathered(coarse, light);
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      if (!rooms.is_in_first_room(i)) EXPECT_NEAR(arrived[i][0], 0, kLinkEpsilon) << i;
+    }
+  }
+}
+
+TEST(LinkCoarsening, KeepsRowSumsOfRooms) {
+  const TwoRooms rooms;
+  const std::vector<Float3> ones(rooms.model.patches.size(), {1, 1, 1});
+  const std::vector<Float3> before = rooms.gathered(rooms.links, ones);
+  for (const double part : {kLinkCoarsening, 1.0}) {
+    const std::vector<Float3> after = rooms.gathered(rooms.coarser(part * kLinkEpsilon), ones);
+    for (std::size_t i = 0; i < ones.size(); ++i) {
+      EXPECT_NEAR(after[i][0], before[i][0], 1e-3) << i;
+    }
+  }
 }
 
 TEST(LinkCoarsening, WithoutAnErrorNothingIsMerged) {

@@ -3,11 +3,9 @@
 #include "rebounce/precompute/link_fitting.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "expect_error.h"
@@ -15,7 +13,9 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/linked_form_factors.h"
+#include "random_light.h"
 #include "test_scenes.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -42,13 +42,6 @@ const Pairs& furnished() {
   return pairs;
 }
 
-std::vector<Float3> gather(const FormFactorOperator& form_factors, const std::vector<Float3>& in) {
-  std::vector<Float3> out(in.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(in, out, workspace);
-  return out;
-}
-
 std::vector<Float3> gather_pairs(const Pairs& pairs, const std::vector<Float3>& in) {
   return gather(FormFactorRows(pairs.exchange, pairs.patches.area), in);
 }
@@ -58,17 +51,9 @@ std::vector<Float3> gather_links(const Pairs& pairs, const FormFactorLinks& link
   return gather(LinkedFormFactors(links, pairs.patches.area, pairs.patches.centroid), in);
 }
 
-std::vector<Float3> random_light(std::size_t n, std::uint32_t seed) {
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<float> uniform;
-  std::vector<Float3> light(n);
-  for (Float3& x : light) x = {uniform(random), uniform(random), uniform(random)};
-  return light;
-}
-
 /// Of F times light that changes from patch to patch, area-weighted L2.
 double error_of(const Pairs& pairs, const FormFactorLinks& links) {
-  const std::vector<Float3> light = random_light(pairs.patches.size(), 7);
+  const std::vector<Float3> light = test::random_light(pairs.patches.size(), 7);
   return relative_difference(gather_links(pairs, links, light), gather_pairs(pairs, light),
                              pairs.patches.area);
 }
@@ -123,12 +108,8 @@ TEST(LinkFitting, NoLightThroughAWall) {
 
 TEST(LinkFitting, SameBitsForAnyNumberOfThreads) {
   const Pairs& pairs = furnished();
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const FormFactorLinks one = fit_links(pairs.exchange, pairs.patches, 1e-4);
-  omp_set_num_threads(5);
-  const FormFactorLinks five = fit_links(pairs.exchange, pairs.patches, 1e-4);
-  omp_set_num_threads(before);
+  const auto make = [&] { return fit_links(pairs.exchange, pairs.patches, 1e-4); };
+  const FormFactorLinks one = test::with_threads(1, make), five = test::with_threads(5, make);
   EXPECT_EQ(one.pair, five.pair);
   EXPECT_EQ(one.exchange_area, five.exchange_area);
   EXPECT_EQ(one.gradient, five.gradient);

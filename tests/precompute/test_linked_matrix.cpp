@@ -35,14 +35,13 @@ const LinkedRoom& room() {
 /// A^1/2 F A^-1/2 by gathering of unit vectors.
 Eigen::MatrixXf gathered() {
   const PatchTable& patches = room().patches();
-  const LinkedFormFactors product(room().links, patches.area, patches.centroid);
+  const LinkedFormFactors form_factors(room().links, patches.area, patches.centroid);
   const std::size_t n = patches.size();
-  std::vector<float> workspace(product.workspace_size());
   Eigen::MatrixXf g(n, n);
   for (std::size_t j = 0; j < n; ++j) {
-    std::vector<Float3> unit(n), column(n);
+    std::vector<Float3> unit(n);
     unit[j][0] = 1 / std::sqrt(patches.area[j]);
-    product.gather(unit, column, workspace);
+    const std::vector<Float3> column = gather(form_factors, unit);
     for (std::size_t i = 0; i < n; ++i) g(i, j) = column[i][0] * std::sqrt(patches.area[i]);
   }
   return g;
@@ -110,14 +109,12 @@ TEST(LinkedMatrix, IsCompressedToATolerance) {
   const std::span all(lights);
   const auto compressed = compress_form_factors(room().links, room().patches(),
                                                 {all.first(32), all.subspan(32, 16)}, {kTolerance});
-  const LinkedFormFactors product(room().links, room().patches().area, room().patches().centroid);
-  std::vector<float> workspace(std::max(product.workspace_size(), compressed->workspace_size()));
-  std::vector<Float3> truth(n), result(n);
+  const LinkedFormFactors links(room().links, room().patches().area, room().patches().centroid);
   double error = 0;
   for (const auto& light : all.last(16)) {
-    product.gather(light, truth, workspace);
-    compressed->apply(light, result, workspace);
-    error += relative_difference(result, truth, room().patches().area) / 16;
+    error += relative_difference(product(*compressed, light), gather(links, light),
+                                 room().patches().area) /
+             16;
   }
   EXPECT_LT(error, kTolerance);
   EXPECT_GT(error, 0.05 * kTolerance) << "bytes are wasted";

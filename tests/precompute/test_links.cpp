@@ -3,7 +3,6 @@
 #include "rebounce/precompute/links.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +18,7 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "test_scenes.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -26,15 +26,6 @@ namespace {
 Scene empty_room() {
   Scene scene = test::empty_scene();
   test::add_box(scene, {-1, 0, 2}, {3, 2.5, 8}, true);
-  return scene;
-}
-
-/// A room with a block that stands on its floor and one that hangs in the air.
-Scene furnished_room() {
-  Scene scene = test::empty_scene();
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
   return scene;
 }
 
@@ -53,7 +44,7 @@ FormFactors form_factors_of(const PatchModel& model, double epsilon) {
 
 /// What several tests look at, made once: the furnished room, its links and all its pairs.
 struct Furnished {
-  PatchModel model = model_of(furnished_room());
+  PatchModel model = model_of(test::furnished_room());
   LinkBuild build = links_of(model);
   FormFactors pairs = form_factors_of(model, 0);
 };
@@ -61,13 +52,6 @@ struct Furnished {
 const Furnished& furnished() {
   static const Furnished room;
   return room;
-}
-
-std::vector<Float3> gather(const FormFactorOperator& form_factors, std::span<const Float3> in) {
-  std::vector<Float3> out(in.size());
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(in, out, workspace);
-  return out;
 }
 
 LinkedFormFactors operator_of(const LinkBuild& build, const PatchTable& patches) {
@@ -179,7 +163,7 @@ TEST(Links, ExpandToAllPairs) {
 
 TEST(Links, WithoutErrorAreAllPairs) {
   // But for what hemisphere rays add to pairs that are partly hidden.
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const FormFactors pairs = form_factors_of(model, 0), links = form_factors_of(model, 1e-30);
   const std::vector<Float3> light = smooth_light(model.patches);
   const auto gathered = [&](const FormFactors& f) {
@@ -204,7 +188,7 @@ TEST(Links, SmallerErrorsAreSmaller) {
 }
 
 TEST(Links, WeightsDecideWhereErrorsMatter) {
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const std::vector<float> ones(model.patches.size(), 1.0F), fewer(model.patches.size(), 0.1F);
   const std::size_t unweighted = links_of(model).links.pair.size();
   EXPECT_EQ(links_of(model, kLinkEpsilon, ones).links.pair.size(), unweighted);
@@ -282,29 +266,31 @@ TEST(Links, AreDimmedByGlass) {
 }
 
 TEST(Links, SameBitsForAnyNumberOfThreads) {
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const std::vector<Float3> light = smooth_light(model.patches);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const LinkBuild one = links_of(model);
-  const std::vector<Float3> by_one = gather(operator_of(one, model.patches), light);
-  const FormFactors f_one = form_factors_of(model, kLinkEpsilon);
-  omp_set_num_threads(3);
-  const LinkBuild three = links_of(model);
-  const std::vector<Float3> by_three = gather(operator_of(three, model.patches), light);
-  const FormFactors f_three = form_factors_of(model, kLinkEpsilon);
-  omp_set_num_threads(before);
-  EXPECT_EQ(one.links.pair, three.links.pair);
-  EXPECT_EQ(one.links.exchange_area, three.links.exchange_area);
-  EXPECT_EQ(one.links.gradient, three.links.gradient);
-  EXPECT_EQ(one.links.scale, three.links.scale);
-  EXPECT_EQ(one.ray_count, three.ray_count);
-  EXPECT_EQ(by_one, by_three);
-  EXPECT_TRUE(std::ranges::equal(f_one.exchange.exchange_area, f_three.exchange.exchange_area));
+  struct Made {
+    LinkBuild build;
+    std::vector<Float3> gathered;
+    FormFactors pairs;
+  };
+  const auto make = [&] {
+    Made made{links_of(model), {}, form_factors_of(model, kLinkEpsilon)};
+    made.gathered = gather(operator_of(made.build, model.patches), light);
+    return made;
+  };
+  const Made one = test::with_threads(1, make), three = test::with_threads(3, make);
+  EXPECT_EQ(one.build.links.pair, three.build.links.pair);
+  EXPECT_EQ(one.build.links.exchange_area, three.build.links.exchange_area);
+  EXPECT_EQ(one.build.links.gradient, three.build.links.gradient);
+  EXPECT_EQ(one.build.links.scale, three.build.links.scale);
+  EXPECT_EQ(one.build.ray_count, three.build.ray_count);
+  EXPECT_EQ(one.gathered, three.gathered);
+  EXPECT_TRUE(
+      std::ranges::equal(one.pairs.exchange.exchange_area, three.pairs.exchange.exchange_area));
 }
 
 TEST(Links, StopWhenAskedTo) {
-  const PatchModel model = model_of(furnished_room(), 300);
+  const PatchModel model = model_of(test::furnished_room(), 300);
   const RayTracer tracer = test::make_tracer(model);
   EXPECT_THROW(
       build_links(model, tracer, {.link_epsilon = kLinkEpsilon}, {}, [](double) { return false; }),
@@ -312,7 +298,7 @@ TEST(Links, StopWhenAskedTo) {
 }
 
 TEST(Links, RefuseSettingsOutOfRange) {
-  const PatchModel model = model_of(furnished_room(), 50);
+  const PatchModel model = model_of(test::furnished_room(), 50);
   const RayTracer tracer = test::make_tracer(model);
   const std::vector<float> few(3, 1.0F);
   EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 0}), Error);

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <omp.h>
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -16,6 +14,7 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -87,13 +86,6 @@ double least_error(const Eigen::MatrixXd& symmetric, int rank) {
   double sum = 0;
   for (std::size_t k = rank; k < squares.size(); ++k) sum += squares[k];
   return std::sqrt(sum);
-}
-
-std::vector<Float3> product(const TransferOperator& transfer, const std::vector<Float3>& light) {
-  std::vector<Float3> result(light.size());
-  std::vector<float> workspace(transfer.workspace_size());
-  transfer.apply(light, result, workspace);
-  return result;
 }
 
 std::vector<Float3> smooth_light(const PatchTable& patches) {
@@ -171,14 +163,8 @@ TEST(LowRankTransfer, CountsTheFormFactorsThatItReads) {
 TEST(LowRankTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = grey_room();
   const std::vector<Float3> light = smooth_light(room.patches);
-  const int before = omp_get_max_threads();
-  std::vector<std::vector<Float3>> results;
-  for (const int threads : {1, 3}) {
-    omp_set_num_threads(threads);
-    results.push_back(product(*room.low_rank({32, Precision::kF16, true}), light));
-  }
-  omp_set_num_threads(before);
-  EXPECT_EQ(results[0], results[1]);
+  const auto make = [&] { return product(*room.low_rank({32, Precision::kF16, true}), light); };
+  EXPECT_EQ(test::with_threads(1, make), test::with_threads(3, make));
 }
 
 TEST(LowRankTransfer, StopsWhenAsked) {

@@ -14,6 +14,7 @@
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/transfer/area_norm.h"
+#include "scene_data.h"
 #include "test_scenes.h"
 
 namespace rebounce {
@@ -31,11 +32,7 @@ Built build(const Scene& scene, std::size_t patch_count) {
   PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
   RayTracer tracer = test::make_tracer(model);
   FormFactors f = compute_form_factors(model, tracer);
-  TransferData data;
-  data.patches = std::move(model.patches);
-  data.patches.sky_visibility = std::move(f.sky_visibility);
-  data.patches.absorbed = std::move(f.absorbed);
-  data.mesh = std::move(model.mesh);
+  TransferData data = test::data_of(std::move(model), f);
   data.exchange = std::move(f.exchange);
   auto dense = build_dense_transfer(data.exchange, data.patches, Precision::kF32);
   data.transfer = dense;

@@ -4,7 +4,6 @@
 #include "rebounce/precompute/reference_solution.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -16,6 +15,7 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -170,12 +170,8 @@ TEST(ReferenceSolution, SameBitsForAnyNumberOfThreads) {
   const Room room({0.7F, 0.5F, 0.9F});
   const ReferenceSolver solver(room.exchange, room.patches);
   const auto lights = room.lights(4);
-  const int threads = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const auto one = solver.radiosities(lights);
-  omp_set_num_threads(3);
-  const auto three = solver.radiosities(lights);
-  omp_set_num_threads(threads);
+  const auto make = [&] { return solver.radiosities(lights); };
+  const auto one = test::with_threads(1, make), three = test::with_threads(3, make);
   EXPECT_EQ(one, three);
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <glm/glm.hpp>
 #include <numbers>
 #include <span>
@@ -47,8 +48,10 @@ inline void add_polygon(Scene& scene, std::span<const glm::dvec3> corner,
   }
 }
 
-/// The six faces of the box [low, high], in the order -x +x -y +y -z +z; `inwards` makes a room of
-/// it.
+/// The faces of a box in the order in which they are added, two triangles each.
+enum class Face : std::uint8_t { kLowX, kHighX, kLowY, kHighY, kLowZ, kHighZ };
+
+/// The six faces of the box [low, high]; `inwards` makes a room of it.
 inline void add_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high, bool inwards,
                     std::uint32_t material = 0) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -66,6 +69,16 @@ inline void add_box(Scene& scene, const glm::dvec3& low, const glm::dvec3& high,
       add_polygon(scene, corner, material);
     }
   }
+}
+
+/// Removes a face of one of the boxes that a scene consists of; of several the last first.
+inline void remove_face(Scene& scene, Face face, std::size_t box = 0) {
+  const auto first = static_cast<std::ptrdiff_t>(12 * box + 2 * static_cast<std::size_t>(face));
+  const auto remove = [first](auto& of_triangle) {
+    of_triangle.erase(of_triangle.begin() + first, of_triangle.begin() + first + 2);
+  };
+  remove(scene.triangle);
+  remove(scene.triangle_material);
 }
 
 /// A ball of radius 1 around the origin, of longitudes and latitudes; `inwards` makes a dome of it.
@@ -104,6 +117,28 @@ inline Scene room_with_block(const Float3& reflectance) {
   Scene scene = empty_scene(reflectance);
   add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
   add_box(scene, {1, 0.5, 1}, {2, 1.2, 2.5}, false);
+  return scene;
+}
+
+/// The room with a block that stands on its floor and one that hangs in the air.
+inline Scene furnished_room(const Float3& reflectance = {0.5F, 0.5F, 0.5F}) {
+  Scene scene = empty_scene(reflectance);
+  add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
+  add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false);
+  return scene;
+}
+
+/// The same with materials 1 and 2 for the blocks.
+inline Scene furnished_room(const Float3& walls, const Float3& standing, const Float3& hanging) {
+  constexpr std::size_t kBox = 12;  // triangles
+  Scene scene = furnished_room(walls);
+  scene.materials.resize(3, scene.materials[0]);
+  scene.materials[1].base_color = standing;
+  scene.materials[2].base_color = hanging;
+  for (std::size_t t = kBox; t < 3 * kBox; ++t) {
+    scene.triangle_material[t] = static_cast<std::uint32_t>(t / kBox);
+  }
   return scene;
 }
 

@@ -16,6 +16,7 @@
 #include "rebounce/runtime/sky_model.h"
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/runtime/surface_light.h"
+#include "scene_data.h"
 #include "seen_patch.h"
 #include "test_scenes.h"
 
@@ -32,9 +33,8 @@ struct SeenScene {
 
   SeenScene(Scene scene, std::size_t patch_count) {
     PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
-    data.patches = std::move(model.patches);
-    data.mesh = std::move(model.mesh);
     shown_patch = std::move(model.shown_patch);
+    data = test::data_of(std::move(model));
   }
 
   RayTracer tracer() const { return make_surface_tracer(data.mesh); }
@@ -60,9 +60,7 @@ const SeenScene& room_with_a_crate() {
     Scene scene = test::empty_scene();
     scene.materials.front().double_sided = true;
     test::add_box(scene, {0.5, 0, 0.5}, {1.5, 0.5, 1.5}, false);
-    // Without its lid, the fourth of its faces of two triangles each.
-    scene.triangle.erase(scene.triangle.begin() + 6, scene.triangle.begin() + 8);
-    scene.triangle_material.resize(scene.triangle.size());
+    test::remove_face(scene, test::Face::kHighY);
     test::add_box(scene, {0, 0, 0}, {2, 2, 2}, true);
     for (Float3& p : scene.position) p = to_float3(turned(to_dvec3(p)));
     for (Float3& n : scene.normal) n = to_float3(turned(to_dvec3(n)));
@@ -131,12 +129,9 @@ const SeenScene& yard() {
   static const SeenScene scene = [] {
     Scene walls = test::empty_scene();
     test::add_box(walls, {-2, 0, -2}, {2, 2, 2}, true);
-    // Faces come as -x +x -y +y -z +z: +x, +y and +z are open.
-    for (const int face : {5, 3, 1}) {
-      walls.triangle.erase(walls.triangle.begin() + 2 * face,
-                           walls.triangle.begin() + 2 * face + 2);
+    for (const test::Face open : {test::Face::kHighZ, test::Face::kHighY, test::Face::kHighX}) {
+      test::remove_face(walls, open);
     }
-    walls.triangle_material.resize(walls.triangle.size());
     return SeenScene(std::move(walls), 100);
   }();
   return scene;

@@ -11,6 +11,7 @@
 #include "rebounce/runtime/polygon_form_factor.h"
 #include "rebounce/runtime/sampling.h"
 #include "rebounce/runtime/sky_model.h"
+#include "scene_data.h"
 #include "test_scenes.h"
 
 namespace rebounce {
@@ -25,11 +26,7 @@ struct OpenScene {
   OpenScene(Scene scene, std::size_t patch_count) {
     PatchModel model = make_patch_model(std::move(scene), {.patch_count = patch_count});
     FormFactors factors = compute_form_factors(model, test::make_tracer(model));
-    data.patches = std::move(model.patches);
-    data.patches.sky_visibility = std::move(factors.sky_visibility);
-    data.patches.absorbed = std::move(factors.absorbed);
-    data.sky_cells = std::move(factors.sky_cells);
-    data.mesh = std::move(model.mesh);
+    data = test::data_of(std::move(model), std::move(factors));
   }
 
   std::vector<Float3> irradiance(const Sky& sky) const {
@@ -45,9 +42,7 @@ const OpenScene& open_box() {
   static const OpenScene box = [] {
     Scene scene = test::empty_scene();
     test::add_box(scene, {-1, 0, -1}, {1, 1, 1}, true);
-    // Faces come as -x +x -y +y -z +z, two triangles each.
-    scene.triangle.erase(scene.triangle.begin() + 6, scene.triangle.begin() + 8);
-    scene.triangle_material.resize(scene.triangle.size());
+    test::remove_face(scene, test::Face::kHighY);
     return OpenScene(std::move(scene), 400);
   }();
   return box;

@@ -59,19 +59,9 @@ struct Room {
 };
 
 /// Coloured walls, a black block, a bright one.
-Scene furnished_room() {
-  Scene scene = test::empty_scene({0.7F, 0.5F, 0.2F});
-  scene.materials.resize(3, scene.materials[0]);
-  scene.materials[1].base_color = {0, 0, 0};
-  scene.materials[2].base_color = {0.6F, 0.8F, 0.0F};
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 1);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false, 2);
-  return scene;
-}
-
 const Room& furnished() {
-  static const Room room(furnished_room());
+  static const Room room(
+      test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.6F, 0.8F, 0.0F}));
   return room;
 }
 

@@ -1,14 +1,14 @@
 #include "rebounce/precompute/surface_harmonics.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <numbers>
 
 #include "allocation_counter.h"
+#include "brute_force.h"
+#include "built_scene.h"
 #include "expect_error.h"
-#include "rebounce/precompute/build.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
@@ -17,6 +17,7 @@
 #include "rebounce/runtime/vertex_light.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -26,10 +27,7 @@ const std::shared_ptr<const TransferData>& cornell_box() {
     BuildSettings settings;
     settings.subdivision.patch_count = 600;
     settings.surface_harmonics.ray_count = 512;
-    BuildReport report;
-    return std::make_shared<const TransferData>(build_transfer_data(
-        std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests/scenes/cornell_box.gltf", settings,
-        report));
+    return std::make_shared<const TransferData>(test::built_scene("cornell_box.gltf", settings));
   }();
   return data;
 }
@@ -47,27 +45,19 @@ Engine lit_box() {
 /// The irradiance on a surface with normal `bent` from what is above the plane of the point, by
 /// brute force: rays spread evenly over the hemisphere, and the radiosity of what each meets.
 glm::dvec3 gather(const Engine& engine, const PatchPoint& point, const glm::dvec3& bent) {
-  constexpr int kRays = 2048;
-  const DisplayMesh& mesh = engine.data().mesh;
-  std::vector<Ray> rays(kRays);
-  std::vector<Hit> hits(kRays);
+  constexpr std::uint32_t kRays = 2048;
   const glm::dmat3 frame = frame_around(to_dvec3(point.normal));
+  std::vector<glm::dvec3> direction;
   for (std::uint32_t k = 0; k < kRays; ++k) {
     const glm::dvec2 s = r2_point(k, {0.3, 0.7});
     const double r = std::sqrt(1 - s.x * s.x), phi = 2 * std::numbers::pi * s.y;
-    rays[k] = Ray{};
-    rays[k].origin = engine.tracer().offset_point(point.position, point.normal);
-    rays[k].direction = to_float3(frame * glm::dvec3(r * std::cos(phi), r * std::sin(phi), s.x));
-    rays[k].t_near = 0;
-    rays[k].t_far = std::numeric_limits<float>::infinity();
+    direction.push_back(frame * glm::dvec3(r * std::cos(phi), r * std::sin(phi), s.x));
   }
-  engine.tracer().intersect(rays, hits);
+  const Float3 origin = engine.tracer().offset_point(point.position, point.normal);
+  const std::vector<glm::dvec3> met = test::met_radiosity(engine, origin, direction);
   glm::dvec3 sum(0);
-  for (std::size_t k = 0; k < hits.size(); ++k) {
-    const Hit& hit = hits[k];
-    if (hit.triangle == kNone || !hit.front || mesh.triangle_patch[hit.triangle] == kNone) continue;
-    const double cosine = std::max(0.0, glm::dot(to_dvec3(rays[k].direction), bent));
-    sum += cosine * to_dvec3(engine.radiosity()[mesh.triangle_patch[hit.triangle]]);
+  for (std::size_t k = 0; k < met.size(); ++k) {
+    sum += std::max(0.0, glm::dot(direction[k], bent)) * met[k];
   }
   return sum * (2.0 / kRays);  // 2 pi / rays, and B / pi
 }
@@ -185,14 +175,8 @@ TEST(SurfaceHarmonics, TheFileKeepsThemAndAFrameAllocatesNothing) {
 TEST(SurfaceHarmonics, SameBitsForAnyNumberOfThreads) {
   const TransferData& data = *cornell_box();
   const RayTracer tracer = make_surface_tracer(data.mesh);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const SurfaceHarmonics one =
-      trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64});
-  omp_set_num_threads(4);
-  const SurfaceHarmonics four =
-      trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64});
-  omp_set_num_threads(before);
+  const auto make = [&] { return trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64}); };
+  const SurfaceHarmonics one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_EQ(one.entry_weight, four.entry_weight);
   EXPECT_EQ(one.sky, four.sky);
   test::expect_error(

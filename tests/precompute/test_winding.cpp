@@ -101,9 +101,8 @@ TEST(Winding, PosterOnAWallIsRight) {
 
 TEST(Winding, SolidWithoutABottomIsRight) {
   Scene scene = furnished_room(kInwards, kOutwards);
-  scene.triangle.erase(scene.triangle.begin() + 16, scene.triangle.begin() + 18);  // its -y face
-  scene.triangle_material.resize(scene.triangle.size());
-  EXPECT_TRUE(find_inside_out(scene).empty());
+  test::remove_face(scene, test::Face::kLowY, 1);
+  EXPECT_TRUE(find(scene).empty());
 }
 
 TEST(Winding, SecondSidesThatAreCopiesAreRight) {

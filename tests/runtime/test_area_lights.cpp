@@ -16,8 +16,7 @@ constexpr double kPi = std::numbers::pi;
 
 std::vector<Float3> direct(const TransferData& data, const std::vector<Light>& lights,
                            const DirectLightingSettings& settings = {}) {
-  const RayTracer tracer(data.mesh.position,
-                         std::span(data.mesh.triangle).first(data.mesh.surface_count()));
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting lighting(data, tracer, settings);
   std::vector<Float3> irradiance(data.patches.size());
   lighting.compute(lights, {}, irradiance);

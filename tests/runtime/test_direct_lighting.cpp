@@ -1,23 +1,19 @@
 #include "rebounce/runtime/direct_lighting.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <numbers>
 
 #include "rebounce/transfer/error.h"
 #include "test_scene_data.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
 
-RayTracer tracer_of(const TransferData& data) {
-  return {data.mesh.position, std::span(data.mesh.triangle).first(data.mesh.surface_count())};
-}
-
 std::vector<Float3> direct(const TransferData& data, const std::vector<Light>& lights,
                            const Sky& sky = {}) {
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting lighting(data, tracer);
   std::vector<Float3> irradiance(data.patches.size());
   lighting.compute(lights, sky, irradiance);
@@ -102,12 +98,8 @@ TEST(DirectLighting, SameBitsForAnyNumberOfThreads) {
   test::add_square(data, 0.5F, 1, 4, true, {0.5F, 0.5F, 0.5F});
   Light lamp;
   lamp.position = {0.2F, 2, 0.1F};
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const std::vector<Float3> one = direct(data, {lamp});
-  omp_set_num_threads(4);
-  const std::vector<Float3> four = direct(data, {lamp});
-  omp_set_num_threads(before);
+  const auto make = [&] { return direct(data, {lamp}); };
+  const std::vector<Float3> one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_EQ(one, four);
 }
 
@@ -141,7 +133,7 @@ TEST(DirectLighting, OnlyChangedLightsAreTraced) {
   TransferData data;
   test::add_square(data, 2, 0, 30, true, {0.5F, 0.5F, 0.5F});
   test::add_square(data, 0.5F, 1, 4, true, {0.5F, 0.5F, 0.5F});
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting lighting(data, tracer);
   std::vector<Light> lights(3);
   for (int k = 0; k < 3; ++k) lights[k].position = {0.3F * static_cast<float>(k), 2, 0.1F};
@@ -215,7 +207,7 @@ TEST(DirectLighting, ProfileOfALuminaire) {
 TEST(DirectLighting, RoomForMoreLightsIsMadeOnce) {
   TransferData data;
   test::add_square(data, 1, 0, 4, true, {0.5F, 0.5F, 0.5F});
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting lighting(data, tracer, {.light_capacity = 0});
   Light lamp;
   lamp.position = {0, 1, 0};
@@ -228,7 +220,7 @@ TEST(DirectLighting, RoomForMoreLightsIsMadeOnce) {
 TEST(DirectLighting, NeedsAPoint) {
   TransferData data;
   test::add_square(data, 1, 0, 1, true, {0.5F, 0.5F, 0.5F});
-  const RayTracer tracer = tracer_of(data);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
   EXPECT_THROW(DirectLighting(data, tracer, {.points_per_patch = 0}), Error);
   EXPECT_THROW(DirectLighting(data, tracer, {.area_light_samples = 0}), Error);
   EXPECT_THROW(DirectLighting(data, tracer, {.area_light_samples = 65}), Error);

@@ -3,7 +3,6 @@
 #include "rebounce/demo/lit_mesh.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -19,6 +18,7 @@
 #include "runtime/rectangle_scene.h"
 #include "subdivided_mesh.h"
 #include "temporary_folder.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -119,12 +119,8 @@ TEST(LitMesh, IsTheSameForAnyNumberOfThreads) {
   scene.add_rectangle(floor_corners(1), scene.add_material({0.5F, 0.5F, 0.5F}));
   Light lamp;
   lamp.position = {0.3F, 0.4F, 0};
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const LitMesh one = lit(scene.data(), {lamp}, unexposed(2000));
-  omp_set_num_threads(3);
-  const LitMesh three = lit(scene.data(), {lamp}, unexposed(2000));
-  omp_set_num_threads(before);
+  const auto make = [&] { return lit(scene.data(), {lamp}, unexposed(2000)); };
+  const LitMesh one = test::with_threads(1, make), three = test::with_threads(3, make);
   EXPECT_EQ(one.color, three.color);
   EXPECT_EQ(one.position, three.position);
 }

@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <omp.h>
 #include <stb_image.h>
 
 #include <algorithm>
@@ -14,6 +13,7 @@
 #include "rebounce/demo/picture.h"
 #include "rebounce/transfer/error.h"
 #include "runtime/rectangle_scene.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -276,12 +276,8 @@ TEST(Picture, SameBitsForAnyNumberOfThreads) {
   settings.width = 70;
   settings.height = 50;
   settings.camera = look_at({0, 1, 0.9F}, {0, 1, 0}, 1.2F);
-  const int threads_before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const Picture one = render(scene.data(), light, settings);
-  omp_set_num_threads(2);
-  const Picture two = render(scene.data(), light, settings);
-  omp_set_num_threads(threads_before);
+  const auto make = [&] { return render(scene.data(), light, settings); };
+  const Picture one = test::with_threads(1, make), two = test::with_threads(2, make);
   EXPECT_EQ(std::memcmp(one.pixel.data(), two.pixel.data(), one.pixel.size() * sizeof(Float3)), 0);
   EXPECT_EQ(one.exposure, two.exposure);
 }

@@ -1,7 +1,6 @@
 // Every iterative method against dense elimination, on systems made by hand.
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +15,9 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/reflection.h"
 #include "test_scene_data.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -115,11 +116,7 @@ class SeriesOperator final : public TransferOperator {
     std::ranges::copy(initial_exitance, b.begin());
     for (int bounce = 0; bounce < 40; ++bounce) {
       form_factors_.gather(b, indirect_irradiance, workspace.subspan(kChannelCount * n));
-      for (std::size_t i = 0; i < n; ++i) {
-        for (int c = 0; c < kChannelCount; ++c) {
-          b[i][c] = initial_exitance[i][c] + reflectance_[i][c] * indirect_irradiance[i][c];
-        }
-      }
+      add_reflected(initial_exitance, reflectance_, indirect_irradiance, b);
     }
     for (Float3& h : indirect_irradiance) {
       for (float& x : h) x *= scale_;
@@ -311,16 +308,13 @@ TEST_P(EveryMethod, TakesOtherReflectancesExactly) {
 
 TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
   const Case c = make_case(0.8F);
-  const int threads = omp_get_max_threads();
-  std::vector<Float3> first;
-  for (const int count : {1, 2, 5}) {
-    omp_set_num_threads(count);
+  const auto solve = [&] {
     const auto solver = c.solver(method());
     solver->solve(c.system.initial_exitance, {.max_sweeps = 3, .residual = 0});
-    if (first.empty()) first = copy(solver->radiosity());
-    EXPECT_EQ(first, copy(solver->radiosity())) << count;
-  }
-  omp_set_num_threads(threads);
+    return copy(solver->radiosity());
+  };
+  const std::vector<Float3> one = test::with_threads(1, solve);
+  for (const int count : {2, 5}) EXPECT_EQ(one, test::with_threads(count, solve)) << count;
 }
 
 TEST_P(EveryMethod, ASolveDoesNotAllocate) {

@@ -6,22 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "allocation_counter.h"
 #include "hierarchical_samples.h"
 #include "rebounce/transfer/error.h"
+#include "random_light.h"
 
 namespace rebounce {
 namespace {
-
-std::vector<Float3> random_light(std::size_t n, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<float> uniform(0, 1);
-  std::vector<Float3> light(n);
-  for (Float3& value : light) value = {uniform(engine), 10 * uniform(engine), uniform(engine)};
-  return light;
-}
 
 /// A random matrix of blocks of all kinds, and a system with it that converges: its reflectances
 /// are below the inverse of the largest row sum.
@@ -42,10 +34,10 @@ struct System {
       for (std::size_t j = 0; j < n; ++j) sum += std::abs(matrix[i * n + j]);
       largest = std::max(largest, sum);
     }
-    for (const Float3& x : random_light(n, seed + 1)) {
-      reflectance.push_back({0.9F * x[0] / largest, 0.09F * x[1] / largest, 0});
+    for (const Float3& x : test::random_light(n, seed + 1)) {
+      reflectance.push_back({0.9F * x[0] / largest, 0.9F * x[1] / largest, 0});
     }
-    light = random_light(n, seed + 2);
+    light = test::random_light(n, seed + 2);
   }
 
   const std::vector<float>& area() const { return exchange->storage().area; }
@@ -101,9 +93,7 @@ double difference(std::span<const Float3> a, const std::vector<std::array<double
 TEST(CompressedFormFactors, GatherIsTheMatrix) {
   const System system(333, 1, Precision::kF32);
   const CompressedFormFactors form_factors(system.exchange);
-  std::vector<Float3> gathered(333);
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(system.light, gathered, workspace);
+  const std::vector<Float3> gathered = gather(form_factors, system.light);
   std::vector<std::array<double, 3>> expected(333, {0, 0, 0});
   for (std::size_t i = 0; i < 333; ++i) {
     for (std::size_t j = 0; j < 333; ++j) {
@@ -127,7 +117,7 @@ TEST(CompressedFormFactors, SweepsAreGaussSeidelInEveryOrderOfDirections) {
       }
       const CompressedFormFactors form_factors(system.exchange);
       const auto relaxation = form_factors.make_relaxation();
-      const std::vector<Float3> start = random_light(421, seed + 7);
+      const std::vector<Float3> start = test::random_light(421, seed + 7);
       std::vector<std::array<double, 3>> expected;
       for (const Float3& x : start) expected.push_back({x[0], x[1], x[2]});
       relaxation->begin(system.problem(), start);
@@ -148,7 +138,7 @@ TEST(CompressedFormFactors, SweepsAreGaussSeidelInEveryOrderOfDirections) {
 TEST(CompressedFormFactors, ASweepReportsWhatItChanged) {
   const System system(200, 5, Precision::kF32);
   const auto relaxation = CompressedFormFactors(system.exchange).make_relaxation();
-  std::vector<Float3> before = random_light(200, 6), after(200);
+  std::vector<Float3> before = test::random_light(200, 6), after(200);
   relaxation->begin(system.problem(), before);
   for (const auto direction : {SweepDirection::kForward, SweepDirection::kBackward}) {
     const double reported = relaxation->sweep(direction);

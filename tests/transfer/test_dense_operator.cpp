@@ -1,7 +1,6 @@
 #include "rebounce/transfer/dense_operator.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,8 @@
 #include "../../transfer/half_float.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "with_threads.h"
+#include "random_light.h"
 
 namespace rebounce {
 namespace {
@@ -72,14 +73,6 @@ struct RandomOperator {
   }
 };
 
-std::vector<Float3> random_light(std::size_t n, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<float> uniform(0, 100);
-  std::vector<Float3> light(n);
-  for (Float3& v : light) v = {uniform(engine), uniform(engine), uniform(engine)};
-  return light;
-}
-
 std::vector<Float3> apply(const DenseOperator& op, const std::vector<Float3>& m0) {
   std::vector<Float3> h(m0.size());
   std::vector<float> workspace(op.workspace_size(), std::nanf(""));
@@ -92,7 +85,7 @@ TEST(DenseOperator, MultipliesLikeThePlainMatrix) {
     for (const std::uint32_t matrices : {1U, 2U, 3U}) {
       const RandomOperator random(n, matrices, 7 * n + matrices);
       const DenseOperator op(random.storage);
-      const std::vector<Float3> m0 = random_light(n, n);
+      const std::vector<Float3> m0 = test::random_light(n, n, 100);
       EXPECT_LT(relative_difference(apply(op, m0), random.multiply(m0), random.storage.area), 1e-6)
           << n << " patches, " << matrices << " matrices";
     }
@@ -107,7 +100,7 @@ TEST(DenseOperator, HalfPrecisionIsAsGoodAsItsBits) {
   half.tiles_f32 = {};
   const DenseOperator op(half), exact(random.storage);
   EXPECT_EQ(2 * op.bytes(), exact.bytes());
-  const std::vector<Float3> m0 = random_light(500, 1);
+  const std::vector<Float3> m0 = test::random_light(500, 1, 100);
   const double error = relative_difference(apply(op, m0), random.multiply(m0), half.area);
   EXPECT_LT(error, 5e-4);  // 11 bits per entry, and errors of many entries cancel
   EXPECT_GT(error, 0);
@@ -116,13 +109,9 @@ TEST(DenseOperator, HalfPrecisionIsAsGoodAsItsBits) {
 TEST(DenseOperator, SameBitsForAnyNumberOfThreads) {
   const RandomOperator random(777, 3, 6);
   const DenseOperator op(random.storage);
-  const std::vector<Float3> m0 = random_light(777, 2);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const std::vector<Float3> one = apply(op, m0);
-  omp_set_num_threads(5);
-  const std::vector<Float3> five = apply(op, m0);
-  omp_set_num_threads(before);
+  const std::vector<Float3> m0 = test::random_light(777, 2, 100);
+  const auto make = [&] { return apply(op, m0); };
+  const std::vector<Float3> one = test::with_threads(1, make), five = test::with_threads(5, make);
   EXPECT_EQ(one, five);
 }
 
@@ -183,11 +172,7 @@ void check_kernels(const DenseKernels& kernels) {
 }
 
 TEST(DenseKernels, EveryInstructionSetAgrees) {
-  check_kernels(kDenseKernelsPortable);
-#if defined(__x86_64__)
-  if (__builtin_cpu_supports("avx2")) check_kernels(kDenseKernelsAvx2);
-  if (__builtin_cpu_supports("avx512f")) check_kernels(kDenseKernelsAvx512);
-#endif
+  for (const DenseKernels* kernels : dense_kernel_sets()) check_kernels(*kernels);
 }
 
 TEST(HalfFloat, ConvertsThereAndBack) {

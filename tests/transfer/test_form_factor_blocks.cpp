@@ -97,7 +97,7 @@ TEST(FormFactorBlocks, LargestTakesTheFirstOfEquals) {
   power[90] = {1, -1, 2};
   std::vector<float> planes(kChannelCount * blocks.plane_size());
   blocks.to_planes(power, planes);
-  for (const GatherKernels* kernels : {&kGatherKernelsPortable, &gather_kernels()}) {
+  for (const GatherKernels* kernels : gather_kernel_sets()) {
     EXPECT_EQ(kernels->largest(planes.data(), blocks.plane_size()), 33U);
   }
   EXPECT_EQ(blocks.largest(planes), 33U);

@@ -14,6 +14,7 @@
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 #include "transfer_file_tampering.h"
+#include "plain_data.h"
 
 namespace rebounce {
 namespace {
@@ -23,19 +24,10 @@ using test::expect_error;
 constexpr std::size_t kPatchCount = 100;
 
 TransferData sample_data(Precision precision, const PatchRoles& roles = {}) {
-  TransferData data;
   HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
   storage.roles = roles;
   if (precision != Precision::kF32) storage = HierarchicalOperator::encode(storage, precision);
-  data.patches.area = storage.area;
-  data.patches.centroid.assign(kPatchCount, {0, 0, 0});
-  data.patches.normal.assign(kPatchCount, {0, 1, 0});
-  data.patches.reflectance.assign(kPatchCount, {0.5F, 0.25F, 0.5F});
-  data.patches.emitted_exitance.assign(kPatchCount, {0, 0, 0});
-  data.patches.sky_visibility.assign(kPatchCount, 0.0F);
-  data.patches.absorbed.assign(kPatchCount, 0.0F);
-  data.mesh.weight_begin = {0};
-  data.exchange = {SharedArray(std::vector<std::uint64_t>(kPatchCount + 1)), {}, {}};
+  TransferData data = test::plain_data(storage.area);
   data.transfer = std::make_shared<const HierarchicalOperator>(std::move(storage));
   return data;
 }

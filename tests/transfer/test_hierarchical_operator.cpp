@@ -1,7 +1,6 @@
 #include "rebounce/transfer/hierarchical_operator.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,26 +10,19 @@
 
 #include "../../transfer/block_kernels.h"
 #include "../../transfer/half_float.h"
-#include "../../transfer/instruction_set.h"
 #include "allocation_counter.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "with_threads.h"
+#include "random_light.h"
 
 namespace rebounce {
 namespace {
 
 using test::expect_error;
 using test::random_hierarchical_storage;
-
-std::vector<Float3> random_light(std::size_t n, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<float> uniform(0, 100);
-  std::vector<Float3> light(n);
-  for (Float3& v : light) v = {uniform(engine), uniform(engine), uniform(engine)};
-  return light;
-}
 
 std::vector<Float3> product(const TransferOperator& op, const std::vector<Float3>& m0) {
   std::vector<Float3> h(m0.size());
@@ -59,7 +51,7 @@ TEST(HierarchicalOperator, MultipliesLikeItsExpansion) {
   for (const std::size_t n : {1U, 15U, 16U, 17U, 100U, 333U, 1000U}) {
     for (const std::uint32_t matrices : {1U, 2U, 3U}) {
       const HierarchicalOperator op(random_hierarchical_storage(n, matrices, 7 * n + matrices));
-      const std::vector<Float3> m0 = random_light(n, n);
+      const std::vector<Float3> m0 = test::random_light(n, n, 100);
       EXPECT_LT(relative_difference(product(op, m0), multiply_expansion(op, m0), op.storage().area),
                 2e-6)
           << n << " patches, " << matrices << " matrices";
@@ -98,7 +90,7 @@ TEST(HierarchicalOperator, HalfPrecisionIsAsGoodAsItsBits) {
   const HierarchicalOperator exact(storage);
   const HierarchicalOperator half(HierarchicalOperator::encode_half(storage));
   EXPECT_EQ(2 * half.storage().values_f16.size_bytes(), exact.storage().values_f32.size_bytes());
-  const std::vector<Float3> m0 = random_light(500, 1);
+  const std::vector<Float3> m0 = test::random_light(500, 1, 100);
   const std::vector<float>& area = storage.area;
   EXPECT_LT(relative_difference(product(half, m0), multiply_expansion(half, m0), area), 2e-6);
   const double error = relative_difference(product(half, m0), product(exact, m0), area);
@@ -112,7 +104,7 @@ TEST(HierarchicalOperator, BytesAreAsGoodAsTheirBits) {
     const HierarchicalOperator exact(storage);
     const HierarchicalOperator bytes(HierarchicalOperator::encode_bytes(storage));
     EXPECT_LT(bytes.bytes(), exact.bytes() / 2);
-    const std::vector<Float3> m0 = random_light(500, 1);
+    const std::vector<Float3> m0 = test::random_light(500, 1, 100);
     const std::vector<float>& area = storage.area;
     EXPECT_LT(relative_difference(product(bytes, m0), multiply_expansion(bytes, m0), area), 2e-6);
     const double error = relative_difference(product(bytes, m0), product(exact, m0), area);
@@ -127,7 +119,7 @@ TEST(HierarchicalOperator, ShortsAreAsGoodAsTheirBits) {
     const HierarchicalOperator exact(storage);
     const HierarchicalOperator shorts(HierarchicalOperator::encode_shorts(storage));
     EXPECT_LT(shorts.bytes(), exact.bytes());
-    const std::vector<Float3> m0 = random_light(500, 1);
+    const std::vector<Float3> m0 = test::random_light(500, 1, 100);
     const std::vector<float>& area = storage.area;
     // Light is rounded to 11 or 12 bits on its way, twice.
     EXPECT_LT(relative_difference(product(shorts, m0), multiply_expansion(shorts, m0), area), 5e-4);
@@ -150,17 +142,12 @@ TEST(HierarchicalOperator, RefusesShortsWhoseSumsCouldOverflow) {
 
 TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
   const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 6);
-  const std::vector<Float3> m0 = random_light(777, 2);
-  const int before = omp_get_max_threads();
+  const std::vector<Float3> m0 = test::random_light(777, 2, 100);
   for (const Precision precision : {Precision::kF32, Precision::kQ16}) {
     const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
-    omp_set_num_threads(1);
-    const std::vector<Float3> one = product(op, m0);
-    omp_set_num_threads(5);
-    const std::vector<Float3> five = product(op, m0);
-    EXPECT_EQ(one, five);
+    const auto multiply = [&] { return product(op, m0); };
+    EXPECT_EQ(test::with_threads(1, multiply), test::with_threads(5, multiply));
   }
-  omp_set_num_threads(before);
 }
 
 std::vector<Float3> batch_product(const TransferOperator& op, std::size_t lights,
@@ -181,7 +168,7 @@ TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
           HierarchicalOperator(HierarchicalOperator::encode_half(storage)),
           HierarchicalOperator(HierarchicalOperator::encode_shorts(storage))}) {
       for (const std::size_t lights : {1U, 2U, 3U, 5U}) {
-        const std::vector<Float3> m0 = random_light(lights * n, lights);
+        const std::vector<Float3> m0 = test::random_light(lights * n, lights, 100);
         const std::vector<Float3> batch = batch_product(op, lights, m0);
         for (std::size_t light = 0; light < lights; ++light) {
           const auto at = static_cast<std::ptrdiff_t>(light * n);
@@ -198,7 +185,7 @@ TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
 /// Light at the receivers differs by `allowed` of the largest at most.
 void check_receivers(const HierarchicalOperator& op, float allowed) {
   const std::size_t n = op.patch_count();
-  const std::vector<Float3> m0 = random_light(n, 4), whole = product(op, m0);
+  const std::vector<Float3> m0 = test::random_light(n, 4, 100), whole = product(op, m0);
   float most = 0;
   for (const Float3& h : whole)
     most = std::max({most, std::abs(h[0]), std::abs(h[1]), std::abs(h[2])});
@@ -238,7 +225,7 @@ TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouch
 TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
   const HierarchicalOperator::Storage by_block = random_hierarchical_storage(500, 2, 9);
   const HierarchicalOperator::Storage streamed = HierarchicalOperator::stream(by_block);
-  const std::vector<Float3> m0 = random_light(500, 5);
+  const std::vector<Float3> m0 = test::random_light(500, 5, 100);
   EXPECT_EQ(streamed.order, HierarchicalOperator::Order::kStreamed);
   EXPECT_EQ(streamed.values_f32.size() % 64, 0U);
   EXPECT_EQ(product(HierarchicalOperator(by_block), m0),
@@ -247,7 +234,7 @@ TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
 
 TEST(HierarchicalOperator, AllocatesNothing) {
   const HierarchicalOperator op(random_hierarchical_storage(500, 3, 8));
-  const std::vector<Float3> m0 = random_light(500, 3);
+  const std::vector<Float3> m0 = test::random_light(500, 3, 100);
   std::vector<Float3> h(m0.size());
   std::vector<float> workspace(op.workspace_size());
   op.apply(m0, h, workspace);
@@ -546,18 +533,8 @@ void check_kernels(const BlockKernelSet& kernels) {
   check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
 }
 
-std::vector<const BlockKernelSet*> runnable_kernels() {
-  std::vector<const BlockKernelSet*> sets{&kBlockKernelsPortable};
-#if defined(__x86_64__)
-  const InstructionSet widest = widest_instruction_set();
-  if (widest >= InstructionSet::kAvx2) sets.push_back(&kBlockKernelsAvx2);
-  if (widest >= InstructionSet::kAvx512) sets.push_back(&kBlockKernelsAvx512);
-#endif
-  return sets;
-}
-
 TEST(BlockKernels, EveryInstructionSetAgrees) {
-  for (const BlockKernelSet* set : runnable_kernels()) check_kernels(*set);
+  for (const BlockKernelSet* set : block_kernel_sets()) check_kernels(*set);
 }
 
 /// What comes of x by way of coefficients and back: those, and the light.
@@ -578,7 +555,7 @@ TEST(BlockKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
   Random random;
   const std::vector<float> x = random.floats(3 * kStride);
   const std::vector<float> expected = there_and_back(kBlockKernelsPortable, plain, x);
-  for (const BlockKernelSet* set : runnable_kernels()) {
+  for (const BlockKernelSet* set : block_kernel_sets()) {
     EXPECT_EQ(there_and_back(*set, plain, x), expected) << set->instruction_set;
   }
 }
@@ -589,7 +566,7 @@ TEST(BlockKernels, SumsOfIntegersHaveRoomForTheLargest) {
   const PlainBasis plain{std::vector<float>(kRank * kSize, kLargest), kRank, kSize, 0};
   // Just below a power of two: it becomes the largest integer that there is.
   const float light = std::nextafter(1.0F, 0.0F);
-  for (const BlockKernelSet* set : runnable_kernels()) {
+  for (const BlockKernelSet* set : block_kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
     const std::vector<float> result =
         there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
@@ -602,7 +579,7 @@ TEST(BlockKernels, SumsOfIntegersHaveRoomForTheLargest) {
 TEST(BlockKernels, NoLightStaysNone) {
   const PlainBasis plain = integer_basis(7, 48);
   for (const float light : {0.0F, 1e-42F}) {
-    for (const BlockKernelSet* set : runnable_kernels()) {
+    for (const BlockKernelSet* set : block_kernel_sets()) {
       const std::vector<float> result =
           there_and_back(*set, plain, std::vector<float>(3 * kStride, light));
       for (const float value : result) EXPECT_LE(std::abs(value), 1e-20F);

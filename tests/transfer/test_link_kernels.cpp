@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "../../transfer/bfloat16.h"
-#include "../../transfer/instruction_set.h"
 
 namespace rebounce {
 namespace {
@@ -47,14 +46,9 @@ TEST(LinkKernels, AgreeWithEachOther) {
     for (std::uint16_t& g : link.gradient_from) g = float_to_bfloat16(value(engine));
     for (std::uint16_t& g : link.gradient_to) g = float_to_bfloat16(value(engine));
   }
-  std::vector<const LinkKernels*> others;
-#if defined(__x86_64__)
-  if (widest_instruction_set() >= InstructionSet::kAvx2) others.push_back(&kLinkKernelsAvx2);
-  if (widest_instruction_set() >= InstructionSet::kAvx512) others.push_back(&kLinkKernelsAvx512);
-#endif
   for (const std::size_t count : {0UL, 1UL, 200UL}) {
     const LinkLight wanted = kLinkKernelsPortable.gather(links.data(), count, light.data());
-    for (const LinkKernels* kernels : others) {
+    for (const LinkKernels* kernels : link_kernel_sets()) {
       const auto found =
           std::bit_cast<std::array<float, 16>>(kernels->gather(links.data(), count, light.data()));
       const auto expected = std::bit_cast<std::array<float, 16>>(wanted);

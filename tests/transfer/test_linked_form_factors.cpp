@@ -14,6 +14,7 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
+#include "plain_data.h"
 
 namespace rebounce {
 namespace {
@@ -87,9 +88,7 @@ TEST(LinkedFormFactors, GatherIsTheDenseProduct) {
   const FormFactorLinks links = sample_links();
   const LinkedFormFactors form_factors(links, kArea, kCentroid);
   const std::vector<Float3> in = {{1, 0, 2}, {0.5F, 1, 0}, {3, 0, 1}, {0, 2, 4}};
-  std::vector<Float3> out(kPatchCount);
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(in, out, workspace);
+  const std::vector<Float3> out = gather(form_factors, in);
   const auto f = dense_of(links);
   for (std::size_t i = 0; i < kPatchCount; ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
@@ -108,10 +107,7 @@ TEST(LinkedFormFactors, OnePatchIsATree) {
   links.scale = {1};
   const LinkedFormFactors form_factors(links, std::vector<float>{2},
                                        std::vector<Float3>{{1, 1, 1}});
-  std::vector<Float3> in = {{1, 2, 3}}, out(1);
-  std::vector<float> workspace(form_factors.workspace_size());
-  form_factors.gather(in, out, workspace);
-  EXPECT_EQ(out[0], (Float3{0, 0, 0}));
+  EXPECT_EQ(gather(form_factors, std::vector<Float3>{{1, 2, 3}})[0], (Float3{0, 0, 0}));
 }
 
 TEST(LinkedFormFactors, RefuseWhatIsNotATreeWithLinks) {
@@ -140,16 +136,8 @@ TEST(LinkedFormFactors, RefuseWhatIsNotATreeWithLinks) {
 }
 
 TransferData sample_data() {
-  TransferData data;
-  data.patches.area = kArea;
+  TransferData data = test::plain_data(kArea);
   data.patches.centroid = kCentroid;
-  data.patches.normal.assign(kPatchCount, {0, 1, 0});
-  data.patches.reflectance.assign(kPatchCount, {0.5F, 0.25F, 0.5F});
-  data.patches.emitted_exitance.assign(kPatchCount, {0, 0, 0});
-  data.patches.sky_visibility.assign(kPatchCount, 0.0F);
-  data.patches.absorbed.assign(kPatchCount, 0.0F);
-  data.mesh.weight_begin = {0};
-  data.exchange = {SharedArray(std::vector<std::uint64_t>(kPatchCount + 1)), {}, {}};
   HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 1, 5);
   storage.area = kArea;
   data.transfer = std::make_shared<const HierarchicalOperator>(std::move(storage));

@@ -13,6 +13,7 @@
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 #include "transfer_file_tampering.h"
+#include "plain_data.h"
 
 namespace rebounce {
 namespace {
@@ -62,15 +63,7 @@ ExchangeMatrix chain() {
 }
 
 TransferData sample_data(Precision precision, bool first_bounce) {
-  TransferData data;
-  data.patches.area.assign(kPatchCount, 0.25F);
-  data.patches.centroid.assign(kPatchCount, {0, 0, 0});
-  data.patches.normal.assign(kPatchCount, {0, 1, 0});
-  data.patches.reflectance.assign(kPatchCount, {0.5F, 0.25F, 0.5F});
-  data.patches.emitted_exitance.assign(kPatchCount, {0, 0, 0});
-  data.patches.sky_visibility.assign(kPatchCount, 0.0F);
-  data.patches.absorbed.assign(kPatchCount, 0.0F);
-  data.mesh.weight_begin = {0};
+  TransferData data = test::plain_data(std::vector<float>(kPatchCount, 0.25F));
   data.exchange = chain();
   std::shared_ptr<const FormFactorOperator> form_factors;
   if (first_bounce) {
@@ -82,11 +75,9 @@ TransferData sample_data(Precision precision, bool first_bounce) {
 }
 
 std::vector<Float3> relit(const TransferData& data) {
-  std::vector<Float3> light(kPatchCount), result(kPatchCount);
+  std::vector<Float3> light(kPatchCount);
   for (std::size_t i = 0; i < kPatchCount; ++i) light[i] = {1.0F + i % 7, 2, 0.1F * i};
-  std::vector<float> workspace(data.transfer->workspace_size());
-  data.transfer->apply(light, result, workspace);
-  return result;
+  return product(*data.transfer, light);
 }
 
 TEST(LowRankFile, RoundTrips) {

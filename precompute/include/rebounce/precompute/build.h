@@ -61,8 +61,8 @@ struct BuildSettings {
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
   std::size_t rank = 256;    ///< of kLowRank and kFirstBounce: see LowRankSettings
-  /// kF16: half the bytes, an error of some 1e-4. By default that for all but the dense operator,
-  /// which is f32.
+  /// By default kF32 for a dense operator, kQ16 for a hierarchical one, kF16 (half the bytes, an
+  /// error of some 1e-4) for others.
   std::optional<Precision> precision;
   /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are
   /// compressed for iterative solvers; 0: they are not, or, where the operator is made from them

@@ -42,7 +42,7 @@ double unoccluded_exchange_area(const FlatTriangle& a, const FlatTriangle& b,
 /// The same by the contour integral alone, whatever the distance.
 double contour_exchange_area(const FlatTriangle& a, const FlatTriangle& b);
 
-/// The integrand of the area formulation (seed, eq. 4.13): cos cos / (pi r²), 0 behind a plane.
+/// The integrand of the area formulation (Burenius, eq. 4.13): cos cos / (pi r²), 0 behind a plane.
 inline double point_kernel(const glm::dvec3& x, const glm::dvec3& nx, const glm::dvec3& y,
                            const glm::dvec3& ny) {
   const glm::dvec3 d = y - x;

@@ -67,4 +67,7 @@ class ReferenceSolver {
   Form form_;
 };
 
+/// A solution [n] in single precision.
+std::vector<Float3> rounded(std::span<const ReferenceSolver::Double3> solution);
+
 }  // namespace rebounce

@@ -7,7 +7,7 @@
 
 namespace rebounce {
 
-/// Gauss-Seidel relaxation (seed, chapter 8): patch after patch,
+/// Gauss-Seidel relaxation (Burenius, chapter 8): patch after patch,
 /// B(i) = M0(i) + rho(i) sum over j of F(i,j) B(j), always with the newest values.
 ///
 /// The sweeps are those of the form factors (SweepableFormFactors::make_relaxation), which know the

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "rebounce/runtime/radiosity_solver.h"
+#include "rebounce/runtime/gathering_solver.h"
 #include "rebounce/transfer/linked_form_factors.h"
 
 namespace rebounce {
@@ -11,14 +11,10 @@ namespace rebounce {
 ///
 /// It is Jacobi's method on links: a sweep costs as much as there are links, some n instead of n².
 /// The solution is that of the links' F, which differs from the patches' by their error.
-class HierarchicalSolver final : public RadiositySolver {
+class HierarchicalSolver final : public GatheringSolver {
  public:
   HierarchicalSolver(const LinkedFormFactors& links, const RadiosityProblem& problem)
-      : RadiositySolver(links, problem) {}
-
- private:
-  void begin(bool /*cold*/) override {}
-  SweepReport sweep() override { return gather_sweep(); }
+      : GatheringSolver(links, problem) {}
 };
 
 }  // namespace rebounce

@@ -12,6 +12,7 @@
 #include "rebounce/runtime/cumulative_choice.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
+#include "rebounce/transfer/grouped.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -23,14 +24,11 @@ class PatchTriangles {
   /// `patch_count`.
   PatchTriangles(std::span<const std::uint32_t> triangle_patch, std::size_t patch_count);
 
-  std::size_t patch_count() const { return begin_.size() - 1; }
-  std::span<const std::uint32_t> operator[](std::size_t patch) const {
-    return {triangle_.data() + begin_[patch], triangle_.data() + begin_[patch + 1]};
-  }
+  std::size_t patch_count() const { return of_patch_.group_count(); }
+  std::span<const std::uint32_t> operator[](std::size_t patch) const { return of_patch_[patch]; }
 
  private:
-  std::vector<std::uint32_t> begin_;     ///< [n + 1]
-  std::vector<std::uint32_t> triangle_;  ///< those of patch i at [begin_[i], begin_[i + 1])
+  Grouped<std::uint32_t> of_patch_;
 };
 
 /// A point on a side of the surface.

@@ -93,9 +93,6 @@ class RadiositySolver {
   /// residual_ = M0 + rho F B - B, and its norm: one gather.
   double compute_residual();
 
-  /// A sweep of gathering, B <- M0 + rho F B: one gather.
-  SweepReport gather_sweep();
-
   /// The time budget of the solve that is running is spent.
   bool out_of_time() const { return Clock::now() >= deadline_; }
 

@@ -41,9 +41,7 @@ class ExchangeBlocks final : public SweepableFormFactors {
   std::unique_ptr<Relaxation> make_relaxation() const override;
 
   /// n, rounded up to whole blocks.
-  std::size_t plane_size() const {
-    return (patch_count() + kFormFactorBlock - 1) / kFormFactorBlock * kFormFactorBlock;
-  }
+  std::size_t plane_size() const { return in_whole_blocks(patch_count()); }
 
   /// The blocks of one row: those with columns below `row`'s group, then those inside of it.
   struct Row {

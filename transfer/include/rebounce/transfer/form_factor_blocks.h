@@ -13,6 +13,11 @@ namespace rebounce {
 /// Consecutive columns that FormFactorBlocks keeps together.
 inline constexpr std::size_t kFormFactorBlock = 8;
 
+/// `count`, rounded up to whole blocks.
+constexpr std::size_t in_whole_blocks(std::size_t count) {
+  return (count + kFormFactorBlock - 1) / kFormFactorBlock * kFormFactorBlock;
+}
+
 struct alignas(4 * kFormFactorBlock) FormFactorBlock {
   float value[kFormFactorBlock];
 };
@@ -52,9 +57,7 @@ class FormFactorBlocks final : public SweepableFormFactors {
   double fill() const;
 
   /// n, rounded up to whole blocks.
-  std::size_t plane_size() const {
-    return (patch_count() + kFormFactorBlock - 1) / kFormFactorBlock * kFormFactorBlock;
-  }
+  std::size_t plane_size() const { return in_whole_blocks(patch_count()); }
 
   /// Copies [n][3] into planes, and back.
   void to_planes(std::span<const Float3> values, std::span<float> planes) const;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "rebounce/transfer/types.h"
 
@@ -30,5 +31,8 @@ class FormFactorOperator {
   virtual void gather(std::span<const Float3> in, std::span<Float3> out,
                       std::span<float> workspace) const = 0;
 };
+
+/// What `form_factors` gather of `in` [n], for once: it allocates.
+std::vector<Float3> gather(const FormFactorOperator& form_factors, std::span<const Float3> in);
 
 }  // namespace rebounce

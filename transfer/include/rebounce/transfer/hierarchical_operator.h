@@ -80,10 +80,9 @@ class HierarchicalOperator final : public TransferOperator {
     /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
     /// the order of their blocks, U^T before V^T; then cores and dense entries by block, the
     /// matrices of an entry side by side; zeros to the next multiple of 64 values, at least
-    /// kPadding
-    /// of them. Bases in an array of their own are followed by zeros likewise. Those in 16 bits are
-    /// [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster: strips of
-    /// kStrip positions or what is left of it, the last ranks filled up with zeros.
+    /// kPadding of them. Bases in an array of their own are followed by zeros likewise. Those in 16
+    /// bits are [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster:
+    /// strips of kStrip positions or what is left of it, the last ranks filled up with zeros.
     kStreamed,
   };
 

@@ -37,6 +37,9 @@ struct FormFactorLinks {
 /// and links between its nodes.
 void check_links(const FormFactorLinks& links, std::size_t patch_count);
 
+/// [m] The position in `links`, which must be checked, of the first patch of each node.
+std::vector<std::uint32_t> first_positions(const FormFactorLinks& links);
+
 /// A link as the node that gathers along it sees it: 20 bytes. Gradients are corrections, and are
 /// kept as bfloat16, the upper half of a float.
 struct IncomingLink {
@@ -81,14 +84,20 @@ class LinkedFormFactors final : public FormFactorOperator {
 
   void build_tree(const FormFactorLinks& links, std::span<const float> area,
                   std::span<const Float3> centroid);
+  void place_children(std::span<const std::array<double, 4>> sum);
+  void find_levels();
   void sort_links(const FormFactorLinks& links);
+
+  /// What arrives at one node along its links.
+  template <typename Lanes>
+  using GatherAlongLinks = LinkLightOf<Lanes> (*)(const IncomingLink* link, std::size_t count,
+                                                  const LinkLightOf<Lanes>* light);
+  /// Pulls, gathers and pushes; `light` and `arrived` are [m].
+  template <typename Columns, typename Lanes>
+  void gather(std::span<const Columns> in, std::span<Columns> out, LinkLightOf<Lanes>* light,
+              LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node) const;
   template <typename Columns, typename Lanes>
   void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const;
-  template <typename Lanes>
-  void gather_nodes(const LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived) const;
-  /// Of one light in single precision, by the widest kernels.
-  void gather_nodes(const LinkLightOf<std::array<float, 4>>* light,
-                    LinkLightOf<std::array<float, 4>>* arrived) const;
   template <typename Lanes, typename Columns>
   void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const;
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "rebounce/transfer/patch_roles.h"
 #include "rebounce/transfer/types.h"
@@ -54,5 +55,10 @@ class TransferOperator {
   /// default n products with unit vectors.
   virtual void expand(int channel, std::span<float> transfer) const;
 };
+
+/// The indirect irradiance [n] in lx that `initial_exitance` [n] in lx gives rise to, for once: it
+/// allocates.
+std::vector<Float3> product(const TransferOperator& transfer,
+                            std::span<const Float3> initial_exitance);
 
 }  // namespace rebounce
