@@ -1,7 +1,9 @@
 #include "affine_links.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "rebounce/transfer/error.h"
 
@@ -14,6 +16,10 @@ using Eigen::Vector3d;
 // Directions in which a node extends by less than this part of its size have no gradient.
 constexpr double kFlat = 1e-6;
 constexpr int kScalingRounds = 4;
+
+// Factors stay within these. A patch that sees next to nothing may have lost most of it, and what
+// would make up for that would amplify the light between two of them without end.
+constexpr float kLeastScale = 0.5F, kMostScale = 2;
 
 Matrix3d inverse_without_flat(const Matrix3d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance);
@@ -94,10 +100,14 @@ std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float>
 
 void scale_rows(std::span<const float> target, std::span<const float> area,
                 std::span<const Float3> centroid, FormFactorLinks& links) {
+  std::vector<float> scaled(target.size(), 1);  // by this function
   for (int round = 0; round < kScalingRounds; ++round) {
     const std::vector<float> sum = row_sums(links, area, centroid);
     for (std::size_t i = 0; i < sum.size(); ++i) {
-      if (sum[i] > 0 && target[i] > 0) links.scale[i] *= std::sqrt(target[i] / sum[i]);
+      if (!(sum[i] > 0 && target[i] > 0)) continue;
+      const float wanted = scaled[i] * std::sqrt(target[i] / sum[i]);
+      const float allowed = std::clamp(wanted, kLeastScale, kMostScale);
+      links.scale[i] *= allowed / std::exchange(scaled[i], allowed);
     }
   }
 }

@@ -40,7 +40,8 @@ void append_link(const AffineLink& link, FormFactorLinks& links);
 std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,
                             std::span<const Float3> centroid);
 
-/// Multiplies the scales of `links` until rows add up to `target` [n], nearly.
+/// Multiplies the scales of `links` until rows add up to `target` [n], nearly; no more than twice
+/// or half.
 void scale_rows(std::span<const float> target, std::span<const float> area,
                 std::span<const Float3> centroid, FormFactorLinks& links);
 
