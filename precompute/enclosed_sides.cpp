@@ -1,4 +1,4 @@
-        if (!small || !open || candidates_#include "enclosed_sides.h"
+#include "enclosed_sides.h"
 
 #include <algorithm>
 #include <array>
@@ -137,7 +137,7 @@ class EnclosedSides {
   /// Gathers the lit sides of double-sided triangles, fronts first.
   void group_candidates() {
     for (const bool front : {true, false}) {
-      bool open = false;      // others may join the last group
+      bool open = false;     // others may join the last group
       glm::dvec3 middle(0);  // of its first triangle
       for (std::uint32_t t = 0; t < sides_.size(); ++t) {
         const std::uint32_t side = 2 * t + (front ? 0 : 1);
@@ -145,7 +145,7 @@ class EnclosedSides {
         const auto [p, q, r] = corners(t);
         const glm::dvec3 centroid = (p + q + r) / 3.0;
         const bool small = area(t) <= 1;
-        if (!small || !middle || candidates_.size() - group_begin_.back() == kGroup ||
+        if (!small || !open || candidates_.size() - group_begin_.back() == kGroup ||
             glm::distance(centroid, middle) > kGroupReach * reach_) {
           group_begin_.push_back(candidates_.size());
           open = small;

@@ -1,12 +1,18 @@
 """How figures are written."""
 
+import math
+
 
 def times(ratio):
     return "–" if ratio is None else f"{ratio:.1f}" if ratio < 10 else f"{ratio:.0f}"
 
 
 def number(value):
-    return "–" if value is None else f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
+    if value is None:
+        return "–"
+    if math.isinf(value):
+        return "diverges"
+    return f"{value:.3g}" if value < 1000 else f"{value:,.0f}"
 
 
 def markdown_table(names, rows):

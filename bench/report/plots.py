@@ -82,7 +82,7 @@ def frames(result, budget, path):
         for method, (color, _, label) in STYLE.items():
             best = result.best_frames(name, (method,), budget)
             if best is not None:
-                errors = np.maximum(best["errors"], 1e-7)
+                errors = np.clip(best["errors"], 1e-7, 1e3)  # above: it diverges
                 panel.semilogy(errors, color=color, label=label, linewidth=1)
         panel.set_title(name, fontsize=9)
         panel.set_ylim(1e-5, 20)

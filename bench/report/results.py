@@ -1,6 +1,7 @@
 """The results of bench_report, and the questions that the report asks of them."""
 
 import json
+import math
 import pathlib
 
 GAUSS_SEIDEL = ("gauss-seidel", "symmetric-gauss-seidel")
@@ -27,6 +28,7 @@ class Result:
     def __init__(self, path):
         self.path = pathlib.Path(path)
         self.data = json.loads(self.path.read_text(encoding="utf-8"))
+        self.data["frames"] = [with_infinity(row) for row in self.data["frames"]]
 
     def __getitem__(self, key):
         return self.data[key]
@@ -99,6 +101,12 @@ class Result:
 
     def seconds(self, phase):
         return sum(c["seconds"] for c in self["costs"] if c["phase"] == phase)
+
+
+def with_infinity(row):
+    """JSON has no infinite numbers: the errors of a method that diverged are null there."""
+    errors = [math.inf if e is None else e for e in row.get("errors", [])]
+    return {k: math.inf if v is None else v for k, v in row.items()} | {"errors": errors}
 
 
 def describe(row):
