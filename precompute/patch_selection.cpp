@@ -22,7 +22,7 @@ constexpr std::string_view kBox = "box:", kMesh = "mesh:", kMaterial = "material
 constexpr std::size_t kListedNames = 8;
 
 /// In quotes and on one line, whatever is in it.
-std::string quoted(std::string_view text) {
+std::string in_quotes(std::string_view text) {
   return nlohmann::json(std::string(text))
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
@@ -51,7 +51,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 std::vector<std::string> nearest(std::string_view name, const std::set<std::string>& names) {
   std::vector<std::pair<std::size_t, std::string>> all;
   for (const std::string& other : names) {
-    if (!other.empty()) all.emplace_back(edit_distance(name, other), quoted(other));
+    if (!other.empty()) all.emplace_back(edit_distance(name, other), in_quotes(other));
   }
   std::ranges::sort(all);
   all.resize(std::min(all.size(), kListedNames));
@@ -127,7 +127,7 @@ void PatchSelection::take_box(const std::string& entry) {
   if (!good) {
     throw Error(fmt::format("{}: {} is no box; give box: and two corners, X0,Y0,Z0,X1,Y1,Z1, in "
                             "metres",
-                            list_, quoted(entry)));
+                            list_, in_quotes(entry)));
   }
   Box& box = boxes_.emplace_back();
   for (std::size_t k = 0; k < 3; ++k) {
@@ -153,7 +153,7 @@ void PatchSelection::take_name(std::string_view name, bool of_meshes, bool of_ma
                                  ? "it has none with a name: give box: and two corners"
                                  : fmt::format("there are {}", fmt::join(others, ", "));
   throw Error(
-      fmt::format("{}: the scene has no {} {}; {}", list_, kind, quoted(name), advice));
+      fmt::format("{}: the scene has no {} {}; {}", list_, kind, in_quotes(name), advice));
 }
 
 std::vector<std::uint8_t> PatchSelection::patches(const PatchModel& model) const {
