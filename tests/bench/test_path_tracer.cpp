@@ -138,7 +138,7 @@ Scene make_ball(const Float3& reflectance) {
 double surface_area(const Scene& scene) {
   double area = 0;
   for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
-    area += SceneSurface(scene).corners(t).area();
+    area += area_of(SceneSurface(scene).corners(t));
   }
   return area;
 }
@@ -410,7 +410,7 @@ TEST(SampleSurface, IsUniformByAreaOverLitSides) {
     EXPECT_TRUE(!is_small || p.normal[2] < 0);
     centroid += to_dvec3(p.position) / 900.0;
     const glm::dvec3 again =
-        SceneSurface(scene).corners(p.triangle).at({p.barycentric[0], p.barycentric[1]});
+        point_at(SceneSurface(scene).corners(p.triangle), {p.barycentric[0], p.barycentric[1]});
     EXPECT_LT(glm::distance(again, to_dvec3(p.position)), 1e-6);
   }
   EXPECT_NEAR(count[0], 400, 4);

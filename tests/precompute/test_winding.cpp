@@ -102,7 +102,7 @@ TEST(Winding, PosterOnAWallIsRight) {
 TEST(Winding, SolidWithoutABottomIsRight) {
   Scene scene = furnished_room(kInwards, kOutwards);
   test::remove_face(scene, test::Face::kLowY, 1);
-  EXPECT_TRUE(find(scene).empty());
+  EXPECT_TRUE(find_inside_out(scene).empty());
 }
 
 TEST(Winding, SecondSidesThatAreCopiesAreRight) {
