@@ -705,7 +705,8 @@ TEST_F(CommandLine, StoresReceiversAndSourcesAlone) {
       table.rows, [](const std::vector<double>& row) { return row.at(3) != 0; }));
   EXPECT_EQ(lit, receivers);
   summary_of({"solve", file, "--lights", kLights, "-o", solution, "--method", "gauss-seidel"});
-  expect_refused({"solve", file, "-o", path("y.csv"), "--method", "refine"}, "receivers or sources");
+  expect_refused({"solve", file, "-o", path("y.csv"), "--method", "refine"},
+                 "receivers or sources");
   const json whole = summary_of({"info", precompute("whole.safetensors")});
   EXPECT_EQ(whole["receiver_count"], whole["patch_count"]);
   EXPECT_EQ(whole["source_count"], whole["patch_count"]);
