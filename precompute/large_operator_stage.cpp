@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include "build_estimate.h"
@@ -10,6 +11,7 @@
 #include "rebounce/precompute/large_transfer.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/reference_solution.h"
+#include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -21,6 +23,9 @@ constexpr int kTestLightCount = 16;
 // Residual of the radiosities that form factors are fitted to and measured with: what light patches
 // give off matters there, not its third digit.
 constexpr double kFittingResidual = 1e-2;
+
+// Of form factors in half precision, whose rounding is not far below.
+constexpr double kLeastTolerance = 1e-4;
 
 using Lights = std::vector<std::vector<Float3>>;
 
@@ -50,9 +55,9 @@ struct FittedLights {
   Lights test_radiosities;
 };
 
-FittedLights find_lights(const RayTracer& tracer, const TransferData& data,
-                         const PatchRoles& roles, std::uint64_t seed,
-                         const ReferenceSolver& solver, const Progress& progress) {
+FittedLights find_lights(const RayTracer& tracer, const TransferData& data, const PatchRoles& roles,
+                         std::uint64_t seed, const ReferenceSolver& solver,
+                         const Progress& progress) {
   FittedLights lights;
   lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
   const Lights tests =
@@ -73,6 +78,36 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data,
   return lights;
 }
 
+/// The part that receivers get of all light that patches give off after the first time: its
+/// geometric mean over the lights.
+double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
+                     const PatchRoles& roles, std::span<const float> area) {
+  double logarithms = 0;
+  int count = 0;
+  for (std::size_t k = 0; k < exitances.shaping.size(); ++k) {
+    std::vector<Float3> reflected = radiosities.shaping[k];
+    for (std::size_t i = 0; i < reflected.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) reflected[i][c] -= exitances.shaping[k][i][c];
+    }
+    const double all = area_norm(reflected, area);
+    roles.keep(PatchRoles::kReceiver, reflected);
+    const double received = area_norm(reflected, area);
+    if (received == 0) continue;
+    logarithms += std::log(received / all);
+    ++count;
+  }
+  return count > 0 ? std::exp(logarithms / count) : 1;
+}
+
+/// What was asked for, or a part of the operator's tolerance: errors of F spread everywhere, and
+/// those of the operator are relative to what arrives at receivers.
+double form_factor_tolerance(const BuildSettings& decided, const FittedLights& lights,
+                             const PatchRoles& roles, std::span<const float> area) {
+  if (decided.form_factor_tolerance > 0) return decided.form_factor_tolerance;
+  const double part = received_part(lights.exitances, lights.radiosities, roles, area);
+  return std::max(kLeastTolerance, decided.tolerance / kToleranceOverFormFactors * part);
+}
+
 }  // namespace
 
 void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
@@ -87,23 +122,22 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
   const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
     return find_lights(tracer, data, roles, seed, reference, part);
   });
+  report.form_factor_tolerance = form_factor_tolerance(decided, lights, roles, patches.area);
   data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
     return compress_form_factors(data.links, links, patches, lights.radiosities.view(),
-                                 {decided.form_factor_tolerance, Precision::kF16}, part);
+                                 {report.form_factor_tolerance, Precision::kF16}, part);
   });
   data.transfer = clock.run("operator", [&](const Progress& part) {
     LargeTransferSettings settings;
     settings.compression = {decided.tolerance, *decided.precision};
     settings.roles = roles;
-    settings.memory_limit_bytes =
-        memory_of_large_transfer(linked_build(data.links, patches, patches.sky_visibility),
-                                 decided.memory_limit_bytes);
+    settings.memory_limit_bytes = memory_of_large_transfer(
+        linked_build(data.links, patches, patches.sky_visibility), decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;
     return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
                                 settings, part);
   });
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
-    report.form_factor_tolerance = decided.form_factor_tolerance;
     report.form_factor_error =
         form_factor_error(*data.compressed_form_factors, *links, patches, lights.test_radiosities);
     if (roles.all_are_both()) {

@@ -26,8 +26,23 @@ LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Fl
       light_channel(matrix, channel, begin, std::min(lights_.size(), begin + kBatch));
     }
   }
-  for (std::vector<Float3>& truth : truths_) matrix.roles().keep(PatchRoles::kReceiver, truth);
+  keep_received(matrix.roles());
   leave_out_dark();
+}
+
+void LitTruth::keep_received(const PatchRoles& roles) {
+  if (roles.all_are_both()) return;
+  double logarithms = 0;
+  int count = 0;
+  for (std::vector<Float3>& truth : truths_) {
+    const double all = area_norm(truth, area_);
+    roles.keep(PatchRoles::kReceiver, truth);
+    const double received = area_norm(truth, area_);
+    if (received == 0) continue;
+    logarithms += std::log(received / all);
+    ++count;
+  }
+  if (count > 0) received_part_ = std::exp(2 * logarithms / count);
 }
 
 void LitTruth::leave_out_dark() {

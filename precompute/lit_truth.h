@@ -20,6 +20,10 @@ class LitTruth {
 
   std::size_t light_count() const { return lights_.size(); }
 
+  /// The square of the part that receivers get of all that arrives of a light, its geometric mean
+  /// over the lights: how much smaller squares of errors must be where they are relative to that.
+  double received_part() const { return received_part_; }
+
   /// The relative area-weighted L2 error of `transfer` under each light.
   std::vector<double> errors(const TransferOperator& transfer) const;
 
@@ -34,10 +38,14 @@ class LitTruth {
   void light_channel(const SymmetricMatrix& matrix, int channel, std::size_t begin,
                      std::size_t end);
 
+  /// Puts out what arrives at other patches than receivers.
+  void keep_received(const PatchRoles& roles);
+
   void leave_out_dark();
 
   std::vector<float> area_;
   std::vector<std::vector<Float3>> lights_, truths_;
+  double received_part_ = 1;
 };
 
 }  // namespace rebounce

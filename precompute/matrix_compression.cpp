@@ -67,6 +67,7 @@ CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patch
   constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
   CompressionFrame frame;
   frame.roles = matrix.roles();
+  frame.received_part = shaping.received_part();
   frame.tree = build_cluster_tree(patches, kLeafSize, kAlignment, role_groups(frame.roles));
   frame.background = background_light(matrix, frame.tree);
   frame.sample = shaping.normalised_lights(frame.tree.patch,
@@ -79,8 +80,7 @@ CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patch
 /// that half of what is left.
 double part_of_search(int rounds) {
   constexpr double kEach = 1.0 / kUsualRounds;
-  return rounds < kUsualRounds ? rounds * kEach
-                               : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
+  return rounds < kUsualRounds ? rounds * kEach : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
 }
 
 /// Where what is done of a compression is kept, and under which names.
@@ -109,13 +109,15 @@ class Compression {
       const std::size_t end = std::min(pieces.size(), begin + together);
       const auto some = std::span(pieces).subspan(begin, end - begin);
       const Progress part = part_of(progress, static_cast<double>(begin) / all, end / all);
-      whole.append(kept.checkpoint.find_or_make(
-          fmt::format("{}_part_{:04}", kept.prefix, begin / together),
-          [&] { return compressor.compress(some, price, part); }));
+      whole.append(
+          kept.checkpoint.find_or_make(fmt::format("{}_part_{:04}", kept.prefix, begin / together),
+                                       [&] { return compressor.compress(some, price, part); }));
       report_progress(part, 1);
     }
     return compressor.assemble(std::move(whole));
   }
+
+  double received_part() const { return frame_.received_part; }
 
   /// Gives the shaping lights weight by the errors that they have with `transfer`.
   void emphasise(const TransferOperator& transfer) {
@@ -184,14 +186,15 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   const LitTruth judging = judging_truth(matrix, lights.judging);
   Compression compression(matrix, patches, lights.shaping);
   const double tolerance = settings.tolerance;
-  PriceSearch search(first_price(tolerance, patches.size()),
+  PriceSearch search(first_price(tolerance, patches.size()) * compression.received_part(),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});
   Best best(kMost * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
-    const auto candidate = std::make_shared<const HierarchicalOperator>(
-        HierarchicalOperator::encode(compression.at(search.price(), kept, part), settings.precision));
+    const auto candidate =
+        std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode(
+            compression.at(search.price(), kept, part), settings.precision));
     const double error = judge(judging.errors(*candidate));
     best.offer(candidate, error);
     search.report(error);

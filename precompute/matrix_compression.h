@@ -18,6 +18,7 @@ struct CompressionFrame {
   Eigen::VectorXd background;  ///< as background_light gives it
   Eigen::MatrixXd sample;      ///< the shaping lights, normalised
   PatchRoles roles;            ///< of the matrix
+  double received_part = 1;    ///< of the shaping lights, LitTruth: prices go with it
 
   std::vector<ClusterWeight> weights() const {
     return make_cluster_weights(tree, sample, background, roles);
