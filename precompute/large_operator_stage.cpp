@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <memory>
 
 #include "build_estimate.h"
@@ -13,6 +12,7 @@
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "received_light.h"
 
 namespace rebounce {
 namespace {
@@ -78,12 +78,11 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
   return lights;
 }
 
-/// The part that receivers get of all light that patches give off after the first time: its
-/// geometric mean over the lights.
+/// The part that errors at receivers are relative to of all light that patches give off after the
+/// first time.
 double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
                      const PatchRoles& roles, std::span<const float> area) {
-  double logarithms = 0;
-  int count = 0;
+  ReceivedLight received;
   for (std::size_t k = 0; k < exitances.shaping.size(); ++k) {
     std::vector<Float3> reflected = radiosities.shaping[k];
     for (std::size_t i = 0; i < reflected.size(); ++i) {
@@ -91,12 +90,9 @@ double received_part(const DrawnLights& exitances, const DrawnLights& radiositie
     }
     const double all = area_norm(reflected, area);
     roles.keep(PatchRoles::kReceiver, reflected);
-    const double received = area_norm(reflected, area);
-    if (received == 0) continue;
-    logarithms += std::log(received / all);
-    ++count;
+    received.add(area_norm(reflected, area), all);
   }
-  return count > 0 ? std::exp(logarithms / count) : 1;
+  return received.part();
 }
 
 /// What was asked for, or a part of the operator's tolerance: errors of F spread everywhere, and

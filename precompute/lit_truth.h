@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rebounce/transfer/transfer_operator.h"
+#include "received_light.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {
@@ -20,16 +21,15 @@ class LitTruth {
 
   std::size_t light_count() const { return lights_.size(); }
 
-  /// The square of the part that receivers get of all that arrives of a light, its geometric mean
-  /// over the lights: how much smaller squares of errors must be where they are relative to that.
-  double received_part() const { return received_part_; }
+  const ReceivedLight& received() const { return received_; }
 
-  /// The relative area-weighted L2 error of `transfer` under each light.
+  /// The relative area-weighted L2 error of `transfer`, which has the roles of the matrix, under
+  /// each light (received_light.h).
   std::vector<double> errors(const TransferOperator& transfer) const;
 
   /// The lights in the coordinates of the symmetric form, A^1/2 M0 averaged over the channels,
   /// [positions][light count], patch[k] at position k and zero beyond; each so strong that its
-  /// indirect light has norm 1.
+  /// errors are relative to 1.
   Eigen::MatrixXd normalised_lights(std::span<const std::uint32_t> patch,
                                     std::size_t position_count) const;
 
@@ -45,7 +45,7 @@ class LitTruth {
 
   std::vector<float> area_;
   std::vector<std::vector<Float3>> lights_, truths_;
-  double received_part_ = 1;
+  ReceivedLight received_;
 };
 
 }  // namespace rebounce

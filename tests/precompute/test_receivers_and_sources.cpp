@@ -62,7 +62,7 @@ Room make_room(std::size_t patch_count) {
 }
 
 const Room& room() {
-  static const Room made = make_room(1200);
+  static const Room made = make_room(900);
   return made;
 }
 
