@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "exchange_samples.h"
@@ -14,6 +15,7 @@
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/transfer/area_norm.h"
+#include "received_light.h"
 #include "scene_data.h"
 #include "test_scenes.h"
 
@@ -169,6 +171,27 @@ TEST(MeasuredError, CountsLightsFromWhichNothingArrives) {
   EXPECT_EQ(points->light_count + points->dark_count, 16);
   EXPECT_GT(points->dark_count, 0);
   EXPECT_LT(points->max, 1e-5);
+}
+
+TEST(ReceivedLight, ErrorsAreRelativeToWhatUsuallyArrives) {
+  ReceivedLight far, all;
+  far.add(1, 2);
+  far.add(0, 2);
+  far.add(2, 2);
+  const double usual = std::sqrt((0.25 + 0 + 1) / 3);
+  EXPECT_NEAR(far.reference(0), 2 * usual, 1e-12);
+  EXPECT_NEAR(far.reference(1), 2 * usual, 1e-12);
+  EXPECT_EQ(far.reference(2), 2);
+  EXPECT_NEAR(far.part(), std::pow(usual, 2.0 / 3), 1e-12);
+  all.add(3, 3);
+  all.add(1e-5, 1e-5);
+  EXPECT_EQ(all.reference(1), 1e-5);
+  EXPECT_EQ(all.part(), 1);
+
+  const std::vector<float> area = {1, 1};
+  const std::vector<Float3> truth = {{3, 0, 0}, {0, 0, 0}}, values = {{3, 4, 0}, {0, 0, 0}};
+  EXPECT_EQ(received_error(values, truth, area, 3), relative_difference(values, truth, area));
+  EXPECT_NEAR(received_error(values, truth, area, 8), 0.5, 1e-12);
 }
 
 TEST(RandomLights, AreTheSameForASeedAndOthersForAnother) {
