@@ -1,6 +1,6 @@
 #pragma once
 
-// What coarser links are made with, whether from links or from pairs of patches.
+// What links are made with from other links or from pairs of patches.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -44,8 +44,5 @@ std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float>
 /// or half.
 void scale_rows(std::span<const float> target, std::span<const float> area,
                 std::span<const Float3> centroid, FormFactorLinks& links);
-
-/// Throws Error if `epsilon` is not the error of a link.
-void check_link_error(double epsilon);
 
 }  // namespace rebounce

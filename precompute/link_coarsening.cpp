@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "affine_links.h"
+#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {
@@ -126,7 +127,9 @@ class Coarsening {
 
 FormFactorLinks coarsen_links(const FormFactorLinks& links, std::span<const float> area,
                               std::span<const Float3> centroid, double epsilon) {
-  check_link_error(epsilon);
+  if (!(epsilon >= 0) || !std::isfinite(epsilon)) {
+    throw Error("links: the error of coarser ones must be finite and not negative");
+  }
   const std::vector<float> target = row_sums(links, area, centroid);
   Coarsening coarsening(links, spread_nodes(links, area, centroid), epsilon);
   coarsening.run();
