@@ -14,10 +14,10 @@ namespace rebounce {
 /// A node of a tree of links and how its patches' centroids are spread, by area.
 struct NodeSpread {
   std::uint32_t parent = kNone, sibling = kNone;
-  double area = 0;                                    ///< m²
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< area-weighted, metres
+  double area = 0;                                       ///< m²
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();      ///< area-weighted, metres
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m²
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();  ///< of it, without flat directions
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();     ///< of it, without flat directions
 };
 
 /// The nodes of the tree that `links` have, [m]; `area` [n] in m², `centroid` [n] in metres.

@@ -63,7 +63,8 @@ std::vector<std::string> nearest(std::string_view name, const std::set<std::stri
 std::set<std::string> names_in(const Scene& scene, bool of_meshes, bool of_materials) {
   std::set<std::string> names;
   if (of_meshes) {
-    for (const PlacedMesh& mesh : scene.placed_meshes) names.insert({mesh.mesh_name, mesh.node_name});
+    for (const PlacedMesh& mesh : scene.placed_meshes)
+      names.insert({mesh.mesh_name, mesh.node_name});
   }
   if (of_materials) {
     for (const Material& material : scene.materials) names.insert(material.name);
@@ -125,9 +126,10 @@ void PatchSelection::take_box(const std::string& entry) {
     at = good && !last ? next + 1 : next;
   }
   if (!good) {
-    throw Error(fmt::format("{}: {} is no box; give box: and two corners, X0,Y0,Z0,X1,Y1,Z1, in "
-                            "metres",
-                            list_, in_quotes(entry)));
+    throw Error(
+        fmt::format("{}: {} is no box; give box: and two corners, X0,Y0,Z0,X1,Y1,Z1, in "
+                    "metres",
+                    list_, in_quotes(entry)));
   }
   Box& box = boxes_.emplace_back();
   for (std::size_t k = 0; k < 3; ++k) {
@@ -149,11 +151,9 @@ void PatchSelection::take_name(std::string_view name, bool of_meshes, bool of_ma
   if (meshes_.size() + materials_.size() > before) return;
   const auto others = nearest(name, names_in(scene, of_meshes, of_materials));
   const char* const kind = !of_meshes ? "material" : of_materials ? "mesh or material" : "mesh";
-  const std::string advice = others.empty()
-                                 ? "it has none with a name: give box: and two corners"
-                                 : fmt::format("there are {}", fmt::join(others, ", "));
-  throw Error(
-      fmt::format("{}: the scene has no {} {}; {}", list_, kind, in_quotes(name), advice));
+  const std::string advice = others.empty() ? "it has none with a name: give box: and two corners"
+                                            : fmt::format("there are {}", fmt::join(others, ", "));
+  throw Error(fmt::format("{}: the scene has no {} {}; {}", list_, kind, in_quotes(name), advice));
 }
 
 std::vector<std::uint8_t> PatchSelection::patches(const PatchModel& model) const {
@@ -186,9 +186,9 @@ PatchRoles choose_roles(const PatchModel& model, const PatchSelection& receivers
   PatchRoles roles;
   roles.role.assign(model.patches.size(), 0);
   const auto give = [&](const PatchSelection& selection, std::uint8_t bit) {
-    const std::vector<std::uint8_t> selected =
-        selection.empty() ? std::vector<std::uint8_t>(roles.role.size(), 1)
-                          : selection.patches(model);
+    const std::vector<std::uint8_t> selected = selection.empty()
+                                                   ? std::vector<std::uint8_t>(roles.role.size(), 1)
+                                                   : selection.patches(model);
     for (std::size_t i = 0; i < selected.size(); ++i) {
       if (selected[i] != 0) roles.role[i] = static_cast<std::uint8_t>(roles.role[i] | bit);
     }

@@ -43,8 +43,8 @@ void WantedBlocks::clear_unwanted(std::span<const std::uint32_t> rows,
   for (std::size_t j = 0; j < columns.size(); ++j) {
     const bool receives = roles_.is_receiver(columns[j]), sends = roles_.is_source(columns[j]);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const bool wanted = (receives && roles_.is_source(rows[i])) ||
-                          (sends && roles_.is_receiver(rows[i]));
+      const bool wanted =
+          (receives && roles_.is_source(rows[i])) || (sends && roles_.is_receiver(rows[i]));
       if (!wanted) entries(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = 0;
     }
   }

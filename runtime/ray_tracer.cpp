@@ -227,8 +227,7 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   // High quality may put a triangle into several leaves, and then filters are called for one hit
   // more than once: transmittance() needs each of them once.
   const bool best = quality == TreeQuality::kBest && !impl_->has_porous();
-  rtcSetSceneBuildQuality(impl_->scene,
-                          best ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
+  rtcSetSceneBuildQuality(impl_->scene, best ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
   rtcCommitScene(impl_->scene);
   impl_->offset_distance = ray_offset_distance(position);
   throw_if_failed(impl_->device, "building the acceleration structure");
