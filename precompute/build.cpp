@@ -21,10 +21,6 @@
 namespace rebounce {
 namespace {
 
-// The operator's tolerance over that of the compressed form factors that it is made from, whose
-// error it has beside its own.
-constexpr double kToleranceOverFormFactors = 5;
-
 // How many times as fast as that of the estimates a machine is taken to be at most, or as slow,
 // whatever it took to find links: that may have been too short to tell.
 constexpr double kFastest = 6;
@@ -96,7 +92,7 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (links && settings.form_factors.link_epsilon == 0) {
     settings.form_factors.link_epsilon = kLinkEpsilon;
   }
-  if (links && settings.form_factor_tolerance == 0) {
+  if (links && settings.form_factor_tolerance == 0 && !of_some) {
     settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
   }
   return settings;

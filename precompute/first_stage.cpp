@@ -25,6 +25,7 @@ FirstStage::FirstStage(PanelMatrix& matrix, const PatchTable& patches,
       frame_(compression_frame(matrix, patches, shaping)),
       weights_(frame_.weights()),
       compressor_(matrix, frame_.tree, weights_) {
+  price_ = frame_.price_of(price);
   make_panels();
   for (Panel& panel : panels_) panel.part = checkpoint_.find(panel.name);
 }

@@ -10,7 +10,9 @@
 #include "rebounce/precompute/large_transfer.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/reference_solution.h"
+#include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "received_light.h"
 
 namespace rebounce {
 namespace {
@@ -21,6 +23,9 @@ constexpr int kTestLightCount = 16;
 // Residual of the radiosities that form factors are fitted to and measured with: what light patches
 // give off matters there, not its third digit.
 constexpr double kFittingResidual = 1e-2;
+
+// Of form factors in half precision, whose rounding is not far below.
+constexpr double kLeastTolerance = 1e-4;
 
 using Lights = std::vector<std::vector<Float3>>;
 
@@ -73,6 +78,32 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
   return lights;
 }
 
+/// The part that errors at receivers are relative to of all light that patches give off after the
+/// first time.
+double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
+                     const PatchRoles& roles, std::span<const float> area) {
+  ReceivedLight received;
+  for (std::size_t k = 0; k < exitances.shaping.size(); ++k) {
+    std::vector<Float3> reflected = radiosities.shaping[k];
+    for (std::size_t i = 0; i < reflected.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) reflected[i][c] -= exitances.shaping[k][i][c];
+    }
+    const double all = area_norm(reflected, area);
+    roles.keep(PatchRoles::kReceiver, reflected);
+    received.add(area_norm(reflected, area), all);
+  }
+  return received.part();
+}
+
+/// What was asked for, or a part of the operator's tolerance: errors of F spread everywhere, and
+/// those of the operator are relative to what arrives at receivers.
+double form_factor_tolerance(const BuildSettings& decided, const FittedLights& lights,
+                             const PatchRoles& roles, std::span<const float> area) {
+  if (decided.form_factor_tolerance > 0) return decided.form_factor_tolerance;
+  const double part = received_part(lights.exitances, lights.radiosities, roles, area);
+  return std::max(kLeastTolerance, decided.tolerance / kToleranceOverFormFactors * part);
+}
+
 }  // namespace
 
 void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
@@ -87,9 +118,10 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
   const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
     return find_lights(tracer, data, roles, seed, reference, part);
   });
+  report.form_factor_tolerance = form_factor_tolerance(decided, lights, roles, patches.area);
   data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
     return compress_form_factors(data.links, links, patches, lights.radiosities.view(),
-                                 {decided.form_factor_tolerance, Precision::kF16}, part);
+                                 {report.form_factor_tolerance, Precision::kF16}, part);
   });
   data.transfer = clock.run("operator", [&](const Progress& part) {
     LargeTransferSettings settings;
@@ -102,7 +134,6 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
                                 settings, part);
   });
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
-    report.form_factor_tolerance = decided.form_factor_tolerance;
     report.form_factor_error =
         form_factor_error(*data.compressed_form_factors, *links, patches, lights.test_radiosities);
     if (roles.all_are_both()) {

@@ -26,8 +26,16 @@ LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Fl
       light_channel(matrix, channel, begin, std::min(lights_.size(), begin + kBatch));
     }
   }
-  for (std::vector<Float3>& truth : truths_) matrix.roles().keep(PatchRoles::kReceiver, truth);
   leave_out_dark();
+  keep_received(matrix.roles());
+}
+
+void LitTruth::keep_received(const PatchRoles& roles) {
+  for (std::vector<Float3>& truth : truths_) {
+    const double all = area_norm(truth, area_);
+    roles.keep(PatchRoles::kReceiver, truth);
+    received_.add(area_norm(truth, area_), all);
+  }
 }
 
 void LitTruth::leave_out_dark() {
@@ -63,7 +71,8 @@ std::vector<double> LitTruth::errors(const TransferOperator& transfer) const {
   std::vector<double> errors;
   errors.reserve(lights_.size());
   for (std::size_t k = 0; k < lights_.size(); ++k) {
-    errors.push_back(relative_difference(product(transfer, lights_[k]), truths_[k], area_));
+    errors.push_back(
+        received_error(product(transfer, lights_[k]), truths_[k], area_, received_.reference(k)));
   }
   return errors;
 }
@@ -73,7 +82,7 @@ Eigen::MatrixXd LitTruth::normalised_lights(std::span<const std::uint32_t> patch
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(position_count),
                                                  static_cast<Eigen::Index>(lights_.size()));
   for (std::size_t k = 0; k < lights_.size(); ++k) {
-    const double norm = area_norm(truths_[k], area_);
+    const double norm = received_.reference(k);
     if (norm == 0) continue;
     for (std::size_t i = 0; i < patch.size(); ++i) {
       const Float3& m0 = lights_[k][patch[i]];

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "rebounce/transfer/transfer_operator.h"
+#include "received_light.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {
@@ -20,12 +21,15 @@ class LitTruth {
 
   std::size_t light_count() const { return lights_.size(); }
 
-  /// The relative area-weighted L2 error of `transfer` under each light.
+  const ReceivedLight& received() const { return received_; }
+
+  /// The relative area-weighted L2 error of `transfer`, which has the roles of the matrix, under
+  /// each light (received_light.h).
   std::vector<double> errors(const TransferOperator& transfer) const;
 
   /// The lights in the coordinates of the symmetric form, A^1/2 M0 averaged over the channels,
   /// [positions][light count], patch[k] at position k and zero beyond; each so strong that its
-  /// indirect light has norm 1.
+  /// errors are relative to 1.
   Eigen::MatrixXd normalised_lights(std::span<const std::uint32_t> patch,
                                     std::size_t position_count) const;
 
@@ -34,10 +38,14 @@ class LitTruth {
   void light_channel(const SymmetricMatrix& matrix, int channel, std::size_t begin,
                      std::size_t end);
 
+  /// Puts out what arrives at other patches than receivers.
+  void keep_received(const PatchRoles& roles);
+
   void leave_out_dark();
 
   std::vector<float> area_;
   std::vector<std::vector<Float3>> lights_, truths_;
+  ReceivedLight received_;
 };
 
 }  // namespace rebounce

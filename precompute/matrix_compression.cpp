@@ -67,6 +67,7 @@ CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patch
   constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
   CompressionFrame frame;
   frame.roles = matrix.roles();
+  frame.received_part = shaping.received().part();
   frame.tree = build_cluster_tree(patches, kLeafSize, kAlignment, role_groups(frame.roles));
   frame.background = background_light(matrix, frame.tree);
   frame.sample = shaping.normalised_lights(frame.tree.patch,
@@ -115,6 +116,8 @@ class Compression {
     }
     return compressor.assemble(std::move(whole));
   }
+
+  double price_of(double usual) const { return frame_.price_of(usual); }
 
   /// Gives the shaping lights weight by the errors that they have with `transfer`.
   void emphasise(const TransferOperator& transfer) {
@@ -183,7 +186,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   const LitTruth judging = judging_truth(matrix, lights.judging);
   Compression compression(matrix, patches, lights.shaping);
   const double tolerance = settings.tolerance;
-  PriceSearch search(first_price(tolerance, patches.size()),
+  PriceSearch search(compression.price_of(first_price(tolerance, patches.size())),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});
   Best best(kMost * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {

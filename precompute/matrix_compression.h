@@ -18,6 +18,11 @@ struct CompressionFrame {
   Eigen::VectorXd background;  ///< as background_light gives it
   Eigen::MatrixXd sample;      ///< the shaping lights, normalised
   PatchRoles roles;            ///< of the matrix
+  double received_part = 1;    ///< ReceivedLight::part of the shaping lights
+
+  /// What a value is worth where that is `usual` with all patches receivers: squares of errors are
+  /// relative to those of what arrives.
+  double price_of(double usual) const { return usual * received_part * received_part; }
 
   std::vector<ClusterWeight> weights() const {
     return make_cluster_weights(tree, sample, background, roles);

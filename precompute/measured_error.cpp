@@ -9,6 +9,7 @@
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "received_light.h"
 
 namespace rebounce {
 namespace {
@@ -23,20 +24,29 @@ constexpr double kReferenceResidual = 1e-9;
 /// Against an iterative solution. Throws Cancelled if asked to stop.
 std::vector<double> errors_by_reference(const TransferData& data, const ReferenceSolver& reference,
                                         const Exitances& lights, const Progress& progress) {
+  const std::vector<float>& area = data.patches.area;
   std::vector<Float3> indirect_irradiance(data.patches.size());
   std::vector<float> workspace(data.transfer->workspace_size());
-  std::vector<double> errors;
+  ReceivedLight received;
+  std::vector<std::vector<Float3>> arrived, results;
   for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kTogether) {
     if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
     const auto some = std::span(lights).subspan(
         done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kTogether));
     auto truths = reference.indirect_irradiances(some, kReferenceResidual);
     for (std::size_t k = 0; k < some.size(); ++k) {
+      if (arrives_nowhere(truths[k], some[k], area)) continue;
+      const double all = area_norm(truths[k], area);
       data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
-      if (arrives_nowhere(truths[k], some[k], data.patches.area)) continue;
+      received.add(area_norm(truths[k], area), all);
       data.transfer->apply(some[k], indirect_irradiance, workspace);
-      errors.push_back(relative_difference(indirect_irradiance, truths[k], data.patches.area));
+      results.push_back(indirect_irradiance);
+      arrived.push_back(std::move(truths[k]));
     }
+  }
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    errors.push_back(received_error(results[k], arrived[k], area, received.reference(k)));
   }
   return errors;
 }

@@ -13,6 +13,10 @@ namespace rebounce {
 // the patches, other than all of both only if the operator is to be hierarchical. Throws Error if
 // the operator fails its own check, Cancelled if asked to stop.
 
+/// The operator's tolerance over that of the compressed form factors that it is made from, whose
+/// error it has beside its own.
+inline constexpr double kToleranceOverFormFactors = 5;
+
 /// From data.exchange, by a dense inverse.
 void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
                               const PatchRoles& roles, TransferData& data, BuildReport& report,
@@ -20,7 +24,8 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
 
 /// From data.links, which stay only if that was asked for: F is compressed, and what is then
 /// solved for is never there as a whole (large_transfer.h). The error is measured against the
-/// links, which know nothing of either compression.
+/// links, which know nothing of either compression. A tolerance of form factors that is still 0 is
+/// as much less than usual as receivers get less than all of the light.
 void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
                               const PatchRoles& roles, TransferData& data, BuildReport& report,
                               PhaseClock& clock);

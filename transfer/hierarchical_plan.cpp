@@ -96,11 +96,10 @@ class Planner {
 
  private:
   void add_core(const TransferBlock& block, const Layout::Place& place) {
-    const bool to_rows = leads({block.column_begin, block.column_count},
-                               {block.row_begin, block.row_count});
-    const bool to_columns =
-        !block.on_diagonal() && leads({block.row_begin, block.row_count},
-                                      {block.column_begin, block.column_count});
+    const bool to_rows =
+        leads({block.column_begin, block.column_count}, {block.row_begin, block.row_count});
+    const bool to_columns = !block.on_diagonal() && leads({block.row_begin, block.row_count},
+                                                          {block.column_begin, block.column_count});
     if (!to_rows && !to_columns) return;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
     using Direction = CoreBlock::Direction;

@@ -26,8 +26,8 @@ void check_roles(const PatchRoles& roles, std::size_t patch_count) {
     throw Error("there are " + std::to_string(roles.role.size()) + " roles for " +
                 std::to_string(patch_count) + " patches");
   }
-  const auto unknown = std::ranges::find_if(
-      roles.role, [](std::uint8_t bits) { return bits > PatchRoles::kBoth; });
+  const auto unknown =
+      std::ranges::find_if(roles.role, [](std::uint8_t bits) { return bits > PatchRoles::kBoth; });
   if (unknown != roles.role.end()) {
     throw Error("the role of patch " + std::to_string(unknown - roles.role.begin()) + " is " +
                 std::to_string(*unknown) + ", not at most " + std::to_string(PatchRoles::kBoth));

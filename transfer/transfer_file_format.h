@@ -53,12 +53,12 @@ struct HierarchicalTensors {
 };
 
 inline constexpr HierarchicalTensors kHierarchicalTransfer = {
-    "transfer.hierarchical.patch", "transfer.hierarchical.blocks", "transfer.hierarchical.bases",
-    "transfer.hierarchical.values", "transfer.hierarchical.channel_matrix",
-    "transfer.hierarchical.role"};
+    "transfer.hierarchical.patch",          "transfer.hierarchical.blocks",
+    "transfer.hierarchical.bases",          "transfer.hierarchical.values",
+    "transfer.hierarchical.channel_matrix", "transfer.hierarchical.role"};
 inline constexpr HierarchicalTensors kCompressedFormFactors = {
-    "form_factor.hierarchical.patch", "form_factor.hierarchical.blocks",
-    "form_factor.hierarchical.bases", "form_factor.hierarchical.values",
+    "form_factor.hierarchical.patch",          "form_factor.hierarchical.blocks",
+    "form_factor.hierarchical.bases",          "form_factor.hierarchical.values",
     "form_factor.hierarchical.channel_matrix", nullptr};
 
 /// A block of the hierarchical operator as it is stored: the members of TransferBlock in their

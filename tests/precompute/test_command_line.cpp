@@ -692,7 +692,7 @@ TEST_F(CommandLine, StoresReceiversAndSourcesAlone) {
   const auto n = info["patch_count"].get<std::size_t>();
   const auto receivers = info["receiver_count"].get<std::size_t>();
   EXPECT_GT(receivers, n / 10);
-  EXPECT_LT(receivers, n / 2);
+  EXPECT_LT(receivers, n * 6 / 10);
   EXPECT_GT(info["source_count"].get<std::size_t>(), n / 10);
   EXPECT_LT(info["source_count"].get<std::size_t>(), n / 2);
   EXPECT_EQ(info["settings"]["sources"], (json{"ceiling", "material:red"}));
@@ -703,9 +703,12 @@ TEST_F(CommandLine, StoresReceiversAndSourcesAlone) {
   const Table table = read_csv(solution);
   const auto lit = static_cast<std::size_t>(std::ranges::count_if(
       table.rows, [](const std::vector<double>& row) { return row.at(3) != 0; }));
-  EXPECT_EQ(lit, receivers);
+  // What is under the blocks sees nothing.
+  EXPECT_LE(lit, receivers);
+  EXPECT_GT(lit, receivers * 3 / 4);
   summary_of({"solve", file, "--lights", kLights, "-o", solution, "--method", "gauss-seidel"});
-  expect_refused({"solve", file, "-o", path("y.csv"), "--method", "refine"}, "receivers or sources");
+  expect_refused({"solve", file, "-o", path("y.csv"), "--method", "refine"},
+                 "receivers or sources");
   const json whole = summary_of({"info", precompute("whole.safetensors")});
   EXPECT_EQ(whole["receiver_count"], whole["patch_count"]);
   EXPECT_EQ(whole["source_count"], whole["patch_count"]);

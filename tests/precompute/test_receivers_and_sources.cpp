@@ -62,7 +62,7 @@ Room make_room(std::size_t patch_count) {
 }
 
 const Room& room() {
-  static const Room made = make_room(1200);
+  static const Room made = make_room(900);
   return made;
 }
 
@@ -81,7 +81,8 @@ bool behind(const Float3& p) {
 PatchRoles roles_at(const PatchTable& patches, const Place& receivers, const Place& sources) {
   PatchRoles roles;
   for (const Float3& p : patches.centroid) {
-    const int role = (receivers(p) ? PatchRoles::kReceiver : 0) | (sources(p) ? PatchRoles::kSource : 0);
+    const int role =
+        (receivers(p) ? PatchRoles::kReceiver : 0) | (sources(p) ? PatchRoles::kSource : 0);
     roles.role.push_back(static_cast<std::uint8_t>(role));
   }
   return roles;
@@ -100,7 +101,8 @@ const Choice kChoices[] = {{"half of both", before, before},
 std::vector<float> expansion(const TransferOperator& transfer) {
   const std::size_t n = transfer.patch_count();
   std::vector<float> y(3 * n * n);
-  for (int c = 0; c < kChannelCount; ++c) transfer.expand(c, std::span(y).subspan(c * n * n, n * n));
+  for (int c = 0; c < kChannelCount; ++c)
+    transfer.expand(c, std::span(y).subspan(c * n * n, n * n));
   return y;
 }
 
@@ -180,16 +182,14 @@ TEST(ReceiversAndSources, BytesFallInProportionAtTheSameTolerance) {
   const auto whole = build_hierarchical_transfer(*room().dense, room().patches, lights, settings);
   // Half of both have a quarter of all pairs, but half of the near ones, which take the most; where
   // only the receivers are fewer, reciprocity had stored what is left out but once.
-  for (const auto& [choice, part] :
-       {std::pair(kChoices[0], 0.6), std::pair(kChoices[1], 0.5), std::pair(kChoices[2], 0.85),
-        std::pair(kChoices[3], 0.85)}) {
+  for (const auto& [choice, part] : {std::pair(kChoices[0], 0.6), std::pair(kChoices[1], 0.5),
+                                     std::pair(kChoices[2], 0.85), std::pair(kChoices[3], 0.85)}) {
     SCOPED_TRACE(choice.name);
     const PatchRoles roles = roles_at(room().patches, choice.receivers, choice.sources);
-    const auto some = build_hierarchical_transfer(*room().dense, room().patches, lights, settings,
-                                                  {}, roles);
+    const auto some =
+        build_hierarchical_transfer(*room().dense, room().patches, lights, settings, {}, roles);
     EXPECT_LT(mean_error(room(), *some, room().others), settings.tolerance);
-    const double bytes =
-        static_cast<double>(some->bytes()) / static_cast<double>(whole->bytes());
+    const double bytes = static_cast<double>(some->bytes()) / static_cast<double>(whole->bytes());
     RecordProperty(choice.name, std::to_string(bytes));
     EXPECT_LT(bytes, part);
     EXPECT_GT(bytes, 0.1);
@@ -216,9 +216,9 @@ std::size_t file_count(const std::filesystem::path& folder) {
 }
 
 TEST(ReceiversAndSources, OnlyTheirColumnsAreSolvedFor) {
-  const auto form_factors = compress_form_factors(
-      room().exchange, room().patches, {room().shaping, room().judging},
-      {.tolerance = 1e-3, .precision = Precision::kF32});
+  const auto form_factors =
+      compress_form_factors(room().exchange, room().patches, {room().shaping, room().judging},
+                            {.tolerance = 1e-3, .precision = Precision::kF32});
   const auto build = [&](const PatchRoles& roles, const std::filesystem::path& panels) {
     LargeTransferSettings settings{.compression = {.tolerance = 0.01}};
     settings.roles = roles;
