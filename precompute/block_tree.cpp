@@ -253,8 +253,7 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (loop.stopped()) continue;
     if (wants(pieces[k])) {
-      parts[k] =
-          PieceCompressor(matrix_, tree_, weights_, wanted_, price, pieces[k]).compress();
+      parts[k] = PieceCompressor(matrix_, tree_, weights_, wanted_, price, pieces[k]).compress();
     }
     loop.advance();
   }

@@ -114,10 +114,7 @@ class TransferBuild {
  public:
   TransferBuild(const BuildSettings& settings, BuildReport& report, const BuildProgress& progress,
                 const EstimateListener& on_estimate)
-      : settings_(settings),
-        report_(report),
-        on_estimate_(on_estimate),
-        clock_(report, progress) {}
+      : settings_(settings), report_(report), on_estimate_(on_estimate), clock_(report, progress) {}
 
   Scene import_scene(const std::filesystem::path& path) {
     Scene scene =
@@ -245,9 +242,8 @@ class TransferBuild {
   /// With links known, and how long they took to find.
   void estimate_rest(const LinkBuild& links) {
     const LinkedBuild build = linked_build(links.links, model_.patches, links.sky_visibility);
-    const double slowness =
-        std::clamp(report_.seconds.back().second / estimate_links(build).seconds, 1 / kFastest,
-                   kFastest);
+    const double slowness = std::clamp(
+        report_.seconds.back().second / estimate_links(build).seconds, 1 / kFastest, kFastest);
     CostEstimate rest = estimate_operator_from_links(build, decided_.memory_limit_bytes);
     rest.seconds *= slowness;
     rest.least_seconds = rest.seconds;

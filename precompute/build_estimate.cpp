@@ -150,14 +150,12 @@ CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_
   CostEstimate estimate;
   estimate.patch_count = build.patch_count;
   estimate.link_count = build.link_count;
-  estimate.peak_bytes =
-      static_cast<std::uint64_t>(bytes_beside_transfer(build)) + plan.peak_bytes;
-  estimate.seconds =
-      on_all_processors(gathers * (kGatherPatch * n + kGatherLink * links) +
-                        groups * ReferenceSolver::kTogether * kDrawPatch * n +
-                        kCompressPatch * n + kCompressLink * links) +
-      large_transfer_seconds(build.patch_count, build.matrix_count, form_factors) /
-          plan.thread_count;
+  estimate.peak_bytes = static_cast<std::uint64_t>(bytes_beside_transfer(build)) + plan.peak_bytes;
+  estimate.seconds = on_all_processors(gathers * (kGatherPatch * n + kGatherLink * links) +
+                                       groups * ReferenceSolver::kTogether * kDrawPatch * n +
+                                       kCompressPatch * n + kCompressLink * links) +
+                     large_transfer_seconds(build.patch_count, build.matrix_count, form_factors) /
+                         plan.thread_count;
   estimate.least_seconds = estimate.seconds;
   return estimate;
 }

@@ -50,9 +50,9 @@ struct FittedLights {
   Lights test_radiosities;
 };
 
-FittedLights find_lights(const RayTracer& tracer, const TransferData& data,
-                         const PatchRoles& roles, std::uint64_t seed,
-                         const ReferenceSolver& solver, const Progress& progress) {
+FittedLights find_lights(const RayTracer& tracer, const TransferData& data, const PatchRoles& roles,
+                         std::uint64_t seed, const ReferenceSolver& solver,
+                         const Progress& progress) {
   FittedLights lights;
   lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
   const Lights tests =
@@ -95,9 +95,8 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     LargeTransferSettings settings;
     settings.compression = {decided.tolerance, *decided.precision};
     settings.roles = roles;
-    settings.memory_limit_bytes =
-        memory_of_large_transfer(linked_build(data.links, patches, patches.sky_visibility),
-                                 decided.memory_limit_bytes);
+    settings.memory_limit_bytes = memory_of_large_transfer(
+        linked_build(data.links, patches, patches.sky_visibility), decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;
     return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
                                 settings, part);

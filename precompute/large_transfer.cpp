@@ -150,8 +150,7 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
     fine = stage.run(part_of(progress, kColumnsBefore / all, done));
   }
   const RoundedMatrix rounded(solved, energies, std::exchange(fine, {}));
-  const BlockCheckpoint rounds(settings.checkpoint,
-                               second_key(key, lights, settings.compression));
+  const BlockCheckpoint rounds(settings.checkpoint, second_key(key, lights, settings.compression));
   return compress_to_tolerance(rounded, patches, lights, settings.compression,
                                part_of(progress, done, 1), rounds);
 }

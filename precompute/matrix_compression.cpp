@@ -79,8 +79,7 @@ CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patch
 /// that half of what is left.
 double part_of_search(int rounds) {
   constexpr double kEach = 1.0 / kUsualRounds;
-  return rounds < kUsualRounds ? rounds * kEach
-                               : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
+  return rounds < kUsualRounds ? rounds * kEach : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
 }
 
 /// Where what is done of a compression is kept, and under which names.
@@ -109,9 +108,9 @@ class Compression {
       const std::size_t end = std::min(pieces.size(), begin + together);
       const auto some = std::span(pieces).subspan(begin, end - begin);
       const Progress part = part_of(progress, static_cast<double>(begin) / all, end / all);
-      whole.append(kept.checkpoint.find_or_make(
-          fmt::format("{}_part_{:04}", kept.prefix, begin / together),
-          [&] { return compressor.compress(some, price, part); }));
+      whole.append(
+          kept.checkpoint.find_or_make(fmt::format("{}_part_{:04}", kept.prefix, begin / together),
+                                       [&] { return compressor.compress(some, price, part); }));
       report_progress(part, 1);
     }
     return compressor.assemble(std::move(whole));
@@ -190,8 +189,9 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
-    const auto candidate = std::make_shared<const HierarchicalOperator>(
-        HierarchicalOperator::encode(compression.at(search.price(), kept, part), settings.precision));
+    const auto candidate =
+        std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode(
+            compression.at(search.price(), kept, part), settings.precision));
     const double error = judge(judging.errors(*candidate));
     best.offer(candidate, error);
     search.report(error);

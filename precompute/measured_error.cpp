@@ -64,8 +64,8 @@ std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer
     };
     if (!part(0)) throw Cancelled();
     const LightKind kind = kLightKinds[k];
-    const Exitances lights = random_initial_exitances(data, tracer, kind, light_count, seed,
-                                                      data.transfer->roles());
+    const Exitances lights =
+        random_initial_exitances(data, tracer, kind, light_count, seed, data.transfer->roles());
     const std::vector<double> errors = errors_of(lights, part);
     if (!errors.empty()) result.push_back(summary(kind, lights.size(), errors));
   }

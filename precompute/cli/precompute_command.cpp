@@ -150,7 +150,8 @@ void take_probes(const std::vector<float>& numbers, ProbeSettings& settings) {
 
 std::vector<std::string> split_lists(const std::vector<std::string>& lists) {
   std::vector<std::string> entries;
-  for (const std::string& list : lists) std::ranges::move(split_selection(list), std::back_inserter(entries));
+  for (const std::string& list : lists)
+    std::ranges::move(split_selection(list), std::back_inserter(entries));
   return entries;
 }
 

@@ -45,8 +45,8 @@ TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
   omp_set_num_threads(8);
   const CostEstimate free = estimate_operator_from_links(build, kPlenty),
                      least = estimate_operator_from_links(build, 1),
-                     between =
-                         estimate_operator_from_links(build, (free.peak_bytes + least.peak_bytes) / 2);
+                     between = estimate_operator_from_links(
+                         build, (free.peak_bytes + least.peak_bytes) / 2);
   omp_set_num_threads(before);
   EXPECT_LT(least.peak_bytes, between.peak_bytes);
   EXPECT_LE(between.peak_bytes, (free.peak_bytes + least.peak_bytes) / 2);
