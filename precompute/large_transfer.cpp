@@ -31,8 +31,8 @@ constexpr double kFinePart = 1.0 / 16;
 // What is done before the first panel, and before the first round of the second stage, takes as
 // long as so many columns; all rounds together as many, where there are kRoundsPatches, and growing
 // with this power of their number. Measured: notes/operator.md.
-constexpr double kColumnsBefore = 1200;
-constexpr double kRounds = 3700, kRoundsPatches = 4000, kRoundsGrowth = 0.7;
+constexpr double kColumnsBefore = 1500;
+constexpr double kRounds = 3400, kRoundsPatches = 4000, kRoundsGrowth = 0.7;
 
 // Products with the form factors that a column takes, and operations a second of a slow core.
 constexpr double kProducts = 5.5, kOperationsPerSecond = 6e10;
