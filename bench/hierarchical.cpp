@@ -174,8 +174,8 @@ class HierarchicalBench {
   void add_hierarchical(const char* form, double epsilon, double coarsening,
                         const FormFactorLinks& links) {
     const std::size_t count = links.pair.size();
-    linked_.push_back(std::make_unique<LinkedFormFactors>(links, model_.patches.area,
-                                                          model_.patches.centroid));
+    linked_.push_back(
+        std::make_unique<LinkedFormFactors>(links, model_.patches.area, model_.patches.centroid));
     const LinkedFormFactors& linked = *linked_.back();
     add({"hierarchical", form, epsilon, coarsening, count, &linked,
          std::make_unique<HierarchicalSolver>(linked, problem())});
@@ -187,9 +187,9 @@ class HierarchicalBench {
   template <typename FormFactors>
   void add_compressed(const FormFactors& form_factors, const FormFactorOperator& product) {
     for (const double tolerance : options_.compression) {
-      const auto made = compress_form_factors(
-          form_factors, model_.patches, bounced(fitting_, product, model_.patches).view(),
-          {tolerance, Precision::kF16});
+      const auto made = compress_form_factors(form_factors, model_.patches,
+                                              bounced(fitting_, product, model_.patches).view(),
+                                              {tolerance, Precision::kF16});
       compressed_.push_back(std::make_unique<CompressedFormFactors>(made));
       const CompressedFormFactors& form = *compressed_.back();
       const std::size_t numbers = made->bytes() / sizeof(std::uint16_t);

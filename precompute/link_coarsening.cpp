@@ -110,7 +110,8 @@ class Coarsening {
           part->exchange * (child.center - parent.center) + child.covariance * part->gradient_b;
     }
     merged.gradient_b = parent.inverse * product;
-    const double before = squared_norm(link, a, node) + squared_norm(other, a, nodes_[node.sibling]);
+    const double before =
+        squared_norm(link, a, node) + squared_norm(other, a, nodes_[node.sibling]);
     const double change = std::max(0.0, before - squared_norm(merged, a, parent));
     merged.lost = link.lost + other.lost + change;
     return merged;

@@ -10,11 +10,11 @@
 
 #include "expect_error.h"
 #include "hierarchical_samples.h"
+#include "plain_data.h"
 #include "rebounce/transfer/safetensors.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 #include "transfer_file_tampering.h"
-#include "plain_data.h"
 
 namespace rebounce {
 namespace {
