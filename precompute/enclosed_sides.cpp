@@ -41,7 +41,7 @@ constexpr std::size_t kFirstPaths = 16, kPathsOfSide = 8, kLeastPaths = 32;
 // All of them are lit where this part of the first paths is out, or this of all; all are inside
 // where none is. What is still in doubt then is lit if it has that part out in a group that has more
 // than the last part out, and inside if it has none out in a group that has no more.
-constexpr double kFirstLit = 1.0 / 4, kLit = 1.0 / 8, kFew = 1.0 / 32;
+constexpr double kFirstLit = 1.0 / 4, kLitPart = 1.0 / 8, kFew = 1.0 / 32;
 
 // Of a triangle larger than the square of this part of the reach none may be out of so many paths
 // for each such square, up to a largest number: a wall's triangle may look out from behind a board.
@@ -190,14 +190,14 @@ class EnclosedSides {
     follow(group, divide_up(kFirstPaths, group.size()), scratch);
     if (part_out(group) >= kFirstLit) return judge_all(group, Verdict::kLit);
     follow(group, enough, scratch);
-    if (part_out(group) >= kLit) return judge_all(group, Verdict::kLit);
+    if (part_out(group) >= kLitPart) return judge_all(group, Verdict::kLit);
     if (part_out(group) == 0) return judge_all(group, Verdict::kInside);
     follow(group, 2 * enough, scratch);
     const bool few = part_out(group) <= kFew;
     for (Suspect& suspect : group) {
       const double part = part_out({&suspect, 1});
       if (few && part == 0) suspect.verdict = Verdict::kInside;
-      if (!few && part >= kLit) suspect.verdict = Verdict::kLit;
+      if (!few && part >= kLitPart) suspect.verdict = Verdict::kLit;
     }
   }
 

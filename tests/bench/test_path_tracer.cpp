@@ -410,7 +410,7 @@ TEST(SampleSurface, IsUniformByAreaOverLitSides) {
     EXPECT_TRUE(!is_small || p.normal[2] < 0);
     centroid += to_dvec3(p.position) / 900.0;
     const glm::dvec3 again =
-        point_at(SceneSurface(scene).corners(p.triangle), {p.barycentric[0], p.barycentric[1]});
+        rebounce::point_at(SceneSurface(scene).corners(p.triangle), {p.barycentric[0], p.barycentric[1]});
     EXPECT_LT(glm::distance(again, to_dvec3(p.position)), 1e-6);
   }
   EXPECT_NEAR(count[0], 400, 4);
