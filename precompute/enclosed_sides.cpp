@@ -26,10 +26,19 @@ struct Look {
   int inside, lit;
 };
 
-// A side of whose paths 8 % get out is taken for inside once in nine times, one of 12 % once in
-// fifty; one of 1 % is taken for lit once in five hundred times.
-constexpr std::array<Look, 5> kLooks{
-    {{4, -1, 2}, {12, -1, 3}, {32, 0, 4}, {64, 1, 5}, {128, 5, 6}}};
+// A sequential test (A. Wald, 1945), cut short: a side of whose paths 8 % get out is taken for
+// inside once in eight times, one of 12 % once in fifty; one of 1 % is taken for lit once in 250
+// times.
+constexpr std::array<Look, 10> kLooks{{{4, -1, 2},
+                                       {12, -1, 3},
+                                       {20, -1, 3},
+                                       {32, 0, 4},
+                                       {48, 0, 4},
+                                       {64, 1, 5},
+                                       {80, 2, 5},
+                                       {96, 3, 6},
+                                       {112, 4, 6},
+                                       {128, 5, 6}}};
 
 // Sides of triangles that follow each other, no farther apart than this part of the reach, are
 // first judged together: by so many paths in all, then by so many of each side and no fewer than
