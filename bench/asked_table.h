@@ -19,8 +19,7 @@ class AskedTable {
   const Table& table() const { return table_; }
 
  private:
-  Table table_ =
-      Table({"subject", "patches", "quality", "measure", "value", "asked", "of asked"});
+  Table table_ = Table({"subject", "patches", "quality", "measure", "value", "asked", "of asked"});
 };
 
 }  // namespace rebounce::bench

@@ -90,8 +90,8 @@ class FrameBenchmark {
     add_outputs();
     const std::vector<Timing> timings = time_interleaved(cases_, {.rounds = options_.repeats});
     for (std::size_t k = 0; k < cases_.size(); ++k) {
-      table.add({scene_name(engine_.data()), engine_.data().patches.size(), threads, names_[k].first, names_[k].second,
-                 timings[k].median * 1e6, timings[k].spread});
+      table.add({scene_name(engine_.data()), engine_.data().patches.size(), threads,
+                 names_[k].first, names_[k].second, timings[k].median * 1e6, timings[k].spread});
     }
   }
 

@@ -132,10 +132,10 @@ class HierarchicalBench {
   }
 
   void add_flat() {
-    const ExchangeMatrix exchange = compute_form_factors(model_, tracer_).exchange;
-    const std::size_t entries = 2 * exchange.column.size();
-    auto blocks = std::make_unique<FormFactorBlocks>(exchange, model_.patches.area);
-    auto half = std::make_unique<ExchangeBlocks>(exchange, model_.patches.area);
+    exchange_ = compute_form_factors(model_, tracer_).exchange;
+    const std::size_t entries = 2 * exchange_.column.size();
+    auto blocks = std::make_unique<FormFactorBlocks>(exchange_, model_.patches.area);
+    auto half = std::make_unique<ExchangeBlocks>(exchange_, model_.patches.area);
     add({"gauss-seidel", "blocks", 0, 0, entries, blocks.get(),
          std::make_unique<GaussSeidelSolver>(*blocks, problem())});
     add({"gathering", "exchange", 0, 0, entries, half.get(),
@@ -150,10 +150,7 @@ class HierarchicalBench {
     }
     flat_.push_back(std::move(blocks));
     flat_.push_back(std::move(half));
-    for (const double error : options_.coarsening) {
-      add_hierarchical("links of pairs", 0, error, fit_links(exchange, model_.patches, error));
-    }
-    add_compressed(exchange, *flat_.front());
+    add_compressed(exchange_, *flat_.front());
   }
 
   void add_links(double epsilon) {
@@ -165,8 +162,13 @@ class HierarchicalBench {
       add_compressed(links, LinkedFormFactors(links, patches.area, patches.centroid));
     }
     for (const double coarsening : options_.coarsening) {
-      add_hierarchical("links", epsilon, coarsening,
-                       coarsen_links(links, patches.area, patches.centroid, coarsening));
+      const FormFactorLinks coarse =
+          coarsen_links(links, patches.area, patches.centroid, coarsening);
+      add_hierarchical("links", epsilon, coarsening, coarse);
+      if (!flat_.empty()) {
+        add_hierarchical("fitted links", epsilon, coarsening,
+                         fit_links(coarse, exchange_, patches));
+      }
     }
   }
 
@@ -174,8 +176,8 @@ class HierarchicalBench {
   void add_hierarchical(const char* form, double epsilon, double coarsening,
                         const FormFactorLinks& links) {
     const std::size_t count = links.pair.size();
-    linked_.push_back(std::make_unique<LinkedFormFactors>(links, model_.patches.area,
-                                                          model_.patches.centroid));
+    linked_.push_back(
+        std::make_unique<LinkedFormFactors>(links, model_.patches.area, model_.patches.centroid));
     const LinkedFormFactors& linked = *linked_.back();
     add({"hierarchical", form, epsilon, coarsening, count, &linked,
          std::make_unique<HierarchicalSolver>(linked, problem())});
@@ -187,9 +189,9 @@ class HierarchicalBench {
   template <typename FormFactors>
   void add_compressed(const FormFactors& form_factors, const FormFactorOperator& product) {
     for (const double tolerance : options_.compression) {
-      const auto made = compress_form_factors(
-          form_factors, model_.patches, bounced(fitting_, product, model_.patches).view(),
-          {tolerance, Precision::kF16});
+      const auto made = compress_form_factors(form_factors, model_.patches,
+                                              bounced(fitting_, product, model_.patches).view(),
+                                              {tolerance, Precision::kF16});
       compressed_.push_back(std::make_unique<CompressedFormFactors>(made));
       const CompressedFormFactors& form = *compressed_.back();
       const std::size_t numbers = made->bytes() / sizeof(std::uint16_t);
@@ -253,6 +255,7 @@ class HierarchicalBench {
   RayTracer tracer_;
   std::vector<LightCase> lights_;
   DrawnLights fitting_;  ///< for compression
+  ExchangeMatrix exchange_;
   std::vector<std::unique_ptr<FormFactorOperator>> flat_;
   std::vector<std::unique_ptr<CompressedFormFactors>> compressed_;
   std::vector<std::unique_ptr<LinkedFormFactors>> linked_;

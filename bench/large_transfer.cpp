@@ -220,8 +220,7 @@ void run(const LargeOptions& options) {
                "error_max", "peak_gib"});
   for (const std::string& scene : options.scenes) {
     for (const std::size_t patches : options.patches) {
-      SceneBench(scene, patches, options)
-          .measure(scene_name(scene), table);
+      SceneBench(scene, patches, options).measure(scene_name(scene), table);
     }
   }
   publish("bench_large", table, options.common);

@@ -90,8 +90,8 @@ class OfflineStage {
   void row(Table& table, const std::string& what, const Timing& time, const Table::Cell& rate = {},
            const Table::Cell& unit = {}, const Table::Cell& ratio = {},
            const Table::Cell& baseline = {}) const {
-    table.add({scene_name(scene_), model_.patches.size(), what,
-               time.median, time.spread, rate, unit, ratio, baseline});
+    table.add({scene_name(scene_), model_.patches.size(), what, time.median, time.spread, rate,
+               unit, ratio, baseline});
   }
 
   void report_form_factors(Table& table) const {

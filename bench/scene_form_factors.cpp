@@ -27,8 +27,7 @@ void SceneFormFactors::add(const char* quality, const std::string& measure, doub
 
 void SceneFormFactors::measure_convergence(int reference_factor) {
   const std::vector<double> light = smooth_light();
-  const ExchangeReference truth =
-      make_exchange_reference(model_, tracer_, light, reference_factor);
+  const ExchangeReference truth = make_exchange_reference(model_, tracer_, light, reference_factor);
   add("", "noise of the gather's reference", truth.gather_noise);
   add("", "gather, one reference against the other",
       light_error(gather(truth.exchange_area, area(), light), truth.gathered, area()));
@@ -84,8 +83,7 @@ std::vector<double> SceneFormFactors::smooth_light() const {
 }
 
 /// `matrices` of the qualities, and of the reference.
-void SceneFormFactors::measure_ranks(
-    const std::vector<std::vector<double>>& matrices) {
+void SceneFormFactors::measure_ranks(const std::vector<std::vector<double>>& matrices) {
   const FarRanksByVisibility ranks = far_ranks(model_, matrices);
   for (const auto& [kind, found] : {std::pair{"clear", &ranks.clear}, {"mixed", &ranks.mixed}}) {
     const std::string what = std::string("mean rank of ") + kind + " far blocks (" +

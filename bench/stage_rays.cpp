@@ -58,8 +58,7 @@ class StageRayMaker {
     result_.shadow_count += rays_.size();
     transmitted_.resize(rays_.size());
     tracer_.transmittance(rays_, PassageDetail::kTriangle, transmitted_);
-    result_.hidden_count +=
-        static_cast<std::uint64_t>(std::ranges::count_if(rays_, is_occluded));
+    result_.hidden_count += static_cast<std::uint64_t>(std::ranges::count_if(rays_, is_occluded));
   }
 
   void add_escape_rays(std::uint32_t row) {

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "rebounce/transfer/error.h"
-
 namespace rebounce {
 namespace {
 
@@ -109,12 +107,6 @@ void scale_rows(std::span<const float> target, std::span<const float> area,
       const float allowed = std::clamp(wanted, kLeastScale, kMostScale);
       links.scale[i] *= allowed / std::exchange(scaled[i], allowed);
     }
-  }
-}
-
-void check_link_error(double epsilon) {
-  if (!(epsilon >= 0) || !std::isfinite(epsilon)) {
-    throw Error("links: the error of coarser ones must be finite and not negative");
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// What coarser links are made with, whether from links or from pairs of patches.
+// What links are made with from other links or from pairs of patches.
 
 #include <Eigen/Core>
 #include <cstdint>
@@ -14,10 +14,10 @@ namespace rebounce {
 /// A node of a tree of links and how its patches' centroids are spread, by area.
 struct NodeSpread {
   std::uint32_t parent = kNone, sibling = kNone;
-  double area = 0;                                    ///< m²
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();   ///< area-weighted, metres
+  double area = 0;                                       ///< m²
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();      ///< area-weighted, metres
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m²
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();  ///< of it, without flat directions
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();     ///< of it, without flat directions
 };
 
 /// The nodes of the tree that `links` have, [m]; `area` [n] in m², `centroid` [n] in metres.
@@ -44,8 +44,5 @@ std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float>
 /// or half.
 void scale_rows(std::span<const float> target, std::span<const float> area,
                 std::span<const Float3> centroid, FormFactorLinks& links);
-
-/// Throws Error if `epsilon` is not the error of a link.
-void check_link_error(double epsilon);
 
 }  // namespace rebounce

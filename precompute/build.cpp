@@ -57,9 +57,11 @@ FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchMod
   return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
 }
 
-/// Of links that are stored for hierarchical radiosity.
-double stored_link_error(const FormFactorSettings& settings) {
-  return kLinkCoarsening * (settings.link_epsilon > 0 ? settings.link_epsilon : kLinkEpsilon);
+FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
+                           FormFactorSettings settings, const Progress& progress) {
+  if (settings.link_epsilon == 0) settings.link_epsilon = kLinkEpsilon;
+  return coarsen_links(build_links(model, tracer, settings, {}, progress).links, model.patches.area,
+                       model.patches.centroid, kLinkCoarsening * settings.link_epsilon);
 }
 
 /// The settings with what was left open decided.
@@ -212,9 +214,9 @@ class TransferBuild {
     report_.form_factor_count = form_factors.exchange.column.size();
     report_.closure = form_factors.closure;
     if (settings_.store_links) {
-      data_.links = clock_.run("links", [&](const Progress&) {
-        return fit_links(form_factors.exchange, model_.patches,
-                         stored_link_error(settings_.form_factors));
+      data_.links = clock_.run("links", [&](const Progress& part) {
+        return fit_links(find_links(model_, *tracer_, settings_.form_factors, part),
+                         form_factors.exchange, model_.patches);
       });
       report_.link_count = data_.links.pair.size();
     }

@@ -43,13 +43,18 @@ constexpr double kFurnishedLinks = 165, kLinkPatches = 4000, kLinkGrowth = 0.32;
 constexpr double kLinkPeakBytes = 160, kLinkBytes = 110, kPatchBytes = 8e3;
 
 // Processor seconds, of about one slow core; measured: notes/links.md. To find links, by patches
-// and links. To gather eight lights along them once, likewise, for groups that are to be fitted to
-// and measured with, and groups of each kind that the check takes, each so many times. To compress
-// F, likewise. A light drawn, by patches.
+// and links.
 constexpr double kFindPatch = 6e-4, kFindLink = 1.7e-5;
-constexpr double kGatherPatch = 6e-6, kGatherLink = 6e-8;
+
+// To gather eight lights along them once, and to compress F, likewise; both where there are
+// kLargePatches, and growing with this power beside, as vectors leave the caches.
+constexpr double kGatherPatch = 4e-6, kGatherLink = 1.25e-7;
+constexpr double kCompressPatch = 2.2e-3, kCompressLink = 5e-6;
+constexpr double kLargePatches = 64000, kGrowth = 1.0 / 3;
+
+// Groups of eight lights that are fitted to and measured with, and of each kind of the check, and
+// gathers that each takes; to draw a light, by patches.
 constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 8, kCheckGathers = 25;
-constexpr double kCompressPatch = 2.4e-3, kCompressLink = 2.2e-6;
 constexpr double kDrawPatch = 4e-7;
 
 // Bytes of a patch of compressed form factors, with no links and for each link of it.
@@ -144,20 +149,20 @@ CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_
   const LargeTransferPlan plan = plan_large_transfer(build.patch_count, build.matrix_count,
                                                      memory_of_large_transfer(build, limit_bytes));
   const double kinds = build.open ? 4 : 3;
-  const double gathers = kFitGroups * kFitGathers + kinds * kCheckGroups * kCheckGathers;
   const double groups = kFitGroups + kinds * kCheckGroups;
+  const double gathers = kFitGroups * kFitGathers + kinds * kCheckGroups * kCheckGathers;
+  const double gathering = gathers * (kGatherPatch * n + kGatherLink * links);
+  const double compressing = kCompressPatch * n + kCompressLink * links;
+  const double drawing = groups * ReferenceSolver::kTogether * kDrawPatch * n;
+  const double growth = std::pow(n / kLargePatches, kGrowth);
   const double form_factors = kFormFactorBytes * n + kFormFactorLinkBytes * links;
   CostEstimate estimate;
   estimate.patch_count = build.patch_count;
   estimate.link_count = build.link_count;
-  estimate.peak_bytes =
-      static_cast<std::uint64_t>(bytes_beside_transfer(build)) + plan.peak_bytes;
-  estimate.seconds =
-      on_all_processors(gathers * (kGatherPatch * n + kGatherLink * links) +
-                        groups * ReferenceSolver::kTogether * kDrawPatch * n +
-                        kCompressPatch * n + kCompressLink * links) +
-      large_transfer_seconds(build.patch_count, build.matrix_count, form_factors) /
-          plan.thread_count;
+  estimate.peak_bytes = static_cast<std::uint64_t>(bytes_beside_transfer(build)) + plan.peak_bytes;
+  estimate.seconds = on_all_processors(growth * (gathering + compressing) + drawing) +
+                     large_transfer_seconds(build.patch_count, build.matrix_count, form_factors) /
+                         plan.thread_count;
   estimate.least_seconds = estimate.seconds;
   return estimate;
 }

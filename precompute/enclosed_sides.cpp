@@ -26,10 +26,19 @@ struct Look {
   int inside, lit;
 };
 
-// A side of whose paths 8 % get out is taken for inside once in nine times, one of 12 % once in
-// fifty; one of 1 % is taken for lit once in five hundred times.
-constexpr std::array<Look, 5> kLooks{
-    {{4, -1, 2}, {12, -1, 3}, {32, 0, 4}, {64, 1, 5}, {128, 5, 6}}};
+// A sequential test (A. Wald, 1945), cut short: a side of whose paths 8 % get out is taken for
+// inside once in eight times, one of 12 % once in fifty; one of 1 % is taken for lit once in 250
+// times.
+constexpr std::array<Look, 10> kLooks{{{4, -1, 2},
+                                       {12, -1, 3},
+                                       {20, -1, 3},
+                                       {32, 0, 4},
+                                       {48, 0, 4},
+                                       {64, 1, 5},
+                                       {80, 2, 5},
+                                       {96, 3, 6},
+                                       {112, 4, 6},
+                                       {128, 5, 6}}};
 
 // Sides of triangles that follow each other, no farther apart than this part of the reach, are
 // first judged together: by so many paths in all, then by so many of each side and no fewer than
@@ -39,8 +48,8 @@ constexpr double kGroupReach = 1.0 / 8;
 constexpr std::size_t kFirstPaths = 16, kPathsOfSide = 8, kLeastPaths = 32;
 
 // All of them are lit where this part of the first paths is out, or this of all; all are inside
-// where none is. What is still in doubt then is lit if it has that part out in a group that has more
-// than the last part out, and inside if it has none out in a group that has no more.
+// where none is. What is still in doubt then is lit if it has that part out in a group that has
+// more than the last part out, and inside if it has none out in a group that has no more.
 constexpr double kFirstLit = 1.0 / 4, kLitPart = 1.0 / 8, kFew = 1.0 / 32;
 
 // Of a triangle larger than the square of this part of the reach none may be out of so many paths
@@ -205,7 +214,9 @@ class EnclosedSides {
     for (Suspect& suspect : group) suspect.verdict = verdict;
   }
 
-  static std::size_t divide_up(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
+  static std::size_t divide_up(std::size_t a, std::size_t b) {
+    return (a + b - 1) / b;
+  }
 
   /// The part of all paths of a group that is out.
   static double part_out(std::span<const Suspect> group) {
@@ -232,8 +243,8 @@ class EnclosedSides {
   }
 
   Verdict judge_large(Suspect& suspect, double size, Scratch& scratch) const {
-    const auto paths = static_cast<std::size_t>(
-        std::min<double>(kMostPaths, std::ceil(kPathsOfSquare * size)));
+    const auto paths =
+        static_cast<std::size_t>(std::min<double>(kMostPaths, std::ceil(kPathsOfSquare * size)));
     for (std::size_t end = 4; suspect.out == 0 && suspect.paths < paths; end *= 4) {
       follow({&suspect, 1}, std::min(end, paths), scratch);
     }
@@ -290,7 +301,9 @@ class EnclosedSides {
     return front ? n : Float3{-n[0], -n[1], -n[2]};
   }
 
-  bool is_out(const Hit& hit) const { return hit.triangle == kNone || surface_[hit.triangle].emits; }
+  bool is_out(const Hit& hit) const {
+    return hit.triangle == kNone || surface_[hit.triangle].emits;
+  }
 
   bool reflects(const Hit& hit) const {
     const Surface& surface = surface_[hit.triangle];

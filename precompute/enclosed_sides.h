@@ -17,8 +17,8 @@ namespace rebounce {
 /// cracks, and a room is none.
 ///
 /// Up to eight sides close together are judged by 16 paths of theirs where these say that they are
-/// lit, by 64 where they are alike; only those that differ from the others, or are in between, by up
-/// to 128 of their own.
+/// lit, by 64 where they are alike; only those that differ from the others, or are in between, by
+/// up to 128 of their own.
 ///
 /// `scene`, `tracer` and `sides` [t] as for find_lit_sides(). Deterministic. Throws Cancelled.
 void bury_enclosed_sides(const Scene& scene, const RayTracer& tracer,

@@ -34,8 +34,8 @@ void FirstStage::make_panels() {
   for (const BlockPiece& piece : block_pieces(frame_.tree, kPanelWidth)) {
     if (!compressor_.wants(piece)) continue;
     const auto found = std::ranges::find(panels_, piece.column, &Panel::column);
-    Panel& panel = found == panels_.end() ? panels_.emplace_back(Panel{piece.column, {}, {}, {}})
-                                          : *found;
+    Panel& panel =
+        found == panels_.end() ? panels_.emplace_back(Panel{piece.column, {}, {}, {}}) : *found;
     panel.pieces.push_back(piece);
   }
   std::ranges::sort(panels_, {},

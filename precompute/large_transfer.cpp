@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -27,9 +28,11 @@ constexpr double kResidualPart = 0.2;
 // go about like the root of the price: a quarter of what the second stage may do.
 constexpr double kFinePart = 1.0 / 16;
 
-// What is done before the first panel takes as long as so many columns, and the second stage as
-// long as this part of all of them. Measured: notes/operator.md.
-constexpr double kColumnsBefore = 500, kSecondStage = 0.54;
+// What is done before the first panel, and before the first round of the second stage, takes as
+// long as so many columns; all rounds together as many, where there are kRoundsPatches, and growing
+// with this power of their number. Measured: notes/operator.md.
+constexpr double kColumnsBefore = 1500;
+constexpr double kRounds = 3400, kRoundsPatches = 4000, kRoundsGrowth = 0.7;
 
 // Products with the form factors that a column takes, and operations a second of a slow core.
 constexpr double kProducts = 5.5, kOperationsPerSecond = 6e10;
@@ -38,9 +41,9 @@ constexpr double kProducts = 5.5, kOperationsPerSecond = 6e10;
 // patch, far on the safe side.
 constexpr std::size_t kOperatorBytes = 48 << 10;
 
-/// All that is done, in columns that are solved for; `first_stage` likewise.
-double work_with(double first_stage, std::size_t patch_count) {
-  return kColumnsBefore + first_stage + kSecondStage * static_cast<double>(patch_count);
+/// The rounds of the second stage, in columns that are solved for.
+double work_of_rounds(std::size_t patch_count) {
+  return kRounds * std::pow(static_cast<double>(patch_count) / kRoundsPatches, kRoundsGrowth);
 }
 
 /// Throws Error unless the limit, if there is one, has room for a plan.
@@ -122,7 +125,8 @@ double large_transfer_seconds(std::size_t patch_count, std::size_t matrix_count,
   // A value of two bytes is multiplied and added twice, there and back.
   const double column =
       2 * form_factor_bytes * kProducts / kOperationsPerSecond * static_cast<double>(matrix_count);
-  return column * work_with(FirstStage::usual_work(patch_count), patch_count);
+  return column *
+         (2 * kColumnsBefore + FirstStage::usual_work(patch_count) + work_of_rounds(patch_count));
 }
 
 std::shared_ptr<const HierarchicalOperator> build_large_transfer(
@@ -139,21 +143,21 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
   const ThreadLimit limited(plan.thread_count);
   const SolvedTransfer solved(form_factors, patches, kResidualPart * tolerance);
   const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
-  double done = 0;
+  const double work_after = kColumnsBefore + work_of_rounds(patches.size());
+  double searching = 0;  // when the search of the second stage begins
   HierarchicalOperator::Storage fine;
   {
     PanelMatrix matrix(solved, energies, settings.roles);
     FirstStage stage(matrix, patches, lights.shaping, price, plan.panel_count, panels);
-    const double all = work_with(stage.work(), patches.size());
+    const double work = stage.work(), all = kColumnsBefore + work + work_after;
     report_progress(progress, kColumnsBefore / all);
-    done = (kColumnsBefore + stage.work()) / all;
-    fine = stage.run(part_of(progress, kColumnsBefore / all, done));
+    fine = stage.run(part_of(progress, kColumnsBefore / all, (kColumnsBefore + work) / all));
+    searching = (2 * kColumnsBefore + work) / all;
   }
   const RoundedMatrix rounded(solved, energies, std::exchange(fine, {}));
-  const BlockCheckpoint rounds(settings.checkpoint,
-                               second_key(key, lights, settings.compression));
+  const BlockCheckpoint rounds(settings.checkpoint, second_key(key, lights, settings.compression));
   return compress_to_tolerance(rounded, patches, lights, settings.compression,
-                               part_of(progress, done, 1), rounds);
+                               part_of(progress, searching, 1), rounds);
 }
 
 }  // namespace rebounce

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "emitter_points.h"
 #include "harmonic_view.h"
 #include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
@@ -19,6 +20,14 @@ namespace {
 constexpr std::size_t kMostProbes = 65536;
 constexpr std::size_t kBatch = 64;  // probes between two looks at the progress
 constexpr double kLargestBackPart = 0.25;
+
+// An emitter that so many rays have met is known well; others are looked at point by point, by so
+// many points, and all of them together by so many for each ray at most.
+constexpr float kEnoughRays = 64;
+constexpr int kMostPoints = 16, kPointsPerRay = 2;
+
+// A ray has met a point if it ends no farther from it than this part of the way.
+constexpr float kAtPoint = 1e-3F;
 
 using View = HarmonicView<kHarmonicCount>;  // what one probe sees
 
@@ -35,8 +44,10 @@ Float3 fibonacci_direction(int k, int count, double turn) {
 class Viewer {
  public:
   Viewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
-         const RayTracer& tracer, int ray_count)
+         const RayTracer& tracer, std::span<const EmitterPoints> emitters, int ray_count)
       : mesh_(mesh),
+        shown_patch_(shown_patch),
+        emitters_(emitters),
         viewer_(mesh, shown_patch, tracer),
         rays_(static_cast<std::size_t>(ray_count)),
         hits_(rays_.size()) {}
@@ -58,16 +69,69 @@ class Viewer {
     if (static_cast<double>(backs) > kLargestBackPart * static_cast<double>(hits_.size())) {
       return std::nullopt;
     }
-    return viewer_.sum_up(rays_, hits_,
-                          4 * std::numbers::pi_v<float> / static_cast<float>(rays_.size()));
+    const float solid_angle = 4 * std::numbers::pi_v<float> / static_cast<float>(rays_.size());
+    View view = viewer_.sum_up(rays_, hits_, solid_angle);
+    look_at_emitters(position, kEnoughRays * solid_angle, view);
+    return view;
   }
 
  private:
+  /// Emitters are small and bright: a few rays more or less that meet one would be seen. What
+  /// `view` has of those that it sees by less than the solid angle `enough` is found anew.
+  void look_at_emitters(const Float3& position, float enough, View& view) {
+    for (const EmitterPoints& emitter : emitters_) {
+      auto seen = std::ranges::lower_bound(view.patches, emitter.patch, {},
+                                           [](const auto& entry) { return entry.first; });
+      const bool known = seen != view.patches.end() && seen->first == emitter.patch;
+      if (known && spot_of(seen->second).amount * std::numbers::pi_v<float> >= enough) continue;
+      const Harmonics weight = look_at(position, emitter);
+      if (!(weight[0] > 0)) continue;
+      if (!known) seen = view.patches.insert(seen, {emitter.patch, {}});
+      seen->second = weight;
+    }
+  }
+
+  Harmonics look_at(const Float3& position, const EmitterPoints& emitter) {
+    point_rays_.clear();
+    for (const EmitterPoint& point : emitter.point) {
+      point_rays_.push_back(
+          {.origin = position,
+           .t_near = 0,
+           .direction = to_float3(glm::normalize(to_glm(point.position) - to_glm(position))),
+           .t_far = std::numeric_limits<float>::infinity()});
+    }
+    point_hits_.resize(point_rays_.size());
+    viewer_.trace(point_rays_, point_hits_);
+    Harmonics sum{};
+    for (std::size_t k = 0; k < point_rays_.size(); ++k) {
+      const EmitterPoint& point = emitter.point[k];
+      const float way = glm::distance(to_glm(point.position), to_glm(position));
+      const float facing = -glm::dot(to_glm(point.area), to_glm(point_rays_[k].direction));
+      if (patch_at(mesh_, shown_patch_, point_hits_[k]) != emitter.patch || !(facing > 0) ||
+          !(std::abs(point_hits_[k].t - way) <= kAtPoint * way)) {
+        continue;
+      }
+      // A diffuse patch of radiosity B has the luminance B / pi.
+      const float factor = facing / (way * way * std::numbers::pi_v<float>);
+      const Harmonics y = spherical_harmonics(point_rays_[k].direction);
+      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += factor * y[i];
+    }
+    return sum;
+  }
+
   const DisplayMesh& mesh_;
+  std::span<const std::uint32_t> shown_patch_;
+  std::span<const EmitterPoints> emitters_;
   HarmonicViewer<kHarmonicCount> viewer_;
-  std::vector<Ray> rays_;
-  std::vector<Hit> hits_;
+  std::vector<Ray> rays_, point_rays_;
+  std::vector<Hit> hits_, point_hits_;
 };
+
+/// Points on a patch that emits, fewer where there are many of these.
+int points_of_emitter(const TransferData& data, int ray_count) {
+  const auto emitters = static_cast<int>(std::max<std::size_t>(emitter_count(data), 1));
+  return std::clamp(kPointsPerRay * ray_count / emitters, 1, kMostPoints);
+}
 
 void append(const std::optional<View>& seen, LightProbes& probes) {
   probes.valid.push_back(seen ? 1 : 0);
@@ -120,6 +184,8 @@ void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown
   probes.entry_weight.clear();
   probes.sky_cells = {.entry_begin = {0}, .entry_cell = {}, .entry_weight = {}};
   probes.patch_count = data.patches.size();
+  const std::vector<EmitterPoints> emitters =
+      spread_over_emitters(data, shown_patch, points_of_emitter(data, settings.ray_count));
   std::vector<std::optional<View>> views;
   for (std::size_t first = 0; first < probes.size(); first += kBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(probes.size()))) {
@@ -129,7 +195,7 @@ void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown
     views.resize(count);
 #pragma omp parallel
     {
-      Viewer viewer(data.mesh, shown_patch, tracer, settings.ray_count);
+      Viewer viewer(data.mesh, shown_patch, tracer, emitters, settings.ray_count);
 #pragma omp for schedule(dynamic, 1)
       for (std::size_t k = 0; k < count; ++k) {
         views[k] = viewer.look_around(probes.position[first + k], first + k);

@@ -136,9 +136,7 @@ class LightmapPlacer {
     return corner;
   }
 
-  double area_in_world(std::uint32_t t) const {
-    return rebounce::area_of(corners_of(mesh(), t));
-  }
+  double area_in_world(std::uint32_t t) const { return rebounce::area_of(corners_of(mesh(), t)); }
 
   /// The side of surface triangle `t` that has texels; kNone if neither sees anything.
   std::uint32_t mapped_side(std::uint32_t t) const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "affine_links.h"
+#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {
@@ -110,7 +111,8 @@ class Coarsening {
           part->exchange * (child.center - parent.center) + child.covariance * part->gradient_b;
     }
     merged.gradient_b = parent.inverse * product;
-    const double before = squared_norm(link, a, node) + squared_norm(other, a, nodes_[node.sibling]);
+    const double before =
+        squared_norm(link, a, node) + squared_norm(other, a, nodes_[node.sibling]);
     const double change = std::max(0.0, before - squared_norm(merged, a, parent));
     merged.lost = link.lost + other.lost + change;
     return merged;
@@ -126,7 +128,9 @@ class Coarsening {
 
 FormFactorLinks coarsen_links(const FormFactorLinks& links, std::span<const float> area,
                               std::span<const Float3> centroid, double epsilon) {
-  check_link_error(epsilon);
+  if (!(epsilon >= 0) || !std::isfinite(epsilon)) {
+    throw Error("links: the error of coarser ones must be finite and not negative");
+  }
   const std::vector<float> target = row_sums(links, area, centroid);
   Coarsening coarsening(links, spread_nodes(links, area, centroid), epsilon);
   coarsening.run();

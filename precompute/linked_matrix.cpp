@@ -107,9 +107,9 @@ class LinkedMatrix::Filler {
 };
 
 LinkedMatrix::LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches)
-    : LinkedMatrix(
-          links, std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
-          patches) {}
+    : LinkedMatrix(links,
+                   std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
+                   patches) {}
 
 LinkedMatrix::LinkedMatrix(const FormFactorLinks& links,
                            std::shared_ptr<const LinkedFormFactors> product,

@@ -24,7 +24,7 @@ constexpr int kMostRounds = 8;
 constexpr double kLeast = 0.72, kAim = 0.76, kMost = 0.8;
 
 // Rounds that the search takes as a rule.
-constexpr int kUsualRounds = 3;
+constexpr int kUsualRounds = 4;
 
 // Pieces of a round that are kept in one file: some seconds of work where pieces are largest, and
 // enough for many threads to share.

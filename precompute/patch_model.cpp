@@ -56,7 +56,7 @@ class PatchModelBuilder {
     make_patches(tracer);
     find_shown_patches(tracer);
     report_progress(progress_, kAfterClusters);
-    copy_lightmap_texcoords(split_vertices(model_.mesh, tracer));
+    copy_lightmap_texcoords(split_vertices(model_.shown_patch, tracer, model_.mesh));
     if (clamped_count_ > 0) {
       model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
                                 " patches was clamped to 0.99");

@@ -60,8 +60,7 @@ Ray segment_ray(const Float3& from, const Float3& to) {
 
 /// Looks straight up from four points of the triangle, and between their upper ends. The rays are
 /// as long as suits a triangle of `least_size` metres at least.
-Exposure find_exposure(const TriangleCorners& p, double least_size,
-                       const RayTracer& tracer) {
+Exposure find_exposure(const TriangleCorners& p, double least_size, const RayTracer& tracer) {
   const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
   const glm::dvec3 normal = glm::normalize(cross);
   const double height = kProbeHeight * std::max(std::sqrt(0.5 * glm::length(cross)), least_size);

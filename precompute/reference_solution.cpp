@@ -37,8 +37,7 @@ Field<kRows> times(const FormFactorRows& rows, const Field<kRows>& in) {
 }
 
 template <int kRows>
-Field<kRows> times(const std::shared_ptr<const LinkedFormFactors>& links,
-                   const Field<kRows>& in) {
+Field<kRows> times(const std::shared_ptr<const LinkedFormFactors>& links, const Field<kRows>& in) {
   using Columns = std::array<double, kRows>;
   std::vector<Columns> from(in.cols()), to(in.cols());
   const auto size = static_cast<std::size_t>(in.size());

@@ -55,8 +55,7 @@ void PanelMatrix::solve(const ClusterTree& tree, std::span<const Cluster> panels
     if (loop.stopped()) continue;
     const auto [matrix, begin, count] = groups[k];
     try {
-      const SolvedTransfer::Vectors solution =
-          solved().columns(matrix, rows.subspan(begin, count));
+      const SolvedTransfer::Vectors solution = solved().columns(matrix, rows.subspan(begin, count));
       for (std::size_t i = 0; i < place_.size(); ++i) {
         const std::uint32_t row = place_[solved().patch()[i]];
         if (row == kNone) continue;

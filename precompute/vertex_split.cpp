@@ -101,13 +101,16 @@ std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v) {
   return static_cast<std::uint32_t>(mesh.position.size() - 1);
 }
 
-std::vector<std::uint32_t> split_vertices(DisplayMesh& mesh, const RayTracer& tracer) {
+std::vector<std::uint32_t> split_vertices(std::span<const std::uint32_t> shown_patch,
+                                          const RayTracer& tracer, DisplayMesh& mesh) {
   const VertexTriangles around(mesh);
   const auto vertex_count = static_cast<std::uint32_t>(mesh.position.size());
   std::vector<std::uint32_t> groups(around.corner_count());
   const VertexSplitter splitter(mesh, tracer);
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::uint32_t v = 0; v < vertex_count; ++v) {
+    const auto shows = [&](std::uint32_t t) { return shown_patch[t] != kNone; };
+    if (std::ranges::none_of(around[v], shows)) continue;  // its triangles are one group
     splitter.find_groups(v, around[v], around.of(groups, v));
   }
   std::vector<std::uint32_t> vertex_of, copied;

@@ -239,7 +239,7 @@ class InsideOutSearch {
 std::vector<InsideOutPiece> find_inside_out(const Scene& scene) {
   const auto is_one_sided = [&](std::uint32_t m) { return !scene.materials[m].double_sided; };
   if (std::ranges::none_of(scene.triangle_material, is_one_sided)) return {};
-  const RayTracer tracer(scene.position, scene.triangle, {}, TreeQuality::kQuick);
+  const RayTracer tracer(scene.position, scene.triangle);
   return InsideOutSearch(scene, tracer).run();
 }
 

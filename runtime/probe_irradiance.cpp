@@ -67,8 +67,7 @@ class IrradianceSum {
   void add_spot(const LightSpot& spot, const Float3& color) {
     const auto& d = spot.direction;
     // The sine of the disc's half angle, whose cosine is 2 sharpness - 1.
-    const float width =
-        std::max(2 * std::sqrt(spot.sharpness * (1 - spot.sharpness)), kLeastWidth);
+    const float width = std::max(2 * std::sqrt(spot.sharpness * (1 - spot.sharpness)), kLeastWidth);
     const float curvature = 0.25F / width, strength = spot.amount * spot.sharpness;
     const Float3 most = {strength * color[0], strength * color[1], strength * color[2]};
     const float *nx = normals_.axis(0), *ny = normals_.axis(1), *nz = normals_.axis(2);
@@ -101,9 +100,8 @@ void add_view(const LightProbes& probes, std::size_t p, std::span<const Float3> 
   }
   const Float3 luminance = scaled(sky.luminance(), factor);
   if (luminance == Float3{0, 0, 0}) return;
-  sky.for_each_part(p, [&](const Harmonics& weight, float part) {
-    sum.add(weight, scaled(luminance, part));
-  });
+  sky.for_each_part(
+      p, [&](const Harmonics& weight, float part) { sum.add(weight, scaled(luminance, part)); });
 }
 
 /// Calls visit(block, first) for the normals, a block at a time.

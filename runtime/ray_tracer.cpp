@@ -209,7 +209,7 @@ struct RayTracer::Impl {
 };
 
 RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> triangle,
-                     const OpacityMaps& opacity, TreeQuality quality)
+                     const OpacityMaps& opacity)
     : impl_(std::make_unique<Impl>()) {
   impl_->device = rtcNewDevice(kDeviceConfig);
   if (impl_->device == nullptr) throw_if_failed(nullptr, "starting Embree");
@@ -226,9 +226,8 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   }
   // High quality may put a triangle into several leaves, and then filters are called for one hit
   // more than once: transmittance() needs each of them once.
-  const bool best = quality == TreeQuality::kBest && !impl_->has_porous();
   rtcSetSceneBuildQuality(impl_->scene,
-                          best ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
+                          impl_->has_porous() ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   rtcCommitScene(impl_->scene);
   impl_->offset_distance = ray_offset_distance(position);
   throw_if_failed(impl_->device, "building the acceleration structure");

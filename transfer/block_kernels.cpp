@@ -23,7 +23,8 @@ const BlockKernelSet kBlockKernelsPortable = make_block_kernels<Vector4, Shorts8
 
 std::span<const BlockKernelSet* const> block_kernel_sets() {
 #if defined(__x86_64__)
-  static const std::array kSets = {&kBlockKernelsPortable, &kBlockKernelsAvx2, &kBlockKernelsAvx512};
+  static const std::array kSets = {&kBlockKernelsPortable, &kBlockKernelsAvx2,
+                                   &kBlockKernelsAvx512};
 #else
   static const std::array kSets = {&kBlockKernelsPortable};
 #endif

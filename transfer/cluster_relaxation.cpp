@@ -15,6 +15,7 @@
 #include "block_kernels.h"
 #include "cluster_sweep_plan.h"
 #include "hierarchical_storage.h"
+#include "kernels_of_storage.h"
 
 namespace rebounce {
 namespace {
@@ -334,29 +335,13 @@ class ClusterRelaxation final : public Relaxation {
 }  // namespace
 
 std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::Storage& exchange) {
-  const BlockKernelSet& kernels = block_kernels();
-  const std::uint64_t first_core = HierarchicalLayout(exchange).basis_value_count;
   const auto make = [&](const auto& bases, const auto& cores, const auto* basis_values,
                         const auto* core_values, float basis_scale) -> std::unique_ptr<Relaxation> {
     return std::make_unique<ClusterRelaxation<std::remove_cvref_t<decltype(*basis_values)>,
                                               std::remove_cvref_t<decltype(*core_values)>>>(
         exchange, bases, cores, basis_values, core_values, basis_scale);
   };
-  const std::uint16_t* const f16 = exchange.values_f16.data();
-  const float* const f32 = exchange.values_f32.data();
-  switch (exchange.precision) {
-    case Precision::kF16:
-      return make(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core, 1);
-    case Precision::kF32:
-      return make(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core, 1);
-    case Precision::kQ16:
-      return make(kernels.bases_q16, kernels.cores_f16, exchange.bases_q16.data(), f16,
-                  HierarchicalOperator::kShortScale);
-    case Precision::kQ8:
-      return make(kernels.bases_q8, kernels.cores_f16, exchange.bases_q8.data(), f16,
-                  HierarchicalOperator::kByteScale);
-  }
-  return nullptr;
+  return with_kernels_of(exchange, HierarchicalLayout(exchange), make);
 }
 
 }  // namespace rebounce

@@ -10,7 +10,8 @@ const DenseKernels kDenseKernelsPortable = make_dense_kernels<Vector4>("portable
 
 std::span<const DenseKernels* const> dense_kernel_sets() {
 #if defined(__x86_64__)
-  static const std::array kSets = {&kDenseKernelsPortable, &kDenseKernelsAvx2, &kDenseKernelsAvx512};
+  static const std::array kSets = {&kDenseKernelsPortable, &kDenseKernelsAvx2,
+                                   &kDenseKernelsAvx512};
 #else
   static const std::array kSets = {&kDenseKernelsPortable};
 #endif

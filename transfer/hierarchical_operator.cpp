@@ -8,6 +8,7 @@
 #include "block_kernels.h"
 #include "hierarchical_plan.h"
 #include "hierarchical_storage.h"
+#include "kernels_of_storage.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -267,7 +268,6 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const std::size_t misplaced = reinterpret_cast<std::uintptr_t>(workspace.data()) / sizeof(float);
   float* const aligned = workspace.data() + (kLine - misplaced % kLine) % kLine;
   const WorkVectors work(position_count(patch_count()), *layout_, light_count, aligned);
-  const BlockKernelSet& kernels = block_kernels();
   const Exchange exchange{storage_.patch, sqrt_area_, inverse_, work};
   const ChannelLanes lanes(storage_.channel_matrix, storage_.matrix_count);
   for (std::size_t light = 0; light < light_count; ++light) {
@@ -280,21 +280,7 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
     const Phases phases(bases, multiply_cores, basis, core, lanes, basis_scale * basis_scale, work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
-  const std::uint16_t* const f16 = storage_.values_f16.data();
-  const float* const f32 = storage_.values_f32.data();
-  const std::uint64_t first_core = layout_->basis_value_count;
-  switch (storage_.precision) {
-    case Precision::kF16:
-      return apply_phases(kernels.bases_f16, kernels.cores_f16, f16, f16 + first_core, 1);
-    case Precision::kF32:
-      return apply_phases(kernels.bases_f32, kernels.cores_f32, f32, f32 + first_core, 1);
-    case Precision::kQ16:
-      return apply_phases(kernels.bases_q16, kernels.cores_f16, storage_.bases_q16.data(), f16,
-                          kShortScale);
-    case Precision::kQ8:
-      return apply_phases(kernels.bases_q8, kernels.cores_f16, storage_.bases_q8.data(), f16,
-                          kByteScale);
-  }
+  with_kernels_of(storage_, *layout_, apply_phases);
 }
 
 void HierarchicalOperator::apply(std::span<const Float3> initial_exitance,

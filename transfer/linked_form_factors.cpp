@@ -169,8 +169,8 @@ void LinkedFormFactors::find_levels() {
 
 /// Every link twice, once for each of its nodes, by the node that gathers.
 void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
-  const LinksByNode of_node = links_by_node(node_.size(), links.pair.size(),
-                                            [&](std::size_t k) { return links.pair[k]; });
+  const LinksByNode of_node =
+      links_by_node(node_.size(), links.pair.size(), [&](std::size_t k) { return links.pair[k]; });
   incoming_begin_ = of_node.offsets();
   incoming_.reserve(incoming_begin_.back());
   for (std::uint32_t node = 0; node < node_.size(); ++node) {

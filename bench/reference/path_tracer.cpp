@@ -230,7 +230,8 @@ class PathTracer {
       if (path.numbers.survival >= survival) return false;
       path.throughput /= survival;
     }
-    path.origin = tracer_.offset_point(to_float3(point_at(corners, barycentric)), to_float3(normal));
+    path.origin =
+        tracer_.offset_point(to_float3(point_at(corners, barycentric)), to_float3(normal));
     path.normal = normal;
     return true;
   }

@@ -63,9 +63,8 @@ void measure(const std::string& scene, std::size_t patch_count, const Options& o
   nlohmann::ordered_json json = provenance("bench_report", options.common);
   json["scene"] = scene_name(scene);
   json["settings"] = json_of(settings, options.quick);
-  const double seconds = seconds_of([&] {
-    json.update(measure_scene(scene, settings, options.folder, name, progress));
-  });
+  const double seconds = seconds_of(
+      [&] { json.update(measure_scene(scene, settings, options.folder, name, progress)); });
   json["seconds"] = seconds;
   json["seconds_by_phase"] = phases.finish();
   write_text(std::filesystem::path(options.folder) / (name + ".json"), json.dump(1) + "\n");

@@ -49,8 +49,7 @@ SurfacePoint DisplaySurface::point_on(std::uint32_t triangle, const glm::vec3& w
   const double v = weight.y, w = weight.z;
   SurfacePoint point{.triangle = triangle, .weight = weight};
   point.position = glm::vec3((1 - v - w) * t[0] + v * t[1] + w * t[2]);
-  point.geometric_normal =
-      unit_or(glm::vec3(front_normal(t)), glm::vec3(0, 1, 0));
+  point.geometric_normal = unit_or(glm::vec3(front_normal(t)), glm::vec3(0, 1, 0));
   const Uint3& corner = m.triangle[triangle];
   point.shading_normal =
       unit_or(weight.x * to_glm(m.normal[corner[0]]) + weight.y * to_glm(m.normal[corner[1]]) +
@@ -63,8 +62,8 @@ SurfacePoint DisplaySurface::point_at(const Hit& hit) const {
   const glm::vec3 weight(1 - hit.u - hit.v, hit.u, hit.v);
   if (hit.front) return point_on(hit.triangle, weight);
   const auto [a, b, c] = corners_of(mesh(), hit.triangle);
-  const glm::dvec3 p = (1.0 - hit.u - hit.v) * a + static_cast<double>(hit.u) * b +
-                       static_cast<double>(hit.v) * c;
+  const glm::dvec3 p =
+      (1.0 - hit.u - hit.v) * a + static_cast<double>(hit.u) * b + static_cast<double>(hit.v) * c;
   const std::uint32_t back = mesh().back_triangle[hit.triangle];
   return point_on(back, glm::vec3(weights_at(corners_of(mesh(), back), p)));
 }

@@ -32,9 +32,7 @@ struct Furnace {
     test::remove_face(scene, test::Face::kLowZ, 1);
   }
 
-  RayTracer mesh_tracer() const {
-    return make_surface_tracer(data.mesh);
-  }
+  RayTracer mesh_tracer() const { return make_surface_tracer(data.mesh); }
 
   std::vector<Float3> uniform(float value) const {
     return std::vector<Float3>(data.patches.size(), Float3{value, value, value});

@@ -18,8 +18,7 @@ const std::string kName = "panel_0000", kOther = "panel_0001";
 
 BlockPart some_part(std::size_t value_count) {
   BlockPart part;
-  part.blocks.push_back(
-      {.row_begin = 16, .row_count = 32, .column_begin = 0, .column_count = 16});
+  part.blocks.push_back({.row_begin = 16, .row_count = 32, .column_begin = 0, .column_count = 16});
   part.blocks.push_back({.row_count = 16,
                          .column_count = 16,
                          .kind = TransferBlock::Kind::kLowRank,

@@ -24,7 +24,10 @@ struct Measured {
 };
 
 const Measured kMeasured[] = {
+    {"white room", {.patch_count = 4000, .link_count = 188'190, .matrix_count = 1}, 4.2, 22.8},
     {"white room", {.patch_count = 64000, .link_count = 2'900'000, .matrix_count = 1}, 86, 1606},
+    {"white room", {.patch_count = 12000, .link_count = 496'530, .matrix_count = 1}, 13.2, 98.3},
+    {"furnished room", {.patch_count = 4000, .link_count = 663'316, .matrix_count = 3}, 13.1, 65.7},
 };
 
 TEST(BuildEstimate, IsThatOfMeasuredBuildsOnceLinksAreKnown) {
@@ -45,8 +48,8 @@ TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
   omp_set_num_threads(8);
   const CostEstimate free = estimate_operator_from_links(build, kPlenty),
                      least = estimate_operator_from_links(build, 1),
-                     between =
-                         estimate_operator_from_links(build, (free.peak_bytes + least.peak_bytes) / 2);
+                     between = estimate_operator_from_links(
+                         build, (free.peak_bytes + least.peak_bytes) / 2);
   omp_set_num_threads(before);
   EXPECT_LT(least.peak_bytes, between.peak_bytes);
   EXPECT_LE(between.peak_bytes, (free.peak_bytes + least.peak_bytes) / 2);

@@ -33,6 +33,7 @@ constexpr double kClosure = 1e-3;
 
 const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
 const std::string kRoom = kScenes + "furnished_room.gltf";
+const std::string kBareRoom = kScenes + "white_room.gltf";
 
 struct Built {
   TransferData data;
@@ -48,22 +49,25 @@ BuildSettings settings_from_links() {
   return settings;
 }
 
-Built build_from_links(std::uint64_t memory_limit_bytes = 0,
-                       const std::filesystem::path& checkpoint = {}) {
-  BuildSettings settings = settings_from_links();
-  settings.memory_limit_bytes = memory_limit_bytes;
-  settings.checkpoint = checkpoint;
+Built build(const std::string& scene, const BuildSettings& settings) {
   Built built;
-  built.data = build_transfer_data(kRoom, settings, built.report);
+  built.data = build_transfer_data(scene, settings, built.report);
   return built;
 }
 
-/// What the room from links cannot do without, by the estimate before links are known.
-std::uint64_t least_memory() {
+/// Where it does not matter how good the links are, or how many.
+BuildSettings quick_settings() {
   BuildSettings settings = settings_from_links();
+  settings.subdivision.patch_count = 250;
+  settings.form_factors = with_quality(FormFactorQuality::kLow);
+  return settings;
+}
+
+/// What a build cannot do without, by the estimate before links are known.
+std::uint64_t least_memory(BuildSettings settings) {
   settings.memory_limit_bytes = 1;
   BuildReport report;
-  EXPECT_THROW(build_transfer_data(kRoom, settings, report), Error);
+  EXPECT_THROW(build_transfer_data(kBareRoom, settings, report), Error);
   return report.estimate.peak_bytes;
 }
 
@@ -80,7 +84,7 @@ Built exchange_of(const std::string& scene, FormFactorKind kind, std::size_t pat
 
 /// The furnished room from links, made once.
 const Built& room() {
-  static const Built built = build_from_links();
+  static const Built built = build(kRoom, settings_from_links());
   return built;
 }
 
@@ -167,14 +171,16 @@ TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
 
 TEST(BuildFromLinks, TheFileIsTheSameForAnyThreadsAnyMemoryAndWithACheckpoint) {
   const test::TemporaryFolder folder;
+  BuildSettings settings = quick_settings();
+  save_transfer_file(folder / "usual", build(kBareRoom, settings).data);
   const int threads = omp_get_max_threads();
-  save_transfer_file(folder / "usual", room().data);
   omp_set_num_threads(threads + 3);
-  // Half of what the threads would take.
-  const std::uint64_t limit = least_memory() * 3 / 2;
-  const Built limited = build_from_links(limit, folder / "panels");
+  // Not enough for all threads.
+  settings.memory_limit_bytes = least_memory(settings) * 3 / 2;
+  settings.checkpoint = folder / "panels";
+  const Built limited = build(kBareRoom, settings);
   omp_set_num_threads(threads);
-  EXPECT_LE(limited.report.estimate_after_links->peak_bytes, limit);
+  EXPECT_LE(limited.report.estimate_after_links->peak_bytes, settings.memory_limit_bytes);
   save_transfer_file(folder / "other", limited.data);
   EXPECT_EQ(test::read_bytes(folder / "usual"), test::read_bytes(folder / "other"));
   EXPECT_TRUE(std::filesystem::exists(folder / "panels" / "panel_0000"));
@@ -185,7 +191,7 @@ TEST(BuildFromLinks, SaysAgainWhatIsLeftWhenLinksAreKnown) {
   std::vector<CostEstimate> estimates;
   BuildReport report;
   EXPECT_THROW(build_transfer_data(
-                   kRoom, settings_from_links(), report,
+                   kBareRoom, quick_settings(), report,
                    [](std::string_view phase, double) { return phase != "fitting lights"; },
                    [&](const CostEstimate& estimate) { estimates.push_back(estimate); }),
                Cancelled);
@@ -198,9 +204,11 @@ TEST(BuildFromLinks, SaysAgainWhatIsLeftWhenLinksAreKnown) {
 }
 
 TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
-  const std::uint64_t least = least_memory();
-  const std::string refusal = test::error_of([&] { build_from_links(1 << 20); });
-  EXPECT_NE(refusal.find("500 patches (from "), std::string::npos) << refusal;
+  BuildSettings settings = quick_settings();
+  const std::uint64_t least = least_memory(settings);
+  settings.memory_limit_bytes = 1 << 20;
+  const std::string refusal = test::error_of([&] { build(kBareRoom, settings); });
+  EXPECT_NE(refusal.find(" patches (from "), std::string::npos) << refusal;
   const std::string need = " need about ";
   ASSERT_NE(refusal.find(need), std::string::npos) << refusal;
   const double gib = std::stod(refusal.substr(refusal.find(need) + need.size()));

@@ -6,13 +6,13 @@
 
 #include <numbers>
 
+#include "random_light.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "test_scenes.h"
 #include "with_threads.h"
-#include "random_light.h"
 
 namespace rebounce {
 namespace {
@@ -164,7 +164,9 @@ TEST(DenseTransfer, IsLinearInTheLight) {
 TEST(DenseTransfer, SameBitsForAnyNumberOfThreads) {
   PatchModel model = make_patch_model(colourful_room(), {.patch_count = 600});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  const auto make = [&] { return build_dense_transfer(f.exchange, model.patches, Precision::kF32); };
+  const auto make = [&] {
+    return build_dense_transfer(f.exchange, model.patches, Precision::kF32);
+  };
   const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_TRUE(std::ranges::equal(one->storage().tiles_f32, four->storage().tiles_f32));
 }

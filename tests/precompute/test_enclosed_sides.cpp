@@ -47,7 +47,8 @@ void refine(Scene& scene, std::size_t count) {
   subdivide(scene, std::vector<std::uint8_t>(scene.triangle.size(), 1), {.patch_count = count});
 }
 
-/// A room with a shell of about 2,000 triangles, with a hole of so many metres square in its face +z.
+/// A room with a shell of about 2,000 triangles, with a hole of so many metres square in its face
+/// +z.
 Scene room_with_holed_shell(double width) {
   Scene scene = nothing();
   test::add_box(scene, kLow, kHigh, false, kShell);

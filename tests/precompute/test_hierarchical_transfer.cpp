@@ -31,8 +31,8 @@ Room make_room(const Scene& scene, std::size_t patch_count) {
 
 /// Coloured walls, a black block, another colour.
 const Room& furnished_room() {
-  static const Room room = make_room(
-      test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.1F, 0.3F, 0.9F}), 1500);
+  static const Room room =
+      make_room(test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.1F, 0.3F, 0.9F}), 1500);
   return room;
 }
 
@@ -130,7 +130,9 @@ TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
 
 TEST(HierarchicalTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = furnished_room();
-  const auto make = [&] { return compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7); };
+  const auto make = [&] {
+    return compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7);
+  };
   const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_TRUE(std::ranges::equal(one.values_f32, four.values_f32));
   EXPECT_EQ(one.patch, four.patch);

@@ -40,9 +40,9 @@ struct Room {
     scene.materials[1].base_color = {0, 0, 0};
     test::add_box(scene, {2.5, 0, 3}, {3, 1, 4}, false, 1);
     const PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-    exchange = compute_form_factors(model, test::make_tracer(model),
-                                    with_quality(FormFactorQuality::kLow))
-                   .exchange;
+    exchange =
+        compute_form_factors(model, test::make_tracer(model), with_quality(FormFactorQuality::kLow))
+            .exchange;
     patches = model.patches;
     shaping = lights_in(patches, 16, 1);
     judging = lights_in(patches, 12, 2);

@@ -76,10 +76,10 @@ TEST(LightProbes, IrradianceIsThatOfABruteForceGather) {
   light.position = {0.278F, 0.4F, 0.1F};
   engine.relight({&light, 1}, {});
   const ProbeErrors reflected = errors_of_probes(engine);
-  std::printf("relative L2 error of the irradiance: harmonics %.4f reflected, %.4f with the lamp's "
-              "surface; for normals %.4f, %.4f\n",
-              reflected.harmonics, with_lamp.harmonics, reflected.for_normals,
-              with_lamp.for_normals);
+  std::printf(
+      "relative L2 error of the irradiance: harmonics %.4f reflected, %.4f with the lamp's "
+      "surface; for normals %.4f, %.4f\n",
+      reflected.harmonics, with_lamp.harmonics, reflected.for_normals, with_lamp.for_normals);
   EXPECT_LE(reflected.harmonics, 0.02);
   EXPECT_LE(reflected.for_normals, 0.02);
   EXPECT_LE(with_lamp.for_normals, 0.02);
@@ -151,7 +151,8 @@ TEST(LightProbes, EveryDirectionIsPatchOrSkyOrBack) {
     }
     const double sphere = 4 * std::numbers::pi * 0.282095;
     if (probes.valid[p] != 0) {
-      EXPECT_LE(seen, sphere * (1 + 1e-4));
+      // The lamp is measured by itself, more exactly than rays all around measure the rest.
+      EXPECT_LE(seen, sphere * (1 + 2e-3));
       EXPECT_GE(seen, 0.7 * sphere);
     } else {
       EXPECT_EQ(seen, 0);
@@ -192,7 +193,10 @@ TEST(LightProbes, SpacingAndLimits) {
   test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "further apart");
   LightProbes few = place_probes(data.mesh, {.grid = {1, 1, 1}});
   test::expect_error(
-      [&] { trace_probes(data, data.mesh.triangle_patch, make_surface_tracer(data.mesh), {.ray_count = 3}, few); },
+      [&] {
+        trace_probes(data, data.mesh.triangle_patch, make_surface_tracer(data.mesh),
+                     {.ray_count = 3}, few);
+      },
       "64 rays");
 }
 

@@ -272,9 +272,10 @@ TEST(SeenLight, ASunsetLightsProbesFromItsSide) {
   const LightProbes probes = scene.probes_at({{0, 0.5F, 0}, {1.5F, 1, 0}, {-1.5F, 1.2F, 1}}, 4096);
   const Sky sky = sunset();
   const SkyErrors error = errors_of_sky(scene, probes, sky);
-  std::printf("relative L2 error of the irradiance: %.4f, %.4f to degree 2, %.4f for normals, "
-              "%.4f of the mean\n",
-              error.found, error.quadratic, error.for_normals, error.of_mean);
+  std::printf(
+      "relative L2 error of the irradiance: %.4f, %.4f to degree 2, %.4f for normals, "
+      "%.4f of the mean\n",
+      error.found, error.quadratic, error.for_normals, error.of_mean);
   EXPECT_LE(error.found, 0.02);
   EXPECT_LE(error.for_normals, 0.02);
   EXPECT_LE(error.quadratic, 0.025);  // what the series lacks beyond degree 2, not the rays

@@ -60,8 +60,7 @@ struct Room {
 
 /// Coloured walls, a black block, a bright one.
 const Room& furnished() {
-  static const Room room(
-      test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.6F, 0.8F, 0.0F}));
+  static const Room room(test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.6F, 0.8F, 0.0F}));
   return room;
 }
 

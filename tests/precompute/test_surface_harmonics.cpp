@@ -175,7 +175,9 @@ TEST(SurfaceHarmonics, TheFileKeepsThemAndAFrameAllocatesNothing) {
 TEST(SurfaceHarmonics, SameBitsForAnyNumberOfThreads) {
   const TransferData& data = *cornell_box();
   const RayTracer tracer = make_surface_tracer(data.mesh);
-  const auto make = [&] { return trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64}); };
+  const auto make = [&] {
+    return trace_surface_harmonics(data, data.mesh.triangle_patch, tracer, {.ray_count = 64});
+  };
   const SurfaceHarmonics one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_EQ(one.entry_weight, four.entry_weight);
   EXPECT_EQ(one.sky, four.sky);

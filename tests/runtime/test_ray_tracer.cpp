@@ -148,14 +148,10 @@ ExactHit brute_force(const Mesh& mesh, const Ray& ray, const OpacityMaps& opacit
   return nearest;
 }
 
-class RayTracerOfQuality : public ::testing::TestWithParam<TreeQuality> {};
-INSTANTIATE_TEST_SUITE_P(Each, RayTracerOfQuality,
-                         ::testing::Values(TreeQuality::kQuick, TreeQuality::kBest));
-
-TEST_P(RayTracerOfQuality, AgreesWithBruteForce) {
+TEST(RayTracer, AgreesWithBruteForce) {
   RandomNumbers random(20240917);
   const Mesh mesh = random_triangles(random, 200, 1);
-  const RayTracer tracer(mesh.position, mesh.triangle, {}, GetParam());
+  const RayTracer tracer(mesh.position, mesh.triangle);
   std::vector<Ray> rays;
   for (int k = 0; k < 10000; ++k) {
     const Float3 origin = random.in_box(1.5F);

@@ -9,8 +9,8 @@
 
 #include "allocation_counter.h"
 #include "hierarchical_samples.h"
-#include "rebounce/transfer/error.h"
 #include "random_light.h"
+#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {

@@ -8,10 +8,10 @@
 
 #include "../../transfer/dense_kernels.h"
 #include "../../transfer/half_float.h"
+#include "random_light.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "with_threads.h"
-#include "random_light.h"
 
 namespace rebounce {
 namespace {

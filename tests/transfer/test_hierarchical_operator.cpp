@@ -13,10 +13,10 @@
 #include "allocation_counter.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
+#include "random_light.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
 #include "with_threads.h"
-#include "random_light.h"
 
 namespace rebounce {
 namespace {

@@ -11,10 +11,10 @@
 #include "../../transfer/bfloat16.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
+#include "plain_data.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
-#include "plain_data.h"
 
 namespace rebounce {
 namespace {

@@ -7,13 +7,13 @@
 #include <random>
 
 #include "expect_error.h"
+#include "plain_data.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/low_rank_operator.h"
 #include "rebounce/transfer/safetensors.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 #include "transfer_file_tampering.h"
-#include "plain_data.h"
 
 namespace rebounce {
 namespace {

@@ -28,8 +28,8 @@ class ReferenceSolver {
   static constexpr int kTogether = 8;
 
   /// What is solved with: F by pairs, as links, or compressed.
-  using Form = std::variant<FormFactorRows, std::shared_ptr<const LinkedFormFactors>,
-                            CompressedFormFactors>;
+  using Form =
+      std::variant<FormFactorRows, std::shared_ptr<const LinkedFormFactors>, CompressedFormFactors>;
 
   /// Compressed form factors gather in single precision: no solution with them has a smaller
   /// residual than this, whatever is asked for.

@@ -4,8 +4,8 @@
 
 namespace rebounce {
 
-/// Gathering (Burenius, chapter 6): B <- M0 + rho F B, every patch at once from the values before, one
-/// more bounce per sweep.
+/// Gathering (Burenius, chapter 6): B <- M0 + rho F B, every patch at once from the values before,
+/// one more bounce per sweep.
 ///
 /// Jacobi's method is the same iteration: a flat patch does not see itself, so that the diagonal
 /// of I - rho F is 1. The error shrinks per sweep by max(rho) or better.

@@ -44,12 +44,6 @@ enum class PassageDetail : std::uint8_t {
   kMicroTriangle,  ///< the opacity where the ray meets it
 };
 
-/// What the structure that rays are traced through is made for.
-enum class TreeQuality : std::uint8_t {
-  kQuick,  ///< few rays: it is made several times as fast
-  kBest,   ///< many rays: they are traced faster
-};
-
 /// Triangles that rays can be traced against. Immutable, usable from any number of threads.
 class RayTracer {
  public:
@@ -57,7 +51,7 @@ class RayTracer {
   /// `opacity` says which of them light passes through; it may be of more triangles, and is copied.
   /// Throws Error if Embree refuses (out of memory).
   RayTracer(std::span<const Float3> position, std::span<const Uint3> triangle,
-            const OpacityMaps& opacity = {}, TreeQuality quality = TreeQuality::kBest);
+            const OpacityMaps& opacity = {});
   ~RayTracer();
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "rebounce/transfer/transfer_data.h"
+
+namespace rebounce {
+
+/// A point on a surface that emits.
+struct EmitterPoint {
+  Float3 position;
+  Float3 area;  ///< the front's normal times the area that the point stands for, m²
+};
+
+/// Points spread over one patch that emits.
+struct EmitterPoints {
+  std::uint32_t patch = 0;
+  std::vector<EmitterPoint> point;
+};
+
+/// `count` points on each patch of `data` that emits, in the order of the patches; `shown_patch` is
+/// that of PatchModel. The same every time.
+std::vector<EmitterPoints> spread_over_emitters(const TransferData& data,
+                                                std::span<const std::uint32_t> shown_patch,
+                                                int count);
+
+/// How many patches of `data` emit.
+std::size_t emitter_count(const TransferData& data);
+
+}  // namespace rebounce
