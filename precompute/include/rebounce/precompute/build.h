@@ -66,7 +66,8 @@ struct BuildSettings {
   std::optional<Precision> precision;
   /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are
   /// compressed for iterative solvers; 0: they are not, or, where the operator is made from them
-  /// (kLinks), to a fifth of its tolerance. Less: more bytes, fewer errors.
+  /// (kLinks), to a fifth of its tolerance, less where little light reaches the receivers. Less:
+  /// more bytes, fewer errors.
   double form_factor_tolerance = 0;
   /// Whose indirect light is wanted, and what lamps shine on: entries of PatchSelection, or none
   /// for all patches. Only what the light of sources does to receivers is compressed, checked and
