@@ -409,8 +409,8 @@ TEST(SampleSurface, IsUniformByAreaOverLitSides) {
     ++count[is_small ? 2 : p.normal[2] > 0 ? 0 : 1];
     EXPECT_TRUE(!is_small || p.normal[2] < 0);
     centroid += to_dvec3(p.position) / 900.0;
-    const glm::dvec3 again =
-        rebounce::point_at(SceneSurface(scene).corners(p.triangle), {p.barycentric[0], p.barycentric[1]});
+    const glm::dvec3 again = rebounce::point_at(SceneSurface(scene).corners(p.triangle),
+                                                {p.barycentric[0], p.barycentric[1]});
     EXPECT_LT(glm::distance(again, to_dvec3(p.position)), 1e-6);
   }
   EXPECT_NEAR(count[0], 400, 4);
