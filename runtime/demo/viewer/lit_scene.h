@@ -44,8 +44,8 @@ class LitScene {
   std::vector<glm::vec3> bounced_at_vertices(Side side) const;
 
   /// What arrives at `position` on surfaces of these unit normals, as the probes around it see the
-  /// last frame but for lamps; the second side's is zero unless `both`. Finds probes first where the
-  /// file has none.
+  /// last frame but for lamps; the second side's is zero unless `both`. Finds probes first where
+  /// the file has none.
   LightInAir light_in_air(const Float3& position, std::span<const Float3> normals, const Sky& sky,
                           bool both);
 
