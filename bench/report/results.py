@@ -87,6 +87,13 @@ class Result:
     def paths(self):
         return list(dict.fromkeys(row["path"] for row in self["frames"]))
 
+    def fits(self, budget, methods):
+        """Whether a product or a sweep of any of the methods fits into a budget."""
+        return any(
+            r["budget_microseconds"] == budget and r["sweeps"] > 0 and r["method"] in methods
+            for r in self["frames"]
+        )
+
     def best_frames(self, path, methods, budget):
         """The row of least mean error over a light path at a budget, or None if nothing fits."""
         rows = [

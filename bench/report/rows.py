@@ -111,6 +111,13 @@ def equal_time_rows(headlines):
     return rows
 
 
+def shown_on_paths(all_results):
+    """Of the largest results the first into whose frames both sides fit."""
+    sides = (results_module.INVERSES, results_module.GAUSS_SEIDEL)
+    followed = [r for r in all_results if all(r.fits(PATH_BUDGET, side) for side in sides)]
+    return max(followed or all_results, key=lambda r: r.patches)
+
+
 def frame_rows(result, budget=PATH_BUDGET):
     rows = []
     for path in result.paths():

@@ -147,7 +147,7 @@ def draw(headlines, folder):
     for result in all_results:
         if result.scene not in largest or result.patches > largest[result.scene].patches:
             largest[result.scene] = result
-    most = max(all_results, key=lambda r: r.patches)
+    most = rows.shown_on_paths(all_results)
     changes = [results_module.SWITCHED, aims.WARM]
     pictures = {
         "accuracy": plots.accuracy(list(largest.values()), changes, folder / "report_accuracy.png"),
@@ -207,7 +207,9 @@ def write_page(headlines, missing, date, pictures, folder):
 
 def budgets_shown(result):
     """Of a quick report one is enough."""
-    return [rows.PATH_BUDGET] if result["settings"]["quick"] else claims_module.LAG_BUDGETS
+    wanted = [rows.PATH_BUDGET] if result["settings"]["quick"] else claims_module.LAG_BUDGETS
+    methods = (*results_module.INVERSES, *results_module.ITERATIONS)
+    return [budget for budget in wanted if result.fits(budget, methods)]
 
 
 def claim_table(headline):

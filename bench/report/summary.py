@@ -59,6 +59,7 @@ def markdown(headlines, missing, date, pictures):
     """The whole file; `pictures` maps "accuracy", "winners", "frames" and scenes to paths."""
     all_results = [h.result for h in headlines]
     largest = max(all_results, key=lambda r: r.patches)
+    followed = rows.shown_on_paths(all_results)
     parts = [
         "# The stored inverse against Gauss-Seidel",
         "Written by `./dev report`; the raw figures are in `report-out/` after a run, each claim with its "
@@ -84,9 +85,9 @@ def markdown(headlines, missing, date, pictures):
         "## Where Gauss-Seidel wins",
         where_gauss_seidel_wins(headlines),
         "## Light paths",
-        f"{largest.title}, {rows.PATH_BUDGET} µs a frame, each method in its best form and warm from its last frame:",
+        f"{followed.title}, {rows.PATH_BUDGET} µs a frame, each method in its best form and warm from its last frame:",
         f"![Error by frame]({pictures['frames']})",
-        markdown_table(rows.FRAME_NAMES, rows.frame_rows(largest)),
+        markdown_table(rows.FRAME_NAMES, rows.frame_rows(followed)),
         "## What it costs to have",
         markdown_table(rows.COST_SUMMARY_NAMES, rows.cost_summary_rows(headlines)),
         "Break-even: after so many switched frames at an error of 0.1 % the inverse has saved the seconds that it takes "
