@@ -1,6 +1,7 @@
 #include "emitter_points.h"
 
 #include <algorithm>
+#include <map>
 
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
@@ -39,24 +40,19 @@ std::vector<EmitterPoint> spread(const DisplayMesh& mesh, std::span<const std::u
 
 std::vector<EmitterPoints> spread_over_emitters(const TransferData& data,
                                                 std::span<const std::uint32_t> shown_patch,
-                                                int count) {
-  std::vector<std::vector<std::uint32_t>> triangles(data.patches.size());
+                                                int most_each, int most) {
+  std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;  // of each patch that emits
   for (std::uint32_t t = 0; t < shown_patch.size(); ++t) {
     const std::uint32_t patch = shown_patch[t];
     if (patch != kNone && emits(data, patch)) triangles[patch].push_back(t);
   }
+  if (triangles.empty()) return {};
+  const int count = std::clamp(most / static_cast<int>(triangles.size()), 1, most_each);
   std::vector<EmitterPoints> emitters;
-  for (std::uint32_t patch = 0; patch < triangles.size(); ++patch) {
-    if (triangles[patch].empty()) continue;
-    emitters.push_back({patch, spread(data.mesh, triangles[patch], count)});
+  for (const auto& [patch, of_patch] : triangles) {
+    emitters.push_back({patch, spread(data.mesh, of_patch, count)});
   }
   return emitters;
-}
-
-std::size_t emitter_count(const TransferData& data) {
-  const auto is_dark = [](const Float3& exitance) { return exitance == Float3{0, 0, 0}; };
-  return data.patches.size() -
-         static_cast<std::size_t>(std::ranges::count_if(data.patches.emitted_exitance, is_dark));
 }
 
 }  // namespace rebounce

@@ -20,13 +20,11 @@ struct EmitterPoints {
   std::vector<EmitterPoint> point;
 };
 
-/// `count` points on each patch of `data` that emits, in the order of the patches; `shown_patch` is
-/// that of PatchModel. The same every time.
+/// Points on each patch of `data` that emits, in the order of the patches: `most_each`, or fewer if
+/// there would be more than `most` of them, but one at least. `shown_patch` is that of PatchModel.
+/// The same every time.
 std::vector<EmitterPoints> spread_over_emitters(const TransferData& data,
                                                 std::span<const std::uint32_t> shown_patch,
-                                                int count);
-
-/// How many patches of `data` emit.
-std::size_t emitter_count(const TransferData& data);
+                                                int most_each, int most);
 
 }  // namespace rebounce

@@ -127,12 +127,6 @@ class Viewer {
   std::vector<Hit> hits_, point_hits_;
 };
 
-/// Points on a patch that emits, fewer where there are many of these.
-int points_of_emitter(const TransferData& data, int ray_count) {
-  const auto emitters = static_cast<int>(std::max<std::size_t>(emitter_count(data), 1));
-  return std::clamp(kPointsPerRay * ray_count / emitters, 1, kMostPoints);
-}
-
 void append(const std::optional<View>& seen, LightProbes& probes) {
   probes.valid.push_back(seen ? 1 : 0);
   append_view(seen ? *seen : View(),
@@ -185,7 +179,7 @@ void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown
   probes.sky_cells = {.entry_begin = {0}, .entry_cell = {}, .entry_weight = {}};
   probes.patch_count = data.patches.size();
   const std::vector<EmitterPoints> emitters =
-      spread_over_emitters(data, shown_patch, points_of_emitter(data, settings.ray_count));
+      spread_over_emitters(data, shown_patch, kMostPoints, kPointsPerRay * settings.ray_count);
   std::vector<std::optional<View>> views;
   for (std::size_t first = 0; first < probes.size(); first += kBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(probes.size()))) {

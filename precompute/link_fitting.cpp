@@ -72,7 +72,7 @@ class LinkFitting {
         pairs_(exchange, links.patch) {}
 
   /// Link `l` with what its pairs say: sums of the kernel, and of the kernel with the place in
-  /// either node.
+  /// either node. Of a single patch with itself there is no gradient.
   AffineLink fit(std::size_t l) const {
     auto [a, b] = links_.pair[l];
     if (first_[a] > first_[b]) std::swap(a, b);
@@ -88,8 +88,6 @@ class LinkFitting {
       moment_a += sum * from_center(row, a);
       link.exchange += sum;
     }
-    // Of a node with itself both gradients are those of either half.
-    if (a == b) return link;
     link.gradient_a = nodes_[a].inverse * moment_a;
     link.gradient_b = nodes_[b].inverse * moment_b;
     return link;
