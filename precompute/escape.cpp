@@ -118,7 +118,9 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
 EscapedLight share_escape(std::span<const double> row_sum, std::span<const Escape> escape) {
   EscapedLight result;
   for (std::size_t i = 0; i < row_sum.size(); ++i) {
-    const double rest = std::max(0.0, 1 - row_sum[i]), lost = escape[i].sky + escape[i].absorbed;
+    // Sums of links cancel to a little below 0 where nothing is seen.
+    const double rest = std::clamp(1 - row_sum[i], 0.0, 1.0);
+    const double lost = escape[i].sky + escape[i].absorbed;
     const double sky = lost > 0 ? rest * escape[i].sky / lost : 0;
     result.sky_visibility.push_back(static_cast<float>(sky));
     result.absorbed.push_back(static_cast<float>(std::max(0.0, rest - sky)));

@@ -114,5 +114,12 @@ TEST(HemisphereExchange, MakesRowsOfBentPatchesThatAlmostTouchAddUp) {
   EXPECT_LT(f.closure.relative_change, 0.01);
 }
 
+TEST(Escape, PartsStayWithinOneWhateverRowsAddUpTo) {
+  const std::vector<Escape> escape = {{.sky = 0, .absorbed = 1}, {.sky = 1}, {.sky = 0.1}};
+  const EscapedLight light = share_escape(std::vector{-1e-6, -1e-6, 1 + 1e-6}, escape);
+  EXPECT_EQ(light.absorbed, (std::vector<float>{1, 0, 0}));
+  EXPECT_EQ(light.sky_visibility, (std::vector<float>{0, 1, 0}));
+}
+
 }  // namespace
 }  // namespace rebounce
