@@ -54,7 +54,7 @@ constexpr double kLargePatches = 64000, kGrowth = 1.0 / 3;
 
 // Groups of eight lights that are fitted to and measured with, and of each kind of the check, and
 // gathers that each takes; to draw a light, by patches.
-constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 8, kCheckGathers = 25;
+constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 8, kCheckGathers = 7;
 constexpr double kDrawPatch = 4e-7;
 
 // Bytes of a patch of compressed form factors, with no links and for each link of it.

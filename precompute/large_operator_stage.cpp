@@ -139,7 +139,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     if (roles.all_are_both()) {
       data.record.solve_residual = transfer_residual(*data.transfer, *links, patches);
     }
-    return measure_error(data, tracer, reference, seed, part);
+    return measure_error(data, tracer, reference.preconditioned(data.transfer), seed, part);
   });
   record_build(decided, report, errors, data.record);
   if (!decided.store_links) data.links = {};

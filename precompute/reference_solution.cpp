@@ -64,6 +64,13 @@ Field<kRows> times(const CompressedFormFactors& compressed, const Field<kRows>& 
   return out;
 }
 
+/// What the system is and how it is solved.
+struct System {
+  const Form& form;
+  const PatchTable& patches;
+  const TransferOperator* nearly_inverse;  ///< may be null
+};
+
 /// kLights lights on one scene, solved together.
 template <int kLights>
 class ConjugateGradients {
@@ -73,12 +80,15 @@ class ConjugateGradients {
   using Field = rebounce::Field<kRows>;
 
   /// `lights`: kLights of them at most.
-  ConjugateGradients(const Form& form, const PatchTable& patches, Lights lights)
-      : form_(form),
-        area_(Eigen::Map<const Eigen::VectorXf>(patches.area.data(), std::ssize(patches.area))
+  ConjugateGradients(const System& system, Lights lights)
+      : form_(system.form),
+        nearly_inverse_(system.nearly_inverse),
+        area_(Eigen::Map<const Eigen::VectorXf>(system.patches.area.data(),
+                                                std::ssize(system.patches.area))
                   .cast<double>()),
-        root_(kRows, std::ssize(patches.area)),
-        m0_(Field::Zero(kRows, std::ssize(patches.area))) {
+        root_(kRows, area_.size()),
+        m0_(Field::Zero(kRows, area_.size())) {
+    const PatchTable& patches = system.patches;
     for (std::size_t i = 0; i < patches.size(); ++i) {
       for (int k = 0; k < kRows; ++k) {
         const int light = k / kChannelCount, channel = k % kChannelCount;
@@ -92,11 +102,17 @@ class ConjugateGradients {
   Field solve(double residual) const {
     const Totals allowed = residual * residual * per_light(product(m0_, m0_));
     Field z = Field::Zero(kRows, m0_.cols());
+    bool conditioned = nearly_inverse_ != nullptr;
+    if (conditioned) z = root_ * transfer(m0_);
     for (int steps = 0; steps < kMaxSteps;) {
       const Field b = m0_ + root_ * z;
       const Field r = root_ * gather(b) - z;  // R r is the residual of B
       if ((left_over(r) <= allowed).all()) return b;
-      descend(r, allowed, z, steps);
+      if (conditioned) {
+        conditioned = descend_conditioned(r, allowed, z, steps);
+      } else {
+        descend(r, allowed, z, steps);
+      }
     }
     throw Error("the reference solution did not converge in " + std::to_string(kMaxSteps) +
                 " steps; a reflectance must be too close to 1");
@@ -126,6 +142,48 @@ class ConjugateGradients {
     } while (++steps < kMaxSteps && !(left_over(r) <= allowed).all());
   }
 
+  /// The same, preconditioned by I + R Y R, which is nearly the inverse of I - R F R. Directions
+  /// are kept conjugate though it is rounded (G. H. Golub, Q. Ye, 1999). Returns false, with `z` as
+  /// near as it came, if Y is so wrong that it is not positive.
+  bool descend_conditioned(Field r, const Totals& allowed, Field& z, int& steps) const {
+    Field y = condition(r), p = y;
+    Products ry = product(r, y);
+    do {
+      if ((ry <= 0 && product(r, r) > 0).any()) return false;
+      const Field q = p - root_ * gather(root_ * p);
+      const Products alpha = quotient(ry, product(p, q));
+      z += p.colwise() * alpha;
+      const Field change = q.colwise() * alpha;
+      r -= change;
+      y = condition(r);
+      const Products before = std::exchange(ry, product(r, y));
+      p = y - p.colwise() * quotient(product(change, y), before);
+    } while (++steps < kMaxSteps && !(left_over(r) <= allowed).all());
+    return true;
+  }
+
+  Field condition(const Field& r) const { return r + root_ * transfer(root_ * r); }
+
+  /// Y times `in`, in single precision.
+  Field transfer(const Field& in) const {
+    const auto n = static_cast<std::size_t>(in.cols());
+    std::vector<Float3> from(kLights * n), to(kLights * n);
+    std::vector<float> workspace(nearly_inverse_->batch_workspace_size(kLights));
+    for (int k = 0; k < kRows; ++k) {
+      Float3* const light = from.data() + k / kChannelCount * n;
+      for (std::size_t i = 0; i < n; ++i) {
+        light[i][k % kChannelCount] = static_cast<float>(in(k, i));
+      }
+    }
+    nearly_inverse_->apply_batch(kLights, from, to, workspace);
+    Field out(kRows, in.cols());
+    for (int k = 0; k < kRows; ++k) {
+      const Float3* const light = to.data() + k / kChannelCount * n;
+      for (std::size_t i = 0; i < n; ++i) out(k, i) = light[i][k % kChannelCount];
+    }
+    return out;
+  }
+
   Totals left_over(const Field& r) const {
     const Field scaled = root_ * r;
     return per_light(product(scaled, scaled));
@@ -147,6 +205,7 @@ class ConjugateGradients {
   }
 
   const Form& form_;
+  const TransferOperator* nearly_inverse_;
   Eigen::VectorXd area_;
   Field root_, m0_;
 };
@@ -164,34 +223,34 @@ enum class Quantity { kRadiosity, kIndirectIrradiance };
 
 /// Appends the solutions [n] of kLights lights at most.
 template <int kLights>
-void solve_together(const Form& form, const PatchTable& patches,
-                    std::span<const std::vector<Float3>> lights, double residual, Quantity quantity,
+void solve_together(const System& system, std::span<const std::vector<Float3>> lights,
+                    double residual, Quantity quantity,
                     std::vector<std::vector<Double3>>& solutions) {
-  const ConjugateGradients<kLights> solver(form, patches, lights);
+  const ConjugateGradients<kLights> solver(system, lights);
   auto field = solver.solve(residual);
   if (quantity == Quantity::kIndirectIrradiance) field = solver.gather(field);
   for (std::size_t light = 0; light < lights.size(); ++light) {
-    std::vector<Double3>& solution = solutions.emplace_back(patches.size());
+    std::vector<Double3>& solution = solutions.emplace_back(system.patches.size());
     for (std::size_t i = 0; i < solution.size(); ++i) {
       for (int c = 0; c < kChannelCount; ++c) solution[i][c] = field(light * kChannelCount + c, i);
     }
   }
 }
 
-std::vector<std::vector<Double3>> solve(const Form& form, const PatchTable& patches,
+std::vector<std::vector<Double3>> solve(const System& system,
                                         std::span<const std::vector<Float3>> lights,
                                         double residual, Quantity quantity) {
-  if (std::holds_alternative<CompressedFormFactors>(form)) {
+  if (std::holds_alternative<CompressedFormFactors>(system.form)) {
     residual = std::max(residual, ReferenceSolver::kSinglePrecisionResidual);
   }
   std::vector<std::vector<Double3>> solutions;
   while (solutions.size() < lights.size()) {
     const auto left = lights.subspan(solutions.size());
     if (left.size() == 1) {
-      solve_together<1>(form, patches, left, residual, quantity, solutions);
+      solve_together<1>(system, left, residual, quantity, solutions);
     } else {
       solve_together<ReferenceSolver::kTogether>(
-          form, patches, left.first(std::min<std::size_t>(ReferenceSolver::kTogether, left.size())),
+          system, left.first(std::min<std::size_t>(ReferenceSolver::kTogether, left.size())),
           residual, quantity, solutions);
     }
   }
@@ -215,6 +274,16 @@ ReferenceSolver::ReferenceSolver(std::shared_ptr<const LinkedFormFactors> links,
 ReferenceSolver::ReferenceSolver(const TransferData& data)
     : patches_(data.patches), form_(best_form(data)) {}
 
+ReferenceSolver ReferenceSolver::preconditioned(
+    std::shared_ptr<const TransferOperator> nearly_inverse) const {
+  if (nearly_inverse->patch_count() != patches_.size()) {
+    throw Error("reference solution: the operator is not of these patches");
+  }
+  ReferenceSolver solver = *this;
+  if (nearly_inverse->roles().all_are_both()) solver.nearly_inverse_ = std::move(nearly_inverse);
+  return solver;
+}
+
 std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_exitance,
                                                 double residual) const {
   const std::vector<Float3> light(initial_exitance.begin(), initial_exitance.end());
@@ -223,7 +292,8 @@ std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_
 
 std::vector<std::vector<Double3>> ReferenceSolver::radiosities(
     std::span<const std::vector<Float3>> initial_exitances, double residual) const {
-  return solve(form_, patches_, initial_exitances, residual, Quantity::kRadiosity);
+  return solve({form_, patches_, nearly_inverse_.get()}, initial_exitances, residual,
+               Quantity::kRadiosity);
 }
 
 std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3> initial_exitance,
@@ -234,8 +304,8 @@ std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3>
 
 std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
     std::span<const std::vector<Float3>> initial_exitances, double residual) const {
-  const auto solutions =
-      solve(form_, patches_, initial_exitances, residual, Quantity::kIndirectIrradiance);
+  const auto solutions = solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
+                               residual, Quantity::kIndirectIrradiance);
   std::vector<std::vector<Float3>> result;
   for (const std::vector<Double3>& h : solutions) result.push_back(rounded(h));
   return result;

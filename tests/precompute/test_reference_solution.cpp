@@ -10,6 +10,7 @@
 #include <random>
 
 #include "exchange_samples.h"
+#include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/transfer/area_norm.h"
@@ -164,6 +165,55 @@ TEST(ReferenceSolution, SolvesOnCompressedFormFactorsToSinglePrecision) {
   for (std::size_t k = 0; k < lights.size(); ++k) {
     EXPECT_LE(relative_difference(found[k], truths[k], room.patches.area), 1e-5);
   }
+}
+
+/// An operator that gives every patch so many times its own light.
+class Multiple final : public TransferOperator {
+ public:
+  Multiple(std::size_t patch_count, float factor) : patch_count_(patch_count), factor_(factor) {}
+
+  std::size_t patch_count() const override { return patch_count_; }
+  std::size_t bytes() const override { return sizeof(float); }
+  std::string kind() const override { return "multiple"; }
+  std::size_t workspace_size() const override { return 0; }
+  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+             std::span<float>) const override {
+    for (std::size_t i = 0; i < patch_count_; ++i) {
+      for (int c = 0; c < kChannelCount; ++c) {
+        indirect_irradiance[i][c] = factor_ * initial_exitance[i][c];
+      }
+    }
+  }
+
+ private:
+  std::size_t patch_count_;
+  float factor_;
+};
+
+TEST(ReferenceSolution, IsTheSameWithAnyPreconditioner) {
+  const Room room({0.9F, 0.5F, 0.1F});
+  PatchTable darker = room.patches;
+  darker.reflectance.assign(darker.size(), {0.6F, 0.6F, 0.6F});
+  const std::size_t n = room.patches.size();
+  const auto lights = room.lights(ReferenceSolver::kTogether + 1);
+  const ReferenceSolver plain(room.exchange, room.patches);
+  const auto truths = plain.radiosities(lights, 1e-12);
+  const std::shared_ptr<const TransferOperator> operators[] = {
+      build_dense_transfer(room.exchange, room.patches, Precision::kF32),
+      build_dense_transfer(room.exchange, darker, Precision::kF16),
+      std::make_shared<Multiple>(n, 0.5F),
+      // Not positive: it is given up.
+      std::make_shared<Multiple>(n, -10.0F)};
+  for (const auto& nearly_inverse : operators) {
+    const auto found = plain.preconditioned(nearly_inverse).radiosities(lights, 1e-12);
+    for (std::size_t k = 0; k < lights.size(); ++k) {
+      EXPECT_LE(room.residual(lights[k], found[k]), 1.01e-12);
+      for (std::size_t i = 0; i < n; ++i) {
+        for (int c = 0; c < kChannelCount; ++c) ASSERT_NEAR(found[k][i][c], truths[k][i][c], 1e-9);
+      }
+    }
+  }
+  EXPECT_THROW(plain.preconditioned(std::make_shared<Multiple>(n + 1, 0.0F)), Error);
 }
 
 TEST(ReferenceSolution, SameBitsForAnyNumberOfThreads) {
