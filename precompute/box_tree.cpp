@@ -1,6 +1,8 @@
 #include "box_tree.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <numeric>
 #include <utility>
 
@@ -43,14 +45,15 @@ void BoxTree::split(std::size_t index) {
 
 void BoxTree::find(const ConvexRegion& region, std::vector<std::uint32_t>& found) const {
   found.clear();
-  std::vector<std::uint32_t> stack = {0};
-  while (!stack.empty()) {
-    const Node& node = nodes_[stack.back()];
-    stack.pop_back();
+  // Halving 2^32 boxes goes no deeper than this, and leaves one more node to do at each level.
+  std::array<std::uint32_t, 40> stack = {0};
+  std::size_t waiting = 1;
+  while (waiting > 0) {
+    const Node& node = nodes_[stack[--waiting]];
     if (!region.may_meet(node.box)) continue;
     if (node.first_child != 0) {
-      stack.push_back(node.first_child);
-      stack.push_back(node.first_child + 1);
+      stack[waiting++] = node.first_child;
+      stack[waiting++] = node.first_child + 1;
       continue;
     }
     for (std::uint32_t k = node.begin; k < node.end; ++k) {
