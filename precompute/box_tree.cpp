@@ -1,6 +1,8 @@
 #include "box_tree.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <numeric>
 #include <utility>
 
@@ -41,20 +43,21 @@ void BoxTree::split(std::size_t index) {
   nodes_[index] = node;
 }
 
-void BoxTree::find(const Box& box, std::vector<std::uint32_t>& found) const {
+void BoxTree::find(const ConvexRegion& region, std::vector<std::uint32_t>& found) const {
   found.clear();
-  std::vector<std::uint32_t> stack = {0};
-  while (!stack.empty()) {
-    const Node& node = nodes_[stack.back()];
-    stack.pop_back();
-    if (!node.box.meets(box)) continue;
+  // Halving 2^32 boxes goes no deeper than this, and leaves one more node to do at each level.
+  std::array<std::uint32_t, 40> stack = {0};
+  std::size_t waiting = 1;
+  while (waiting > 0) {
+    const Node& node = nodes_[stack[--waiting]];
+    if (!region.may_meet(node.box)) continue;
     if (node.first_child != 0) {
-      stack.push_back(node.first_child);
-      stack.push_back(node.first_child + 1);
+      stack[waiting++] = node.first_child;
+      stack[waiting++] = node.first_child + 1;
       continue;
     }
     for (std::uint32_t k = node.begin; k < node.end; ++k) {
-      if (boxes_[order_[k]].meets(box)) found.push_back(order_[k]);
+      if (region.may_meet(boxes_[order_[k]])) found.push_back(order_[k]);
     }
   }
   std::ranges::sort(found);

@@ -3,18 +3,19 @@
 #include <cstdint>
 #include <vector>
 
+#include "convex_region.h"
 #include "rebounce/runtime/box.h"
 
 namespace rebounce {
 
-/// A binary tree over boxes that finds those that meet another. Immutable, usable from any number
+/// A binary tree over boxes that finds those in a region. Immutable, usable from any number
 /// of threads.
 class BoxTree {
  public:
   explicit BoxTree(std::vector<Box> boxes);
 
-  /// Puts the numbers of the boxes that meet `box` into `found`, ascending.
-  void find(const Box& box, std::vector<std::uint32_t>& found) const;
+  /// Puts the numbers of the boxes that may meet `region` into `found`, ascending.
+  void find(const ConvexRegion& region, std::vector<std::uint32_t>& found) const;
 
  private:
   struct Node {

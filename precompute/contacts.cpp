@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <map>
+#include <iterator>
 #include <optional>
 #include <utility>
 
@@ -20,31 +19,45 @@ constexpr double kSameLine = 8;
 using Corners = TriangleCorners;
 using Heights = std::array<double, 3>;      // of the corners of a triangle above a plane, metres
 using Segment = std::array<glm::dvec3, 2>;  // its ends
-
-/// Edges by their ends, the lower first, and of how many triangles each is one.
-using Outline = std::map<std::array<Float3, 2>, int>;
+using Edge = std::array<Float3, 2>;         // its ends, the lower first
 
 double longest_edge(const Corners& p) {
   return std::max(
       {glm::distance(p[0], p[1]), glm::distance(p[1], p[2]), glm::distance(p[2], p[0])});
 }
 
+/// A triangle whose contacts are looked for.
+struct Touched {
+  std::uint32_t triangle;
+  Corners corner;
+  glm::dvec3 normal;  ///< unit
+  bool both_sides;
+};
+
+/// Leaves one of each kind that is there once, and none of the others.
+void keep_single(std::vector<Edge>& edges) {
+  std::ranges::sort(edges);
+  std::size_t kept = 0;
+  for (std::size_t k = 0, next = 0; k < edges.size(); k = next) {
+    while (next < edges.size() && edges[next] == edges[k]) ++next;
+    if (next == k + 1) edges[kept++] = edges[k];
+  }
+  edges.resize(kept);
+}
+
 class ContactFinder {
  public:
   ContactFinder(const Scene& scene, const ContactSettings& settings)
-      : scene_(scene), settings_(settings), large_(find_large()), tree_(make_boxes()) {}
+      : scene_(scene),
+        settings_(settings),
+        width_(kSameLine * settings.tolerance),
+        large_(find_large()),
+        tree_(make_boxes()) {}
 
   std::vector<Contact> find() const {
     std::vector<std::vector<ContactLine>> lines(large_.size());
-#pragma omp parallel
-    {
-      std::vector<std::uint32_t> near;
-#pragma omp for schedule(dynamic, 64)
-      for (std::size_t k = 0; k < large_.size(); ++k) {
-        tree_.find(box_of(large_[k]), near);
-        lines[k] = lines_on(large_[k], near);
-      }
-    }
+#pragma omp parallel for schedule(dynamic, 64)
+    for (std::size_t k = 0; k < large_.size(); ++k) lines[k] = lines_on(touched(large_[k]));
     std::vector<Contact> contacts;
     for (std::size_t k = 0; k < large_.size(); ++k) {
       for (const ContactLine& line : lines[k]) contacts.push_back({large_[k], line});
@@ -64,59 +77,122 @@ class ContactFinder {
   std::vector<Box> make_boxes() const {
     std::vector<Box> boxes;
     boxes.reserve(large_.size());
-    for (const std::uint32_t t : large_) boxes.push_back(box_of(t));
+    for (const std::uint32_t t : large_) boxes.push_back(box_of(t, 0));
     return boxes;
   }
 
-  Box box_of(std::uint32_t t) const {
+  /// The box around a triangle, larger by `margin` metres on each side.
+  Box box_of(std::uint32_t t, double margin) const {
     Box box;
     for (const std::uint32_t v : scene_.triangle[t]) box.add(to_glm(scene_.position[v]));
-    const glm::vec3 margin(static_cast<float>(settings_.gap));
-    return {box.low - margin, box.high + margin};
+    const glm::vec3 more(static_cast<float>(margin));
+    return {box.low - more, box.high + more};
   }
 
-  /// Contacts of triangle t with the large triangles number `near`.
-  std::vector<ContactLine> lines_on(std::uint32_t t, const std::vector<std::uint32_t>& near) const {
+  Touched touched(std::uint32_t t) const {
     const Corners p = corners_of(scene_, t);
-    const glm::dvec3 normal = front_normal(p);
-    const bool both_sides = scene_.materials[scene_.triangle_material[t]].double_sided;
-    std::vector<ContactLine> lines;
-    Outline outline;
-    for (const std::uint32_t other : near) {
-      if (large_[other] == t) continue;
-      const Corners q = corners_of(scene_, large_[other]);
+    return {t, p, front_normal(p), scene_.materials[scene_.triangle_material[t]].double_sided};
+  }
+
+  /// The contacts of a triangle. Far more pieces lie around it, in its plane, than touch it (one
+  /// that is a thread of a thin tube has the whole tube around it): only those that touch make
+  /// lines, and only lines that cross it are followed beyond it.
+  std::vector<ContactLine> lines_on(const Touched& t) const {
+    std::vector<ContactLine> whole;
+    for (const ContactLine& line : crossing_lines(pieces_in(prism_around(t), t), t)) {
+      std::vector<ContactLine> pieces = pieces_in(strip_around(line, t), t);
+      pieces.push_back(line);
+      std::ranges::copy(crossing_lines(std::move(pieces), t), std::back_inserter(whole));
+    }
+    std::vector<ContactLine> lines = crossing_lines(std::move(whole), t);
+    std::erase_if(lines, [&](const ContactLine& l) { return l.length() < settings_.shortest; });
+    return lines;
+  }
+
+  /// Pieces joined to lines, those that cross a triangle.
+  std::vector<ContactLine> crossing_lines(std::vector<ContactLine> pieces, const Touched& t) const {
+    std::vector<ContactLine> lines = join_lines(std::move(pieces), width_, settings_.tolerance);
+    std::erase_if(lines, [&](const ContactLine& line) { return !crosses(line, t); });
+    return lines;
+  }
+
+  bool crosses(const ContactLine& line, const Touched& t) const {
+    std::array<double, 3> across;
+    for (int k = 0; k < 3; ++k) across[k] = snap(line.across(t.corner[k]), settings_.tolerance);
+    return line.crosses(t.corner, across, settings_.tolerance);
+  }
+
+  /// What is above a triangle or below it.
+  ConvexRegion prism_around(const Touched& t) const {
+    ConvexRegion region = {box_of(t.triangle, settings_.gap + width_), {}};
+    for (int k = 0; k < 3; ++k) {
+      const glm::dvec3& begin = t.corner[k];
+      const glm::dvec3 outwards =
+          glm::normalize(glm::cross(t.corner[(k + 1) % 3] - begin, t.normal));
+      region.sides.push_back({outwards, glm::dot(outwards, begin) + width_});
+    }
+    return region;
+  }
+
+  /// What is above or below a line on a triangle, no farther beyond that than the shortest contact.
+  ConvexRegion strip_around(const ContactLine& line, const Touched& t) const {
+    const double reach = settings_.gap + settings_.shortest + width_;
+    ConvexRegion region = {box_of(t.triangle, reach), {}};
+    for (const glm::dvec3& outwards : {line.across_direction(), -line.across_direction()}) {
+      region.sides.push_back({outwards, glm::dot(outwards, line.begin()) + 2 * width_});
+    }
+    return region;
+  }
+
+  /// The part of a region that is near enough to a triangle's plane, and not wholly behind it.
+  ConvexRegion layer_of(ConvexRegion region, const Touched& t) const {
+    const double height = glm::dot(t.normal, t.corner[0]);
+    // A tolerance more than what is asked of each triangle later.
+    const double above = settings_.gap + settings_.tolerance;
+    const double below = t.both_sides ? above : 2 * settings_.tolerance;
+    region.sides.push_back({t.normal, height + above});
+    region.sides.push_back({-t.normal, below - height});
+    return region;
+  }
+
+  /// Contacts with large triangles, in pieces as small as these, as far as they meet a region.
+  std::vector<ContactLine> pieces_in(const ConvexRegion& region, const Touched& t) const {
+    std::vector<std::uint32_t> near;
+    tree_.find(layer_of(region, t), near);
+    std::vector<ContactLine> pieces;
+    std::vector<Edge> outline;
+    for (const std::uint32_t k : near) {
+      const std::uint32_t other = large_[k];
+      if (other == t.triangle) continue;
+      const Corners q = corners_of(scene_, other);
       Heights height;
-      for (int k = 0; k < 3; ++k) height[k] = glm::dot(q[k] - p[0], normal);
+      for (int c = 0; c < 3; ++c) height[c] = glm::dot(q[c] - t.corner[0], t.normal);
       const auto [lowest, highest] = std::ranges::minmax(height);
       const bool flat = lowest >= -settings_.gap && highest <= settings_.gap;
       const bool behind = highest <= (flat ? -settings_.tolerance : settings_.tolerance);
-      if (behind && !both_sides) continue;
+      if (behind && !t.both_sides) continue;
       if (flat) {
-        add_edges(large_[other], outline);
+        add_edges(other, region, outline);
       } else if (const auto ends = meet(q, height)) {
-        add(*ends, p[0], normal, lines);
+        if (region.may_meet((*ends)[0], (*ends)[1])) add(*ends, t, pieces);
       }
     }
-    for (const auto& [edge, count] : outline) {
-      if (count == 1) add({to_dvec3(edge[0]), to_dvec3(edge[1])}, p[0], normal, lines);
-    }
-    std::erase_if(lines, [&](const ContactLine& line) {
-      std::array<double, 3> across;
-      for (int k = 0; k < 3; ++k) across[k] = snap(line.across(p[k]), settings_.tolerance);
-      return line.length() < settings_.shortest || !line.crosses(p, across, settings_.tolerance);
-    });
-    return lines;
+    keep_single(outline);
+    for (const Edge& edge : outline) add({to_dvec3(edge[0]), to_dvec3(edge[1])}, t, pieces);
+    return pieces;
   }
 
   static double snap(double distance, double tolerance) {
     return std::abs(distance) <= tolerance ? 0 : distance;
   }
 
-  void add_edges(std::uint32_t t, Outline& outline) const {
+  /// Edges in a region. Of those the tree finds every triangle that is not behind, so that single
+  /// ones are outlines.
+  void add_edges(std::uint32_t t, const ConvexRegion& region, std::vector<Edge>& edges) const {
     for (int k = 0; k < 3; ++k) {
       const Float3& a = scene_.position[scene_.triangle[t][k]];
       const Float3& b = scene_.position[scene_.triangle[t][(k + 1) % 3]];
-      ++outline[{std::min(a, b), std::max(a, b)}];
+      if (region.may_meet(to_glm(a), to_glm(b))) edges.push_back({std::min(a, b), std::max(a, b)});
     }
   }
 
@@ -141,76 +217,21 @@ class ContactFinder {
     return Segment{end[0], end[1]};
   }
 
-  /// Adds a segment, moved into the plane through `origin`, to `lines`.
-  void add(Segment segment, const glm::dvec3& origin, const glm::dvec3& normal,
-           std::vector<ContactLine>& lines) const {
-    for (glm::dvec3& end : segment) end -= glm::dot(end - origin, normal) * normal;
+  /// Adds a segment, moved into the triangle's plane, to `pieces`.
+  void add(Segment segment, const Touched& t, std::vector<ContactLine>& pieces) const {
+    for (glm::dvec3& end : segment) end -= glm::dot(end - t.corner[0], t.normal) * t.normal;
     if (glm::distance(segment[0], segment[1]) <= settings_.tolerance) return;
-    merge(ContactLine(segment[0], segment[1], normal), normal, lines);
-  }
-
-  /// Adds `line` to `lines`, joined with all those that go on from it.
-  void merge(ContactLine line, const glm::dvec3& normal, std::vector<ContactLine>& lines) const {
-    for (std::size_t k = 0; k < lines.size();) {
-      const auto joined = join(line, lines[k], normal);
-      if (!joined) {
-        ++k;
-        continue;
-      }
-      line = *joined;
-      lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(k));
-      k = 0;
-    }
-    lines.push_back(line);
-  }
-
-  /// Two lines as one, if one goes on where the other ends, or they overlap.
-  std::optional<ContactLine> join(const ContactLine& a, const ContactLine& b,
-                                  const glm::dvec3& normal) const {
-    const ContactLine& longer = a.length() > b.length() ? a : b;
-    const ContactLine& shorter = a.length() > b.length() ? b : a;
-    const glm::dvec3 begin = shorter.begin(), end = shorter.end();
-    const double farthest = std::max(std::abs(longer.across(begin)), std::abs(longer.across(end)));
-    if (farthest > kSameLine * settings_.tolerance) return {};
-    const auto [low, high] = std::minmax({longer.along(begin), longer.along(end)});
-    if (high < -settings_.tolerance || low > longer.length() + settings_.tolerance) return {};
-    const glm::dvec3 direction = (longer.end() - longer.begin()) / longer.length();
-    return ContactLine(longer.begin() + std::min(low, 0.0) * direction,
-                       longer.begin() + std::max(high, longer.length()) * direction, normal);
+    pieces.emplace_back(segment[0], segment[1], t.normal);
   }
 
   const Scene& scene_;
   const ContactSettings& settings_;
+  double width_;                      ///< of what counts as one line, metres to either side
   std::vector<std::uint32_t> large_;  ///< triangles that may cut and be cut
   BoxTree tree_;                      ///< over them
 };
 
 }  // namespace
-
-ContactLine::ContactLine(const glm::dvec3& begin, const glm::dvec3& end, const glm::dvec3& normal)
-    : begin_(begin),
-      direction_(glm::normalize(end - begin)),
-      across_(glm::cross(normal, direction_)),
-      length_(glm::distance(begin, end)) {}
-
-bool ContactLine::crosses(const std::array<glm::dvec3, 3>& corner,
-                          const std::array<double, 3>& across, double tolerance) const {
-  const auto [lowest, highest] = std::ranges::minmax(across);
-  if (lowest >= 0 || highest <= 0) return false;
-  double low = std::numeric_limits<double>::infinity(), high = -low;
-  const auto reach = [&](const glm::dvec3& point) {
-    low = std::min(low, along(point));
-    high = std::max(high, along(point));
-  };
-  for (int k = 0; k < 3; ++k) {
-    const int next = (k + 1) % 3;
-    if (across[k] == 0) reach(corner[k]);
-    if (across[k] * across[next] < 0) {
-      reach(glm::mix(corner[k], corner[next], across[k] / (across[k] - across[next])));
-    }
-  }
-  return std::min(high, length_) - std::max(low, 0.0) > tolerance;
-}
 
 std::vector<Contact> find_contacts(const Scene& scene, const ContactSettings& settings) {
   return ContactFinder(scene, settings).find();
