@@ -7,8 +7,9 @@
 namespace rebounce {
 namespace {
 
-// A difference of one in normal or reflectance weighs like this many mean patch sizes of distance.
-constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0;
+// A difference of one in normal, reflectance or cover weighs like this many mean patch sizes of
+// distance.
+constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0, kCoverWeight = 2.0;
 
 // Only pieces of the mesh up to this many times the length that may merge around itself are things
 // and not walls.
@@ -47,6 +48,7 @@ Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
     cluster.sum[3 + k] = kNormalWeight * size * elements.normal[e][k];
     cluster.sum[6 + k] = kReflectanceWeight * size * elements.reflectance[e][k];
   }
+  cluster.sum[9] = kCoverWeight * size * elements.covered[e];
   for (double& s : cluster.sum) s *= cluster.area;
   cluster.low = elements.low(e);
   cluster.high = elements.high(e);

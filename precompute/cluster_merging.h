@@ -22,11 +22,12 @@ inline constexpr std::size_t kWitnessCount = 4;
 
 /// Elements taken together.
 struct Cluster {
-  static constexpr std::size_t kFeatureCount = 9;
+  static constexpr std::size_t kFeatureCount = 10;
 
-  double area = 0;                          ///< m²
-  std::array<double, kFeatureCount> sum{};  ///< of area x feature: place, normal, reflectance
-  glm::vec3 low{0}, high{0};                ///< box around it, metres
+  double area = 0;  ///< m²
+  std::array<double, kFeatureCount>
+      sum{};                  ///< of area x feature: place, normal, reflectance, cover
+  glm::vec3 low{0}, high{0};  ///< box around it, metres
   std::array<std::uint32_t, kWitnessCount> witness{};  ///< its largest elements
   std::uint8_t witness_count = 0;
   bool emits = false;
@@ -34,8 +35,8 @@ struct Cluster {
   glm::dvec3 centroid() const { return glm::dvec3(sum[0], sum[1], sum[2]) / area; }
 };
 
-/// A cluster of element `e` alone. A difference of one in normal or reflectance weighs like some
-/// patches of `size` metres of distance.
+/// A cluster of element `e` alone. A difference of one in normal, reflectance or cover weighs like
+/// some patches of `size` metres of distance.
 Cluster make_cluster(const Elements& elements, std::uint32_t e, double size);
 
 /// Two clusters as one.

@@ -192,6 +192,7 @@ void Elements::resize(std::size_t count) {
   area.resize(count);
   reflectance.resize(count);
   emits.resize(count);
+  covered.resize(count);
 }
 
 Float3 Elements::centroid(std::size_t e) const {

@@ -171,6 +171,7 @@ class ReconstructionWeights {
     area_.resize(n);
     centroid_.resize(n);
     exposure_.resize(n);
+    triangle_exposure_.assign(mesh_.triangle.size(), Exposure::kMixed);
     const double least_size = kLeastProbeSize * mean_patch_size();
 #pragma omp parallel for schedule(dynamic, 16)
     for (std::size_t i = 0; i < n; ++i) {
@@ -179,7 +180,8 @@ class ReconstructionWeights {
       for (const std::uint32_t t : triangles_[i]) {
         const TriangleCorners p = corners_of(mesh_, t);
         const double size = area_of(p);
-        area[static_cast<std::size_t>(find_exposure(p, least_size, tracer_))] += size;
+        triangle_exposure_[t] = find_exposure(p, least_size, tracer_);
+        area[static_cast<std::size_t>(triangle_exposure_[t])] += size;
         moment += size / 3 * (p[0] + p[1] + p[2]);
       }
       const double whole = area[0] + area[1] + area[2];
@@ -197,6 +199,7 @@ class ReconstructionWeights {
     std::vector<glm::dvec3> normal(receivers_.size(), glm::dvec3(0));
     std::vector<double> largest(receivers_.size(), 0.0);
     std::vector<float> size_sum(receivers_.size(), 0.0F), count(receivers_.size(), 0.0F);
+    is_covered_.assign(receivers_.size(), 1);
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
       const TriangleCorners p = corners_of(mesh_, t);
       const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
@@ -211,6 +214,7 @@ class ReconstructionWeights {
         }
         if (patch == kNone) continue;
         receivers_[v].is_shown = true;
+        if (triangle_exposure_[t] != Exposure::kCovered) is_covered_[v] = 0;
         size_sum[v] += std::sqrt(area_[patch]);
         count[v] += 1;
       }
@@ -223,8 +227,9 @@ class ReconstructionWeights {
     }
   }
 
-  /// Patches in the open, if need be from farther away; else those that are mixed, on whose rim the
-  /// vertex lies; else its own.
+  /// Of a vertex in the open: patches in the open, if need be from farther away; else those that
+  /// are mixed, on whose rim the vertex lies. Of one that is covered: covered patches, else mixed
+  /// ones. Else its own.
   std::vector<Giver> find_givers(const GiverSearch& search, std::size_t v,
                                  GiverSearch::Scratch& scratch) const {
     const auto within = [&](float reach) {
@@ -234,6 +239,11 @@ class ReconstructionWeights {
     const auto is = [&](Exposure e) {
       return [this, e](const Giver& g) { return exposure_[g.patch] == e; };
     };
+    if (is_covered_[v] != 0) {
+      for (const Exposure e : {Exposure::kCovered, Exposure::kMixed}) {
+        if (std::ranges::any_of(near, is(e))) return only(near, is(e));
+      }
+    }
     if (std::ranges::any_of(near, is(Exposure::kOpen))) return only(near, is(Exposure::kOpen));
     if (std::ranges::any_of(near, is(Exposure::kMixed))) {
       const std::vector<Giver> farther =
@@ -314,10 +324,12 @@ class ReconstructionWeights {
   DisplayMesh& mesh_;
   const PatchTriangles triangles_;
   const VertexPatches own_patches_;
-  std::vector<float> area_;          ///< [n] m²
-  std::vector<glm::vec3> centroid_;  ///< [n]
-  std::vector<Exposure> exposure_;   ///< [n]
-  std::vector<Receiver> receivers_;  ///< [v]
+  std::vector<float> area_;                  ///< [n] m²
+  std::vector<glm::vec3> centroid_;          ///< [n]
+  std::vector<Exposure> exposure_;           ///< [n]
+  std::vector<Exposure> triangle_exposure_;  ///< [t] kMixed where there is no patch
+  std::vector<Receiver> receivers_;          ///< [v]
+  std::vector<std::uint8_t> is_covered_;     ///< [v] all triangles that show a patch are covered
 };
 
 }  // namespace
