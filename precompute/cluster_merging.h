@@ -24,7 +24,8 @@ inline constexpr std::size_t kWitnessCount = 4;
 struct Cluster {
   static constexpr std::size_t kFeatureCount = 10;
 
-  double area = 0;  ///< m²
+  double surface = 0;  ///< m²
+  double area = 0;     ///< m², each element's times its importance
   std::array<double, kFeatureCount>
       sum{};                  ///< of area x feature: place, normal, reflectance, cover
   glm::vec3 low{0}, high{0};  ///< box around it, metres
@@ -127,6 +128,7 @@ class ClusterMerging {
 
   void queue(std::uint32_t a, std::uint32_t b);
   bool is_alive(std::uint32_t c) const { return merged_into_[c] == kNone; }
+  bool is_too_long(const Cluster& a, const Cluster& b) const;
   double cost_of_walls(std::uint32_t a, std::uint32_t b) const;
   double hidden_part(std::uint32_t a, std::uint32_t b) const;
   SightCount look_between(std::uint32_t a, std::uint32_t b) const;

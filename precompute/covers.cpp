@@ -16,6 +16,9 @@ using EdgeKey = ConformingMesh::EdgeKey;
 // Points of a triangle at which it is looked for covers before it is bisected.
 constexpr std::uint32_t kPoints = kMostCoverPoints;
 
+// Points that tell whether a half of it is covered.
+constexpr std::uint32_t kPointsOfHalf = 7;
+
 // Triangles whose longest edge is no longer than this many patch sizes are fine enough.
 constexpr double kFinest = 0.3;
 
@@ -122,6 +125,10 @@ double covered_part(const TriangleCorners& corners, const RayTracer& tracer, dou
   tracer.occluded(rays);
   return static_cast<double>(std::ranges::count_if(rays, is_occluded)) /
          static_cast<double>(rays.size());
+}
+
+bool is_covered(const TriangleCorners& corners, const RayTracer& tracer, double height) {
+  return covered_part(corners, tracer, height, kPointsOfHalf) >= 0.5;
 }
 
 std::vector<std::uint32_t> refine_at_covers(Scene& scene, std::span<const TriangleSides> sides,

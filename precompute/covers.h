@@ -25,6 +25,14 @@ inline constexpr std::uint32_t kMostCoverPoints = 16;
 double covered_part(const TriangleCorners& corners, const RayTracer& tracer, double height,
                     std::uint32_t count);
 
+/// What hangs no higher above a surface than this many mean patch sizes ends the smooth light on
+/// it.
+inline constexpr double kCloseCover = 0.25;
+
+/// Whether at least half of a triangle's front is covered by what hangs no higher than `height`
+/// metres.
+bool is_covered(const TriangleCorners& corners, const RayTracer& tracer, double height);
+
 /// Bisects triangles of which a part is covered and a part is in the open, until they are small
 /// beside a patch of `patch_size` metres: so patches can end about where covers do, whatever these
 /// are made of. `sides` [t] are those of the triangles, and only those that are lit count; `tracer`

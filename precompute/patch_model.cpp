@@ -15,6 +15,7 @@
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
+#include "seen_part.h"
 #include "vertex_split.h"
 
 namespace rebounce {
@@ -28,13 +29,14 @@ constexpr double kAfterContacts = 0.08, kAfterSides = 0.25, kAfterElements = 0.3
 // most.
 constexpr double kMostAtCovers = 4;
 
-// What hangs no higher above a surface than this many mean patch sizes ends the smooth light on it.
-constexpr double kCloseCover = 1.0 / 8;
+// What is covered counts for so much less where patches are shared out: it is dark, and gets its
+// light from close by.
+constexpr double kLessCovered = 0.75;
 
-// An element of more than this part of a mean patch is looked at for covers at so many points; a
-// smaller one at one.
+// An element of more than this part of a mean patch is looked at for covers at so many points, and
+// by so many rays for what it sees; a smaller one at one, and is taken to see much.
 constexpr double kSmallElement = 1.0 / 16;
-constexpr std::uint32_t kCoverPoints = 8;
+constexpr std::uint32_t kCoverPoints = 8, kSightRays = 64;
 
 class PatchModelBuilder {
  public:
@@ -51,7 +53,7 @@ class PatchModelBuilder {
       if (opacity.stopping_part(t) == 0) sides_[t] = {SideKind::kOpening, SideKind::kOpening};
     }
     const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
-    inherit_sides(subdivide(scene_, patches_per_triangle(), settings));
+    inherit_sides(subdivide(scene_, patches_per_triangle(), settings, importances(tracer)));
     refine(tracer, scene_size);
   }
 
@@ -93,6 +95,29 @@ class PatchModelBuilder {
     const double wanted = std::pow(scene_size / patch_size, 2);
     inherit_sides(refine_at_covers(scene_, sides_, tracer, patch_size,
                                    static_cast<std::size_t>(kMostAtCovers * wanted)));
+  }
+
+  /// What each triangle counts for: as much as the more important of its lit sides. Nothing where
+  /// patches are to have a size.
+  std::vector<float> importances(const RayTracer& tracer) const {
+    if (settings_.patch_size > 0) return {};
+    const double mean_area =
+        std::pow(mean_patch_size(scene_, patches_per_triangle(), settings_.patch_count), 2);
+    std::vector<float> result(sides_.size(), 1.0F);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+      const auto [p, q, r] = corners_of(scene_, t);
+      const TriangleCorners front{p, q, r}, back{p, r, q};
+      if (rebounce::area_of(front) <= kSmallElement * mean_area) continue;
+      const auto of = [&](const TriangleCorners& side) {
+        return static_cast<float>(importance(seen_part(side, tracer, kSightRays, t)));
+      };
+      float most = 0;
+      if (sides_[t].front == SideKind::kLit) most = of(front);
+      if (sides_[t].back == SideKind::kLit && most < 1) most = std::max(most, of(back));
+      if (most > 0) result[t] = most;
+    }
+    return result;
   }
 
   /// Gives the parts of triangles their sides; `source` [t] is the triangle that each was part of.
@@ -256,6 +281,11 @@ class PatchModelBuilder {
       const bool small = elements_.area[e] <= kSmallElement * patch_area_;
       elements_.covered[e] = static_cast<float>(covered_part(
           {p, q, r}, tracer, kCoverHeight * std::sqrt(patch_area_), small ? 1 : kCoverPoints));
+      if (settings_.patch_size == 0) {
+        const double seen = small ? 1 : importance(seen_part({p, q, r}, tracer, kSightRays, e));
+        elements_.importance[e] =
+            static_cast<float>(seen * (1 - kLessCovered * elements_.covered[e]));
+      }
       elements_.emits[e] =
           std::ranges::any_of(mean_exitance(t), [](float m) { return m > 0; }) ? 1 : 0;
     }

@@ -18,9 +18,6 @@ namespace {
 // to the third corner on either side.
 constexpr double kAlongEdge = 0.25, kAwayFromEdge = 0.1;
 
-// Points at which a triangle is looked at for covers: all of them must be covered.
-constexpr std::uint32_t kCoverPoints = 4;
-
 /// The display triangles around each vertex, in ascending order.
 class VertexTriangles {
  public:
@@ -53,8 +50,8 @@ class VertexSplitter {
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t t = 0; t < place_.size(); ++t) {
       if (shown_patch[t] == kNone) continue;
-      const bool covered = covered_part(corners_of(mesh, static_cast<std::uint32_t>(t)), tracer,
-                                        cover_height, kCoverPoints) == 1;
+      const TriangleCorners corners = corners_of(mesh, static_cast<std::uint32_t>(t));
+      const bool covered = is_covered(corners, tracer, cover_height);
       place_[t] = covered ? Place::kCovered : Place::kOpen;
     }
   }
