@@ -1,14 +1,16 @@
 #include "cluster_merging.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
 namespace {
 
-// A difference of one in normal or reflectance weighs like this many mean patch sizes of distance.
-constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0;
+// A difference of one in normal, reflectance or cover weighs like this many mean patch sizes of
+// distance.
+constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0, kCoverWeight = 1.0;
 
 // Only pieces of the mesh up to this many times the length that may merge around itself are things
 // and not walls.
@@ -40,13 +42,15 @@ double joint_weight(const Cluster& a, const Cluster& b) {
 
 Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
   Cluster cluster;
-  cluster.area = elements.area[e];
+  cluster.surface = elements.area[e];
+  cluster.area = cluster.surface * elements.importance[e];
   const Float3 centroid = elements.centroid(e);
   for (int k = 0; k < 3; ++k) {
     cluster.sum[k] = centroid[k];
     cluster.sum[3 + k] = kNormalWeight * size * elements.normal[e][k];
     cluster.sum[6 + k] = kReflectanceWeight * size * elements.reflectance[e][k];
   }
+  cluster.sum[9] = kCoverWeight * size * elements.covered[e];
   for (double& s : cluster.sum) s *= cluster.area;
   cluster.low = elements.low(e);
   cluster.high = elements.high(e);
@@ -58,6 +62,7 @@ Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
 
 Cluster join(const Elements& elements, const Cluster& a, const Cluster& b) {
   Cluster whole;
+  whole.surface = a.surface + b.surface;
   whole.area = a.area + b.area;
   for (std::size_t k = 0; k < whole.sum.size(); ++k) whole.sum[k] = a.sum[k] + b.sum[k];
   whole.low = glm::min(a.low, b.low);
@@ -140,7 +145,7 @@ void ClusterMerging::merge_cheapest(std::size_t count, const Watch& watch) {
     const Candidate pair = queue_.top();
     queue_.pop();
     if (!is_alive(pair.a) || !is_alive(pair.b)) continue;
-    if (joint_length(clusters_[pair.a], clusters_[pair.b]) > limits_.largest) continue;
+    if (is_too_long(clusters_[pair.a], clusters_[pair.b])) continue;
     if (!pair.is_final) {
       const double more = cost_of_walls(pair.a, pair.b);
       if (more > 0) {
@@ -153,9 +158,16 @@ void ClusterMerging::merge_cheapest(std::size_t count, const Watch& watch) {
   }
 }
 
+/// What counts for little may be longer.
+bool ClusterMerging::is_too_long(const Cluster& a, const Cluster& b) const {
+  const double scale = std::sqrt((a.surface + b.surface) / (a.area + b.area));
+  return joint_length(a, b) > limits_.largest * scale;
+}
+
 /// What the walls between two add to merging_cost().
 double ClusterMerging::cost_of_walls(std::uint32_t a, std::uint32_t b) const {
-  return hidden_part(a, b) * limits_.wall * limits_.wall * joint_weight(clusters_[a], clusters_[b]);
+  const double sa = clusters_[a].surface, sb = clusters_[b].surface;
+  return hidden_part(a, b) * limits_.wall * limits_.wall * sa * sb / (sa + sb);
 }
 
 /// The part of the view between two that is blocked, 0 if most is free.

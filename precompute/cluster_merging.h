@@ -22,11 +22,13 @@ inline constexpr std::size_t kWitnessCount = 4;
 
 /// Elements taken together.
 struct Cluster {
-  static constexpr std::size_t kFeatureCount = 9;
+  static constexpr std::size_t kFeatureCount = 10;
 
-  double area = 0;                          ///< m²
-  std::array<double, kFeatureCount> sum{};  ///< of area x feature: place, normal, reflectance
-  glm::vec3 low{0}, high{0};                ///< box around it, metres
+  double surface = 0;  ///< m²
+  double area = 0;     ///< m², each element's times its importance
+  std::array<double, kFeatureCount>
+      sum{};                  ///< of area x feature: place, normal, reflectance, cover
+  glm::vec3 low{0}, high{0};  ///< box around it, metres
   std::array<std::uint32_t, kWitnessCount> witness{};  ///< its largest elements
   std::uint8_t witness_count = 0;
   bool emits = false;
@@ -34,8 +36,8 @@ struct Cluster {
   glm::dvec3 centroid() const { return glm::dvec3(sum[0], sum[1], sum[2]) / area; }
 };
 
-/// A cluster of element `e` alone. A difference of one in normal or reflectance weighs like some
-/// patches of `size` metres of distance.
+/// A cluster of element `e` alone. A difference of one in normal, reflectance or cover weighs like
+/// some patches of `size` metres of distance.
 Cluster make_cluster(const Elements& elements, std::uint32_t e, double size);
 
 /// Two clusters as one.
@@ -126,6 +128,7 @@ class ClusterMerging {
 
   void queue(std::uint32_t a, std::uint32_t b);
   bool is_alive(std::uint32_t c) const { return merged_into_[c] == kNone; }
+  bool is_too_long(const Cluster& a, const Cluster& b) const;
   double cost_of_walls(std::uint32_t a, std::uint32_t b) const;
   double hidden_part(std::uint32_t a, std::uint32_t b) const;
   SightCount look_between(std::uint32_t a, std::uint32_t b) const;

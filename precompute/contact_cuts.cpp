@@ -1,5 +1,4 @@
-// Bisection: M.-C. Rivara, "New longest-edge algorithms for the refinement and/or improvement of
-// unstructured triangulations" (1997), the longest-edge propagation path.
+// Bisection: longest_edges.h.
 // Vertices moved onto the line before edges are cut: F. Labelle and J. R. Shewchuk, "Isosurface
 // stuffing" (2007), there in three dimensions.
 
@@ -16,6 +15,7 @@
 
 #include "conforming_mesh.h"
 #include "contacts.h"
+#include "longest_edges.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {
@@ -87,47 +87,21 @@ class ContactCuts {
     const std::vector<std::uint32_t>& pieces = pieces_of(contact);
     const double longest = kLongestEdge * patch_size_;
     for (std::size_t k = 0; k < pieces.size(); ++k) {
-      while (mesh_.length_squared(longest_edge(pieces[k])) > longest * longest &&
+      while (mesh_.length_squared(longest_edge(mesh_, pieces[k])) > longest * longest &&
              is_crossed(pieces[k], contact.line)) {
         bisect(pieces[k]);
       }
     }
   }
 
-  bool is_longer(EdgeKey a, EdgeKey b) const {
-    const float la = mesh_.length_squared(a), lb = mesh_.length_squared(b);
-    return la != lb ? la > lb : a < b;
-  }
-
-  EdgeKey longest_edge(std::uint32_t t) const {
-    EdgeKey longest = mesh_.edge(t, 0);
-    for (int corner = 1; corner < 3; ++corner) {
-      if (is_longer(mesh_.edge(t, corner), longest)) longest = mesh_.edge(t, corner);
-    }
-    return longest;
-  }
-
   /// Bisects the longest edge of a triangle, but first that of any neighbour with a longer one.
   void bisect(std::uint32_t t) {
-    const EdgeKey wanted = longest_edge(t);
+    const EdgeKey wanted = longest_edge(mesh_, t);
     EdgeKey key = wanted;
     do {
-      key = wanted;
-      for (EdgeKey longer = longest_around(key); longer != key; longer = longest_around(key)) {
-        key = longer;
-      }
+      key = end_of_longest_edge_path(mesh_, wanted);
       split(key, 0.5);
     } while (key != wanted);
-  }
-
-  /// The longest edge of the triangles that share an edge.
-  EdgeKey longest_around(EdgeKey key) const {
-    EdgeKey longest = key;
-    for (const HalfEdge& side : mesh_.triangles(key)) {
-      const EdgeKey of_triangle = longest_edge(side.triangle());
-      if (is_longer(of_triangle, longest)) longest = of_triangle;
-    }
-    return longest;
   }
 
   /// Makes a contact an edge of the mesh; returns whether it was none.

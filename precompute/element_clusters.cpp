@@ -46,7 +46,8 @@ class ElementMerging {
  public:
   ElementMerging(const Elements& elements, const RayTracer& tracer, const ClusterSettings& settings)
       : scene_{elements, tracer, {}, {}}, settings_(settings) {
-    const double area = std::accumulate(elements.area.begin(), elements.area.end(), 0.0);
+    const double area = std::inner_product(elements.area.begin(), elements.area.end(),
+                                           elements.importance.begin(), 0.0);
     size_ = settings.patch_count > 0 ? std::sqrt(area / static_cast<double>(settings.patch_count))
                                      : settings.largest;
     limits_ = {.detail = kDetail * size_,
@@ -192,6 +193,8 @@ void Elements::resize(std::size_t count) {
   area.resize(count);
   reflectance.resize(count);
   emits.resize(count);
+  covered.resize(count);
+  importance.resize(count, 1.0F);
 }
 
 Float3 Elements::centroid(std::size_t e) const {

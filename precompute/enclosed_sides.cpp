@@ -8,6 +8,7 @@
 
 #include "hemisphere_rays.h"
 #include "progress_part.h"
+#include "rebounce/precompute/texture_sampling.h"
 
 namespace rebounce {
 namespace {
@@ -16,8 +17,13 @@ namespace {
 // these metres: where a person can stand there may be lamps.
 constexpr double kReach = 1.0 / 4, kRoom = 1.5;
 
-// Half of the paths end at each bounce; none is followed for longer than this.
-constexpr int kBounces = 16;
+// At each bounce goes on what the surface reflects, but half of the paths at least; none is
+// followed for longer than this.
+constexpr double kLeastSurvival = 0.5;
+constexpr int kBounces = 32;
+
+// Texture samples for what a triangle reflects.
+constexpr int kTextureSamples = 16;
 
 /// A look at a side by itself, by so many paths all in all: it is inside if no more than `inside`
 /// of them are out and lit if no fewer than `lit` are; else it is looked at again.
@@ -102,6 +108,7 @@ class EnclosedSides {
   struct Surface {
     Float3 normal;  ///< of the front
     bool emits, front_reflects, back_reflects;
+    float survival;  ///< the part of the paths that go on where it reflects
   };
 
   struct Scratch {
@@ -135,12 +142,23 @@ class EnclosedSides {
     return glm::length(area_vector(t)) / (side * side);
   }
 
+  float survival(std::uint32_t t) const {
+    const auto [a, b, c] = scene_.triangle[t];
+    const auto& texcoord = scene_.base_color_texcoord;
+    const auto& color = scene_.vertex_color;
+    const Float3 reflected =
+        mean_base_color(scene_, material(t), {texcoord[a], texcoord[b], texcoord[c]},
+                        {color[a], color[b], color[c]}, kTextureSamples);
+    return std::max(static_cast<float>(kLeastSurvival), *std::ranges::max_element(reflected));
+  }
+
   Surface surface_of(std::uint32_t t) const {
     const Material& m = material(t);
     return {.normal = to_float3(glm::normalize(area_vector(t))),
             .emits = m.emitted_luminance != Float3{0, 0, 0},
             .front_reflects = sides_[t].front != SideKind::kBuried,
-            .back_reflects = m.double_sided && sides_[t].back != SideKind::kBuried};
+            .back_reflects = m.double_sided && sides_[t].back != SideKind::kBuried,
+            .survival = survival(t)};
   }
 
   /// Gathers the lit sides of double-sided triangles, fronts first.
@@ -269,7 +287,9 @@ class EnclosedSides {
           ++suspect.out;
         } else if (reflects(hit)) {
           const std::uint64_t bits = path_bits(suspect.side, ray.id, bounce);
-          if (bits % 2 == 0) scratch.rays[kept++] = reflect(ray, hit, mix_bits(bits));
+          const bool goes_on =
+              static_cast<double>(bits >> 32) * 0x1p-32 < surface_[hit.triangle].survival;
+          if (goes_on) scratch.rays[kept++] = reflect(ray, hit, mix_bits(bits));
         }
       }
       scratch.rays.resize(kept);

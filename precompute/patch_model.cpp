@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "contact_cuts.h"
+#include "covers.h"
 #include "progress_part.h"
 #include "rebounce/precompute/element_clusters.h"
 #include "rebounce/precompute/lit_sides.h"
@@ -14,6 +15,7 @@
 #include "rebounce/precompute/texture_sampling.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
+#include "seen_part.h"
 #include "vertex_split.h"
 
 namespace rebounce {
@@ -22,6 +24,19 @@ namespace {
 // How far the work is when these are done; measured on scenes of some 300,000 triangles.
 constexpr double kAfterContacts = 0.08, kAfterSides = 0.25, kAfterElements = 0.33,
                  kAfterClusters = 0.92;
+
+// Triangles that are added where others are covered in part, for each patch that is wanted: at
+// most.
+constexpr double kMostAtCovers = 4;
+
+// What is covered counts for so much less where patches are shared out: it is dark, and gets its
+// light from close by.
+constexpr double kLessCovered = 0.75;
+
+// An element of more than this part of a mean patch is looked at for covers at so many points, and
+// by so many rays for what it sees; a smaller one at one, and is taken to see much.
+constexpr double kSmallElement = 1.0 / 16;
+constexpr std::uint32_t kCoverPoints = 8, kSightRays = 64;
 
 class PatchModelBuilder {
  public:
@@ -32,20 +47,14 @@ class PatchModelBuilder {
     cut_at_contacts(scene_, settings);
     report_progress(progress_, kAfterContacts);
     const OpacityMaps opacity = find_opacity_maps(scene_);
-    std::vector<TriangleSides> sides =
-        find_lit_sides(scene_, RayTracer(scene_.position, scene_.triangle, opacity),
-                       part_of(progress_, kAfterContacts, kAfterSides));
-    for (std::uint32_t t = 0; t < sides.size(); ++t) {
-      if (opacity.stopping_part(t) == 0) sides[t] = {SideKind::kOpening, SideKind::kOpening};
+    const RayTracer tracer(scene_.position, scene_.triangle, opacity);
+    sides_ = find_lit_sides(scene_, tracer, part_of(progress_, kAfterContacts, kAfterSides));
+    for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+      if (opacity.stopping_part(t) == 0) sides_[t] = {SideKind::kOpening, SideKind::kOpening};
     }
-    std::vector<std::uint8_t> patches_per_triangle;
-    patches_per_triangle.reserve(sides.size());
-    for (const TriangleSides& s : sides) {
-      patches_per_triangle.push_back(static_cast<std::uint8_t>(s.patch_count()));
-    }
-    const std::vector<std::uint32_t> source = subdivide(scene_, patches_per_triangle, settings);
-    sides_.reserve(source.size());
-    for (const std::uint32_t t : source) sides_.push_back(sides[t]);
+    const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
+    inherit_sides(subdivide(scene_, patches_per_triangle(), settings, importances(tracer)));
+    refine(tracer, scene_size);
   }
 
   PatchModel build() {
@@ -56,7 +65,8 @@ class PatchModelBuilder {
     make_patches(tracer);
     find_shown_patches(tracer);
     report_progress(progress_, kAfterClusters);
-    copy_lightmap_texcoords(split_vertices(model_.shown_patch, tracer, model_.mesh));
+    copy_lightmap_texcoords(split_vertices(model_.shown_patch, tracer,
+                                           kCloseCover * std::sqrt(patch_area_), model_.mesh));
     if (clamped_count_ > 0) {
       model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
                                 " patches was clamped to 0.99");
@@ -65,6 +75,59 @@ class PatchModelBuilder {
   }
 
  private:
+  std::vector<std::uint8_t> patches_per_triangle() const {
+    std::vector<std::uint8_t> count;
+    count.reserve(sides_.size());
+    for (const TriangleSides& s : sides_) {
+      count.push_back(static_cast<std::uint8_t>(s.patch_count()));
+    }
+    return count;
+  }
+
+  /// Makes triangles that are covered in part small beside patches; `scene_size` is the root of the
+  /// area of all lit sides, metres.
+  void refine(const RayTracer& tracer, double scene_size) {
+    const double patch_size =
+        settings_.patch_count > 0
+            ? scene_size / std::sqrt(static_cast<double>(settings_.patch_count))
+            : settings_.patch_size / kLongestEdge;
+    if (!(patch_size > 0)) return;
+    const double wanted = std::pow(scene_size / patch_size, 2);
+    inherit_sides(refine_at_covers(scene_, sides_, tracer, patch_size,
+                                   static_cast<std::size_t>(kMostAtCovers * wanted)));
+  }
+
+  /// What each triangle counts for: as much as the more important of its lit sides. Nothing where
+  /// patches are to have a size.
+  std::vector<float> importances(const RayTracer& tracer) const {
+    if (settings_.patch_size > 0) return {};
+    const double mean_area =
+        std::pow(mean_patch_size(scene_, patches_per_triangle(), settings_.patch_count), 2);
+    std::vector<float> result(sides_.size(), 1.0F);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+      const auto [p, q, r] = corners_of(scene_, t);
+      const TriangleCorners front{p, q, r}, back{p, r, q};
+      if (rebounce::area_of(front) <= kSmallElement * mean_area) continue;
+      const auto of = [&](const TriangleCorners& side) {
+        return static_cast<float>(importance(seen_part(side, tracer, kSightRays, t)));
+      };
+      float most = 0;
+      if (sides_[t].front == SideKind::kLit) most = of(front);
+      if (sides_[t].back == SideKind::kLit && most < 1) most = std::max(most, of(back));
+      if (most > 0) result[t] = most;
+    }
+    return result;
+  }
+
+  /// Gives the parts of triangles their sides; `source` [t] is the triangle that each was part of.
+  void inherit_sides(const std::vector<std::uint32_t>& source) {
+    std::vector<TriangleSides> sides;
+    sides.reserve(source.size());
+    for (const std::uint32_t t : source) sides.push_back(sides_[t]);
+    sides_ = std::move(sides);
+  }
+
   bool is_double_sided(std::uint32_t t) const {
     return scene_.materials[model_.mesh.triangle_material[t]].double_sided;
   }
@@ -193,8 +256,8 @@ class PatchModelBuilder {
     return std::move(welded.id);
   }
 
-  /// The lit sides, with what they reflect and emit.
-  void make_elements() {
+  /// The lit sides, with what they reflect and emit, and how they are covered.
+  void make_elements(const RayTracer& tracer) {
     for (std::uint32_t t = 0; t < kind_.size(); ++t) {
       if (kind_[t] == SideKind::kLit) element_triangle_.push_back(t);
     }
@@ -215,13 +278,21 @@ class PatchModelBuilder {
       elements_.area[e] =
           static_cast<float>(0.5 * glm::length(cross) * model_.mesh.opacity.stopping_part(t));
       elements_.reflectance[e] = mean_reflectance(t);
+      const bool small = elements_.area[e] <= kSmallElement * patch_area_;
+      elements_.covered[e] = static_cast<float>(covered_part(
+          {p, q, r}, tracer, kCoverHeight * std::sqrt(patch_area_), small ? 1 : kCoverPoints));
+      if (settings_.patch_size == 0) {
+        const double seen = small ? 1 : importance(seen_part({p, q, r}, tracer, kSightRays, e));
+        elements_.importance[e] =
+            static_cast<float>(seen * (1 - kLessCovered * elements_.covered[e]));
+      }
       elements_.emits[e] =
           std::ranges::any_of(mean_exitance(t), [](float m) { return m > 0; }) ? 1 : 0;
     }
   }
 
   void make_patches(const RayTracer& tracer) {
-    make_elements();
+    make_elements(tracer);
     report_progress(progress_, kAfterElements);
     const ElementPatches merged = merge_elements(
         elements_, tracer, {.patch_count = settings_.patch_count, .largest = settings_.patch_size},

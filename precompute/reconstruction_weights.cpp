@@ -6,6 +6,7 @@
 #include <numeric>
 #include <vector>
 
+#include "covers.h"
 #include "giver_search.h"
 #include "local_max_entropy.h"
 #include "mean_preservation.h"
@@ -197,11 +198,14 @@ class ReconstructionWeights {
     std::vector<glm::dvec3> normal(receivers_.size(), glm::dvec3(0));
     std::vector<double> largest(receivers_.size(), 0.0);
     std::vector<float> size_sum(receivers_.size(), 0.0F), count(receivers_.size(), 0.0F);
+    is_covered_.assign(receivers_.size(), 1);
+    const double cover_height = kCloseCover * mean_patch_size();
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
       const TriangleCorners p = corners_of(mesh_, t);
       const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double area = glm::length(cross);
       const std::uint32_t patch = shown_patch_[t];
+      const bool covered = patch != kNone && is_covered(p, tracer_, cover_height);
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t v = mesh_.triangle[t][k];
         normal[v] += cross;
@@ -211,6 +215,7 @@ class ReconstructionWeights {
         }
         if (patch == kNone) continue;
         receivers_[v].is_shown = true;
+        if (!covered) is_covered_[v] = 0;
         size_sum[v] += std::sqrt(area_[patch]);
         count[v] += 1;
       }
@@ -223,8 +228,10 @@ class ReconstructionWeights {
     }
   }
 
-  /// Patches in the open, if need be from farther away; else those that are mixed, on whose rim the
-  /// vertex lies; else its own.
+  /// Of a vertex in the open: patches in the open, if need be from farther away; else those that
+  /// are mixed, on whose rim the vertex lies; else its own. Of one that is covered: covered
+  /// patches, else mixed ones, else its own; none where these see next to nothing, and black is
+  /// shown.
   std::vector<Giver> find_givers(const GiverSearch& search, std::size_t v,
                                  GiverSearch::Scratch& scratch) const {
     const auto within = [&](float reach) {
@@ -234,17 +241,29 @@ class ReconstructionWeights {
     const auto is = [&](Exposure e) {
       return [this, e](const Giver& g) { return exposure_[g.patch] == e; };
     };
+    if (is_covered_[v] != 0) {
+      for (const Exposure e : {Exposure::kCovered, Exposure::kMixed}) {
+        if (std::ranges::any_of(near, is(e))) return only(near, is(e));
+      }
+      return own_givers(v, kMostlyCovered);
+    }
     if (std::ranges::any_of(near, is(Exposure::kOpen))) return only(near, is(Exposure::kOpen));
     if (std::ranges::any_of(near, is(Exposure::kMixed))) {
       const std::vector<Giver> farther =
           only(within(kFartherReach * receivers_[v].reach), is(Exposure::kOpen));
       if (!farther.empty()) return farther;
     }
-    if (!near.empty()) return near;
+    return near.empty() ? own_givers(v, 1) : near;
+  }
+
+  /// A vertex's own patches that absorb no more than that part of their view, all alike.
+  std::vector<Giver> own_givers(std::size_t v, float most_absorbed) const {
+    std::vector<Giver> givers;
     for (const std::uint32_t patch : own_patches_[v]) {
-      near.push_back({patch, 1.0F, 0, receivers_[v].position, receivers_[v].normal});
+      if (absorbed_[patch] > most_absorbed) continue;
+      givers.push_back({patch, 1.0F, 0, receivers_[v].position, receivers_[v].normal});
     }
-    return near;
+    return givers;
   }
 
   template <typename Wanted>
@@ -314,10 +333,11 @@ class ReconstructionWeights {
   DisplayMesh& mesh_;
   const PatchTriangles triangles_;
   const VertexPatches own_patches_;
-  std::vector<float> area_;          ///< [n] m²
-  std::vector<glm::vec3> centroid_;  ///< [n]
-  std::vector<Exposure> exposure_;   ///< [n]
-  std::vector<Receiver> receivers_;  ///< [v]
+  std::vector<float> area_;               ///< [n] m²
+  std::vector<glm::vec3> centroid_;       ///< [n]
+  std::vector<Exposure> exposure_;        ///< [n]
+  std::vector<Receiver> receivers_;       ///< [v]
+  std::vector<std::uint8_t> is_covered_;  ///< [v] all triangles that show a patch are covered
 };
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "covers.h"
 #include "element_neighbours.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/triangle.h"
@@ -43,7 +44,17 @@ class VertexTriangles {
 
 class VertexSplitter {
  public:
-  VertexSplitter(const DisplayMesh& mesh, const RayTracer& tracer) : mesh_(mesh), tracer_(tracer) {}
+  VertexSplitter(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+                 const RayTracer& tracer, double cover_height)
+      : mesh_(mesh), tracer_(tracer), place_(mesh.triangle.size(), Place::kHidden) {
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::size_t t = 0; t < place_.size(); ++t) {
+      if (shown_patch[t] == kNone) continue;
+      const TriangleCorners corners = corners_of(mesh, static_cast<std::uint32_t>(t));
+      const bool covered = is_covered(corners, tracer, cover_height);
+      place_[t] = covered ? Place::kCovered : Place::kOpen;
+    }
+  }
 
   /// Writes to `label` the groups of the `around` triangles of a vertex that share it: numbers in
   /// order of first use.
@@ -64,12 +75,16 @@ class VertexSplitter {
   }
 
  private:
-  /// True if triangles `a` and `b` share an edge from `v` and nothing stands on it.
+  /// Where the light of a triangle shows: nowhere, under something, or in the open.
+  enum class Place : std::uint8_t { kHidden, kCovered, kOpen };
+
+  /// True if triangles `a` and `b` are in like places, share an edge from `v`, and nothing stands
+  /// on it.
   bool are_joined(std::uint32_t v, std::uint32_t a, std::uint32_t b) const {
-    return std::ranges::any_of(mesh_.triangle[a], [&](std::uint32_t u) {
-      return u != v && std::ranges::count(mesh_.triangle[b], u) > 0 &&
-             find_between(beside_edge(v, u, a), beside_edge(v, u, b), tracer_) == kNone;
-    });
+    return place_[a] == place_[b] && std::ranges::any_of(mesh_.triangle[a], [&](std::uint32_t u) {
+             return u != v && std::ranges::count(mesh_.triangle[b], u) > 0 &&
+                    find_between(beside_edge(v, u, a), beside_edge(v, u, b), tracer_) == kNone;
+           });
   }
 
   /// A point of triangle `t` beside its edge from `v` to `u`.
@@ -84,6 +99,7 @@ class VertexSplitter {
 
   const DisplayMesh& mesh_;
   const RayTracer& tracer_;
+  std::vector<Place> place_;  ///< of each triangle
 };
 
 }  // namespace
@@ -102,11 +118,12 @@ std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v) {
 }
 
 std::vector<std::uint32_t> split_vertices(std::span<const std::uint32_t> shown_patch,
-                                          const RayTracer& tracer, DisplayMesh& mesh) {
+                                          const RayTracer& tracer, double cover_height,
+                                          DisplayMesh& mesh) {
   const VertexTriangles around(mesh);
   const auto vertex_count = static_cast<std::uint32_t>(mesh.position.size());
   std::vector<std::uint32_t> groups(around.corner_count());
-  const VertexSplitter splitter(mesh, tracer);
+  const VertexSplitter splitter(mesh, shown_patch, tracer, cover_height);
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::uint32_t v = 0; v < vertex_count; ++v) {
     const auto shows = [&](std::uint32_t t) { return shown_patch[t] != kNone; };

@@ -15,10 +15,13 @@ std::uint32_t copy_vertex(DisplayMesh& mesh, std::uint32_t v);
 /// Gives a vertex on which something stands (a wall on the floor, the edge of a slab in a wall) a
 /// copy for each side of it, so that each side shows its own light: triangles around a vertex keep
 /// sharing it where they meet at an edge with nothing between them and do not bend away from each
-/// other by more than about 50 degrees. `shown_patch` [t] is the patch that each display
-/// triangle shows, or kNone: a vertex of nothing but these stays one. `tracer` holds the surface of
-/// `mesh`. Returns the vertex that each of the appended ones is a copy of.
+/// other by more than about 50 degrees. What is covered (covers.h, by what hangs no higher
+/// than `cover_height` metres), what is not and what shows nothing have vertices of their own too.
+/// `shown_patch` [t] is the patch that each display triangle shows, or kNone: a vertex of nothing
+/// but these stays one. `tracer` holds the surface of `mesh`. Returns the vertex that each of the
+/// appended ones is a copy of.
 std::vector<std::uint32_t> split_vertices(std::span<const std::uint32_t> shown_patch,
-                                          const RayTracer& tracer, DisplayMesh& mesh);
+                                          const RayTracer& tracer, double cover_height,
+                                          DisplayMesh& mesh);
 
 }  // namespace rebounce

@@ -57,6 +57,14 @@ PatchComparison compare_patch_means(const TransferData& data,
 RelativeError compare_patch_means(const PatchComparison& traced,
                                   std::span<const Float3> indirect_irradiance);
 
+/// What is shown at the points that could be compared.
+struct ReconstructionComparison {
+  RelativeError relative;
+  std::vector<std::uint32_t> point;     ///< [m] number of each, ascending
+  std::vector<std::uint32_t> triangle;  ///< [m] of the display mesh, where it lies
+  std::vector<Float3> shown;            ///< [m] lx
+};
+
 /// Compares the smooth reconstruction of `indirect_irradiance` [n] with the path tracer's `truth`
 /// at `points` (sample_surface), each of equal weight. The value at a point is that of the display
 /// mesh: patch values brought to its vertices by the reconstruction weights, then interpolated.
@@ -64,9 +72,10 @@ RelativeError compare_patch_means(const PatchComparison& traced,
 /// `mesh_tracer` holds the first surface_count triangles of data.mesh. Left out are points whose
 /// view is all but back faces (the floor under a box: nobody sees them) and points that the mesh
 /// does not have. Throws Error if the sizes do not agree or the mesh has no weights.
-RelativeError compare_reconstruction(const TransferData& data, const RayTracer& mesh_tracer,
-                                     std::span<const Float3> indirect_irradiance,
-                                     std::span<const SurfacePoint> points,
-                                     const IrradianceEstimate& truth);
+ReconstructionComparison compare_reconstruction(const TransferData& data,
+                                                const RayTracer& mesh_tracer,
+                                                std::span<const Float3> indirect_irradiance,
+                                                std::span<const SurfacePoint> points,
+                                                const IrradianceEstimate& truth);
 
 }  // namespace rebounce::reference

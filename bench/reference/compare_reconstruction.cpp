@@ -75,10 +75,11 @@ Float3 reconstruct(const DisplayMesh& mesh, std::span<const Float3> patch_value,
 
 }  // namespace
 
-RelativeError compare_reconstruction(const TransferData& data, const RayTracer& mesh_tracer,
-                                     std::span<const Float3> indirect_irradiance,
-                                     std::span<const SurfacePoint> points,
-                                     const IrradianceEstimate& truth) {
+ReconstructionComparison compare_reconstruction(const TransferData& data,
+                                                const RayTracer& mesh_tracer,
+                                                std::span<const Float3> indirect_irradiance,
+                                                std::span<const SurfacePoint> points,
+                                                const IrradianceEstimate& truth) {
   if (indirect_irradiance.size() != data.patches.size() || truth.mean.size() != points.size()) {
     throw Error("comparison of the reconstruction: one entry per patch and point is needed");
   }
@@ -87,6 +88,7 @@ RelativeError compare_reconstruction(const TransferData& data, const RayTracer& 
   }
   MeshLocator locator(data.mesh, mesh_tracer);
   ErrorSum sum;
+  ReconstructionComparison comparison;
   std::size_t left_out = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
     const std::optional<MeshPoint> place = locator.locate(points[k]);
@@ -94,10 +96,14 @@ RelativeError compare_reconstruction(const TransferData& data, const RayTracer& 
       ++left_out;
       continue;
     }
-    sum.add(1, reconstruct(data.mesh, indirect_irradiance, *place), truth.mean[k],
-            truth.standard_error[k]);
+    const Float3 shown = reconstruct(data.mesh, indirect_irradiance, *place);
+    comparison.point.push_back(static_cast<std::uint32_t>(k));
+    comparison.triangle.push_back(place->triangle);
+    comparison.shown.push_back(shown);
+    sum.add(1, shown, truth.mean[k], truth.standard_error[k]);
   }
-  return sum.result(left_out);
+  comparison.relative = sum.result(left_out);
+  return comparison;
 }
 
 }  // namespace rebounce::reference

@@ -1,6 +1,7 @@
 #include "reference/key_light.h"
 
 #include <algorithm>
+#include <limits>
 #include <numbers>
 
 #include "rebounce/runtime/box.h"
@@ -15,6 +16,10 @@ constexpr double kFluxPerArea = 100;  // lm/m²
 constexpr std::size_t kCandidates = 128;
 constexpr std::size_t kReceivers = 512;  // points that a candidate may reach
 constexpr std::uint32_t kClearanceRays = 64;
+
+// A receiver is inside of the scene if at least half of so many rays from it meet something: what
+// reaches an outer wall goes nowhere from there.
+constexpr std::uint32_t kInsideRays = 16;
 
 // A lamp counts as close to a surface within this part of the scene's diagonal.
 constexpr double kCloseness = 0.08;
@@ -57,6 +62,24 @@ std::vector<Float3> make_candidates(std::span<const SurfacePoint> points, const 
   return places;
 }
 
+/// Those of `points` that are inside of the scene; all of them if none is.
+std::vector<SurfacePoint> those_inside(std::vector<SurfacePoint> points, const RayTracer& tracer) {
+  const auto is_outside = [&](const SurfacePoint& point) {
+    std::vector<Ray> rays;
+    for (std::uint32_t k = 0; k < kInsideRays; ++k) {
+      const glm::dvec3 local = square_to_cosine_hemisphere(r2_point(k, glm::dvec2(0)));
+      rays.push_back(make_ray(tracer.offset_point(point.position, point.normal),
+                              to_float3(frame_around(to_dvec3(point.normal)) * local),
+                              std::numeric_limits<float>::infinity()));
+    }
+    tracer.occluded(rays);
+    return 2 * std::ranges::count_if(rays, is_occluded) < static_cast<std::ptrdiff_t>(rays.size());
+  };
+  std::vector<SurfacePoint> inside = points;
+  std::erase_if(inside, is_outside);
+  return inside.empty() ? points : inside;
+}
+
 /// The part of `receivers` that face `place` with nothing between.
 double reached_part(const Float3& place, std::span<const SurfacePoint> receivers,
                     const RayTracer& tracer) {
@@ -95,7 +118,7 @@ double clearance(const Float3& place, const RayTracer& tracer, double reach) {
 Light make_key_light(const Scene& scene, const RayTracer& tracer,
                      std::span<const TriangleSides> sides, std::uint64_t seed) {
   const double size = box_around(scene.position).diagonal();
-  const auto receivers = sample_surface(scene, sides, kReceivers, seed);
+  const auto receivers = those_inside(sample_surface(scene, sides, kReceivers, seed), tracer);
   const auto candidates = make_candidates(sample_surface(scene, sides, kCandidates, seed + 1),
                                           tracer, 0.5 * size, seed);
   Light light;

@@ -87,7 +87,8 @@ TruthResult measure_truth(const std::string& scene, const Contenders& contenders
   const auto at_points = reference::indirect_irradiance(truth.lit(), points, settings.truth_samples,
                                                         settings.seed, phase("truth at points"));
   result.reconstruction =
-      reference::compare_reconstruction(data, *contenders.tracer, compressed, points, at_points);
+      reference::compare_reconstruction(data, *contenders.tracer, compressed, points, at_points)
+          .relative;
   result.form_factors = relative_difference(dense, better, data.patches.area);
   result.compression = relative_difference(compressed, dense, data.patches.area);
   return result;

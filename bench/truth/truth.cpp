@@ -9,7 +9,10 @@
 #include <memory>
 
 #include "console.h"
+#include "error_causes.h"
+#include "error_tables.h"
 #include "light_file.h"
+#include "named_quality.h"
 #include "program.h"
 #include "rebounce/demo/camera.h"
 #include "rebounce/demo/image_file.h"
@@ -29,7 +32,9 @@ namespace rebounce {
 namespace {
 
 struct Options {
-  std::string scene, lights, csv, patch_csv, error_picture;
+  std::string scene, lights, csv, patch_csv, point_csv, error_picture;
+  bool causes = false;
+  std::string quality = "default";  ///< of the form factors
   std::vector<std::size_t> patch_counts{1000, 4000};
   bool key_light = false;
   std::size_t point_count = 20000;
@@ -38,6 +43,10 @@ struct Options {
   reference::PatchComparisonSettings patch_comparison;
   bench::CommonOptions common;
 };
+
+FormFactorQuality quality_named(const std::string& name) {
+  return std::ranges::find(bench::kQualities, name, &bench::NamedQuality::name)->quality;
+}
 
 /// One row of the result.
 struct Row {
@@ -73,16 +82,25 @@ class TruthBench {
   Row run(std::size_t patch_count, bool last) {
     const Solution solution = solve(patch_count);
     const bool draws = last && !options_.error_picture.empty();
+    const bool finds_causes = last && options_.causes;
     reference::PatchComparisonSettings settings = options_.patch_comparison;
-    if (draws) settings.patch_count = 0;  // a picture shows them all
+    if (draws || finds_causes) settings.patch_count = 0;  // all of them are needed
     const reference::PatchComparison patches =
         reference::compare_patch_means(solution.data, solution.indirect_irradiance, lit_scene(),
                                        settings, progress("truth on patches"));
     if (draws) draw_error(solution, patches, options_.error_picture);
-    if (last && !options_.patch_csv.empty()) write_patches(solution, patches, options_.patch_csv);
-    return {solution.data.patches.size(), patches.relative,
-            reference::compare_reconstruction(solution.data, solution.tracer,
-                                              solution.indirect_irradiance, points_, truth_)};
+    if (last && !options_.patch_csv.empty()) {
+      const reference::OneBounce bounce =
+          finds_causes ? one_bounce(solution, patches) : reference::OneBounce{};
+      reference::write_patch_table(options_.patch_csv, solution.data.patches, patches,
+                                   solution.indirect_irradiance, bounce);
+    }
+    const reference::ReconstructionComparison shown = reference::compare_reconstruction(
+        solution.data, solution.tracer, solution.indirect_irradiance, points_, truth_);
+    if (last && !options_.point_csv.empty()) {
+      reference::write_point_table(options_.point_csv, solution.data, points_, truth_, shown);
+    }
+    return {solution.data.patches.size(), patches.relative, shown.relative};
   }
 
  private:
@@ -97,6 +115,7 @@ class TruthBench {
       setup_ = cli::read_lights(options_.lights);
     } else if (options_.key_light) {
       setup_.lights = {reference::make_key_light(scene_, tracer_, sides_)};
+      print_as_file(setup_.lights.front());
     } else {
       setup_.lights = scene_.lights;
     }
@@ -108,12 +127,21 @@ class TruthBench {
     }
   }
 
+  /// What --lights takes: the key light moves when other sides count as lit.
+  static void print_as_file(const Light& lamp) {
+    const auto& [x, y, z] = lamp.position;
+    fmt::print(R"({{"lights":[{{"type":"point","position":[{},{},{}],"intensity":{}}}]}})"
+               "\n",
+               x, y, z, lamp.intensity);
+  }
+
   /// Solves with the form factors themselves: an operator adds its own error, and many patches
   /// take long to invert.
   Solution solve(std::size_t patch_count) {
     BuildSettings settings;
     settings.subdivision.patch_count = patch_count;
     settings.operator_kind = OperatorKind::kNoOperator;
+    settings.form_factors = with_quality(quality_named(options_.quality), settings.form_factors);
     BuildReport report;
     TransferData data = build_transfer_data(
         options_.scene, settings, report,
@@ -170,46 +198,23 @@ class TruthBench {
     write_png(path, tone_map(render_picture(data, solution.tracer, light, settings)));
   }
 
-  /// A row for each patch that was compared.
-  static void write_patches(const Solution& solution, const reference::PatchComparison& patches,
-                            const std::string& path) {
+  /// What one bounce brings of the truth's light.
+  reference::OneBounce one_bounce(const Solution& solution,
+                                  const reference::PatchComparison& patches) const {
     const PatchTable& table = solution.data.patches;
-    std::vector<float> values;
+    std::vector<Float3> irradiance(table.size()), radiosity(table.size());
+    DirectLighting(solution.data, solution.tracer, {.points_per_patch = kManyPoints})
+        .compute(setup_.lights, setup_.sky, irradiance);
     for (std::size_t k = 0; k < patches.patch.size(); ++k) {
-      const std::uint32_t i = patches.patch[k];
-      values.push_back(static_cast<float>(i));
-      values.push_back(table.area[i]);
-      values.push_back(static_cast<float>(patches.weight[k]));
-      for (const Float3& v :
-           {table.centroid[i], table.normal[i], table.reflectance[i],
-            solution.indirect_irradiance[i], patches.truth[k], patches.standard_error[k]}) {
-        values.insert(values.end(), v.begin(), v.end());
-      }
+      for (int c = 0; c < 3; ++c) irradiance[patches.patch[k]][c] += patches.truth[k][c];
     }
-    const CsvColumns columns{{"patch",
-                              "area",
-                              "weight",
-                              "x",
-                              "y",
-                              "z",
-                              "normal_x",
-                              "normal_y",
-                              "normal_z",
-                              "reflectance_r",
-                              "reflectance_g",
-                              "reflectance_b",
-                              "h_r",
-                              "h_g",
-                              "h_b",
-                              "truth_r",
-                              "truth_g",
-                              "truth_b",
-                              "noise_r",
-                              "noise_g",
-                              "noise_b"},
-                             values};
-    write_csv(path, {&columns, 1});
+    add_reflected(table.emitted_exitance, table.reflectance, irradiance, radiosity);
+    return reference::find_one_bounce(solution.data, solution.tracer, radiosity, kBounceRays,
+                                      options_.patch_comparison.seed);
   }
+
+  // Points of a patch and rays from it, of which the noise is far below what is looked for.
+  static constexpr int kManyPoints = 256, kBounceRays = 16384;
 
   static constexpr SolveMethod kMethod = SolveMethod::kConjugateGradient;
 
@@ -293,10 +298,20 @@ void add_options(CLI::App& app, Options& options) {
                  "Points of a patch at which the pipeline looks at lamps")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
+  std::vector<std::string> qualities;
+  for (const bench::NamedQuality& q : bench::kQualities) qualities.emplace_back(q.name);
+  app.add_option("--form-factor-quality", options.quality, "Quality of the form factors")
+      ->check(CLI::IsMember(qualities))
+      ->capture_default_str();
   app.add_option("--seed", patches.seed, "Of all that is random")->capture_default_str();
   app.add_option("--csv", options.csv, "Table to write");
   app.add_option("--patch-csv", options.patch_csv,
                  "Table to write of the compared patches, for the last number of patches");
+  app.add_flag("--causes", options.causes,
+               "Compare all patches and add to their table what one bounce of the truth's light "
+               "brings them, along rays and by the form factors");
+  app.add_option("--point-csv", options.point_csv,
+                 "Table to write of the compared points, for the last number of patches");
   app.add_option("--error-picture", options.error_picture,
                  "Picture (.png) of where the patch means err, for the last number of patches");
   bench::add_threads_option(app, options.common);

@@ -130,6 +130,24 @@ TEST(EnclosedSides, AShellThatAWallClosesIsBuried) {
   }
 }
 
+TEST(EnclosedSides, TheBottomOfAWhiteShaftIsLit) {
+  // Eight times as deep as wide: of what a dark one gets next to nothing comes back.
+  for (const bool white : {false, true}) {
+    Scene scene = room();
+    const float rho = white ? 0.98F : 0.3F;
+    scene.materials[kShell].base_color = {rho, rho, rho};
+    const std::size_t first = scene.triangle.size();
+    add_open_box(scene, {2, 0.5, 1}, {2.1, 0.6, 1.8});
+    const std::vector<TriangleSides> sides =
+        find_lit_sides(scene, RayTracer(scene.position, scene.triangle));
+    const auto bottom = first + 2 * static_cast<std::size_t>(test::Face::kLowZ);
+    for (const std::size_t t : {bottom, bottom + 1}) {
+      EXPECT_EQ(sides[t].back, white ? SideKind::kLit : SideKind::kBuried);
+      EXPECT_EQ(sides[t].front, SideKind::kLit);
+    }
+  }
+}
+
 TEST(EnclosedSides, AWallThatLooksOutFromBehindABoardIsLit) {
   // Of the wall's triangle 2 % are seen, beside a board 2 cm before it that hides the rest.
   Scene scene = room();

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "rebounce/precompute/patch_model.h"
+#include "rebounce/runtime/triangle.h"
 #include "test_scenes.h"
 
 namespace rebounce {
@@ -212,6 +213,30 @@ TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
     }
     EXPECT_NEAR(shown, 1, 1e-5);
   }
+}
+
+TEST(ReconstructionWeights, LightEndsWhereACoverDoes) {
+  // A plate of 0.8 m 1 cm above a floor of 2 m: below it black, beside it white.
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 1);
+  test::add_box(scene, {-0.4, 0.01, -0.4}, {0.4, 0.02, 0.4}, false);
+  const PatchModel model = make_weighted_model(std::move(scene), 300);
+  const auto is_below = [](const Float3& p) {
+    return p[1] < 0.01F && std::max(std::abs(p[0]), std::abs(p[2])) < 0.4F;
+  };
+  const auto field = [&](const Float3& p) { return is_below(p) ? 0.0 : 1.0; };
+  std::size_t below = 0, beside = 0;
+  for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+    const TriangleCorners p = corners_of(model.mesh, t);
+    if (std::max({p[0].y, p[1].y, p[2].y}) > 1e-3 || model.shown_patch[t] == kNone) continue;
+    const bool covered = is_below(to_float3((p[0] + p[1] + p[2]) / 3.0));
+    ++(covered ? below : beside);
+    for (const std::uint32_t v : model.mesh.triangle[t]) {
+      EXPECT_NEAR(shown_value(model, v, field), covered ? 0 : 1, 1e-5);
+    }
+  }
+  EXPECT_GT(below, 20U);
+  EXPECT_GT(beside, 100U);
 }
 
 }  // namespace

@@ -22,6 +22,8 @@ struct Elements {
   std::vector<float> area;              ///< [e] m² of what stops light, > 0
   std::vector<Float3> reflectance;      ///< [e] [0, 1]
   std::vector<std::uint8_t> emits;      ///< [e] 1 if it does
+  std::vector<float> importance;        ///< [e] (0, 1] what its area counts for
+  std::vector<float> covered;           ///< [e] part of it above which something lies close
 
   std::size_t size() const { return area.size(); }
   void resize(std::size_t count);
@@ -45,8 +47,8 @@ struct ClusterSettings {
 };
 
 /// Merges elements into patches, the cheapest pair first: what a pair costs is how much more its
-/// elements differ from the mean of their patch, in position, normal and reflectance, summed over
-/// their area (J. H. Ward, "Hierarchical grouping to optimize an objective function", 1963; over
+/// elements differ from the mean of their patch, in position, normal, reflectance and the part that is
+/// covered (covers.h), summed over their area times importance (J. H. Ward, "Hierarchical grouping to optimize an objective function", 1963; over
 /// the dual graph of the mesh as in M. Garland, A. Willmott, P. S. Heckbert, "Hierarchical face
 /// clustering on polygonal surfaces", 2001). So a patch is small where surfaces turn or change
 /// colour, and detail far smaller than a patch is taken as a whole.
