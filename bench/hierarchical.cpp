@@ -23,8 +23,10 @@
 #include "rebounce/runtime/hierarchical_solver.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
+#include "rebounce/transfer/error.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/transfer_file.h"
 #include "timing.h"
 
 namespace rebounce::bench {
@@ -40,9 +42,11 @@ struct HierarchicalOptions {
   std::vector<double> epsilons = {kLinkEpsilon};
   std::vector<double> coarsening = {kLinkCoarsening *
                                     kLinkEpsilon};  ///< errors for which links are merged again
-  std::vector<double> compression = {1e-3};         ///< errors of F B to which F is compressed
-  std::size_t most_flat = 20000;                    ///< patches of which F of all pairs is found
-  int light_count = 4;                              ///< of each kind
+  std::vector<double> worths = {kLinkWorth};  ///< what links fitted to all pairs must be worth
+  std::vector<double> compression = {1e-3};   ///< errors of F B to which F is compressed
+  std::string pairs;              ///< transfer file with F of all pairs; empty: they are found
+  std::size_t most_flat = 20000;  ///< patches of which F of all pairs is found
+  int light_count = 4;            ///< of each kind
   double error = 0.01;
   CommonOptions common{.repeats = 7};
 };
@@ -56,7 +60,7 @@ struct LightCase {
 struct Contender {
   std::string method, form;
   double epsilon = 0;    ///< of links that were refined; 0: from all pairs
-  double tolerance = 0;  ///< for which links were merged again, or F was compressed
+  double tolerance = 0;  ///< for which links were merged again or fitted, or F was compressed
   std::size_t entry_count = 0;
   const FormFactorOperator* form_factors = nullptr;
   std::unique_ptr<RadiositySolver> solver;
@@ -131,13 +135,25 @@ class HierarchicalBench {
     fitting_ = draw_fitting_lights(data, tracer_, 1);
   }
 
+  ExchangeMatrix find_pairs() const {
+    if (options_.pairs.empty()) return compute_form_factors(model_, tracer_).exchange;
+    const TransferData data = load_transfer_file(options_.pairs);
+    if (data.exchange.patch_count() != model_.patches.size() ||
+        data.patches.area != model_.patches.area) {
+      throw Error(options_.pairs + ": not the form factors of these patches");
+    }
+    return data.exchange;
+  }
+
   void add_flat() {
-    exchange_ = compute_form_factors(model_, tracer_).exchange;
+    exchange_ = find_pairs();
     const std::size_t entries = 2 * exchange_.column.size();
     auto blocks = std::make_unique<FormFactorBlocks>(exchange_, model_.patches.area);
     auto half = std::make_unique<ExchangeBlocks>(exchange_, model_.patches.area);
     add({"gauss-seidel", "blocks", 0, 0, entries, blocks.get(),
          std::make_unique<GaussSeidelSolver>(*blocks, problem())});
+    add({"symmetric-gauss-seidel", "exchange", 0, 0, entries, half.get(),
+         std::make_unique<GaussSeidelSolver>(*half, problem(), SweepOrder::kSymmetric)});
     add({"gathering", "exchange", 0, 0, entries, half.get(),
          std::make_unique<GatheringSolver>(*half, problem())});
     add({"conjugate-gradient", "exchange", 0, 0, entries, half.get(),
@@ -151,6 +167,9 @@ class HierarchicalBench {
     flat_.push_back(std::move(blocks));
     flat_.push_back(std::move(half));
     add_compressed(exchange_, *flat_.front());
+    for (const double worth : options_.worths) {
+      add_hierarchical("fitted links", 0, worth, fit_links(exchange_, model_.patches, worth));
+    }
   }
 
   void add_links(double epsilon) {
@@ -165,10 +184,6 @@ class HierarchicalBench {
       const FormFactorLinks coarse =
           coarsen_links(links, patches.area, patches.centroid, coarsening);
       add_hierarchical("links", epsilon, coarsening, coarse);
-      if (!flat_.empty()) {
-        add_hierarchical("fitted links", epsilon, coarsening,
-                         fit_links(coarse, exchange_, patches));
-      }
     }
   }
 
@@ -291,8 +306,14 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--coarsen", options.coarsening, "Errors for which links are merged again")
       ->capture_default_str();
+  app.add_option("--worth", options.worths, "What links fitted to all pairs must be worth")
+      ->capture_default_str();
   app.add_option("--compress", options.compression, "Errors of F B to which F is compressed")
       ->capture_default_str();
+  app.add_option("--pairs", options.pairs,
+                 "Transfer file whose form factors of all pairs are taken instead of finding them: "
+                 "of the one scene and number of patches that is measured")
+      ->check(CLI::ExistingFile);
   app.add_option("--most-flat", options.most_flat,
                  "With more patches than this, links alone are found and timed")
       ->capture_default_str();

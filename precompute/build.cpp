@@ -8,7 +8,6 @@
 #include "operator_stage.h"
 #include "phase_clock.h"
 #include "rebounce/precompute/import_gltf.h"
-#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/patch_model.h"
@@ -55,13 +54,6 @@ FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchMod
       model.patches.size() > kPairsPatchCount ||
       estimate_cost_of_pairs(model, settings).peak_bytes > memory_limit_bytes(settings);
   return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
-}
-
-FormFactorLinks find_links(const PatchModel& model, const RayTracer& tracer,
-                           FormFactorSettings settings, const Progress& progress) {
-  if (settings.link_epsilon == 0) settings.link_epsilon = kLinkEpsilon;
-  return coarsen_links(build_links(model, tracer, settings, {}, progress).links, model.patches.area,
-                       model.patches.centroid, kLinkCoarsening * settings.link_epsilon);
 }
 
 /// The settings with what was left open decided.
@@ -215,8 +207,7 @@ class TransferBuild {
     report_.closure = form_factors.closure;
     if (settings_.store_links) {
       data_.links = clock_.run("links", [&](const Progress& part) {
-        return fit_links(find_links(model_, *tracer_, settings_.form_factors, part),
-                         form_factors.exchange, model_.patches);
+        return fit_links(form_factors.exchange, model_.patches, kLinkWorth, part);
       });
       report_.link_count = data_.links.pair.size();
     }

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <map>
-#include <numeric>
 #include <utility>
 
+#include "disjoint_sets.h"
 #include "edge_table.h"
 #include "hemisphere_rays.h"
 #include "rebounce/precompute/subdivision.h"
@@ -34,23 +34,6 @@ constexpr double kLeastBackCoverage = 0.02;
 
 // Fronts of which fewer see something belong to a scene without exchange of light.
 constexpr double kNoExchange = 1e-3;
-
-class DisjointSets {
- public:
-  explicit DisjointSets(std::size_t size) : parent_(size) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
-  }
-
-  std::uint32_t find(std::uint32_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-
-  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 // [t] The piece of each triangle, numbered by their first triangles.
 std::vector<std::uint32_t> find_pieces(const Scene& scene, const WeldedPositions& place) {

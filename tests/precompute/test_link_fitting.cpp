@@ -1,16 +1,22 @@
-// Links made from the form factors of all pairs: as true as asked, and no light through walls.
+// Links made from the form factors of all pairs: as few as their error allows, and no light through
+// walls.
 
 #include "rebounce/precompute/link_fitting.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <random>
 #include <vector>
 
 #include "expect_error.h"
 #include "random_light.h"
 #include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/links.h"
+#include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/linked_form_factors.h"
@@ -21,24 +27,24 @@ namespace rebounce {
 namespace {
 
 struct Pairs {
-  PatchTable patches;
+  PatchModel model;
   ExchangeMatrix exchange;
-  FormFactorLinks links;  ///< by rays of their own
+
+  const PatchTable& patches() const { return model.patches; }
 };
 
 Pairs pairs_of(const Scene& scene, std::size_t patch_count) {
   PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-  const RayTracer tracer = test::make_tracer(model);
-  ExchangeMatrix exchange = compute_form_factors(model, tracer).exchange;
-  FormFactorLinks links = build_links(model, tracer, {.link_epsilon = kLinkEpsilon}).links;
-  return {std::move(model.patches), std::move(exchange), std::move(links)};
+  ExchangeMatrix exchange = compute_form_factors(model, test::make_tracer(model)).exchange;
+  return {std::move(model), std::move(exchange)};
 }
 
-FormFactorLinks fitted(const Pairs& pairs) {
-  return fit_links(pairs.links, pairs.exchange, pairs.patches);
+FormFactorLinks fitted(const Pairs& pairs, double worth = kLinkWorth) {
+  return fit_links(pairs.exchange, pairs.patches(), worth);
 }
 
-/// A room with a block on its floor.
+/// A room with a block on its floor; more patches than a side of the blocks that links are chosen
+/// in.
 const Pairs& furnished() {
   static const Pairs pairs = [] {
     Scene scene = test::empty_scene();
@@ -50,57 +56,66 @@ const Pairs& furnished() {
 }
 
 std::vector<Float3> gather_pairs(const Pairs& pairs, const std::vector<Float3>& in) {
-  return gather(FormFactorRows(pairs.exchange, pairs.patches.area), in);
+  return gather(FormFactorRows(pairs.exchange, pairs.patches().area), in);
 }
 
 std::vector<Float3> gather_links(const Pairs& pairs, const FormFactorLinks& links,
                                  const std::vector<Float3>& in) {
-  return gather(LinkedFormFactors(links, pairs.patches.area, pairs.patches.centroid), in);
+  return gather(LinkedFormFactors(links, pairs.patches().area, pairs.patches().centroid), in);
 }
 
 /// Of F times light that changes from patch to patch, area-weighted L2.
 double error_of(const Pairs& pairs, const FormFactorLinks& links) {
-  const std::vector<Float3> light = test::random_light(pairs.patches.size(), 7);
+  const std::vector<Float3> light = test::random_light(pairs.patches().size(), 7);
   return relative_difference(gather_links(pairs, links, light), gather_pairs(pairs, light),
-                             pairs.patches.area);
+                             pairs.patches().area);
 }
 
-/// A tree of which every pair of patches is a link, all with the same wrong exchange area.
-FormFactorLinks all_pairs(const Pairs& pairs) {
-  FormFactorLinks links = pairs.links;
-  links.pair.clear();
-  std::vector<std::uint32_t> leaf(pairs.patches.size());
-  const std::vector<std::uint32_t> first = first_positions(links);
-  for (std::uint32_t k = 0; k < first.size(); ++k) {
-    if (links.first_child[k] == kNone) leaf[links.patch[first[k]]] = k;
-  }
-  for (std::uint32_t i = 0; i < leaf.size(); ++i) {
-    for (std::uint32_t j = 0; j < i; ++j) links.pair.push_back({leaf[i], leaf[j]});
-  }
-  links.exchange_area.assign(links.pair.size(), 1);
-  links.gradient.assign(links.pair.size(), {});
-  return links;
+/// As refinement found them by rays, and merged.
+FormFactorLinks traced(const Pairs& pairs) {
+  const PatchTable& patches = pairs.patches();
+  const FormFactorLinks links =
+      build_links(pairs.model, test::make_tracer(pairs.model), {.link_epsilon = kLinkEpsilon})
+          .links;
+  return coarsen_links(links, patches.area, patches.centroid, kLinkCoarsening * kLinkEpsilon);
 }
 
-TEST(LinkFitting, LinksOfSinglePatchesAreTheirPairs) {
+TEST(LinkFitting, WorthNextToNothingLinksAreThePairs) {
   const Pairs& pairs = furnished();
-  const FormFactorLinks links = fit_links(all_pairs(pairs), pairs.exchange, pairs.patches);
-  EXPECT_EQ(links.pair.size(), pairs.exchange.column.size());  // others have no light
-  EXPECT_LE(error_of(pairs, links), 1e-5);
-  check_links(links, pairs.patches.size());
+  const FormFactorLinks links = fitted(pairs, 1e-9);
+  check_links(links, pairs.patches().size());
+  EXPECT_LE(links.pair.size(), pairs.exchange.column.size());  // others have no light
+  EXPECT_GE(links.pair.size(), pairs.exchange.column.size() / 4);
+  EXPECT_LE(error_of(pairs, links), 2e-4);
 }
 
-TEST(LinkFitting, IsNearerToThePairsThanRaysOfLinksAre) {
+TEST(LinkFitting, FewerAndTruerThanByRays) {
   const Pairs& pairs = furnished();
-  const double traced = error_of(pairs, pairs.links), found = error_of(pairs, fitted(pairs));
-  std::printf("error of F times light: %.4f by rays of the links, %.4f fitted\n", traced, found);
-  EXPECT_LT(found, traced);
-  EXPECT_LE(found, 0.002);
+  const FormFactorLinks by_rays = traced(pairs), links = fitted(pairs, 2 * kLinkWorth);
+  const double error_by_rays = error_of(pairs, by_rays), error = error_of(pairs, links);
+  std::printf("links, error of F times light: %zu, %.4f by rays; %zu, %.4f fitted\n",
+              by_rays.pair.size(), error_by_rays, links.pair.size(), error);
+  EXPECT_LT(links.pair.size(), by_rays.pair.size());
+  EXPECT_LT(error, error_by_rays);
+  EXPECT_LE(error, 0.001);
+}
+
+TEST(LinkFitting, WorthMoreLinksAreFewerAndLessTrue) {
+  const Pairs& pairs = furnished();
+  std::size_t count = pairs.exchange.column.size() + 1;
+  double error = 0;
+  for (const double worth : {2e-4, 1e-3, 5e-3}) {
+    const FormFactorLinks links = fitted(pairs, worth);
+    EXPECT_LT(links.pair.size(), count) << worth;
+    EXPECT_GT(error_of(pairs, links), error) << worth;
+    count = links.pair.size();
+    error = error_of(pairs, links);
+  }
 }
 
 TEST(LinkFitting, KeepsRowSums) {
   const Pairs& pairs = furnished();
-  const std::vector<Float3> ones(pairs.patches.size(), {1, 1, 1});
+  const std::vector<Float3> ones(pairs.patches().size(), {1, 1, 1});
   const auto truth = gather_pairs(pairs, ones), found = gather_links(pairs, fitted(pairs), ones);
   for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_NEAR(found[i][0], truth[i][0], 5e-3);
 }
@@ -112,8 +127,8 @@ TEST(LinkFitting, NoLightThroughAWall) {
   const Pairs pairs = pairs_of(scene, 500);
   const FormFactorLinks links = fitted(pairs);
   EXPECT_LT(links.pair.size(), pairs.exchange.column.size() / 2);
-  const auto in_first = [&](std::size_t i) { return pairs.patches.centroid[i][0] < 3.02F; };
-  std::vector<Float3> light(pairs.patches.size());
+  const auto in_first = [&](std::size_t i) { return pairs.patches().centroid[i][0] < 3.02F; };
+  std::vector<Float3> light(pairs.patches().size());
   for (std::size_t i = 0; i < light.size(); ++i) {
     if (in_first(i)) light[i] = {1, 1, 1};
   }
@@ -122,6 +137,66 @@ TEST(LinkFitting, NoLightThroughAWall) {
     if (in_first(i)) continue;
     EXPECT_EQ(found[i][0], 0) << i;
   }
+}
+
+/// Two squares of 8 by 8 patches face to face, a metre apart, neither quite flat and neither along
+/// an axis. What they exchange is uneven by a fifth.
+Pairs tilted_squares() {
+  constexpr std::uint32_t kSide = 8, kCount = 2 * kSide * kSide;
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> uneven(-1, 1);
+  const glm::dvec3 u = glm::normalize(glm::dvec3(1, -1, 0.3));
+  const glm::dvec3 v = glm::normalize(glm::cross(u, glm::dvec3(0.5, 0.7, -0.4)));
+  const glm::dvec3 normal = glm::cross(u, v);
+  Pairs pairs;
+  std::vector<std::uint64_t> begin(1, 0);
+  std::vector<std::uint32_t> column;
+  std::vector<float> exchange;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const bool first = i < kCount / 2;
+    const double height = (first ? 0 : 1) + 1e-4 * uneven(engine);
+    const glm::dvec3 place =
+        (i % kSide + 0.5) / kSide * u + (i / kSide % kSide + 0.5) / kSide * v + height * normal;
+    pairs.model.patches.area.push_back(1.0F / (kSide * kSide));
+    pairs.model.patches.centroid.push_back(to_float3(place));
+    pairs.model.patches.normal.push_back(to_float3(first ? normal : -normal));
+    for (std::uint32_t j = kCount / 2; first && j < kCount; ++j) {
+      column.push_back(j);
+      exchange.push_back(
+          static_cast<float>(0.2 * (1 + 0.2 * uneven(engine)) * std::pow(kSide, -4)));
+    }
+    begin.push_back(column.size());
+  }
+  pairs.exchange.row_begin = SharedArray<std::uint64_t>(std::move(begin));
+  pairs.exchange.column = SharedArray<std::uint32_t>(std::move(column));
+  pairs.exchange.exchange_area = SharedArray<float>(std::move(exchange));
+  return pairs;
+}
+
+TEST(LinkFitting, RoundingOfGradientsIsSmallWhereNodesAreThin) {
+  const Pairs pairs = tilted_squares();
+  for (const double worth : {1e-2, 3e-3}) {
+    const FormFactorLinks links = fitted(pairs, worth);
+    EXPECT_LT(links.pair.size(), pairs.exchange.column.size() / 2);
+    EXPECT_LE(error_of(pairs, links), 0.05) << worth;
+  }
+}
+
+TEST(LinkFitting, PatchesThatSeeThemselves) {
+  Pairs pairs = furnished();
+  const std::uint32_t n = static_cast<std::uint32_t>(pairs.patches().size());
+  pairs.exchange.row_begin = SharedArray<std::uint64_t>([&] {
+    std::vector<std::uint64_t> begin(n + 1);
+    for (std::uint32_t i = 0; i <= n; ++i) begin[i] = i;
+    return begin;
+  }());
+  std::vector<std::uint32_t> column(n);
+  for (std::uint32_t i = 0; i < n; ++i) column[i] = i;
+  pairs.exchange.column = SharedArray<std::uint32_t>(std::move(column));
+  pairs.exchange.exchange_area = SharedArray<float>(std::vector<float>(n, 0.001F));
+  const FormFactorLinks links = fitted(pairs);
+  EXPECT_EQ(links.pair.size(), n);
+  EXPECT_LE(error_of(pairs, links), 1e-6);
 }
 
 TEST(LinkFitting, SameBitsForAnyNumberOfThreads) {
@@ -134,12 +209,19 @@ TEST(LinkFitting, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.scale, five.scale);
 }
 
+TEST(LinkFitting, StopsWhenAskedTo) {
+  const Pairs& pairs = furnished();
+  EXPECT_THROW(fit_links(pairs.exchange, pairs.patches(), kLinkWorth, [](double) { return false; }),
+               Cancelled);
+}
+
 TEST(LinkFitting, RefusesWhatDoesNotFit) {
   const Pairs& pairs = furnished();
-  test::expect_error([&] { fit_links(pairs.links, {}, pairs.patches); }, "differ in number");
-  FormFactorLinks damaged = pairs.links;
-  damaged.pair[0][0] = static_cast<std::uint32_t>(damaged.first_child.size());
-  test::expect_error([&] { fit_links(damaged, pairs.exchange, pairs.patches); }, "links");
+  test::expect_error([&] { fit_links({}, pairs.patches()); }, "differ in number");
+  for (const double worth : {0.0, -1e-3, std::numeric_limits<double>::infinity(),
+                             std::numeric_limits<double>::quiet_NaN()}) {
+    test::expect_error([&] { fitted(pairs, worth); }, "worth");
+  }
 }
 
 }  // namespace

@@ -52,8 +52,8 @@ struct BuildSettings {
   FormFactorSettings form_factors;
   /// kLinks: link_epsilon 0 stands for kLinkEpsilon, and the operator is hierarchical or none.
   FormFactorKind form_factor_kind = FormFactorKind::kAutomatic;
-  /// Store links too, for hierarchical radiosity: to form_factors.link_epsilon, or kLinkEpsilon if
-  /// that is 0.
+  /// Store links too, for hierarchical radiosity: fitted to the form factors of all pairs, or those
+  /// that were found instead.
   bool store_links = false;
   ProbeSettings probes;                       ///< by default none
   LightmapSettings lightmap;                  ///< by default none

@@ -6,7 +6,7 @@
 
 namespace rebounce {
 
-/// The error for which stored links are made coarser, as a part of that to which they were refined:
+/// The usual error for which links are made coarser, as a part of that to which they were refined:
 /// a third of the links stays, and the light is as true as it was (notes/links.md).
 inline constexpr double kLinkCoarsening = 0.2;
 

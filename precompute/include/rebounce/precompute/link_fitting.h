@@ -1,21 +1,31 @@
 #pragma once
 
+#include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
 
-/// Links between the same nodes, with the form factors of all pairs: each is the least squares of
-/// its pairs, so that what nodes exchange and, after scaling, what each patch gathers of uniform
-/// light are those of the pairs. What rays of the links were off is gone; where links are was a
-/// matter of geometry. Links without any light are left out.
+/// What a fitted link must be worth by default: see fit_links. Measured: notes/links.md.
+inline constexpr double kLinkWorth = 7e-4;
+
+/// Links for the form factors of all pairs, as few as possible for their error.
 ///
-/// `links` and `exchange` are over the n patches; only single patches are linked to themselves, as
-/// build_links has it. The same bits for any number of threads. The work
-/// is that of sorting the pairs and a look at each; it takes 8 bytes for each. Throws Error if the
-/// sizes differ or `links` are damaged.
-FormFactorLinks fit_links(const FormFactorLinks& links, const ExchangeMatrix& exchange,
-                          const PatchTable& patches);
+/// Each link is the least squares of its pairs, so that what nodes exchange and, after scaling,
+/// what each patch gathers of uniform light are those of the pairs. Of all ways to cut the pairs
+/// into pairs of nodes, by splitting either node again and again, that of the least squared error
+/// plus price for each link is found (by dynamic programming, within blocks of 256 patches by 256):
+/// the Lagrangian form of "fewest links for a given error". The error is that of A^1/2 F A^-1/2,
+/// Frobenius; the price is the square of `worth` times the mean that a patch has of its square. A
+/// larger worth means fewer links and more error, which grows about like its power 0.8.
+///
+/// Pairs without light have no link, and no link takes light from one room to another that light
+/// cannot reach on any way. The same bits for any number of threads. It takes 8 bytes for
+/// each pair and the time of a look at some twentieth to fifth of the pairs of nodes. Throws Error
+/// if `exchange` and the n patches differ in number or `worth` is not above 0 and finite, Cancelled
+/// when `progress` says so.
+FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patches,
+                          double worth = kLinkWorth, const Progress& progress = {});
 
 }  // namespace rebounce
