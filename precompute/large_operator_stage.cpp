@@ -59,7 +59,7 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
                          std::uint64_t seed, const ReferenceSolver& solver,
                          const Progress& progress) {
   FittedLights lights;
-  lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
+  lights.exitances = draw_fitting_lights(data, tracer, seed, roles, kFewJudgingCount);
   const Lights tests =
       random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
   const std::size_t shaping = lights.exitances.shaping.size(),
