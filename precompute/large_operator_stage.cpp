@@ -8,6 +8,7 @@
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/large_transfer.h"
+#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/area_norm.h"
@@ -142,8 +143,17 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     }
     return measure_error(data, tracer, reference, seed, part);
   });
+  // The check is the last that needs them all.
+  if (decided.store_links) {
+    data.links = clock.run("links", [&](const Progress&) {
+      return coarsen_links(data.links, patches.area, patches.centroid,
+                           kLinkCoarsening * decided.form_factors.link_epsilon);
+    });
+    report.link_count = data.links.pair.size();
+  } else {
+    data.links = {};
+  }
   record_build(decided, report, errors, data.record);
-  if (!decided.store_links) data.links = {};
 }
 
 }  // namespace rebounce
