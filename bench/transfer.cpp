@@ -28,6 +28,7 @@ constexpr std::uint64_t kLightSeed = 77;  // no lights that an operator was fitt
 struct TransferOptions {
   std::vector<std::string> scenes;
   std::vector<std::size_t> patch_counts = {1000, 4000};
+  bool untimed = false;
   CommonOptions common{.repeats = 21};
 };
 
@@ -82,19 +83,20 @@ class TransferBenchmark {
     for (const Contestant& contestant : list_contestants(contenders, settings)) add(contestant);
   }
 
-  void run(const CommonOptions& options, Table& table) const {
+  void run(const TransferOptions& options, Table& table) const {
     const int threads = omp_get_max_threads();
     std::vector<std::vector<Errors>> errors;
     for (const Entry& entry : entries_) {
       errors.emplace_back();
       for (const Lights& lights : lights_) errors.back().push_back(errors_of(entry, lights));
     }
-    omp_set_num_threads(1);
-    const std::vector<Timing> times = time(options.repeats);
-    omp_set_num_threads(threads);
-    for (std::size_t k = 0; k < entries_.size(); ++k) {
-      report(entries_[k], errors[k], times[2 * k], times[2 * k + 1], table);
+    std::vector<Timing> times;
+    if (!options.untimed) {
+      omp_set_num_threads(1);
+      times = time(options.common.repeats);
+      omp_set_num_threads(threads);
     }
+    for (std::size_t k = 0; k < entries_.size(); ++k) report(k, errors[k], times, table);
   }
 
  private:
@@ -175,16 +177,32 @@ class TransferBenchmark {
     return time_interleaved(cases, {.rounds = repeats});
   }
 
-  void report(const Entry& entry, const std::vector<Errors>& errors, const Timing& read,
-              const Timing& work, Table& table) const {
+  /// `times` as time() has them, or none.
+  void report(std::size_t k, const std::vector<Errors>& errors, std::span<const Timing> times,
+              Table& table) const {
+    const Entry& entry = entries_[k];
     const auto n = static_cast<double>(patches_.size());
-    const double read_seconds = read.median * std::max(entry.sweeps, 1);
-    table.add({contenders_.data->record.scene_name, patches_.size(), entry.name, entry.form,
-               entry.sweeps > 0 ? Table::Cell(entry.sweeps) : Table::Cell(),
-               static_cast<double>(entry.bytes) / n, errors[0].mean, errors[0].max, errors[1].mean,
-               errors[1].max,
-               entry.build_seconds ? Table::Cell(*entry.build_seconds) : Table::Cell(),
-               work.median * 1e6, work.spread, read_seconds / work.median});
+    std::vector<Table::Cell> row = {contenders_.data->record.scene_name,
+                                    patches_.size(),
+                                    entry.name,
+                                    entry.form,
+                                    entry.sweeps > 0 ? Table::Cell(entry.sweeps) : Table::Cell(),
+                                    static_cast<double>(entry.bytes) / n,
+                                    errors[0].mean,
+                                    errors[0].max,
+                                    errors[1].mean,
+                                    errors[1].max};
+    row.resize(row.size() + 4);
+    if (!times.empty()) {
+      const Timing &read = times[2 * k], &work = times[2 * k + 1];
+      const double read_seconds = read.median * std::max(entry.sweeps, 1);
+      auto cell = row.end() - 4;
+      if (entry.build_seconds) *cell = *entry.build_seconds;
+      *++cell = work.median * 1e6;
+      *++cell = work.spread;
+      *++cell = read_seconds / work.median;
+    }
+    table.add(std::move(row));
   }
 
   const Contenders& contenders_;
@@ -202,7 +220,9 @@ void run(const TransferOptions& options) {
       const ReportSettings settings = settings_for(patch_count);
       const Contenders contenders =
           build_contenders(scene, settings, [](std::string_view, double) { return true; });
-      TransferBenchmark(contenders, settings).run(options.common, table);
+      TransferBenchmark(contenders, settings).run(options, table);
+      // What is there stays if a later scene fails, or is not waited for.
+      if (!options.common.csv.empty()) write_text(options.common.csv, table.csv());
     }
   }
   publish("transfer", table, options.common);
@@ -217,6 +237,8 @@ int main(int argc, char** argv) {
                "bench_transfer");
   rebounce::bench::add_scene_option(app, options.scenes);
   rebounce::bench::add_patches_option(app, options.patch_counts);
+  app.add_flag("--untimed", options.untimed,
+               "Bytes and errors alone, for a machine that has other things to do");
   rebounce::bench::add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

@@ -42,7 +42,8 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
 }
 
 /// What the operator is to be made from, if that was left open.
-FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
+FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model,
+                                   const PatchRoles& roles) {
   const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
                           settings.operator_kind == OperatorKind::kHierarchical;
   if (settings.form_factor_kind == FormFactorKind::kLinks && !from_links &&
@@ -52,14 +53,14 @@ FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchMod
   if (settings.form_factor_kind != FormFactorKind::kAutomatic) return settings.form_factor_kind;
   const bool too_many =
       model.patches.size() > kPairsPatchCount ||
-      estimate_cost_of_pairs(model, settings).peak_bytes > memory_limit_bytes(settings);
+      estimate_cost_of_pairs(model, roles, settings).peak_bytes > memory_limit_bytes(settings);
   return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
 }
 
 /// The settings with what was left open decided.
-BuildSettings decide(BuildSettings settings, const PatchModel& model) {
+BuildSettings decide(BuildSettings settings, const PatchModel& model, const PatchRoles& roles) {
   settings.memory_limit_bytes = memory_limit_bytes(settings);
-  settings.form_factor_kind = choose_form_factors(settings, model);
+  settings.form_factor_kind = choose_form_factors(settings, model, roles);
   const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
   const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
   if (settings.operator_kind == OperatorKind::kAutomatic) {
@@ -135,8 +136,8 @@ class TransferBuild {
       data_.lightmap = clock_.run(
           "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
     }
-    decided_ = decide(settings_, model_);
-    report_.estimate = estimate_cost(model_, decided_);
+    decided_ = decide(settings_, model_, roles_);
+    report_.estimate = estimate_cost(model_, roles_, decided_);
     announce(report_.estimate);
   }
 
@@ -230,11 +231,13 @@ class TransferBuild {
 
   /// With links known, and how long they took to find.
   void estimate_rest(const LinkBuild& links) {
-    const LinkedBuild build = linked_build(links.links, model_.patches, links.sky_visibility);
+    const LinkedBuild build =
+        linked_build(links.links, model_.patches, links.sky_visibility, roles_, decided_.tolerance);
     const double slowness = std::clamp(
         report_.seconds.back().second / estimate_links(build).seconds, 1 / kFastest, kFastest);
     CostEstimate rest = estimate_operator_from_links(build, decided_.memory_limit_bytes);
     rest.seconds *= slowness;
+    rest.whole_seconds *= slowness;
     rest.least_seconds = rest.seconds;
     announce(report_.estimate_after_links.emplace(rest));
   }

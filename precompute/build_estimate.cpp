@@ -9,6 +9,7 @@
 
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/large_transfer.h"
+#include "rebounce/precompute/patch_selection.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/error.h"
 
@@ -31,6 +32,10 @@ double on_all_processors(double processor_seconds) {
 double seconds_of_vertices(std::size_t vertex_count) {
   return static_cast<double>(vertex_count) / 8e4;
 }
+
+// Processor seconds to compress the dense inverse of so many patches, and how they grow; measured:
+// notes/operator.md.
+constexpr double kCompressPairs = 3.4e-4, kCompressPairsGrowth = 1.3;
 
 // Links of a patch where there are kLinkPatches of them, and how their number grows: in a bare room
 // and in a furnished one. Measured: notes/links.md, notes/operator.md. Rooms full of small things
@@ -60,6 +65,14 @@ constexpr double kDrawPatch = 4e-7;
 // Bytes of a patch of compressed form factors, with no links and for each link of it.
 constexpr double kFormFactorBytes = 570, kFormFactorLinkBytes = 4;
 
+CostEstimate estimate_of(std::size_t patch_count, const PatchRoles& roles) {
+  CostEstimate estimate;
+  estimate.patch_count = patch_count;
+  estimate.receiver_count = roles.count(PatchRoles::kReceiver, patch_count);
+  estimate.source_count = roles.count(PatchRoles::kSource, patch_count);
+  return estimate;
+}
+
 /// Memory of the links and of all else that stays beside build_large_transfer.
 double bytes_beside_transfer(const LinkedBuild& build) {
   return kPatchBytes * static_cast<double>(build.patch_count) +
@@ -67,25 +80,31 @@ double bytes_beside_transfer(const LinkedBuild& build) {
 }
 
 /// What it would be with so many links to a patch.
-LinkedBuild build_with(double links_per_patch, const PatchTable& patches) {
+LinkedBuild build_with(double links_per_patch, const PatchTable& patches, const PatchRoles& roles,
+                       double tolerance) {
   const double links = links_per_patch * static_cast<double>(patches.size());
   return {.patch_count = patches.size(),
           .link_count = static_cast<std::size_t>(links),
-          .matrix_count = distinct_channels(patches.reflectance)};
+          .matrix_count = distinct_channels(patches.reflectance),
+          .roles = roles,
+          .tolerance = tolerance};
 }
 
-CostEstimate estimate_cost_of_links(const PatchModel& model, std::uint64_t limit_bytes) {
+CostEstimate estimate_cost_of_links(const PatchModel& model, const PatchRoles& roles,
+                                    const BuildSettings& settings) {
+  const std::uint64_t limit_bytes = memory_limit_bytes(settings);
   const auto n = static_cast<double>(model.patches.size());
   const double growth = std::pow(n / kLinkPatches, kLinkGrowth);
-  const LinkedBuild furnished = build_with(kFurnishedLinks * growth, model.patches),
-                    bare = build_with(kBareLinks, model.patches);
+  const LinkedBuild furnished = build_with(kFurnishedLinks * growth, model.patches, roles,
+                                           settings.tolerance),
+                    bare = build_with(kBareLinks, model.patches, roles, settings.tolerance);
   const CostEstimate links = estimate_links(furnished),
                      rest = estimate_operator_from_links(furnished, limit_bytes);
   const double vertices = seconds_of_vertices(model.mesh.position.size());
-  CostEstimate all;
-  all.patch_count = furnished.patch_count;
+  CostEstimate all = estimate_of(furnished.patch_count, roles);
   all.peak_bytes = std::max(links.peak_bytes, rest.peak_bytes);
   all.seconds = links.seconds + rest.seconds + vertices;
+  all.whole_seconds = links.seconds + rest.whole_seconds + vertices;
   all.least_seconds = estimate_links(bare).seconds +
                       estimate_operator_from_links(bare, limit_bytes).seconds + vertices;
   return all;
@@ -97,12 +116,12 @@ std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
   return settings.memory_limit_bytes > 0 ? settings.memory_limit_bytes : machine_memory_bytes() / 2;
 }
 
-CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings& settings) {
+CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& roles,
+                                    const BuildSettings& settings) {
   const PatchTable& patches = model.patches;
   const std::uint32_t matrices = distinct_channels(patches.reflectance);
   const auto n = static_cast<double>(patches.size());
-  CostEstimate estimate;
-  estimate.patch_count = patches.size();
+  CostEstimate estimate = estimate_of(patches.size(), roles);
   // Form factors at their fullest: half of all pairs, 16 bytes each while they are made and 24 when
   // they are compressed and expanded; then the inversion beside the compressed ones.
   const double factors = n * n / 4;
@@ -110,35 +129,44 @@ CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings
       40 * factors,
       8 * factors + static_cast<double>(dense_transfer_peak_bytes(patches.size(), matrices))));
   // Ten million rays and fifty billion operations a second, about one slow core.
-  estimate.seconds = on_all_processors(factors * settings.form_factors.probe_rays / 1e7 +
-                                       2 * n * n * n * matrices / 5e10) +
-                     seconds_of_vertices(model.mesh.position.size());
+  estimate.whole_seconds = on_all_processors(factors * settings.form_factors.probe_rays / 1e7 +
+                                             2 * n * n * n * matrices / 5e10) +
+                           seconds_of_vertices(model.mesh.position.size());
+  estimate.seconds = estimate.whole_seconds;
+  if (settings.operator_kind == OperatorKind::kHierarchical) {
+    estimate.seconds += on_all_processors(kCompressPairs * std::pow(n, kCompressPairsGrowth) *
+                                          wanted_part(roles, patches.size()));
+  }
   estimate.least_seconds = estimate.seconds;
   return estimate;
 }
 
-CostEstimate estimate_cost(const PatchModel& model, const BuildSettings& settings) {
+CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
+                           const BuildSettings& settings) {
   return settings.form_factor_kind == FormFactorKind::kLinks
-             ? estimate_cost_of_links(model, memory_limit_bytes(settings))
-             : estimate_cost_of_pairs(model, settings);
+             ? estimate_cost_of_links(model, roles, settings)
+             : estimate_cost_of_pairs(model, roles, settings);
 }
 
 LinkedBuild linked_build(const FormFactorLinks& links, const PatchTable& patches,
-                         std::span<const float> sky_visibility) {
+                         std::span<const float> sky_visibility, const PatchRoles& roles,
+                         double tolerance) {
   return {.patch_count = patches.size(),
           .link_count = links.pair.size(),
           .matrix_count = distinct_channels(patches.reflectance),
-          .open = std::ranges::any_of(sky_visibility, [](float v) { return v > 0; })};
+          .open = std::ranges::any_of(sky_visibility, [](float v) { return v > 0; }),
+          .roles = roles,
+          .tolerance = tolerance};
 }
 
 CostEstimate estimate_links(const LinkedBuild& build) {
   const auto n = static_cast<double>(build.patch_count),
              links = static_cast<double>(build.link_count);
-  CostEstimate estimate;
-  estimate.patch_count = build.patch_count;
+  CostEstimate estimate = estimate_of(build.patch_count, build.roles);
   estimate.link_count = build.link_count;
   estimate.peak_bytes = static_cast<std::uint64_t>(kPatchBytes * n + kLinkPeakBytes * links);
   estimate.seconds = on_all_processors(kFindPatch * n + kFindLink * links);
+  estimate.whole_seconds = estimate.seconds;
   estimate.least_seconds = estimate.seconds;
   return estimate;
 }
@@ -146,8 +174,11 @@ CostEstimate estimate_links(const LinkedBuild& build) {
 CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
   const auto n = static_cast<double>(build.patch_count),
              links = static_cast<double>(build.link_count);
-  const LargeTransferPlan plan = plan_large_transfer(build.patch_count, build.matrix_count,
-                                                     memory_of_large_transfer(build, limit_bytes));
+  LargeTransferSettings settings{.compression = {.tolerance = build.tolerance},
+                                 .roles = build.roles};
+  settings.memory_limit_bytes = memory_of_large_transfer(build, limit_bytes);
+  const LargeTransferPlan plan =
+      plan_large_transfer(build.patch_count, build.matrix_count, settings);
   const double kinds = build.open ? 4 : 3;
   const double groups = kFitGroups + kinds * kCheckGroups;
   const double gathers = kFitGroups * kFitGathers + kinds * kCheckGroups * kCheckGathers;
@@ -156,13 +187,14 @@ CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_
   const double drawing = groups * ReferenceSolver::kTogether * kDrawPatch * n;
   const double growth = std::pow(n / kLargePatches, kGrowth);
   const double form_factors = kFormFactorBytes * n + kFormFactorLinkBytes * links;
-  CostEstimate estimate;
-  estimate.patch_count = build.patch_count;
+  CostEstimate estimate = estimate_of(build.patch_count, build.roles);
   estimate.link_count = build.link_count;
   estimate.peak_bytes = static_cast<std::uint64_t>(bytes_beside_transfer(build)) + plan.peak_bytes;
-  estimate.seconds = on_all_processors(growth * (gathering + compressing) + drawing) +
-                     large_transfer_seconds(build.patch_count, build.matrix_count, form_factors) /
-                         plan.thread_count;
+  estimate.whole_seconds = on_all_processors(growth * (gathering + compressing) + drawing);
+  estimate.seconds =
+      estimate.whole_seconds +
+      large_transfer_seconds(build.patch_count, build.matrix_count, form_factors, build.roles) /
+          plan.thread_count;
   estimate.least_seconds = estimate.seconds;
   return estimate;
 }

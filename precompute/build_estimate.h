@@ -7,6 +7,7 @@
 #include "rebounce/precompute/build.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/transfer/linked_form_factors.h"
+#include "rebounce/transfer/patch_roles.h"
 
 namespace rebounce {
 
@@ -14,11 +15,13 @@ namespace rebounce {
 std::uint64_t memory_limit_bytes(const BuildSettings& settings);
 
 /// What form factors and operator of these patches will take, by pairs whatever the settings say.
-CostEstimate estimate_cost_of_pairs(const PatchModel& model, const BuildSettings& settings);
+CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& roles,
+                                    const BuildSettings& settings);
 
 /// The same of what settings.form_factor_kind, which is no longer open, says. Links are taken to be
 /// as many as in a furnished room.
-CostEstimate estimate_cost(const PatchModel& model, const BuildSettings& settings);
+CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
+                           const BuildSettings& settings);
 
 /// What the cost of a build from links follows from.
 struct LinkedBuild {
@@ -26,10 +29,13 @@ struct LinkedBuild {
   std::size_t link_count = 0;
   std::uint32_t matrix_count = 1;  ///< distinct reflectance channels
   bool open = false;               ///< to the sky, whose lights are a kind of their own
+  PatchRoles roles{};
+  double tolerance = 0.005;  ///< of the operator
 };
 
 LinkedBuild linked_build(const FormFactorLinks& links, const PatchTable& patches,
-                         std::span<const float> sky_visibility);
+                         std::span<const float> sky_visibility, const PatchRoles& roles,
+                         double tolerance);
 
 /// What finding the links takes.
 CostEstimate estimate_links(const LinkedBuild& build);

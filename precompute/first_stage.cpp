@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "progress_part.h"
+#include "rebounce/precompute/patch_selection.h"
 
 namespace rebounce {
 namespace {
@@ -45,8 +46,11 @@ void FirstStage::make_panels() {
   }
 }
 
-double FirstStage::usual_work(std::size_t patch_count) {
-  return (1 + kCompression / 2) * static_cast<double>(patch_count);
+double FirstStage::usual_work(std::size_t patch_count, const PatchRoles& roles) {
+  const std::size_t columns = std::min(roles.count(PatchRoles::kReceiver, patch_count),
+                                       roles.count(PatchRoles::kSource, patch_count));
+  return static_cast<double>(columns) +
+         kCompression / 2 * wanted_part(roles, patch_count) * static_cast<double>(patch_count);
 }
 
 double FirstStage::compression_work(const Panel& panel) const {

@@ -12,12 +12,11 @@ namespace {
 
 // Measured: notes/operator.md.
 constexpr int kShapingPointCount = 128, kShapingSpotCount = 32, kShapingSunCount = 32;
-constexpr int kJudgingLightCount = 64;
 
 }  // namespace
 
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed, const PatchRoles& roles) {
+                                std::uint64_t seed, const PatchRoles& roles, int judging_count) {
   const auto draw = [&](LightKind kind, int count) {
     seed = mix_bits(seed);
     return random_initial_exitances(data, tracer, kind, count, seed, roles);
@@ -28,12 +27,12 @@ DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& trace
                                     std::pair(LightKind::kSky, kShapingSunCount)}) {
     std::ranges::move(draw(kind, count), std::back_inserter(lights.shaping));
   }
-  lights.judging = draw(LightKind::kPoint, kJudgingLightCount);
   // The scene's own lamps are sure to be used.
   std::vector<Float3> own = data.patches.emitted_exitance;
   roles.keep(PatchRoles::kSource, own);
   lights.shaping.push_back(own);
   lights.judging.push_back(std::move(own));
+  std::ranges::move(draw(LightKind::kPoint, judging_count), std::back_inserter(lights.judging));
   return lights;
 }
 

@@ -8,6 +8,7 @@
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/large_transfer.h"
+#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/area_norm.h"
@@ -59,7 +60,7 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
                          std::uint64_t seed, const ReferenceSolver& solver,
                          const Progress& progress) {
   FittedLights lights;
-  lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
+  lights.exitances = draw_fitting_lights(data, tracer, seed, roles, kFewJudgingCount);
   const Lights tests =
       random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
   const std::size_t shaping = lights.exitances.shaping.size(),
@@ -128,7 +129,8 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     settings.compression = {decided.tolerance, *decided.precision};
     settings.roles = roles;
     settings.memory_limit_bytes = memory_of_large_transfer(
-        linked_build(data.links, patches, patches.sky_visibility), decided.memory_limit_bytes);
+        linked_build(data.links, patches, patches.sky_visibility, roles, decided.tolerance),
+        decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;
     return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
                                 settings, part);
@@ -141,8 +143,17 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     }
     return measure_error(data, tracer, reference.preconditioned(data.transfer), seed, part);
   });
+  // The check is the last that needs them all.
+  if (decided.store_links) {
+    data.links = clock.run("links", [&](const Progress&) {
+      return coarsen_links(data.links, patches.area, patches.centroid,
+                           kLinkCoarsening * decided.form_factors.link_epsilon);
+    });
+    report.link_count = data.links.pair.size();
+  } else {
+    data.links = {};
+  }
   record_build(decided, report, errors, data.record);
-  if (!decided.store_links) data.links = {};
 }
 
 }  // namespace rebounce

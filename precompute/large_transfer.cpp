@@ -11,6 +11,7 @@
 #include "matrix_compression.h"
 #include "progress_part.h"
 #include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/content_hash.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
@@ -37,13 +38,17 @@ constexpr double kRounds = 3400, kRoundsPatches = 4000, kRoundsGrowth = 0.7;
 // Products with the form factors that a column takes, and operations a second of a slow core.
 constexpr double kProducts = 5.5, kOperationsPerSecond = 6e10;
 
-// An operator of the first stage, the rounds of the second and what they are judged by, bytes a
-// patch, far on the safe side.
-constexpr std::size_t kOperatorBytes = 48 << 10;
+// Bytes a patch: lights, what they lead to and how they fall on clusters; and, for each matrix, an
+// operator of the first stage and the rounds of the second, at a tolerance, with the power by which
+// less of that takes more. Measured, and about a fifth more than all that was used:
+// notes/operator.md.
+constexpr double kLightBytes = 14e3, kOperatorBytes = 10.5e3;
+constexpr double kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
 
 /// The rounds of the second stage, in columns that are solved for.
-double work_of_rounds(std::size_t patch_count) {
-  return kRounds * std::pow(static_cast<double>(patch_count) / kRoundsPatches, kRoundsGrowth);
+double work_of_rounds(std::size_t patch_count, const PatchRoles& roles) {
+  return kRounds * wanted_part(roles, patch_count) *
+         std::pow(static_cast<double>(patch_count) / kRoundsPatches, kRoundsGrowth);
 }
 
 /// Throws Error unless the limit, if there is one, has room for a plan.
@@ -98,7 +103,7 @@ std::string second_key(const std::string& first, const FittingLights& lights,
 }  // namespace
 
 LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                      std::uint64_t memory_limit_bytes) {
+                                      const LargeTransferSettings& settings) {
   constexpr std::size_t kVectors = 8;  // those of the solver, coefficients, entries of F
   constexpr std::size_t kTogether = SolvedTransfer::kTogether, kWidth = FirstStage::kPanelWidth;
   const std::size_t group = kVectors * patch_count * kTogether * sizeof(float);
@@ -107,33 +112,37 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
       largest_piece(static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count)));
   const std::size_t piece = side * side * matrix_count * (sizeof(float) + 3 * sizeof(double));
   const std::size_t groups_of_panel = matrix_count * kWidth / kTogether;
+  const std::uint64_t limit = settings.memory_limit_bytes;
+  const double operators =
+      kOperatorBytes * static_cast<double>(matrix_count) *
+      wanted_part(settings.roles, patch_count) *
+      std::pow(kOperatorTolerance / settings.compression.tolerance, kOperatorGrowth);
+  const auto kept =
+      static_cast<std::size_t>(static_cast<double>(patch_count) * (kLightBytes + operators));
 
   LargeTransferPlan plan;
   for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
     const auto threads = static_cast<std::size_t>(plan.thread_count);
     plan.panel_count = (threads + groups_of_panel - 1) / groups_of_panel;
-    plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) +
-                      patch_count * kOperatorBytes;
-    if (memory_limit_bytes == 0 || plan.peak_bytes <= memory_limit_bytes || threads == 1) {
-      return plan;
-    }
+    plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) + kept;
+    if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
 }
 
 double large_transfer_seconds(std::size_t patch_count, std::size_t matrix_count,
-                              double form_factor_bytes) {
+                              double form_factor_bytes, const PatchRoles& roles) {
   // A value of two bytes is multiplied and added twice, there and back.
   const double column =
       2 * form_factor_bytes * kProducts / kOperationsPerSecond * static_cast<double>(matrix_count);
-  return column *
-         (2 * kColumnsBefore + FirstStage::usual_work(patch_count) + work_of_rounds(patch_count));
+  return column * (2 * kColumnsBefore + FirstStage::usual_work(patch_count, roles) +
+                   work_of_rounds(patch_count, roles));
 }
 
 std::shared_ptr<const HierarchicalOperator> build_large_transfer(
     const HierarchicalOperator& form_factors, const PatchTable& patches,
     const FittingLights& lights, const LargeTransferSettings& settings, const Progress& progress) {
-  const LargeTransferPlan plan = plan_large_transfer(
-      patches.size(), distinct_channels(patches.reflectance), settings.memory_limit_bytes);
+  const LargeTransferPlan plan =
+      plan_large_transfer(patches.size(), distinct_channels(patches.reflectance), settings);
   check_memory(patches.size(), plan, settings.memory_limit_bytes);
   const double tolerance = settings.compression.tolerance;
   const double price = kFinePart * first_price(tolerance, patches.size());
@@ -143,7 +152,7 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
   const ThreadLimit limited(plan.thread_count);
   const SolvedTransfer solved(form_factors, patches, kResidualPart * tolerance);
   const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
-  const double work_after = kColumnsBefore + work_of_rounds(patches.size());
+  const double work_after = kColumnsBefore + work_of_rounds(patches.size(), settings.roles);
   double searching = 0;  // when the search of the second stage begins
   HierarchicalOperator::Storage fine;
   {

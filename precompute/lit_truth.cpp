@@ -12,7 +12,40 @@ namespace {
 // Lights that the matrix is read for at a time.
 constexpr std::size_t kBatch = 64;
 
+using Lights = std::span<const std::vector<Float3>>;
+
+/// One channel of the products with some lights.
+void multiply_channel(const SymmetricMatrix& matrix, int channel, Lights lights,
+                      std::span<std::vector<Float3>> results) {
+  const std::span<const float> area = matrix.area();
+  Eigen::MatrixXf x(area.size(), lights.size());
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    for (std::size_t i = 0; i < area.size(); ++i) {
+      x(i, k) = std::sqrt(area[i]) * lights[k][i][channel];
+    }
+  }
+  const Eigen::MatrixXf y = matrix.multiply(matrix.channel_matrix()[channel], x);
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    for (std::size_t i = 0; i < area.size(); ++i) {
+      results[k][i][channel] = y(i, k) / std::sqrt(area[i]);
+    }
+  }
+}
+
 }  // namespace
+
+std::vector<std::vector<Float3>> products(const SymmetricMatrix& matrix, Lights lights) {
+  std::vector<std::vector<Float3>> results(lights.size(),
+                                           std::vector<Float3>(matrix.area().size()));
+  for (std::size_t begin = 0; begin < lights.size(); begin += kBatch) {
+    const std::size_t count = std::min(kBatch, lights.size() - begin);
+    for (int channel = 0; channel < kChannelCount; ++channel) {
+      multiply_channel(matrix, channel, lights.subspan(begin, count),
+                       std::span(results).subspan(begin, count));
+    }
+  }
+  return results;
+}
 
 LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights)
     : area_(matrix.area().begin(), matrix.area().end()) {
@@ -20,12 +53,7 @@ LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Fl
     matrix.roles().keep(PatchRoles::kSource, lights_.emplace_back(light));
     if (!(area_norm(lights_.back(), area_) > 0)) lights_.pop_back();
   }
-  truths_.assign(lights_.size(), std::vector<Float3>(area_.size()));
-  for (int channel = 0; channel < kChannelCount; ++channel) {
-    for (std::size_t begin = 0; begin < lights_.size(); begin += kBatch) {
-      light_channel(matrix, channel, begin, std::min(lights_.size(), begin + kBatch));
-    }
-  }
+  truths_ = products(matrix, lights_);
   leave_out_dark();
   keep_received(matrix.roles());
 }
@@ -49,22 +77,6 @@ void LitTruth::leave_out_dark() {
   if (kept == 0) return;  // light arrives nowhere: the matrix is zero
   lights_.resize(kept);
   truths_.resize(kept);
-}
-
-void LitTruth::light_channel(const SymmetricMatrix& matrix, int channel, std::size_t begin,
-                             std::size_t end) {
-  Eigen::MatrixXf x(area_.size(), end - begin);
-  for (std::size_t k = begin; k < end; ++k) {
-    for (std::size_t i = 0; i < area_.size(); ++i) {
-      x(i, k - begin) = std::sqrt(area_[i]) * lights_[k][i][channel];
-    }
-  }
-  const Eigen::MatrixXf y = matrix.multiply(matrix.channel_matrix()[channel], x);
-  for (std::size_t k = begin; k < end; ++k) {
-    for (std::size_t i = 0; i < area_.size(); ++i) {
-      truths_[k][i][channel] = y(i, k - begin) / std::sqrt(area_[i]);
-    }
-  }
 }
 
 std::vector<double> LitTruth::errors(const TransferOperator& transfer) const {

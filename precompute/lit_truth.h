@@ -10,6 +10,11 @@
 
 namespace rebounce {
 
+/// The products of a matrix, in its plain form, with `lights` [n each]: for Y, what arrives in lx
+/// of initial exitances. The same bits for any number of threads.
+std::vector<std::vector<Float3>> products(const SymmetricMatrix& matrix,
+                                          std::span<const std::vector<Float3>> lights);
+
 /// Lights, and what a matrix, taken as exact, makes of them: what operators that are made from it
 /// are judged by. Of the lights what its sources give off, and of the truth what arrives at its
 /// receivers.
@@ -34,10 +39,6 @@ class LitTruth {
                                     std::size_t position_count) const;
 
  private:
-  /// Fills in one channel of the truths of lights [begin, end).
-  void light_channel(const SymmetricMatrix& matrix, int channel, std::size_t begin,
-                     std::size_t end);
-
   /// Puts out what arrives at other patches than receivers.
   void keep_received(const PatchRoles& roles);
 

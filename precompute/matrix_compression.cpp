@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "block_tree.h"
+#include "judged_error.h"
 #include "lit_truth.h"
 #include "price_search.h"
 #include "progress_part.h"
@@ -29,9 +30,6 @@ constexpr int kUsualRounds = 4;
 // Pieces of a round that are kept in one file: some seconds of work where pieces are largest, and
 // enough for many threads to share.
 constexpr std::size_t kKeptPieces = 64;
-
-// The largest error may be this many times the tolerance: gates of 0.5 % and 1.5 %.
-constexpr double kLargestOverMean = 3;
 
 // What one value per patch is worth at the tolerance, to begin the search with: measured over
 // scenes and sizes, notes/operator.md.
@@ -136,11 +134,6 @@ class Compression {
   CompressionFrame frame_;
 };
 
-/// The mean error, or the largest by kLargestOverMean if that is more.
-double judge(const std::vector<double>& errors) {
-  return std::max(mean(errors), std::ranges::max(errors) / kLargestOverMean);
-}
-
 /// The best operator that the search has met: the smallest within the limit, or the most exact.
 class Best {
  public:
@@ -195,7 +188,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const auto candidate =
         std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode(
             compression.at(search.price(), kept, part), settings.precision));
-    const double error = judge(judging.errors(*candidate));
+    const double error = judged_error(judging.errors(*candidate));
     best.offer(candidate, error);
     search.report(error);
     if (!search.done()) compression.emphasise(*candidate);

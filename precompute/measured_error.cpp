@@ -21,36 +21,6 @@ using Exitances = std::vector<std::vector<Float3>>;
 constexpr int kLightCount = 256, kReferenceLightCount = 16, kLinkedLightCount = 64;
 constexpr double kReferenceResidual = 1e-9;
 
-/// Against an iterative solution. Throws Cancelled if asked to stop.
-std::vector<double> errors_by_reference(const TransferData& data, const ReferenceSolver& reference,
-                                        const Exitances& lights, const Progress& progress) {
-  const std::vector<float>& area = data.patches.area;
-  std::vector<Float3> indirect_irradiance(data.patches.size());
-  std::vector<float> workspace(data.transfer->workspace_size());
-  ReceivedLight received;
-  std::vector<std::vector<Float3>> arrived, results;
-  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kTogether) {
-    if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
-    const auto some = std::span(lights).subspan(
-        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kTogether));
-    auto truths = reference.indirect_irradiances(some, kReferenceResidual);
-    for (std::size_t k = 0; k < some.size(); ++k) {
-      if (arrives_nowhere(truths[k], some[k], area)) continue;
-      const double all = area_norm(truths[k], area);
-      data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
-      received.add(area_norm(truths[k], area), all);
-      data.transfer->apply(some[k], indirect_irradiance, workspace);
-      results.push_back(indirect_irradiance);
-      arrived.push_back(std::move(truths[k]));
-    }
-  }
-  std::vector<double> errors;
-  for (std::size_t k = 0; k < results.size(); ++k) {
-    errors.push_back(received_error(results[k], arrived[k], area, received.reference(k)));
-  }
-  return errors;
-}
-
 KindError summary(LightKind kind, std::size_t light_count, const std::vector<double>& errors) {
   const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
   return {kind,
@@ -84,6 +54,37 @@ std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer
 
 }  // namespace
 
+std::vector<LightError> light_errors(const TransferData& data,
+                                     std::span<const std::vector<Float3>> lights,
+                                     const TruthOf& truth_of, const Progress& progress) {
+  const std::vector<float>& area = data.patches.area;
+  std::vector<Float3> indirect_irradiance(data.patches.size());
+  std::vector<float> workspace(data.transfer->workspace_size());
+  ReceivedLight received;
+  std::vector<std::vector<Float3>> arrived, results;
+  std::vector<LightError> errors;
+  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kTogether) {
+    if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
+    const auto some = lights.subspan(
+        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kTogether));
+    auto truths = truth_of(some);
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      if (arrives_nowhere(truths[k], some[k], area)) continue;
+      const double all = area_norm(truths[k], area);
+      data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
+      received.add(area_norm(truths[k], area), all);
+      errors.push_back({.arriving = area_norm(truths[k], area) / area_norm(some[k], area)});
+      data.transfer->apply(some[k], indirect_irradiance, workspace);
+      results.push_back(indirect_irradiance);
+      arrived.push_back(std::move(truths[k]));
+    }
+  }
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    errors[k].error = received_error(results[k], arrived[k], area, received.reference(k));
+  }
+  return errors;
+}
+
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress) {
@@ -101,7 +102,14 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
                                      const ReferenceSolver& reference, std::uint64_t seed,
                                      const Progress& progress) {
   const auto errors_of = [&](const Exitances& lights, const Progress& part) {
-    return errors_by_reference(data, reference, lights, part);
+    const auto truth_of = [&](std::span<const std::vector<Float3>> some) {
+      return reference.indirect_irradiances(some, kReferenceResidual);
+    };
+    std::vector<double> errors;
+    for (const LightError& light : light_errors(data, lights, truth_of, part)) {
+      errors.push_back(light.error);
+    }
+    return errors;
   };
   return measure(data, tracer, data.exchange.empty() ? kLinkedLightCount : kReferenceLightCount,
                  seed, errors_of, progress);

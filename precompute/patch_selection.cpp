@@ -205,4 +205,14 @@ PatchRoles choose_roles(const PatchModel& model, const PatchSelection& receivers
   return roles;
 }
 
+double wanted_part(const PatchRoles& roles, std::size_t patch_count) {
+  if (roles.all_are_both()) return 1;
+  const auto n = static_cast<double>(patch_count);
+  const double receivers = static_cast<double>(roles.count(PatchRoles::kReceiver, patch_count)) / n;
+  const double sources = static_cast<double>(roles.count(PatchRoles::kSource, patch_count)) / n;
+  const double both = static_cast<double>(std::ranges::count(roles.role, PatchRoles::kBoth)) / n;
+  // Pairs that want light both ways are counted once.
+  return 2 * receivers * sources - both * both;
+}
+
 }  // namespace rebounce

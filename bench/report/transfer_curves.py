@@ -20,6 +20,8 @@ LINES = (
     ("inverse", "q8", "tab:brown", "o-", "hierarchical q8"),
     ("gauss-seidel", "0.1 %", "tab:blue", ".--", "F at 0.1 %, 1 to 9 sweeps of Gauss-Seidel"),
     ("gauss-seidel", "0.3 %", "tab:cyan", ".--", "F at 0.3 %, 1 to 9 sweeps of Gauss-Seidel"),
+    ("symmetric-gauss-seidel", "0.1 %", "tab:green", ".:", "F at 0.1 %, symmetric Gauss-Seidel"),
+    ("symmetric-gauss-seidel", "0.3 %", "limegreen", ".:", "F at 0.3 %, symmetric Gauss-Seidel"),
 )
 
 
@@ -28,9 +30,10 @@ def draw(panel, rows, across):
         points = sorted(
             (float(row[across]), float(row["error_mean"]))
             for row in rows
-            if row["kind"] == kind and part in row["form"]
+            if row["kind"] == kind and part in row["form"] and row[across]
         )
         if points:
+            panel.set_visible(True)
             panel.loglog(*zip(*points), style, color=color, label=label)
     panel.set_ylim(2e-8, 1)
     panel.grid(True, which="major", alpha=0.3)
@@ -44,16 +47,27 @@ def main():
     options = parser.parse_args()
     with options.csv.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    cases = list(dict.fromkeys((row["scene"], row["patches"]) for row in rows))
-    figure, axes = plt.subplots(len(cases), 2, figsize=(11, 4 * len(cases)), squeeze=False)
-    for (scene, patches), (by_bytes, by_time) in zip(cases, axes):
-        of_case = [row for row in rows if (row["scene"], row["patches"]) == (scene, patches)]
-        draw(by_bytes, of_case, "bytes_per_patch")
-        draw(by_time, of_case, "microseconds")
-        by_bytes.set_title(f"{pathlib.Path(scene).stem}, {int(patches):,} patches", fontsize=9)
-        by_bytes.set_xlabel("bytes per patch, three channels")
-        by_time.set_xlabel("microseconds, one thread")
-    plots.put_legend(figure, *axes[0][0].get_legend_handles_labels())
+    cases = {}
+    for row in rows:
+        cases.setdefault(row["scene"], {}).setdefault(row["patches"], []).append(row)
+    columns = 2 * max(len(sizes) for sizes in cases.values())
+    figure, axes = plt.subplots(
+        len(cases), columns, figsize=(5.5 * columns, 4 * len(cases)), squeeze=False
+    )
+    for panel in axes.flat:
+        panel.set_visible(False)
+    for panels, (scene, sizes) in zip(axes, cases.items()):
+        for k, (patches, of_case) in enumerate(sizes.items()):
+            by_bytes, by_time = panels[2 * k : 2 * k + 2]
+            draw(by_bytes, of_case, "bytes_per_patch")
+            draw(by_time, of_case, "microseconds")
+            by_bytes.set_title(f"{pathlib.Path(scene).stem}, {int(patches):,} patches", fontsize=9)
+            by_bytes.set_xlabel("bytes per patch, three channels")
+            by_time.set_xlabel("microseconds, one thread")
+    named = {}  # a scene need not have all kinds
+    for panel in axes.flat:
+        named.update(zip(*reversed(panel.get_legend_handles_labels())))
+    plots.put_legend(figure, named.values(), named.keys())
     plots.save(figure, options.picture)
 
 

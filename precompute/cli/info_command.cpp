@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "commands.h"
 #include "info_json.h"
+#include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 
@@ -19,6 +21,21 @@ nlohmann::json parse_or_text(const std::string& text) {
 const char* form_factors_of(const TransferData& data) {
   if (data.exchange.empty()) return "compressed";
   return data.compressed_form_factors ? "pairs, compressed" : "pairs";
+}
+
+/// How many patches light is brought to, taken from, both and neither.
+nlohmann::json counts_of(const PatchRoles& roles, std::size_t patch_count) {
+  const std::size_t receivers = roles.count(PatchRoles::kReceiver, patch_count),
+                    sources = roles.count(PatchRoles::kSource, patch_count);
+  const std::size_t both =
+      roles.all_are_both()
+          ? patch_count
+          : static_cast<std::size_t>(std::ranges::count(roles.role, PatchRoles::kBoth));
+  return {{"both", both},
+          {"receiver_only", receivers - both},
+          {"source_only", sources - both},
+          {"neither", patch_count + both - receivers - sources},
+          {"part_of_pairs", wanted_part(roles, patch_count)}};
 }
 
 void print_summary(const nlohmann::json& info) {
@@ -64,6 +81,7 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
       {"bytes_per_patch", static_cast<double>(data.transfer->bytes()) / n},
       {"receiver_count", roles.count(PatchRoles::kReceiver, data.patches.size())},
       {"source_count", roles.count(PatchRoles::kSource, data.patches.size())},
+      {"roles", counts_of(roles, data.patches.size())},
       {"file_bytes", file_bytes},
       {"residual", record.solve_residual},
       {"tolerance", record.tolerance},

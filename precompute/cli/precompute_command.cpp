@@ -39,14 +39,31 @@ std::string rough_time(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600);
 }
 
+bool of_some(const CostEstimate& estimate) {
+  return estimate.receiver_count < estimate.patch_count ||
+         estimate.source_count < estimate.patch_count;
+}
+
+std::string roles_of(const CostEstimate& estimate) {
+  if (!of_some(estimate)) return "";
+  return fmt::format(" ({} receivers, {} sources)", estimate.receiver_count, estimate.source_count);
+}
+
+/// What receivers and sources do not shorten.
+std::string whole_part(const CostEstimate& estimate) {
+  if (!of_some(estimate)) return "";
+  return fmt::format(", {} of it whatever receivers and sources there are,",
+                     rough_time(estimate.whole_seconds));
+}
+
 std::string described(const CostEstimate& estimate) {
   const bool links_known = estimate.link_count > 0;
   const std::string most = rough_time(estimate.seconds), least = rough_time(estimate.least_seconds);
-  return fmt::format("{} {}: about {}{}{} and {:.2g} GiB",
+  return fmt::format("{} {}{}: about {}{}{}{} and {:.2g} GiB",
                      links_known ? estimate.link_count : estimate.patch_count,
-                     links_known ? "links" : "patches", least == most ? "" : least + " to ", most,
-                     links_known ? " more" : "",
-                     static_cast<double>(estimate.peak_bytes) / (1ULL << 30));
+                     links_known ? "links" : "patches", roles_of(estimate),
+                     least == most ? "" : least + " to ", most, links_known ? " more" : "",
+                     whole_part(estimate), static_cast<double>(estimate.peak_bytes) / (1ULL << 30));
 }
 
 /// What of an error's lights is no part of it.
@@ -71,6 +88,7 @@ void print_json(const TransferData& data, const BuildReport& report, std::uint64
   const auto json_of = [](const CostEstimate& estimate) {
     return nlohmann::json{{"seconds", estimate.seconds},
                           {"least_seconds", estimate.least_seconds},
+                          {"whole_seconds", estimate.whole_seconds},
                           {"peak_bytes", estimate.peak_bytes}};
   };
   summary["estimate"] = json_of(report.estimate);

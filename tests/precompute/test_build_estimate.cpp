@@ -6,6 +6,7 @@
 #include <omp.h>
 
 #include "expect_error.h"
+#include "rebounce/precompute/patch_selection.h"
 
 namespace rebounce {
 namespace {
@@ -22,6 +23,17 @@ struct Measured {
   LinkedBuild build;
   double links, rest;  ///< processor seconds; notes/links.md, notes/operator.md
 };
+
+/// The first patches are receivers, the last sources.
+PatchRoles roles(std::size_t patch_count, std::size_t receivers, std::size_t sources) {
+  PatchRoles roles;
+  for (std::size_t i = 0; i < patch_count; ++i) {
+    const int role = (i < receivers ? PatchRoles::kReceiver : 0) |
+                     (i + sources >= patch_count ? PatchRoles::kSource : 0);
+    roles.role.push_back(static_cast<std::uint8_t>(role));
+  }
+  return roles;
+}
 
 const Measured kMeasured[] = {
     {"white room", {.patch_count = 4000, .link_count = 188'190, .matrix_count = 1}, 4.2, 22.8},
@@ -62,6 +74,59 @@ TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
   refuse_if_too_large(least, least.peak_bytes, 12);
   test::expect_error([&] { refuse_if_too_large(least, least.peak_bytes - 1, 12); },
                      "64000 patches (from 12 triangles) need about ");
+}
+
+TEST(BuildEstimate, OfMemoryIsAboveWhatBuildsTookAndNotFarAbove) {
+  struct Peak {
+    LinkedBuild build;
+    int threads;
+    double bytes;  ///< notes/operator.md
+  };
+  const int before = omp_get_max_threads();
+  for (const Peak& peak :
+       {Peak{{.patch_count = 4000, .link_count = 188'190, .matrix_count = 1}, 1, 134.8e6},
+        Peak{{.patch_count = 4000, .link_count = 188'190, .matrix_count = 1}, 2, 158.8e6},
+        Peak{{.patch_count = 8000, .link_count = 352'216, .matrix_count = 1}, 2, 314.4e6},
+        Peak{{.patch_count = 4000, .link_count = 663'316, .matrix_count = 3}, 2, 286.6e6}}) {
+    omp_set_num_threads(peak.threads);
+    const auto estimate =
+        static_cast<double>(estimate_operator_from_links(peak.build, kPlenty).peak_bytes);
+    EXPECT_GT(estimate, 1.1 * peak.bytes);
+    EXPECT_LT(estimate, 1.32 * peak.bytes);
+  }
+  omp_set_num_threads(before);
+}
+
+TEST(BuildEstimate, FallsWithReceiversAndSourcesWhereTheWorkDoes) {
+  const std::size_t n = 30000;
+  const LinkedBuild whole{.patch_count = n, .link_count = 2'000'000, .matrix_count = 3};
+  const CostEstimate all = estimate_operator_from_links(whole, kPlenty);
+  EXPECT_EQ(all.receiver_count, n);
+  EXPECT_EQ(all.source_count, n);
+  double last = all.seconds;
+  for (const auto& [receivers, sources] :
+       {std::pair(n, n / 2), std::pair(n / 2, n / 2), std::pair(n / 8, n / 8)}) {
+    LinkedBuild part = whole;
+    part.roles = roles(n, receivers, sources);
+    const CostEstimate some = estimate_operator_from_links(part, kPlenty);
+    EXPECT_EQ(some.receiver_count, receivers);
+    EXPECT_EQ(some.source_count, sources);
+    EXPECT_EQ(some.whole_seconds, all.whole_seconds) << "lights and their truths are the same";
+    EXPECT_LT(some.seconds, last);
+    EXPECT_GT(some.seconds, some.whole_seconds);
+    EXPECT_LT(some.peak_bytes, all.peak_bytes);
+    last = some.seconds;
+  }
+}
+
+TEST(WantedPart, CountsPairsThatWantLightBothWaysOnce) {
+  EXPECT_EQ(wanted_part({}, 8), 1);
+  EXPECT_EQ(wanted_part(roles(8, 8, 8), 8), 1);
+  EXPECT_NEAR(wanted_part(roles(8, 4, 4), 8), 0.5, 1e-12) << "from one half to the other";
+  EXPECT_NEAR(wanted_part(roles(8, 4, 8), 8), 0.75, 1e-12);
+  PatchRoles quarter = roles(8, 2, 0);
+  for (std::uint8_t& role : quarter.role) role = role != 0 ? PatchRoles::kBoth : 0;
+  EXPECT_NEAR(wanted_part(quarter, 8), 1.0 / 16, 1e-12);
 }
 
 TEST(BuildEstimate, GrowsWithEverything) {

@@ -137,6 +137,10 @@ TEST(BuildFromLinks, KeepsNoPairsAndIsTheirLightWithTheErrorOnRecord) {
   EXPECT_LT(mean(of_links), 1.5 * data.record.error_mean);
   EXPECT_LT(std::ranges::max(of_links), data.record.error_bound);
 
+  // Those that are stored are fewer than those that it was made from.
+  const Built found = exchange_of("furnished_room.gltf", FormFactorKind::kLinks, 500);
+  EXPECT_LT(data.links.pair.size(), found.data.links.pair.size() * 2 / 3);
+
   const Built pairs = exchange_of("furnished_room.gltf", FormFactorKind::kPairs, 500);
   ASSERT_EQ(pairs.data.patches.area, data.patches.area);
   const auto of_pairs =

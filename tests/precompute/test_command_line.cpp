@@ -697,6 +697,16 @@ TEST_F(CommandLine, StoresReceiversAndSourcesAlone) {
   EXPECT_LT(info["source_count"].get<std::size_t>(), n / 2);
   EXPECT_EQ(info["settings"]["sources"], (json{"ceiling", "material:red"}));
   EXPECT_EQ(info["settings"]["receivers"].size(), 3U);
+  const json& roles = info["roles"];
+  EXPECT_EQ(roles["both"].get<std::size_t>() + roles["receiver_only"].get<std::size_t>(),
+            receivers);
+  EXPECT_EQ(roles["both"].get<std::size_t>() + roles["receiver_only"].get<std::size_t>() +
+                roles["source_only"].get<std::size_t>() + roles["neither"].get<std::size_t>(),
+            n);
+  EXPECT_GT(roles["neither"], 0);
+  EXPECT_GT(roles["part_of_pairs"], 0);
+  EXPECT_LT(roles["part_of_pairs"], 0.5);
+  EXPECT_GT(made["estimate"]["seconds"], made["estimate"]["whole_seconds"]);
   EXPECT_LT(info["error_mean"].get<double>(), 0.005);
 
   summary_of({"solve", file, "--lights", kLights, "-o", solution});
@@ -712,6 +722,8 @@ TEST_F(CommandLine, StoresReceiversAndSourcesAlone) {
   const json whole = summary_of({"info", precompute("whole.safetensors")});
   EXPECT_EQ(whole["receiver_count"], whole["patch_count"]);
   EXPECT_EQ(whole["source_count"], whole["patch_count"]);
+  EXPECT_EQ(whole["roles"]["both"], whole["patch_count"]);
+  EXPECT_EQ(whole["roles"]["part_of_pairs"], 1);
 }
 
 TEST_F(CommandLine, RefusesReceiversAndSourcesThatAreNotThere) {

@@ -244,8 +244,10 @@ TEST(LargeTransfer, SameBitsForAnyNumberOfThreadsAndAnyMemory) {
   omp_set_num_threads(1);
   const auto one = build(room);
   omp_set_num_threads(6);
-  const LargeTransferPlan free = plan_large_transfer(room.patches.size(), 1),
-                          least = plan_large_transfer(room.patches.size(), 1, 1);
+  const LargeTransferPlan free =
+      plan_large_transfer(room.patches.size(), 1, {.compression = kCoarse});
+  const LargeTransferPlan least = plan_large_transfer(
+      room.patches.size(), 1, {.compression = kCoarse, .memory_limit_bytes = 1});
   ASSERT_GT(room.patches.size(), 1024U) << "not four panels";
   ASSERT_EQ(free.panel_count, 2U);
   ASSERT_EQ(least.panel_count, 1U);
@@ -264,7 +266,7 @@ TEST(LargeTransfer, MorePanelsAndThreadsForMoreMemory) {
   omp_set_num_threads(16);
   for (const std::size_t matrices : {1U, 3U}) {
     const LargeTransferPlan free = plan_large_transfer(65536, matrices),
-                            least = plan_large_transfer(65536, matrices, 1);
+                            least = plan_large_transfer(65536, matrices, {.memory_limit_bytes = 1});
     EXPECT_EQ(free.thread_count, 16);
     EXPECT_EQ(free.panel_count, matrices == 1 ? 4U : 2U) << "not enough columns for all threads";
     EXPECT_EQ(least.thread_count, 1);
@@ -272,7 +274,8 @@ TEST(LargeTransfer, MorePanelsAndThreadsForMoreMemory) {
     LargeTransferPlan last = least;
     int narrowed = 0;
     for (std::size_t limit = least.peak_bytes; limit < free.peak_bytes; limit += 100 << 20) {
-      const LargeTransferPlan plan = plan_large_transfer(65536, matrices, limit);
+      const LargeTransferPlan plan =
+          plan_large_transfer(65536, matrices, {.memory_limit_bytes = limit});
       EXPECT_LE(plan.peak_bytes, limit);
       EXPECT_GE(plan.thread_count, last.thread_count);
       EXPECT_GE(plan.panel_count, last.panel_count);
@@ -344,8 +347,9 @@ TEST(LargeTransfer, StopsWhenAsked) {
 
 TEST(LargeTransfer, RefusesWhatItCannotDo) {
   const Room& room = small_room();
-  const std::size_t least = plan_large_transfer(room.patches.size(), 1, 1).peak_bytes;
-  LargeTransferSettings settings{.compression = kCoarse, .memory_limit_bytes = least - 1};
+  LargeTransferSettings settings{.compression = kCoarse, .memory_limit_bytes = 1};
+  const std::size_t least = plan_large_transfer(room.patches.size(), 1, settings).peak_bytes;
+  settings.memory_limit_bytes = least - 1;
   const auto attempt = [&] {
     build_large_transfer(*room.form_factors, room.patches, room.lights(), settings);
   };
@@ -361,6 +365,14 @@ TEST(LargeTransfer, TakesMemoryInProportionToThePatches) {
   const double at_64k = static_cast<double>(plan_large_transfer(65536, 3).peak_bytes);
   EXPECT_NEAR(static_cast<double>(plan_large_transfer(131072, 3).peak_bytes) / at_64k, 2, 0.3);
   EXPECT_LT(plan_large_transfer(2000, 1).peak_bytes, plan_large_transfer(4000, 1).peak_bytes);
+  // A finer operator takes more, one over a quarter of the patches less, but as many lights.
+  PatchRoles quarter;
+  for (std::size_t i = 0; i < 4000; ++i) quarter.role.push_back(i % 4 == 0 ? PatchRoles::kBoth : 0);
+  const LargeTransferSettings fine{.compression = {.tolerance = 0.001}}, part{.roles = quarter};
+  const std::size_t usual = plan_large_transfer(4000, 3).peak_bytes;
+  EXPECT_GT(plan_large_transfer(4000, 3, fine).peak_bytes, usual * 5 / 4);
+  EXPECT_LT(plan_large_transfer(4000, 3, part).peak_bytes, usual * 3 / 4);
+  EXPECT_GT(plan_large_transfer(4000, 3, part).peak_bytes, usual / 4);
 }
 
 }  // namespace

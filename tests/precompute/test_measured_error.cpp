@@ -112,6 +112,30 @@ TEST(MeasuredError, BothTruthsAgree) {
   }
 }
 
+TEST(LightErrors, AreThoseOfTheCheckWhateverTheTruthIsFoundWith) {
+  Built built = build(room(), 300);
+  compress(built, 0.02);
+  auto lights = random_initial_exitances(built.data, built.tracer, LightKind::kPoint, 12, kSeed);
+  lights.insert(lights.begin() + 3, std::vector<Float3>(lights[0].size(), Float3{0, 0, 0}));
+  const ReferenceSolver reference(built.data);
+  const auto by_dense = light_errors(
+      built.data, lights, [&](auto some) { return products(DenseMatrix(*built.dense), some); });
+  const auto by_reference = light_errors(
+      built.data, lights, [&](auto some) { return reference.indirect_irradiances(some, 1e-9); });
+  ASSERT_EQ(by_dense.size(), lights.size() - 1) << "one is dark";
+  ASSERT_EQ(by_reference.size(), by_dense.size());
+  const std::vector<double> errors =
+      LitTruth(DenseMatrix(*built.dense), lights).errors(*built.data.transfer);
+  for (std::size_t k = 0; k < errors.size(); ++k) {
+    EXPECT_NEAR(by_dense[k].error, errors[k], 1e-6 * errors[k]);
+    EXPECT_NEAR(by_reference[k].error, errors[k], 1e-5);
+    EXPECT_GT(by_reference[k].error, 0);
+    EXPECT_NEAR(by_dense[k].arriving, by_reference[k].arriving, 1e-5);
+    EXPECT_GT(by_dense[k].arriving, 0.01);
+    EXPECT_LT(by_dense[k].arriving, 10);
+  }
+}
+
 TEST(LitTruth, LightFromWhichNothingArrivesIsLeftOut) {
   const Built built = build(room(), 200);
   // A patch that sees nothing, as the floor in a box that has no bottom.

@@ -35,15 +35,15 @@ struct LargeTransferPlan {
   std::size_t peak_bytes = 0;
 };
 
-/// The plan with the most threads, those of OpenMP at most and one at least, that keeps to a limit
-/// (0: none). Above the limit is only the plan with one thread: less cannot be done with.
+/// The plan with the most threads, those of OpenMP at most and one at least, that keeps to the
+/// limit of `settings`. Above it is only the plan with one thread: less cannot be done with.
 LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                      std::uint64_t memory_limit_bytes = 0);
+                                      const LargeTransferSettings& settings = {});
 
 /// Seconds that build_large_transfer takes of one processor, about a slow one, without a
 /// checkpoint: rough. `form_factor_bytes`: those of the form factors.
 double large_transfer_seconds(std::size_t patch_count, std::size_t matrix_count,
-                              double form_factor_bytes);
+                              double form_factor_bytes, const PatchRoles& roles = {});
 
 /// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
 /// are solved for by conjugate gradients, a panel of neighbouring patches at a time, and each panel

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <span>
 #include <vector>
 
 #include "rebounce/precompute/progress.h"
@@ -21,6 +23,23 @@ struct KindError {
   double max = 0;
   double bound = 0;  ///< with 95 % probability above those of 1,000 more lights: error_bound.h
 };
+
+/// How far off an operator is under one light.
+struct LightError {
+  double error = 0;     ///< relative area-weighted L2 error of the indirect irradiance at receivers
+  double arriving = 0;  ///< area norm of what arrives at receivers, of what the light gives off
+};
+
+/// What arrives [n] in lx of some lights, which are initial exitances [n] in lx.
+using TruthOf =
+    std::function<std::vector<std::vector<Float3>>(std::span<const std::vector<Float3>>)>;
+
+/// That of data.transfer under `lights`, each what its sources give off, against `truth_of`, which
+/// is asked for ReferenceSolver::kTogether of them at a time. In their order, less those from which
+/// nothing arrives (arrives_nowhere). Throws Cancelled if asked to stop.
+std::vector<LightError> light_errors(const TransferData& data,
+                                     std::span<const std::vector<Float3>> lights,
+                                     const TruthOf& truth_of, const Progress& progress = {});
 
 /// Measures data.transfer under random lights of every kind that the scene has: what its sources
 /// give off, at its receivers.

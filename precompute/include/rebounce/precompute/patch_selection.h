@@ -53,4 +53,8 @@ class PatchSelection {
 PatchRoles choose_roles(const PatchModel& model, const PatchSelection& receivers,
                         const PatchSelection& sources);
 
+/// Of all pairs of so many patches, the part between which light is wanted in either direction:
+/// what of an operator is compressed and stored.
+double wanted_part(const PatchRoles& roles, std::size_t patch_count);
+
 }  // namespace rebounce
