@@ -150,7 +150,7 @@ class ReconstructionWeights {
         if (!receivers_[v].is_shown) continue;
         std::vector<Giver> givers = find_givers(search, v, scratch);
         centre_weights(receivers_[v], givers);
-        weights[v] = open_weights(givers);
+        weights[v] = is_covered_[v] != 0 ? plain_weights(givers) : open_weights(givers);
       }
     }
   }
@@ -230,8 +230,7 @@ class ReconstructionWeights {
 
   /// Of a vertex in the open: patches in the open, if need be from farther away; else those that
   /// are mixed, on whose rim the vertex lies; else its own. Of one that is covered: covered
-  /// patches, else mixed ones, else its own; none where these see next to nothing, and black is
-  /// shown.
+  /// patches, else mixed ones, else its own.
   std::vector<Giver> find_givers(const GiverSearch& search, std::size_t v,
                                  GiverSearch::Scratch& scratch) const {
     const auto within = [&](float reach) {
@@ -245,7 +244,7 @@ class ReconstructionWeights {
       for (const Exposure e : {Exposure::kCovered, Exposure::kMixed}) {
         if (std::ranges::any_of(near, is(e))) return only(near, is(e));
       }
-      return own_givers(v, kMostlyCovered);
+      return own_givers(v);
     }
     if (std::ranges::any_of(near, is(Exposure::kOpen))) return only(near, is(Exposure::kOpen));
     if (std::ranges::any_of(near, is(Exposure::kMixed))) {
@@ -253,14 +252,13 @@ class ReconstructionWeights {
           only(within(kFartherReach * receivers_[v].reach), is(Exposure::kOpen));
       if (!farther.empty()) return farther;
     }
-    return near.empty() ? own_givers(v, 1) : near;
+    return near.empty() ? own_givers(v) : near;
   }
 
-  /// A vertex's own patches that absorb no more than that part of their view, all alike.
-  std::vector<Giver> own_givers(std::size_t v, float most_absorbed) const {
+  /// A vertex's own patches, all alike.
+  std::vector<Giver> own_givers(std::size_t v) const {
     std::vector<Giver> givers;
     for (const std::uint32_t patch : own_patches_[v]) {
-      if (absorbed_[patch] > most_absorbed) continue;
       givers.push_back({patch, 1.0F, 0, receivers_[v].position, receivers_[v].normal});
     }
     return givers;
@@ -312,13 +310,22 @@ class ReconstructionWeights {
     return weight;
   }
 
+  /// What the givers have under their covers.
+  static VertexWeights plain_weights(const std::vector<Giver>& givers) {
+    double sum = 0;
+    for (const Giver& giver : givers) sum += giver.weight;
+    VertexWeights weight;
+    for (const Giver& giver : givers) weight.push_back({giver.patch, giver.weight / sum});
+    return weight;
+  }
+
   void write_weights(const std::vector<VertexWeights>& weights) {
     mesh_.weight_begin.assign(1, 0);
     mesh_.weight_patch.clear();
     mesh_.weight.clear();
-    for (const VertexWeights& of_vertex : weights) {
-      for (const auto& [patch, weight] : of_vertex) {
-        const double open = 1.0 - absorbed_[patch];
+    for (std::size_t v = 0; v < weights.size(); ++v) {
+      for (const auto& [patch, weight] : weights[v]) {
+        const double open = is_covered_[v] != 0 ? 1.0 : 1.0 - absorbed_[patch];
         if (open <= 0) continue;
         mesh_.weight_patch.push_back(patch);
         mesh_.weight.push_back(static_cast<float>(weight / open));

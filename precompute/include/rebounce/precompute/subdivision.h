@@ -40,9 +40,9 @@ double mean_patch_size(const Scene& scene, std::span<const std::uint8_t> patches
 /// of its sides are lit). Triangles that come from one keep its order, neighbours stay close.
 ///
 /// `importance` [t] in (0, 1], or empty where all have 1: with `patch_count`, an edge of triangles
-/// of importance w counts as long as its length x √w, so that their parts become larger than others.
-/// Then an edge that is to be split may not be the longest of its triangles, and those are split
-/// first (longest_edges.h).
+/// of importance w counts as long as its length x √w, so that their parts become larger than
+/// others. Then an edge that is to be split may not be the longest of its triangles, and those are
+/// split first (longest_edges.h).
 std::vector<std::uint32_t> subdivide(Scene& scene,
                                      std::span<const std::uint8_t> patches_per_triangle,
                                      const SubdivisionSettings& settings,
