@@ -16,8 +16,11 @@ using EdgeKey = ConformingMesh::EdgeKey;
 // Points of a triangle at which it is looked for covers before it is bisected.
 constexpr std::uint32_t kPoints = kMostCoverPoints;
 
-// Points that tell whether a half of it is covered.
-constexpr std::uint32_t kPointsOfHalf = 7;
+// Points that tell whether all of it is covered, beside its three corners, this part of the way to
+// the middle.
+constexpr std::uint32_t kPointsOfWhole = 12;
+constexpr double kInset = 0.05;
+const glm::dvec2 kCentroid(1.0 / 3);
 
 // Triangles whose longest edge is no longer than this many patch sizes are fine enough.
 constexpr double kFinest = 0.3;
@@ -106,29 +109,41 @@ class CoverRefinement {
   std::vector<std::uint8_t> is_new_;  ///< of each triangle: made in this round
 };
 
-}  // namespace
-
-double covered_part(const TriangleCorners& corners, const RayTracer& tracer, double height,
-                    std::uint32_t count) {
+/// How many points of a triangle's front have something within `height` metres above them.
+std::size_t count_covered(const TriangleCorners& corners, std::span<const glm::dvec2> points,
+                          const RayTracer& tracer, double height) {
   const glm::dvec3 up = front_normal(corners);
   std::array<Ray, kMostCoverPoints> room;
-  const std::span<Ray> rays = std::span(room).first(std::min(count, kMostCoverPoints));
-  for (std::uint32_t k = 0; k < rays.size(); ++k) {
-    const glm::dvec2 b =
-        rays.size() == 1 ? glm::dvec2(1.0 / 3) : square_to_triangle(r2_point(k, {0, 0}));
+  const std::span<Ray> rays = std::span(room).first(points.size());
+  for (std::size_t k = 0; k < rays.size(); ++k) {
     Ray& ray = rays[k] = Ray{};
-    ray.origin = tracer.offset_point(to_float3(point_at(corners, b)), to_float3(up));
+    ray.origin = tracer.offset_point(to_float3(point_at(corners, points[k])), to_float3(up));
     ray.direction = to_float3(up);
     ray.t_near = 0;
     ray.t_far = static_cast<float>(height);
   }
   tracer.occluded(rays);
-  return static_cast<double>(std::ranges::count_if(rays, is_occluded)) /
-         static_cast<double>(rays.size());
+  return static_cast<std::size_t>(std::ranges::count_if(rays, is_occluded));
+}
+
+}  // namespace
+
+double covered_part(const TriangleCorners& corners, const RayTracer& tracer, double height,
+                    std::uint32_t count) {
+  std::array<glm::dvec2, kMostCoverPoints> points;
+  const auto some = std::span(points).first(std::min(count, kMostCoverPoints));
+  for (std::uint32_t k = 0; k < some.size(); ++k) {
+    some[k] = some.size() == 1 ? kCentroid : square_to_triangle(r2_point(k, {0, 0}));
+  }
+  return static_cast<double>(count_covered(corners, some, tracer, height)) /
+         static_cast<double>(some.size());
 }
 
 bool is_covered(const TriangleCorners& corners, const RayTracer& tracer, double height) {
-  return covered_part(corners, tracer, height, kPointsOfHalf) >= 0.5;
+  std::array<glm::dvec2, 3> tips = {glm::dvec2(0, 0), {1, 0}, {0, 1}};
+  for (glm::dvec2& tip : tips) tip = glm::mix(tip, kCentroid, kInset);
+  return count_covered(corners, tips, tracer, height) == tips.size() &&
+         covered_part(corners, tracer, height, kPointsOfWhole) == 1;
 }
 
 std::vector<std::uint32_t> refine_at_covers(Scene& scene, std::span<const TriangleSides> sides,

@@ -29,8 +29,9 @@ double covered_part(const TriangleCorners& corners, const RayTracer& tracer, dou
 /// it.
 inline constexpr double kCloseCover = 0.25;
 
-/// Whether at least half of a triangle's front is covered by what hangs no higher than `height`
-/// metres.
+/// Whether all of a triangle's front is covered by what hangs no higher than `height` metres, as a
+/// few points of it have it. What is covered in part shows the light beside the cover: it is what
+/// stands out from under it that is seen.
 bool is_covered(const TriangleCorners& corners, const RayTracer& tracer, double height);
 
 /// Bisects triangles of which a part is covered and a part is in the open, until they are small

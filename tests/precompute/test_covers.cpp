@@ -53,6 +53,19 @@ TEST(Covers, ThePartOfATriangleThatIsCovered) {
   EXPECT_NEAR(part(kEnd - 0.1, 0.1, 16), 0.75, 0.1);
 }
 
+TEST(Covers, OnlyWhatIsWhollyCoveredIs) {
+  const Scene scene = floor_under_board();
+  const RayTracer tracer(scene.position, scene.triangle);
+  const auto covered = [&](double x, double height) {
+    return is_covered({glm::dvec3(x, 0, 0), {x, 0, 0.2}, {x + 0.2, 0, 0}}, tracer, height);
+  };
+  EXPECT_TRUE(covered(0, 0.1));
+  EXPECT_FALSE(covered(0, 0.01)) << "what hangs higher does not count";
+  EXPECT_FALSE(covered(0.4, 0.1));
+  EXPECT_FALSE(covered(kEnd - 0.1, 0.1));
+  EXPECT_FALSE(covered(kEnd - 0.18, 0.1)) << "a corner stands out";
+}
+
 TEST(Covers, TrianglesAreSmallWhereACoverEnds) {
   Scene scene = floor_under_board();
   const RayTracer tracer(scene.position, scene.triangle);
