@@ -26,8 +26,8 @@ double covered_part(const TriangleCorners& corners, const RayTracer& tracer, dou
                     std::uint32_t count);
 
 /// What hangs no higher above a surface than this many mean patch sizes ends the smooth light on
-/// it.
-inline constexpr double kCloseCover = 0.25;
+/// it. Under what hangs higher one can see.
+inline constexpr double kCloseCover = 1.0 / 32;
 
 /// Whether all of a triangle's front is covered by what hangs no higher than `height` metres, as a
 /// few points of it have it. What is covered in part shows the light beside the cover: it is what

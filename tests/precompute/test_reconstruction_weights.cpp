@@ -216,14 +216,14 @@ TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
 }
 
 TEST(ReconstructionWeights, LightEndsWhereACoverDoes) {
-  // A plate of 0.8 m 1 cm above a floor of 2 m: below it dim, beside it white. What is below shows
+  // A plate of 0.8 m 2 mm above a floor of 2 m: below it dim, beside it white. What is below shows
   // what arrives there, however much of its view the plate's back takes.
   Scene scene = test::empty_scene();
   add_tiled_floor(scene, 1);
-  test::add_box(scene, {-0.4, 0.01, -0.4}, {0.4, 0.02, 0.4}, false);
+  test::add_box(scene, {-0.4, 0.002, -0.4}, {0.4, 0.012, 0.4}, false);
   PatchModel model = make_patch_model(std::move(scene), {.patch_count = 300});
   const auto is_below = [](const Float3& p) {
-    return p[1] < 0.01F && std::max(std::abs(p[0]), std::abs(p[2])) < 0.4F;
+    return p[1] < 0.001F && std::max(std::abs(p[0]), std::abs(p[2])) < 0.4F;
   };
   const auto field = [&](const Float3& p) { return is_below(p) ? 0.2 : 1.0; };
   std::vector<float> absorbed;
