@@ -193,19 +193,30 @@ class ReconstructionWeights {
     }
   }
 
+  /// For each triangle whether it shows a patch and is covered.
+  std::vector<std::uint8_t> find_covered() const {
+    const double height = kCloseCover * mean_patch_size();
+    std::vector<std::uint8_t> covered(mesh_.triangle.size(), 0);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::uint32_t t = 0; t < covered.size(); ++t) {
+      if (shown_patch_[t] == kNone) continue;
+      covered[t] = is_covered(corners_of(mesh_, t), tracer_, height) ? 1 : 0;
+    }
+    return covered;
+  }
+
   void make_receivers() {
     receivers_.resize(mesh_.position.size());
     std::vector<glm::dvec3> normal(receivers_.size(), glm::dvec3(0));
     std::vector<double> largest(receivers_.size(), 0.0);
     std::vector<float> size_sum(receivers_.size(), 0.0F), count(receivers_.size(), 0.0F);
     is_covered_.assign(receivers_.size(), 1);
-    const double cover_height = kCloseCover * mean_patch_size();
+    const std::vector<std::uint8_t> covered = find_covered();
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
       const TriangleCorners p = corners_of(mesh_, t);
       const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double area = glm::length(cross);
       const std::uint32_t patch = shown_patch_[t];
-      const bool covered = patch != kNone && is_covered(p, tracer_, cover_height);
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t v = mesh_.triangle[t][k];
         normal[v] += cross;
@@ -215,7 +226,7 @@ class ReconstructionWeights {
         }
         if (patch == kNone) continue;
         receivers_[v].is_shown = true;
-        if (!covered) is_covered_[v] = 0;
+        if (covered[t] == 0) is_covered_[v] = 0;
         size_sum[v] += std::sqrt(area_[patch]);
         count[v] += 1;
       }
