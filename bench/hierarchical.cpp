@@ -13,7 +13,6 @@
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/form_factors.h"
-#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/random_lights.h"
@@ -40,9 +39,7 @@ struct HierarchicalOptions {
   std::vector<std::string> scenes;
   std::vector<std::size_t> patches = {4000, 16000};
   std::vector<double> epsilons = {kLinkEpsilon};
-  std::vector<double> coarsening = {kLinkCoarsening *
-                                    kLinkEpsilon};  ///< errors for which links are merged again
-  std::vector<double> worths = {kLinkWorth};  ///< what links fitted to all pairs must be worth
+  std::vector<double> worths = {kLinkWorth};  ///< what fitted links must be worth
   std::vector<double> compression = {1e-3};   ///< errors of F B to which F is compressed
   std::string pairs;              ///< transfer file with F of all pairs; empty: they are found
   std::size_t most_flat = 20000;  ///< patches of which F of all pairs is found
@@ -60,7 +57,7 @@ struct LightCase {
 struct Contender {
   std::string method, form;
   double epsilon = 0;    ///< of links that were refined; 0: from all pairs
-  double tolerance = 0;  ///< for which links were merged again or fitted, or F was compressed
+  double tolerance = 0;  ///< worth of fitted links, or error of compressed F
   std::size_t entry_count = 0;
   const FormFactorOperator* form_factors = nullptr;
   std::unique_ptr<RadiositySolver> solver;
@@ -180,23 +177,21 @@ class HierarchicalBench {
     if (flat_.empty()) {
       add_compressed(links, LinkedFormFactors(links, patches.area, patches.centroid));
     }
-    for (const double coarsening : options_.coarsening) {
-      const FormFactorLinks coarse =
-          coarsen_links(links, patches.area, patches.centroid, coarsening);
-      add_hierarchical("links", epsilon, coarsening, coarse);
+    for (const double worth : options_.worths) {
+      add_hierarchical("links", epsilon, worth, fit_links(links, patches, worth));
     }
   }
 
   /// Hierarchical radiosity and conjugate gradients on `links`.
-  void add_hierarchical(const char* form, double epsilon, double coarsening,
+  void add_hierarchical(const char* form, double epsilon, double worth,
                         const FormFactorLinks& links) {
     const std::size_t count = links.pair.size();
     linked_.push_back(
         std::make_unique<LinkedFormFactors>(links, model_.patches.area, model_.patches.centroid));
     const LinkedFormFactors& linked = *linked_.back();
-    add({"hierarchical", form, epsilon, coarsening, count, &linked,
+    add({"hierarchical", form, epsilon, worth, count, &linked,
          std::make_unique<HierarchicalSolver>(linked, problem())});
-    add({"conjugate-gradient", form, epsilon, coarsening, count, &linked,
+    add({"conjugate-gradient", form, epsilon, worth, count, &linked,
          std::make_unique<ConjugateGradientSolver>(linked, problem())});
   }
 
@@ -304,9 +299,8 @@ int main(int argc, char** argv) {
   add_patches_option(app, options.patches);
   app.add_option("--epsilon", options.epsilons, "Errors that a link may have")
       ->capture_default_str();
-  app.add_option("--coarsen", options.coarsening, "Errors for which links are merged again")
-      ->capture_default_str();
-  app.add_option("--worth", options.worths, "What links fitted to all pairs must be worth")
+  app.add_option("--worth", options.worths,
+                 "What links fitted to all pairs, or to refined links, must be worth")
       ->capture_default_str();
   app.add_option("--compress", options.compression, "Errors of F B to which F is compressed")
       ->capture_default_str();

@@ -18,6 +18,7 @@
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/linked_form_factors.h"
 #include "reflected_light.h"
 #include "timing.h"
 
@@ -28,6 +29,7 @@ struct SolverOptions {
   std::vector<std::string> inputs;
   BuildSettings settings;
   std::string solve_csv;
+  bool sweeps_only = false;
   CommonOptions common{.repeats = 7};
 };
 
@@ -38,7 +40,12 @@ constexpr int kMostSweeps = 64;
 /// One form of F.
 struct Form {
   std::string name;
-  std::unique_ptr<const SweepableFormFactors> form_factors;
+  std::unique_ptr<const FormFactorOperator> form_factors;
+
+  /// Null if it only gathers.
+  const SweepableFormFactors* sweepable() const {
+    return dynamic_cast<const SweepableFormFactors*>(form_factors.get());
+  }
 };
 
 std::shared_ptr<const HierarchicalOperator> compressed(const TransferData& data,
@@ -51,14 +58,29 @@ std::shared_ptr<const HierarchicalOperator> compressed(const TransferData& data,
       {.tolerance = settings.form_factor_tolerance, .precision = Precision::kF16});
 }
 
+/// Those that the data hold or that can be made of all pairs, where the data hold these.
 std::vector<Form> make_forms(const TransferData& data, const BuildSettings& settings) {
   std::vector<Form> forms;
-  forms.push_back({"rows", std::make_unique<FormFactorRows>(data.exchange, data.patches.area)});
-  forms.push_back({"blocks", std::make_unique<FormFactorBlocks>(data.exchange, data.patches.area)});
-  forms.push_back({"exchange", std::make_unique<ExchangeBlocks>(data.exchange, data.patches.area)});
-  forms.push_back(
-      {"compressed", std::make_unique<CompressedFormFactors>(compressed(data, settings))});
+  const std::vector<float>& area = data.patches.area;
+  const bool pairs = data.exchange.patch_count() > 0;
+  if (pairs) {
+    forms.push_back({"rows", std::make_unique<FormFactorRows>(data.exchange, area)});
+    forms.push_back({"blocks", std::make_unique<FormFactorBlocks>(data.exchange, area)});
+    forms.push_back({"exchange", std::make_unique<ExchangeBlocks>(data.exchange, area)});
+  }
+  if (!data.links.empty()) {
+    forms.push_back(
+        {"links", std::make_unique<LinkedFormFactors>(data.links, area, data.patches.centroid)});
+  }
+  if (pairs || data.compressed_form_factors) {
+    forms.push_back(
+        {"compressed", std::make_unique<CompressedFormFactors>(compressed(data, settings))});
+  }
   return forms;
+}
+
+bool sweeps_over_rows(SolveMethod method) {
+  return method == SolveMethod::kGaussSeidel || method == SolveMethod::kSymmetricGaussSeidel;
 }
 
 class SolverBenchmark {
@@ -74,22 +96,25 @@ class SolverBenchmark {
     std::vector<Sweep> sweeps;
     for (const Form& form : forms_) {
       add_gather(form, sweeps);
+      if (form.sweepable() == nullptr) continue;
       add_relaxation(form, SweepOrder::kForward, sweeps);
       add_relaxation(form, SweepOrder::kSymmetric, sweeps);
     }
     std::vector<TimedCase> cases;
     for (const Sweep& sweep : sweeps) {
-      cases.push_back({.work = [&sweep] { sweep.buffer->read(); }});
+      cases.push_back({.work = [&sweep] { sweep.stored->read(); }});
       cases.push_back({.work = sweep.work});
     }
     const std::vector<Timing> timings =
         time_interleaved(cases, {.rounds = options_.common.repeats});
     for (std::size_t k = 0; k < sweeps.size(); ++k) {
       const double read = timings[2 * k].median, time = timings[2 * k + 1].median;
-      const auto bytes = static_cast<double>(sweeps[k].bytes);
+      const auto bytes = static_cast<double>(sweeps[k].bytes),
+                 stored = static_cast<double>(sweeps[k].stored_bytes);
       table.add({scene_name(data_), data_.patches.size(), sweeps[k].form, sweeps[k].name,
                  sweeps[k].bytes, bytes / static_cast<double>(data_.patches.size()), time * 1e6,
-                 timings[2 * k + 1].spread, bytes / time / 1e9, bytes / read / 1e9, read / time});
+                 timings[2 * k + 1].spread, bytes / time / 1e9, stored / read / 1e9,
+                 bytes / stored * read / time});
     }
   }
 
@@ -100,6 +125,7 @@ class SolverBenchmark {
       for (const NamedSolveMethod& named : kSolveMethods) {
         if (named.method == SolveMethod::kJacobi) continue;  // gathering
         if (named.method == SolveMethod::kSouthwell && form.name != "blocks") continue;
+        if (sweeps_over_rows(named.method) && form.sweepable() == nullptr) continue;
         const auto solver =
             make_solver(named.method, *form.form_factors,
                         {data_.patches.area, data_.patches.reflectance}, data_.transfer);
@@ -124,37 +150,39 @@ class SolverBenchmark {
  private:
   struct Sweep {
     std::string form, name;
-    std::size_t bytes;  ///< of F that it reads
+    std::size_t bytes;         ///< of F that it reads, what it reads twice counted twice
+    std::size_t stored_bytes;  ///< of F
     std::function<void()> work;
-    std::shared_ptr<ReadBuffer> buffer;
+    std::shared_ptr<ReadBuffer> stored;  ///< as large as F
   };
 
   void add_gather(const Form& form, std::vector<Sweep>& sweeps) const {
     const auto out = std::make_shared<std::vector<Float3>>(data_.patches.size());
     const auto workspace =
         std::make_shared<std::vector<float>>(form.form_factors->workspace_size());
-    const std::size_t bytes = form.form_factors->bytes();
-    sweeps.push_back({form.name, "gather", bytes,
+    const std::size_t stored = form.form_factors->bytes();
+    sweeps.push_back({form.name, "gather", form.form_factors->bytes_per_gather(), stored,
                       [this, &form, out, workspace] {
                         form.form_factors->gather(changes_[0].after, *out, *workspace);
                       },
-                      std::make_shared<ReadBuffer>(bytes)});
+                      std::make_shared<ReadBuffer>(stored)});
   }
 
   void add_relaxation(const Form& form, SweepOrder order, std::vector<Sweep>& sweeps) const {
-    const std::shared_ptr<Relaxation> relaxation = form.form_factors->make_relaxation();
+    const std::shared_ptr<Relaxation> relaxation = form.sweepable()->make_relaxation();
     relaxation->begin({data_.patches.area, data_.patches.reflectance, changes_[0].after},
                       changes_[0].after);
-    const std::size_t bytes = form.form_factors->bytes() * relaxation->reads_per_sweep(order);
+    const std::size_t stored = form.form_factors->bytes();
+    const std::size_t bytes = stored * relaxation->reads_per_sweep(order);
     const bool symmetric = order == SweepOrder::kSymmetric;
     const auto backward = std::make_shared<bool>(false);
-    sweeps.push_back({form.name, symmetric ? "symmetric-gauss-seidel" : "gauss-seidel", bytes,
-                      [relaxation, symmetric, backward] {
-                        relaxation->sweep(*backward ? SweepDirection::kBackward
-                                                    : SweepDirection::kForward);
-                        if (symmetric) *backward = !*backward;
-                      },
-                      std::make_shared<ReadBuffer>(bytes)});
+    sweeps.push_back(
+        {form.name, symmetric ? "symmetric-gauss-seidel" : "gauss-seidel", bytes, stored,
+         [relaxation, symmetric, backward] {
+           relaxation->sweep(*backward ? SweepDirection::kBackward : SweepDirection::kForward);
+           if (symmetric) *backward = !*backward;
+         },
+         std::make_shared<ReadBuffer>(stored)});
   }
 
   static SolveSettings exactly(int sweeps) {
@@ -211,10 +239,13 @@ class SolverBenchmark {
     table.add(std::move(row));
   }
 
-  /// What the form itself adds: the error of its solution against that of the exact F.
-  double form_error(const Form& form, const std::vector<Float3>& light,
-                    const std::vector<Float3>& truth) const {
-    return form.name == "compressed" ? error(truth, solution(forms_[1], light), light) : 0;
+  /// What the form itself adds: the error of its solution against that of the F of all pairs.
+  Table::Cell form_error(const Form& form, const std::vector<Float3>& light,
+                         const std::vector<Float3>& truth) const {
+    if (form.name != "compressed" && form.name != "links") return 0.0;
+    const auto exact = std::ranges::find(forms_, "blocks", &Form::name);
+    if (exact == forms_.end()) return {};
+    return error(truth, solution(*exact, light), light);
   }
 
   const TransferData& data_;
@@ -232,10 +263,12 @@ void run(const SolverOptions& options) {
     const TransferData data = load_or_build(input, options.settings);
     SolverBenchmark benchmark(data, options);
     benchmark.measure_sweeps(sweeps);
+    if (options.sweeps_only) continue;
     benchmark.measure_transfer(solves);
     benchmark.measure_solves(solves);
   }
   publish("sweeps", sweeps, options.common);
+  if (options.sweeps_only) return;
   CommonOptions of_solves = options.common;
   of_solves.csv = options.solve_csv;
   of_solves.json.clear();
@@ -256,6 +289,7 @@ int main(int argc, char** argv) {
                  "Error of the compressed form factors, where the input holds none")
       ->check(CLI::Range(1e-5, 0.5))
       ->capture_default_str();
+  app.add_flag("--sweeps-only", options.sweeps_only, "No solves, which take longest");
   app.add_option("--solve-csv", options.solve_csv, "Write the solves to this file, as CSV");
   add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,

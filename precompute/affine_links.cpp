@@ -42,13 +42,6 @@ std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<con
   const std::size_t m = links.first_child.size();
   std::vector<NodeSpread> nodes(m);
   const std::vector<std::uint32_t> begin = first_positions(links);
-  for (std::uint32_t k = 0; k < m; ++k) {
-    const std::uint32_t child = links.first_child[k];
-    if (child == kNone) continue;
-    nodes[child].parent = nodes[child + 1].parent = k;
-    nodes[child].sibling = child + 1;
-    nodes[child + 1].sibling = child;
-  }
   for (std::size_t k = m; k-- > 0;) {
     NodeSpread& node = nodes[k];
     const std::uint32_t child = links.first_child[k];
@@ -86,6 +79,15 @@ void append_link(const AffineLink& link, FormFactorLinks& links) {
     gradient[static_cast<std::size_t>(axis)] = static_cast<float>(link.gradient_a[axis]);
     gradient[static_cast<std::size_t>(axis) + 3] = static_cast<float>(link.gradient_b[axis]);
   }
+}
+
+AffineLink affine_link(const FormFactorLinks& links, std::size_t l) {
+  const auto& g = links.gradient[l];
+  return {.a = links.pair[l][0],
+          .b = links.pair[l][1],
+          .exchange = links.exchange_area[l],
+          .gradient_a = {g[0], g[1], g[2]},
+          .gradient_b = {g[3], g[4], g[5]}};
 }
 
 std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,

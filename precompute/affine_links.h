@@ -11,9 +11,8 @@
 
 namespace rebounce {
 
-/// A node of a tree of links and how its patches' centroids are spread, by area.
+/// How the centroids of a node's patches are spread, by area.
 struct NodeSpread {
-  std::uint32_t parent = kNone, sibling = kNone;
   double area = 0;                                       ///< m²
   Eigen::Vector3d center = Eigen::Vector3d::Zero();      ///< area-weighted, metres
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m²
@@ -35,6 +34,9 @@ struct AffineLink {
 double squared_norm(const AffineLink& link, const NodeSpread& a, const NodeSpread& b);
 
 void append_link(const AffineLink& link, FormFactorLinks& links);
+
+/// The link number `l` of `links`.
+AffineLink affine_link(const FormFactorLinks& links, std::size_t l);
 
 /// The sums of the rows of F as links have it [n].
 std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,

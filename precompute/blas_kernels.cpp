@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <system_error>
 
 namespace rebounce {
 namespace {
@@ -34,7 +36,10 @@ void restart_with_better_blas_kernels(char** arguments) {
   if (std::getenv(kVariable) != nullptr) return;
   const std::string kernels = better_blas_kernels(openblas_get_corename(), processor_features());
   if (kernels.empty() || setenv(kVariable, kernels.c_str(), 0) != 0) return;
-  execv("/proc/self/exe", arguments);
+  // By its own name, not that of the link, which is what lists of processes would show.
+  std::error_code error;
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (!error) execv(program.c_str(), arguments);
 }
 
 }  // namespace rebounce

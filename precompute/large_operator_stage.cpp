@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "build_estimate.h"
 #include "build_record.h"
@@ -8,7 +9,7 @@
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
 #include "rebounce/precompute/large_transfer.h"
-#include "rebounce/precompute/link_coarsening.h"
+#include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/measured_error.h"
 #include "rebounce/precompute/reference_solution.h"
 #include "rebounce/transfer/area_norm.h"
@@ -116,8 +117,14 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
   const auto links =
       std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
   const ReferenceSolver reference(links, patches);
+  FormFactorLinks fewer = clock.run("fewer links", [&](const Progress& part) {
+    return fit_links(data.links, patches, kLinkWorth, part);
+  });
   const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
-    return find_lights(tracer, data, roles, seed, reference, part);
+    // What light patches give off matters here, not its third digit.
+    const ReferenceSolver solver(
+        std::make_shared<const LinkedFormFactors>(fewer, patches.area, patches.centroid), patches);
+    return find_lights(tracer, data, roles, seed, solver, part);
   });
   report.form_factor_tolerance = form_factor_tolerance(decided, lights, roles, patches.area);
   data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
@@ -144,15 +151,8 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     return measure_error(data, tracer, reference.preconditioned(data.transfer), seed, part);
   });
   // The check is the last that needs them all.
-  if (decided.store_links) {
-    data.links = clock.run("links", [&](const Progress&) {
-      return coarsen_links(data.links, patches.area, patches.centroid,
-                           kLinkCoarsening * decided.form_factors.link_epsilon);
-    });
-    report.link_count = data.links.pair.size();
-  } else {
-    data.links = {};
-  }
+  data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
+  if (decided.store_links) report.link_count = data.links.pair.size();
   record_build(decided, report, errors, data.record);
 }
 

@@ -1,6 +1,7 @@
 #include "pair_sums.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace rebounce {
 
@@ -38,6 +39,33 @@ std::span<const SortedPairs::Pair> SortedPairs::of_row(std::uint32_t row,
   return {from, to};
 }
 
+void SortedPairs::block(PositionRange rows, PositionRange columns,
+                        std::span<float> exchange) const {
+  std::ranges::fill(exchange, 0.0F);
+  for (std::uint32_t r = 0; r < rows.count; ++r) {
+    const auto row = exchange.subspan(std::size_t{r} * columns.count, columns.count);
+    for (const Pair& pair : of_row(rows.begin + r, columns)) {
+      row[pair.column - columns.begin] = pair.exchange;
+    }
+  }
+}
+
+void LinkedPairs::block(PositionRange rows, PositionRange columns,
+                        std::span<float> exchange) const {
+  const auto of_rows = patch_.subspan(rows.begin, rows.count);
+  const auto of_columns = patch_.subspan(columns.begin, columns.count);
+  // Column by column as Eigen has it: of the transposed block.
+  Eigen::Map<Eigen::MatrixXf> entries(exchange.data(), columns.count, rows.count);
+  matrix_.entries(0, of_columns, of_rows, entries);
+  for (std::uint32_t r = 0; r < rows.count; ++r) {
+    for (std::uint32_t c = 0; c < columns.count; ++c) {
+      const float root = std::sqrt(patches_.area[of_rows[r]] * patches_.area[of_columns[c]]);
+      // An affine kernel may fall below 0 at the end of a node.
+      entries(c, r) = std::max(0.0F, entries(c, r) * root);
+    }
+  }
+}
+
 PairSums& PairSums::operator+=(const PairSums& other) {
   count += other.count;
   squared += other.squared;
@@ -56,10 +84,10 @@ PairSums& PairSums::operator-=(const PairSums& other) {
   return *this;
 }
 
-PairSums SummedPairs::sums_of(std::uint32_t row, const SortedPairs::Pair& pair) const {
-  const std::uint32_t i = patch_[row], j = patch_[pair.column];
+PairSums SummedPairs::sums_of(std::uint32_t row, std::uint32_t column, float exchange) const {
+  const std::uint32_t i = patch_[row], j = patch_[column];
   const Float3 &x = patches_.centroid[i], &y = patches_.centroid[j];
-  const double s = pair.exchange;
+  const double s = exchange;
   PairSums sums;
   sums.count = 1;
   sums.squared = s * s / (static_cast<double>(patches_.area[i]) * patches_.area[j]);
@@ -72,15 +100,14 @@ PairSums SummedPairs::sums_of(std::uint32_t row, const SortedPairs::Pair& pair) 
 void SummedPairs::add_up(PositionRange rows, PositionRange columns) {
   rows_ = rows;
   columns_ = columns;
+  exchange_.resize(std::size_t{rows.count} * columns.count);
+  pairs_.block(rows, columns, exchange_);
   table_.assign((std::size_t{rows.count} + 1) * (columns.count + 1), PairSums{});
+  const float* exchange = exchange_.data();
   for (std::uint32_t r = 0; r < rows.count; ++r) {
-    const auto pairs = pairs_.of_row(rows.begin + r, columns);
-    auto next = pairs.begin();
     PairSums row;
-    for (std::uint32_t c = 0; c < columns.count; ++c) {
-      if (next != pairs.end() && next->column == columns.begin + c) {
-        row += sums_of(rows.begin + r, *next++);
-      }
+    for (std::uint32_t c = 0; c < columns.count; ++c, ++exchange) {
+      if (*exchange != 0) row += sums_of(rows.begin + r, columns.begin + c, *exchange);
       (at(r + 1, c + 1) = row) += at(r, c + 1);
     }
   }

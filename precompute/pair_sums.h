@@ -7,7 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "linked_matrix.h"
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -19,23 +21,52 @@ struct PositionRange {
   std::uint32_t end() const { return begin + count; }
 };
 
-/// The exchange areas by positions in the order of a tree, rows at the lower position.
-class SortedPairs {
+/// Exchange areas of pairs of patches by positions in the order of a tree.
+class PairSource {
  public:
+  virtual ~PairSource() = default;
+
+  /// Those of `rows` with `columns`, which are the same or come after, row by row, m²; 0 for pairs
+  /// without light. Of the same positions only those with columns from the row on count.
+  virtual void block(PositionRange rows, PositionRange columns,
+                     std::span<float> exchange) const = 0;
+};
+
+/// All pairs that exchange light.
+class SortedPairs final : public PairSource {
+ public:
+  /// `patch` [n] is the patch at each position.
+  SortedPairs(const ExchangeMatrix& exchange, std::span<const std::uint32_t> patch);
+
+  void block(PositionRange rows, PositionRange columns, std::span<float> exchange) const override;
+
+ private:
   struct Pair {
     std::uint32_t column;
     float exchange;  ///< m²
   };
 
-  /// `patch` [n] is the patch at each position.
-  SortedPairs(const ExchangeMatrix& exchange, std::span<const std::uint32_t> patch);
-
   /// Those of a row whose columns are in a range, ascending.
   std::span<const Pair> of_row(std::uint32_t row, PositionRange columns) const;
 
- private:
   std::vector<std::uint64_t> begin_;  ///< [n + 1]
   std::vector<Pair> pairs_;
+};
+
+/// The pairs that links stand for; nowhere kept.
+class LinkedPairs final : public PairSource {
+ public:
+  /// Refers to all; `patch` [n] is the patch at each position, in any order.
+  LinkedPairs(const FormFactorLinks& links, const PatchTable& patches,
+              std::span<const std::uint32_t> patch)
+      : matrix_(links, patches), patches_(patches), patch_(patch) {}
+
+  void block(PositionRange rows, PositionRange columns, std::span<float> exchange) const override;
+
+ private:
+  LinkedMatrix matrix_;
+  const PatchTable& patches_;
+  std::span<const std::uint32_t> patch_;
 };
 
 /// Sums over the pairs of a block of positions.
@@ -55,7 +86,7 @@ struct PairSums {
 class SummedPairs {
  public:
   /// Refers to both; `patch` [n] is the patch at each position.
-  SummedPairs(const SortedPairs& pairs, const PatchTable& patches,
+  SummedPairs(const PairSource& pairs, const PatchTable& patches,
               std::span<const std::uint32_t> patch)
       : pairs_(pairs), patches_(patches), patch_(patch) {}
 
@@ -72,12 +103,13 @@ class SummedPairs {
   const PairSums& at(std::uint32_t row, std::uint32_t column) const {
     return table_[std::size_t{row} * (columns_.count + 1) + column];
   }
-  PairSums sums_of(std::uint32_t row, const SortedPairs::Pair& pair) const;
+  PairSums sums_of(std::uint32_t row, std::uint32_t column, float exchange) const;
 
-  const SortedPairs& pairs_;
+  const PairSource& pairs_;
   const PatchTable& patches_;
   std::span<const std::uint32_t> patch_;
   PositionRange rows_, columns_;
+  std::vector<float> exchange_;  ///< [rows][columns]
   std::vector<PairSums> table_;  ///< [rows + 1][columns + 1] all before a row and a column
 };
 

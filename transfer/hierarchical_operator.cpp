@@ -253,6 +253,13 @@ std::size_t HierarchicalOperator::bytes() const {
          storage_.patch.size() * sizeof(std::uint32_t) + storage_.roles.role.size();
 }
 
+std::size_t HierarchicalOperator::bytes_per_apply() const {
+  const auto bytes_of_bases = [this](const auto&, auto, const auto* basis, const auto*, float) {
+    return layout_->basis_value_count * sizeof(*basis);
+  };
+  return bytes() + with_kernels_of(storage_, *layout_, bytes_of_bases);
+}
+
 std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
   return WorkVectors::size(position_count(patch_count()), *layout_, light_count) + kLine;
 }

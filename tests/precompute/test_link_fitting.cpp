@@ -14,7 +14,6 @@
 #include "expect_error.h"
 #include "random_light.h"
 #include "rebounce/precompute/form_factors.h"
-#include "rebounce/precompute/link_coarsening.h"
 #include "rebounce/precompute/links.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/area_norm.h"
@@ -71,13 +70,13 @@ double error_of(const Pairs& pairs, const FormFactorLinks& links) {
                              pairs.patches().area);
 }
 
-/// As refinement found them by rays, and merged.
+/// As refinement found them by rays, fewer.
 FormFactorLinks traced(const Pairs& pairs) {
   const PatchTable& patches = pairs.patches();
   const FormFactorLinks links =
       build_links(pairs.model, test::make_tracer(pairs.model), {.link_epsilon = kLinkEpsilon})
           .links;
-  return coarsen_links(links, patches.area, patches.centroid, kLinkCoarsening * kLinkEpsilon);
+  return fit_links(links, patches);
 }
 
 TEST(LinkFitting, WorthNextToNothingLinksAreThePairs) {
@@ -91,7 +90,7 @@ TEST(LinkFitting, WorthNextToNothingLinksAreThePairs) {
 
 TEST(LinkFitting, FewerAndTruerThanByRays) {
   const Pairs& pairs = furnished();
-  const FormFactorLinks by_rays = traced(pairs), links = fitted(pairs, 2 * kLinkWorth);
+  const FormFactorLinks by_rays = traced(pairs), links = fitted(pairs, 2.5 * kLinkWorth);
   const double error_by_rays = error_of(pairs, by_rays), error = error_of(pairs, links);
   std::printf("links, error of F times light: %zu, %.4f by rays; %zu, %.4f fitted\n",
               by_rays.pair.size(), error_by_rays, links.pair.size(), error);
@@ -217,7 +216,7 @@ TEST(LinkFitting, StopsWhenAskedTo) {
 
 TEST(LinkFitting, RefusesWhatDoesNotFit) {
   const Pairs& pairs = furnished();
-  test::expect_error([&] { fit_links({}, pairs.patches()); }, "differ in number");
+  test::expect_error([&] { fit_links(ExchangeMatrix(), pairs.patches()); }, "differ in number");
   for (const double worth : {0.0, -1e-3, std::numeric_limits<double>::infinity(),
                              std::numeric_limits<double>::quiet_NaN()}) {
     test::expect_error([&] { fitted(pairs, worth); }, "worth");

@@ -28,4 +28,10 @@ inline constexpr double kLinkWorth = 7e-4;
 FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patches,
                           double worth = kLinkWorth, const Progress& progress = {});
 
+/// The same for the pairs that other links stand for, of which far more than needed come from
+/// refinement: it splits where it cannot know yet, and what row sums make doubtful down to patches.
+/// Nothing of n² entries is kept. Throws Error if `links` are damaged or not of these patches.
+FormFactorLinks fit_links(const FormFactorLinks& links, const PatchTable& patches,
+                          double worth = kLinkWorth, const Progress& progress = {});
+
 }  // namespace rebounce

@@ -18,6 +18,7 @@ class CompressedFormFactors final : public SweepableFormFactors {
 
   std::size_t patch_count() const override { return exchange_->patch_count(); }
   std::size_t bytes() const override { return exchange_->bytes(); }
+  std::size_t bytes_per_gather() const override { return exchange_->bytes_per_apply(); }
   std::size_t workspace_size() const override { return exchange_->workspace_size(); }
   void gather(std::span<const Float3> in, std::span<Float3> out,
               std::span<float> workspace) const override;

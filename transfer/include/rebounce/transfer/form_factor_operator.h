@@ -19,8 +19,11 @@ class FormFactorOperator {
 
   virtual std::size_t patch_count() const = 0;
 
-  /// Bytes that one gather reads of F.
+  /// Bytes of F as it is stored.
   virtual std::size_t bytes() const = 0;
+
+  /// Bytes that one gather reads of F, what it reads twice counted twice.
+  virtual std::size_t bytes_per_gather() const { return bytes(); }
 
   /// Floats of workspace that `gather` needs.
   virtual std::size_t workspace_size() const = 0;

@@ -1,7 +1,10 @@
-#include "rebounce/precompute/link_coarsening.h"
+// Links fitted to the pairs that other links stand for: fewer, and the same light.
+
+#include "rebounce/precompute/link_fitting.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -18,8 +21,7 @@ constexpr std::uint32_t kSide = 16;  // patches of each of two walls
 
 struct Walls {
   FormFactorLinks links;
-  std::vector<float> area;
-  std::vector<Float3> centroid;
+  PatchTable patches;
 };
 
 /// Two rows of patches that face each other, each pair linked with the exchange area `exchange` of
@@ -29,8 +31,8 @@ Walls two_walls(const std::function<double(double, double)>& exchange) {
   constexpr std::uint32_t kPatches = 2 * kSide, kNodes = 2 * kPatches - 1;
   for (std::uint32_t i = 0; i < kPatches; ++i) {
     const auto along = static_cast<float>(i % kSide);
-    walls.area.push_back(0.5F + 0.05F * along);
-    walls.centroid.push_back({along, i < kSide ? 0.0F : 4.0F, 0.1F * along});
+    walls.patches.area.push_back(0.5F + 0.05F * along);
+    walls.patches.centroid.push_back({along, i < kSide ? 0.0F : 4.0F, 0.1F * along});
     walls.links.patch.push_back(i);
     walls.links.scale.push_back(1);
   }
@@ -44,10 +46,10 @@ Walls two_walls(const std::function<double(double, double)>& exchange) {
   }
   for (std::uint32_t i = 0; i < kSide; ++i) {
     for (std::uint32_t j = kSide; j < kPatches; ++j) {
-      const double kernel = exchange(walls.centroid[i][0], walls.centroid[j][0]);
+      const double kernel = exchange(walls.patches.centroid[i][0], walls.patches.centroid[j][0]);
       walls.links.pair.push_back({kPatches - 1 + i, kPatches - 1 + j});
       walls.links.exchange_area.push_back(
-          static_cast<float>(kernel * walls.area[i] * walls.area[j]));
+          static_cast<float>(kernel * walls.patches.area[i] * walls.patches.area[j]));
       walls.links.gradient.push_back({});
     }
   }
@@ -56,56 +58,82 @@ Walls two_walls(const std::function<double(double, double)>& exchange) {
 
 std::vector<Float3> gathered(const Walls& walls, const FormFactorLinks& links,
                              const std::vector<Float3>& light) {
-  return gather(LinkedFormFactors(links, walls.area, walls.centroid), light);
+  return gather(LinkedFormFactors(links, walls.patches.area, walls.patches.centroid), light);
 }
 
 /// Of the symmetric form, Frobenius.
 double difference(const Walls& walls, const FormFactorLinks& coarse) {
   double sum = 0;
-  for (std::size_t j = 0; j < walls.area.size(); ++j) {
-    std::vector<Float3> unit(walls.area.size());
+  for (std::size_t j = 0; j < walls.patches.size(); ++j) {
+    std::vector<Float3> unit(walls.patches.size());
     unit[j][0] = 1;
     const auto a = gathered(walls, walls.links, unit), b = gathered(walls, coarse, unit);
     for (std::size_t i = 0; i < a.size(); ++i) {
-      sum += std::pow(a[i][0] - b[i][0], 2) * walls.area[i] / walls.area[j];
+      sum += std::pow(a[i][0] - b[i][0], 2) * walls.patches.area[i] / walls.patches.area[j];
     }
   }
   return std::sqrt(sum);
+}
+
+/// Of all that the walls exchange, likewise.
+double norm(const Walls& walls) {
+  FormFactorLinks none = walls.links;
+  std::ranges::fill(none.exchange_area, 0.0F);
+  return difference(walls, none);
 }
 
 double near_kernel(double x, double y) {
   return 0.02 / (0.2 + 0.05 * (x - y) * (x - y));
 }
 
-TEST(LinkCoarsening, AnAffineKernelIsOneLink) {
+TEST(LinkRefitting, AnAffineKernelIsOneLink) {
   const Walls walls = two_walls([](double x, double y) { return 1e-3 * (5 + 0.2 * x - 0.1 * y); });
-  const FormFactorLinks coarse = coarsen_links(walls.links, walls.area, walls.centroid, 1e-4);
-  ASSERT_EQ(coarse.pair.size(), 1U);
-  EXPECT_EQ(coarse.count[coarse.pair[0][0]], kSide);
-  EXPECT_EQ(coarse.count[coarse.pair[0][1]], kSide);
-  EXPECT_LE(difference(walls, coarse), 1e-3);  // of 0.08: gradients have eight bits
+  const FormFactorLinks fewer = fit_links(walls.links, walls.patches, 0.1);
+  ASSERT_EQ(fewer.pair.size(), 1U);
+  EXPECT_EQ(fewer.count[fewer.pair[0][0]], kSide);
+  EXPECT_EQ(fewer.count[fewer.pair[0][1]], kSide);
+  EXPECT_LE(difference(walls, fewer), 1e-3);  // of 0.08: gradients have eight bits
 }
 
-TEST(LinkCoarsening, LosesNoMoreThanItIsAllowed) {
+TEST(LinkRefitting, WorthMoreLinksAreFewerAndLessTrue) {
   const Walls walls = two_walls(near_kernel);
-  std::size_t before = walls.links.pair.size();
-  for (const double epsilon : {1e-3, 3e-3, 1e-2}) {
-    const FormFactorLinks coarse = coarsen_links(walls.links, walls.area, walls.centroid, epsilon);
-    const auto count = static_cast<double>(coarse.pair.size());
-    EXPECT_LT(coarse.pair.size(), before);
-    before = coarse.pair.size();
-    EXPECT_GT(coarse.pair.size(), 1U);
-    // Both triangles; scaling moves it a little.
-    EXPECT_LE(difference(walls, coarse), 1.5 * epsilon * std::sqrt(2 * count));
+  std::size_t count = walls.links.pair.size();
+  double error = 1e-3;  // that of bits that gradients have not
+  for (const double worth : {0.02, 0.1, 0.3}) {
+    const FormFactorLinks fewer = fit_links(walls.links, walls.patches, worth);
+    EXPECT_LT(fewer.pair.size(), count);
+    EXPECT_GT(fewer.pair.size(), 1U);
+    EXPECT_GT(difference(walls, fewer), error);
+    // Another link would have cost more than all the error.
+    EXPECT_LE(difference(walls, fewer), worth * norm(walls) * std::sqrt(count / 32.0));
+    count = fewer.pair.size();
+    error = difference(walls, fewer);
   }
 }
 
-TEST(LinkCoarsening, KeepsRowSums) {
+TEST(LinkRefitting, WorthNextToNothingTheLightIsTheSame) {
   const Walls walls = two_walls(near_kernel);
-  const FormFactorLinks coarse = coarsen_links(walls.links, walls.area, walls.centroid, 1e-2);
-  const std::vector<Float3> ones(walls.area.size(), {1, 1, 1});
-  const auto a = gathered(walls, walls.links, ones), b = gathered(walls, coarse, ones);
+  EXPECT_LE(difference(walls, fit_links(walls.links, walls.patches, 1e-9)), 5e-4 * norm(walls));
+}
+
+TEST(LinkRefitting, KeepsRowSums) {
+  const Walls walls = two_walls(near_kernel);
+  const FormFactorLinks fewer = fit_links(walls.links, walls.patches, 0.02);
+  const std::vector<Float3> ones(walls.patches.size(), {1, 1, 1});
+  const auto a = gathered(walls, walls.links, ones), b = gathered(walls, fewer, ones);
   for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(b[i][0] / a[i][0], 1, 1e-3);
+}
+
+TEST(LinkRefitting, KeepsWhatPatchesExchangeWithThemselves) {
+  Walls walls = two_walls(near_kernel);
+  const std::uint32_t leaf = 2 * kSide - 1 + 3;  // of the fourth patch
+  walls.links.pair.push_back({leaf, leaf});
+  walls.links.exchange_area.push_back(0.1F * walls.patches.area[3]);
+  walls.links.gradient.push_back({});
+  std::vector<Float3> light(walls.patches.size());
+  light[3] = {1, 1, 1};
+  const FormFactorLinks fewer = fit_links(walls.links, walls.patches, 0.02);
+  EXPECT_NEAR(gathered(walls, fewer, light)[3][0], 0.1, 1e-3);
 }
 
 /// Two closed rooms with a wall of 10 cm between them, and links of the pairs in each.
@@ -125,23 +153,21 @@ struct TwoRooms {
     return model.patches.centroid[patch][0] < 3.05F;
   }
 
-  FormFactorLinks coarser(double epsilon) const {
-    return coarsen_links(links, model.patches.area, model.patches.centroid, epsilon);
-  }
+  FormFactorLinks fewer(double worth) const { return fit_links(links, model.patches, worth); }
 
   std::vector<Float3> gathered(const FormFactorLinks& by, const std::vector<Float3>& light) const {
     return gather(LinkedFormFactors(by, model.patches.area, model.patches.centroid), light);
   }
 };
 
-TEST(LinkCoarsening, CarriesNothingThroughAWall) {
+TEST(LinkRefitting, CarriesNothingThroughAWall) {
   const TwoRooms rooms;
   std::vector<Float3> light(rooms.model.patches.size(), {0, 0, 0});
   for (std::size_t i = 0; i < light.size(); ++i) {
     if (rooms.is_in_first_room(i)) light[i] = {1, 1, 1};
   }
-  for (const double part : {kLinkCoarsening, 1.0, 20.0}) {
-    const FormFactorLinks coarse = rooms.coarser(part * kLinkEpsilon);
+  for (const double worth : {kLinkWorth, 1e-2, 0.2}) {
+    const FormFactorLinks coarse = rooms.fewer(worth);
     ASSERT_LT(coarse.pair.size(), rooms.links.pair.size());
     const std::vector<Float3> arrived = rooms.gathered(coarse, light);
     for (std::size_t i = 0; i < light.size(); ++i) {
@@ -151,31 +177,24 @@ TEST(LinkCoarsening, CarriesNothingThroughAWall) {
   }
 }
 
-TEST(LinkCoarsening, KeepsRowSumsOfRooms) {
+TEST(LinkRefitting, KeepsRowSumsOfRooms) {
   const TwoRooms rooms;
   const std::vector<Float3> ones(rooms.model.patches.size(), {1, 1, 1});
   const std::vector<Float3> before = rooms.gathered(rooms.links, ones);
-  for (const double part : {kLinkCoarsening, 1.0}) {
-    const std::vector<Float3> after = rooms.gathered(rooms.coarser(part * kLinkEpsilon), ones);
+  for (const double worth : {kLinkWorth, 3e-3}) {
+    const std::vector<Float3> after = rooms.gathered(rooms.fewer(worth), ones);
     for (std::size_t i = 0; i < ones.size(); ++i) {
       EXPECT_NEAR(after[i][0], before[i][0], 1e-3) << i;
     }
   }
 }
 
-TEST(LinkCoarsening, WithoutAnErrorNothingIsMerged) {
-  const Walls walls = two_walls(near_kernel);
-  const FormFactorLinks same = coarsen_links(walls.links, walls.area, walls.centroid, 0);
-  EXPECT_EQ(same.pair, walls.links.pair);
-  EXPECT_EQ(same.exchange_area, walls.links.exchange_area);
-}
-
-TEST(LinkCoarsening, RefusesWhatIsNoError) {
-  const Walls walls = two_walls(near_kernel);
-  for (const double epsilon : {-1.0, std::numeric_limits<double>::quiet_NaN()}) {
-    test::expect_error([&] { coarsen_links(walls.links, walls.area, walls.centroid, epsilon); },
-                       "not negative");
-  }
+TEST(LinkRefitting, RefusesWhatDoesNotFit) {
+  Walls walls = two_walls(near_kernel);
+  test::expect_error([&] { fit_links(walls.links, walls.patches, 0); }, "above 0");
+  walls.patches.area.pop_back();
+  walls.patches.centroid.pop_back();
+  test::expect_error([&] { fit_links(walls.links, walls.patches); }, "patch");
 }
 
 }  // namespace
