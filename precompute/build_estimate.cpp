@@ -57,6 +57,9 @@ constexpr double kGatherPatch = 4e-6, kGatherLink = 1.25e-7;
 constexpr double kCompressPatch = 2.2e-3, kCompressLink = 5e-6;
 constexpr double kLargePatches = 64000, kGrowth = 1.0 / 3;
 
+// To choose fewer links, by those that there are; links of a patch that are left.
+constexpr double kChooseLink = 3.5e-6, kFewerLinks = 30;
+
 // Groups of eight lights that are fitted to and measured with, and of each kind of the check, and
 // gathers that each takes; to draw a light, by patches.
 constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 8, kCheckGathers = 7;
@@ -181,8 +184,10 @@ CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_
       plan_large_transfer(build.patch_count, build.matrix_count, settings);
   const double kinds = build.open ? 4 : 3;
   const double groups = kFitGroups + kinds * kCheckGroups;
-  const double gathers = kFitGroups * kFitGathers + kinds * kCheckGroups * kCheckGathers;
-  const double gathering = gathers * (kGatherPatch * n + kGatherLink * links);
+  const double fewer = std::min(links, kFewerLinks * n);
+  const double fitting = kFitGroups * kFitGathers * (kGatherPatch * n + kGatherLink * fewer);
+  const double checking =
+      kinds * kCheckGroups * kCheckGathers * (kGatherPatch * n + kGatherLink * links);
   const double compressing = kCompressPatch * n + kCompressLink * links;
   const double drawing = groups * ReferenceSolver::kTogether * kDrawPatch * n;
   const double growth = std::pow(n / kLargePatches, kGrowth);
@@ -190,7 +195,8 @@ CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_
   CostEstimate estimate = estimate_of(build.patch_count, build.roles);
   estimate.link_count = build.link_count;
   estimate.peak_bytes = static_cast<std::uint64_t>(bytes_beside_transfer(build)) + plan.peak_bytes;
-  estimate.whole_seconds = on_all_processors(growth * (gathering + compressing) + drawing);
+  estimate.whole_seconds = on_all_processors(growth * (fitting + checking + compressing) +
+                                             kChooseLink * links + drawing);
   estimate.seconds =
       estimate.whole_seconds +
       large_transfer_seconds(build.patch_count, build.matrix_count, form_factors, build.roles) /
