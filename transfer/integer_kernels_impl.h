@@ -110,6 +110,20 @@ inline StripBasis strip_at(const std::int16_t* values, const BasisPart& part, st
           width * kRankGroup};
 }
 
+// How far ahead of what is read values are asked for, in bytes: the processor itself looks no
+// farther than the end of a page. Measured: notes/operator.md.
+constexpr std::size_t kAhead = 4096;
+
+/// Values of a basis. Only vectors that are whole cache lines ask for others.
+template <typename N>
+REBOUNCE_INLINE inline N load_basis(const std::int16_t* values) {
+  constexpr std::size_t kLine = 64;
+  if constexpr (N::kWidth * sizeof(std::int16_t) == kLine) {
+    __builtin_prefetch(values + kAhead / sizeof(std::int16_t));
+  }
+  return N::load(values);
+}
+
 // The next functions are not inlined: their sums need all registers, which g++ 12 would otherwise
 // share out among the constants of everything around them.
 
@@ -125,8 +139,9 @@ template <typename N, std::size_t kGroups>
   const auto add_strip = [&](StripBasis strip, std::size_t begin, std::size_t end) REBOUNCE_INLINE {
     for (std::size_t k = begin; k < end; k += N::kWidth, strip.values += N::kWidth) {
       N b[kGroups];
-      unroll<kGroups>([&](auto g)
-                          REBOUNCE_INLINE { b[g] = N::load(strip.values + g * strip.group_step); });
+      unroll<kGroups>([&](auto g) REBOUNCE_INLINE {
+        b[g] = load_basis<N>(strip.values + g * strip.group_step);
+      });
       unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
         const N l = N::load(light.value[c] + k);
         unroll<kGroups>([&](auto g)
@@ -237,7 +252,7 @@ template <typename N, std::size_t kWide>
     unroll<kChannelCount>(
         [&](auto c) REBOUNCE_INLINE { four[c] = N::repeat_four(group + c * kRankGroup); });
     unroll<kWide>([&](auto w) REBOUNCE_INLINE {
-      const N b = N::load(strip.values + w * N::kWidth).by_position();
+      const N b = load_basis<N>(strip.values + w * N::kWidth).by_position();
       unroll<kChannelCount>(
           [&](auto c) REBOUNCE_INLINE { sum[s][c][w] = add_products(sum[s][c][w], b, four[c]); });
     });

@@ -21,7 +21,11 @@ struct Shorts32 {
   __m512i v;
 
   static Shorts32 zero() { return {_mm512_setzero_si512()}; }
-  static Shorts32 load(const std::int16_t* p) { return {_mm512_loadu_si512(p)}; }
+  static Shorts32 load(const std::int16_t* p) {
+    __m512i loaded = _mm512_loadu_si512(p);
+    asm("" : "+v"(loaded));  // else g++ 12 loads it again for each of its products
+    return {loaded};
+  }
   static Shorts32 repeat_four(const std::int16_t* p) {
     return {_mm512_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))};
   }

@@ -18,6 +18,7 @@ struct Vector16 {
   static constexpr std::size_t kWidth = 16;
   static constexpr std::size_t kStrip = 64;
   static constexpr std::size_t kLights = 2;
+  static constexpr std::size_t kCoreVectors = 4;
   __m512 v;
 
   static Vector16 load(const float* p) { return {_mm512_loadu_ps(p)}; }
@@ -84,14 +85,15 @@ template <>
 class Vector16::EntryLanes<std::uint16_t> {
  public:
   explicit EntryLanes(const ChannelLanes& lanes)
-      : lane_(_mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data()))) {}
+      : lane_(_mm512_cvtepu16_epi32(
+            _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())))) {}
+  // Converted as they come from memory, which takes one operation less than what was permuted.
   Vector16 load(const std::uint16_t* p) const {
-    const __m256i values = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(p));
-    return {_mm512_cvtph_ps(_mm256_permutexvar_epi16(lane_, values))};
+    return {_mm512_permutexvar_ps(lane_, load_half(p).v)};
   }
 
  private:
-  __m256i lane_;
+  __m512i lane_;
 };
 
 }  // namespace
