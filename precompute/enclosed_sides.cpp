@@ -46,12 +46,17 @@ constexpr std::array<Look, 10> kLooks{{{4, -1, 2},
                                        {112, 4, 6},
                                        {128, 5, 6}}};
 
+// Of a side smaller than the square of this part of the reach little depends: it is inside if of so
+// many paths no more than so many are out, and else lit.
+constexpr double kTiny = 1.0 / 64;
+constexpr Look kLookAtTiny{32, 1, 2};
+
 // Sides of triangles that follow each other, no farther apart than this part of the reach, are
 // first judged together: by so many paths in all, then by so many of each side and no fewer than
-// kLeastPaths in all, then by twice as many.
-constexpr std::size_t kGroup = 8;
+// kLeastPaths in all, then by four times as many.
+constexpr std::size_t kGroup = 16;
 constexpr double kGroupReach = 1.0 / 8;
-constexpr std::size_t kFirstPaths = 16, kPathsOfSide = 8, kLeastPaths = 32;
+constexpr std::size_t kFirstPaths = 16, kPathsOfSide = 4, kLeastPaths = 32;
 
 // All of them are lit where this part of the first paths is out, or this of all; all are inside
 // where none is. What is still in doubt then is lit if it has that part out in a group that has
@@ -219,7 +224,7 @@ class EnclosedSides {
     follow(group, enough, scratch);
     if (part_out(group) >= kLitPart) return judge_all(group, Verdict::kLit);
     if (part_out(group) == 0) return judge_all(group, Verdict::kInside);
-    follow(group, 2 * enough, scratch);
+    follow(group, 4 * enough, scratch);
     const bool few = part_out(group) <= kFew;
     for (Suspect& suspect : group) {
       const double part = part_out({&suspect, 1});
@@ -248,10 +253,11 @@ class EnclosedSides {
   }
 
   Verdict judge_alone(Suspect& suspect, Scratch& scratch) const {
-    if (const double size = area(suspect.side / 2); size > 1) {
-      return judge_large(suspect, size, scratch);
-    }
-    for (const Look& look : kLooks) {
+    const double size = area(suspect.side / 2);
+    if (size > 1) return judge_large(suspect, size, scratch);
+    const bool tiny = size * kLarge * kLarge < kTiny * kTiny;
+    for (const Look& usual : kLooks) {
+      const Look& look = tiny && usual.paths == kLookAtTiny.paths ? kLookAtTiny : usual;
       if (look.paths <= suspect.paths) continue;
       follow({&suspect, 1}, look.paths, scratch);
       if (suspect.out <= look.inside) return Verdict::kInside;

@@ -17,9 +17,9 @@ namespace rebounce {
 /// emits; a side of whose paths no more than 4 % get out is inside. So a shell may have cracks, and
 /// a room is none.
 ///
-/// Up to eight sides close together are judged by 16 paths of theirs where these say that they are
-/// lit, by 64 where they are alike; only those that differ from the others, or are in between, by
-/// up to 128 of their own.
+/// Up to sixteen sides close together are judged by 16 paths of theirs where these say that they
+/// are lit, by 64 where they are alike; only those that differ from the others, or are in between,
+/// by up to 128 of their own, by 32 where they are tiny.
 ///
 /// `scene`, `tracer` and `sides` [t] as for find_lit_sides(). Deterministic. Throws Cancelled.
 void bury_enclosed_sides(const Scene& scene, const RayTracer& tracer,
