@@ -13,16 +13,17 @@
 #include "rebounce/precompute/npz_writer.h"
 #include "rebounce/runtime/automatic_solver.h"
 #include "rebounce/runtime/engine.h"
-#include "rebounce/runtime/hierarchical_solver.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/linked_form_factors.h"
 
 namespace rebounce::cli {
 namespace {
 
-constexpr const char *kExact = "exact", *kCompressed = "compressed";  // F as methods see it
+// F as methods see it.
+constexpr const char *kExact = "exact", *kCompressed = "compressed", *kLinks = "links";
 
 // The runtime's choice: automatic_solver.h.
 constexpr const char* kAutomatic = "auto";
@@ -87,9 +88,15 @@ Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
 }
 
 Solution solve_automatically(const SolveOptions& chosen, const Engine& engine,
-                             const SweepableFormFactors& form_factors) {
+                             const FormFactorOperator& form_factors) {
+  const auto* const sweepable = dynamic_cast<const SweepableFormFactors*>(&form_factors);
+  if (sweepable == nullptr) {
+    throw Error(
+        "auto weighs methods that do not run on links; name one, such as "
+        "conjugate-gradient");
+  }
   const TransferData& data = engine.data();
-  AutomaticSolver solver(form_factors, {data.patches.area, data.patches.reflectance}, data.transfer,
+  AutomaticSolver solver(*sweepable, {data.patches.area, data.patches.reflectance}, data.transfer,
                          data.record.error_mean);
   Solution solution;
   AutomaticSolver::Result result;
@@ -145,24 +152,14 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
 
 /// What --method names; for the product and for the choice, a method that reads F least.
 SolveMethod method_of(const SolveOptions& chosen) {
+  if (chosen.method == kHierarchicalMethod) return SolveMethod::kJacobi;
   const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
   return named == kSolveMethods.end() ? SolveMethod::kSymmetricGaussSeidel : named->method;
 }
 
-Solution solve_on_links(const SolveOptions& chosen, Engine& engine) {
-  const TransferData& data = engine.data();
-  if (data.links.empty()) {
-    throw Error(chosen.file + " has no links; make it again with precompute --store-links");
-  }
-  const LinkedFormFactors links(data.links, data.patches.area, data.patches.centroid);
-  HierarchicalSolver solver(links, {data.patches.area, data.patches.reflectance});
-  return solve_by_iteration(solver, engine, links, chosen.settings);
-}
-
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
-                       const SweepableFormFactors& form_factors) {
+                       const FormFactorOperator& form_factors) {
   if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
-  if (chosen.method == kHierarchicalMethod) return solve_on_links(chosen, engine);
   if (chosen.method == kAutomatic) return solve_automatically(chosen, engine, form_factors);
   const TransferData& data = engine.data();
   const auto solver = make_solver(method_of(chosen), form_factors,
@@ -170,26 +167,39 @@ Solution find_solution(const SolveOptions& chosen, Engine& engine,
   return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
 }
 
-/// kExact or kCompressed: what was asked for, or the best that the file holds.
-const char* form_factors_of(const SolveOptions& chosen, const TransferData& data) {
-  if (chosen.form_factors == kCompressed && !data.compressed_form_factors) {
+/// What was asked for, or the best that the file holds; hierarchical radiosity is on links.
+std::string form_factors_of(const SolveOptions& chosen, const TransferData& data) {
+  const bool hierarchical = chosen.method == kHierarchicalMethod;
+  if (hierarchical && !chosen.form_factors.empty() && chosen.form_factors != kLinks) {
+    throw Error("hierarchical is on links; go without --form-factors");
+  }
+  const std::string asked = hierarchical ? kLinks : chosen.form_factors;
+  if (asked == kLinks && data.links.empty()) {
+    throw Error(chosen.file + " has no links; make it again with precompute --store-links");
+  }
+  if (asked == kCompressed && !data.compressed_form_factors) {
     throw Error(chosen.file +
                 " holds no compressed form factors; make it with --compress-form-factors");
   }
-  if (chosen.form_factors == kExact && data.exchange.empty()) {
+  if (asked == kExact && data.exchange.empty()) {
     throw Error(chosen.file +
                 " holds its form factors compressed only; go without --form-factors exact");
   }
-  if (chosen.form_factors.empty()) return data.exchange.empty() ? kCompressed : kExact;
-  return chosen.form_factors == kCompressed ? kCompressed : kExact;
+  if (asked.empty()) return data.exchange.empty() ? kCompressed : kExact;
+  return asked;
 }
 
-std::unique_ptr<const SweepableFormFactors> choose_form_factors(const SolveOptions& chosen,
-                                                                const TransferData& data) {
-  if (chosen.form_factors == kCompressed) {
+std::unique_ptr<const FormFactorOperator> choose_form_factors(const std::string& kind,
+                                                              SolveMethod method,
+                                                              const TransferData& data) {
+  if (kind == kLinks) {
+    return std::make_unique<LinkedFormFactors>(data.links, data.patches.area,
+                                               data.patches.centroid);
+  }
+  if (kind == kCompressed) {
     return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
   }
-  return make_form_factors(method_of(chosen), data);
+  return make_form_factors(method, data);
 }
 
 void run(const SolveOptions& chosen, const CommonOptions& options) {
@@ -198,8 +208,8 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   engine.compute_direct(setup.lights, setup.sky);
   engine.compute_initial_exitance();
-  const char* const kind = form_factors_of(chosen, *data);
-  const auto form_factors = choose_form_factors(chosen, *data);
+  const std::string kind = form_factors_of(chosen, *data);
+  const auto form_factors = choose_form_factors(kind, method_of(chosen), *data);
   const Solution solution = find_solution(chosen, engine, *form_factors);
   if (solution.diverged) {
     throw Error(chosen.method + " diverges: the operator of " + chosen.file +
@@ -241,9 +251,9 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
   command
       ->add_option("--form-factors", chosen->form_factors,
                    "What iterative methods gather with: the exact form factors of pairs, or the "
-                   "compressed ones of a file that holds them; by default exact ones where there "
-                   "are any")
-      ->check(CLI::IsMember({kExact, kCompressed}));
+                   "compressed ones or the links of a file that holds them; by default exact ones "
+                   "where there are any")
+      ->check(CLI::IsMember({kExact, kCompressed, kLinks}));
   command
       ->add_option("--iterations", chosen->settings.max_sweeps,
                    "Sweeps at most, for iterative methods")

@@ -390,12 +390,28 @@ TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
   const json solved =
       summary_of({"solve", file, "--lights", kLights, "-o", linked, "--method", "hierarchical"});
   EXPECT_EQ(solved["method"], "hierarchical");
+  EXPECT_EQ(solved["form_factors"], "links");
   EXPECT_LT(difference(read_csv(flat), read_csv(linked), 6), 0.05);
 
   const std::string without = precompute("pairs.safetensors");
   expect_refused(
       {"solve", without, "--lights", kLights, "-o", path("x.csv"), "--method", "hierarchical"},
       "--store-links");
+}
+
+TEST_F(CommandLine, GathersAlongLinksWithAnyMethodThatGathers) {
+  const std::string file = precompute("box.safetensors", {"--store-links"});
+  const auto solve = [&](const std::string& method, const std::string& name) {
+    return std::vector<std::string>{"solve",    file,       "--lights", kLights,          "-o",
+                                    path(name), "--method", method,     "--form-factors", "links"};
+  };
+  const json jacobi = summary_of(solve("hierarchical", "jacobi.csv"));
+  const json conjugate = summary_of(solve("conjugate-gradient", "conjugate.csv"));
+  EXPECT_EQ(conjugate["form_factors"], "links");
+  EXPECT_LT(conjugate["sweeps"], jacobi["sweeps"]);
+  EXPECT_LT(difference(read_csv(path("jacobi.csv")), read_csv(path("conjugate.csv")), 6), 1e-3);
+  expect_refused(solve("gauss-seidel", "x.csv"), "gather");
+  expect_refused(solve("auto", "x.csv"), "links");
 }
 
 TEST_F(CommandLine, WritesTheSameSolutionAsCsvAndNpz) {
