@@ -221,11 +221,11 @@ template <typename V, Direction kDirection, typename Value>
 REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& core,
                                           const ChannelLanes& lanes, const float* in, float* out) {
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes;
-  for_each_rows<V::kCoreVectors>(
-      (core.columns + kEntries - 1) / kEntries,
-      [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
-        multiply_columns<V, kDirection, kWide>(values, core, first * kEntries, lanes, in, out);
-      });
+  for_each_rows<V::kCoreVectors>((core.columns + kEntries - 1) / kEntries,
+                                 [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
+                                   multiply_columns<V, kDirection, kWide>(
+                                       values, core, first * kEntries, lanes, in, out);
+                                 });
 }
 
 template <typename V, typename Value>
