@@ -17,6 +17,8 @@
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/compressed_form_factors.h"
+#include "rebounce/transfer/error.h"
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 #include "tile_product.h"
@@ -46,6 +48,24 @@ std::shared_ptr<const DenseOperator> to_f16(const DenseOperator& dense) {
   return std::make_shared<const DenseOperator>(std::move(storage));
 }
 
+/// Where there are pairs, which the others are made of: in f32 and f16.
+std::vector<std::shared_ptr<const DenseOperator>> dense_operators(const TransferData& data) {
+  if (data.exchange.empty()) return {};
+  const auto f32 = operator_f32(data);
+  return {f32, to_f16(*f32)};
+}
+
+/// By pairs, or compressed where those are not kept.
+std::unique_ptr<const SweepableFormFactors> sweepable_form_factors(const TransferData& data) {
+  if (!data.exchange.empty()) {
+    return std::make_unique<FormFactorBlocks>(data.exchange, data.patches.area);
+  }
+  if (!data.compressed_form_factors) {
+    throw Error("'" + scene_name(data) + "' holds form factors neither by pairs nor compressed");
+  }
+  return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
+}
+
 /// The light that the patches send out first under one point light in the free space of the scene.
 std::vector<Float3> light_one_lamp(const TransferData& data) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
@@ -57,6 +77,7 @@ std::vector<Float3> light_one_lamp(const TransferData& data) {
 struct Measure {
   std::string name, instruction_set = {}, precision = {};
   std::size_t bytes = 0;               ///< that one run must read or write at least
+  double reads = 1;                    ///< of each of them, on average
   std::function<double()> error = {};  ///< of the last run's result; empty: it has none
   TimedCase timed;
 };
@@ -67,20 +88,21 @@ class ApplyBenchmark {
       : scene_(scene_name(data)),
         patches_(data.patches),
         options_(options),
-        f32_(operator_f32(data)),
-        f16_(to_f16(*f32_)),
+        dense_(dense_operators(data)),
         stored_(data.transfer),
-        form_factors_(data.exchange, data.patches.area),
-        gauss_seidel_(form_factors_, {patches_.area, patches_.reflectance}),
+        form_factors_(sweepable_form_factors(data)),
+        gauss_seidel_(*form_factors_, {patches_.area, patches_.reflectance}),
         initial_exitance_(light_one_lamp(data)),
-        truth_(ReferenceSolver(data.exchange, data.patches).indirect_irradiance(initial_exitance_)),
+        truth_(ReferenceSolver(data).indirect_irradiance(initial_exitance_)),
         result_(patches_.size()),
-        workspace_(std::max({f32_->workspace_size(), f16_->workspace_size(),
-                             stored_->workspace_size(), form_factors_.workspace_size()})),
-        read_f32_(f32_->bytes()),
-        read_f16_(f16_->bytes()),
+        workspace_(std::max(stored_->workspace_size(), form_factors_->workspace_size())),
         read_stored_(stored_->bytes()),
-        read_form_factors_(gather_bytes()) {}
+        read_form_factors_(gather_bytes()) {
+    for (const auto& dense : dense_) {
+      workspace_.resize(std::max(workspace_.size(), dense->workspace_size()));
+      read_dense_.emplace_back(dense->bytes());
+    }
+  }
 
   /// Measures everything with `threads` threads.
   void run(int threads, Table& table) {
@@ -94,7 +116,7 @@ class ApplyBenchmark {
       add_batch(precision, *stored_);
       if (blocks) add_receivers(precision, *blocks);
     }
-    for (const auto& dense : {f32_, f16_}) add_dense(*dense);
+    for (std::size_t k = 0; k < dense_.size(); ++k) add_dense(*dense_[k], read_dense_[k]);
     add_gather();
     add_gauss_seidel();
 
@@ -105,8 +127,13 @@ class ApplyBenchmark {
   }
 
  private:
-  std::size_t gather_bytes() const { return form_factors_.bytes() + 2 * vector_bytes(); }
+  std::size_t gather_bytes() const { return form_factors_->bytes() + 2 * vector_bytes(); }
   std::size_t vector_bytes() const { return patches_.size() * sizeof(Float3); }
+
+  std::string form_factor_precision() const {
+    const auto* compressed = dynamic_cast<const CompressedFormFactors*>(form_factors_.get());
+    return compressed ? precision_name(compressed->exchange().storage().precision) : "f32";
+  }
 
   double error_of(std::span<const Float3> indirect_irradiance) const {
     return relative_difference(indirect_irradiance, truth_, patches_.area);
@@ -130,6 +157,8 @@ class ApplyBenchmark {
                          .instruction_set = dense_kernels().instruction_set,
                          .precision = precision,
                          .bytes = transfer.bytes(),
+                         .reads = static_cast<double>(transfer.bytes_per_apply()) /
+                                  static_cast<double>(transfer.bytes()),
                          .error = apply_error,
                          .timed = {.work = apply}});
   }
@@ -187,9 +216,9 @@ class ApplyBenchmark {
          .timed = {.work = apply}});
   }
 
-  void add_dense(const DenseOperator& dense) {
+  void add_dense(const DenseOperator& dense, ReadBuffer& read) {
     const Precision precision = dense.storage().precision;
-    add_read(precision == Precision::kF16 ? read_f16_ : read_f32_, dense.bytes());
+    add_read(read, dense.bytes());
     add_product("apply dense", precision_name(precision), dense);
     for (const DenseKernels* kernels : dense_kernel_sets()) add_tiles(dense, *kernels);
   }
@@ -208,13 +237,13 @@ class ApplyBenchmark {
 
   void add_gather() {
     add_read(read_form_factors_, gather_bytes());
-    const auto gather = [this] { form_factors_.gather(initial_exitance_, result_, workspace_); };
+    const auto gather = [this] { form_factors_->gather(initial_exitance_, result_, workspace_); };
     const auto first_bounce_error = [this, gather] {
       gather();
       return error_of(result_);
     };
     measures_.push_back({.name = "gather",
-                         .precision = "f32",
+                         .precision = form_factor_precision(),
                          .bytes = gather_bytes(),
                          .error = first_bounce_error,
                          .timed = {.work = gather}});
@@ -228,12 +257,12 @@ class ApplyBenchmark {
       start();
       sweep();
       std::vector<Float3> gathered(patches_.size());
-      form_factors_.gather(gauss_seidel_.radiosity(), gathered, workspace_);
+      form_factors_->gather(gauss_seidel_.radiosity(), gathered, workspace_);
       return error_of(gathered);
     };
     measures_.push_back({.name = "Gauss-Seidel sweep",
-                         .precision = "f32",
-                         .bytes = form_factors_.bytes() + 4 * vector_bytes(),
+                         .precision = form_factor_precision(),
+                         .bytes = form_factors_->bytes() + 4 * vector_bytes(),
                          .error = error,
                          .timed = {.work = sweep, .prepare = start}});
   }
@@ -249,10 +278,12 @@ class ApplyBenchmark {
       const Timing& time = timings[k];
       const bool is_read = !measure.error;
       if (is_read) read_seconds = time.median;  // each read comes before what is measured by it
+      const double of_read = read_seconds / time.median;
       table.add({scene_, patches_.size(), threads, measure.name, text(measure.instruction_set),
                  text(measure.precision), time.median * 1e6, time.spread, measure.bytes,
-                 static_cast<double>(measure.bytes) / time.median / 1e9,
-                 is_read ? Table::Cell() : Table::Cell(read_seconds / time.median),
+                 measure.reads * static_cast<double>(measure.bytes) / time.median / 1e9,
+                 is_read ? Table::Cell() : Table::Cell(of_read),
+                 is_read ? Table::Cell() : Table::Cell(measure.reads * of_read),
                  is_read ? Table::Cell() : Table::Cell(measure.error())});
     }
   }
@@ -260,19 +291,20 @@ class ApplyBenchmark {
   std::string scene_;
   const PatchTable& patches_;
   const CommonOptions& options_;
-  std::shared_ptr<const DenseOperator> f32_, f16_;
+  std::vector<std::shared_ptr<const DenseOperator>> dense_;
   std::shared_ptr<const TransferOperator> stored_;  ///< the file's own, of any kind
-  FormFactorBlocks form_factors_;
+  std::unique_ptr<const SweepableFormFactors> form_factors_;
   GaussSeidelSolver gauss_seidel_;
   std::vector<Float3> initial_exitance_, truth_, result_;
   std::vector<float> workspace_;
-  ReadBuffer read_f32_, read_f16_, read_stored_, read_form_factors_;
+  ReadBuffer read_stored_, read_form_factors_;
+  std::vector<ReadBuffer> read_dense_;  ///< one for each
   std::vector<Measure> measures_;
 };
 
 void run(const ApplyOptions& options) {
   Table table({"scene", "patches", "threads", "measure", "instructions", "precision",
-               "microseconds", "spread", "bytes", "GB/s", "of read", "error"});
+               "microseconds", "spread", "bytes", "GB/s", "of read", "bandwidth of read", "error"});
   for (const std::string& input : options.inputs) {
     const TransferData data = load_or_build(input, options.settings);
     ApplyBenchmark benchmark(data, options.common);

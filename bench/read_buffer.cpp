@@ -1,5 +1,12 @@
 #include "read_buffer.h"
 
+#include <unistd.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "timing.h"
+
 namespace rebounce::bench {
 namespace {
 
@@ -67,6 +74,19 @@ void ReadBuffer::read() {
     sum += sum_of(reinterpret_cast<const Line*>(lines_.data() + begin), count);
   }
   sum_ += sum;
+}
+
+double measure_memory_bandwidth() {
+  constexpr std::size_t kLeast = std::size_t{256} << 20, kTimesTheCache = 4;
+  constexpr int kRepeats = 7;
+  // 0 or less where the system does not know.
+  const long cache = sysconf(_SC_LEVEL3_CACHE_SIZE);
+  const std::size_t bytes =
+      std::max(kLeast, kTimesTheCache * static_cast<std::size_t>(std::max(cache, 0L)));
+  ReadBuffer buffer(bytes);
+  std::vector<double> seconds;
+  for (int k = 0; k < kRepeats; ++k) seconds.push_back(seconds_of([&buffer] { buffer.read(); }));
+  return static_cast<double>(bytes) / summarise(seconds).median;
 }
 
 }  // namespace rebounce::bench

@@ -24,4 +24,8 @@ class ReadBuffer {
   std::uint64_t sum_ = 0;  ///< of all words: what is not used need not be read
 };
 
+/// Bytes per second at which a buffer is read that no cache holds, several times as large as the
+/// last of them, on all OpenMP threads: the median of a few times.
+double measure_memory_bandwidth();
+
 }  // namespace rebounce::bench

@@ -91,8 +91,8 @@ class SolverBenchmark {
         forms_(make_forms(data, options.settings)),
         changes_(light_changes(data)) {}
 
-  /// A row for each form and kind of sweep.
-  void measure_sweeps(Table& table) {
+  /// A row for each form and kind of sweep, beside what memory gives, in bytes per second.
+  void measure_sweeps(double memory_bandwidth, Table& table) {
     std::vector<Sweep> sweeps;
     for (const Form& form : forms_) {
       add_gather(form, sweeps);
@@ -114,7 +114,8 @@ class SolverBenchmark {
       table.add({scene_name(data_), data_.patches.size(), sweeps[k].form, sweeps[k].name,
                  sweeps[k].bytes, bytes / static_cast<double>(data_.patches.size()), time * 1e6,
                  timings[2 * k + 1].spread, bytes / time / 1e9, stored / read / 1e9,
-                 bytes / stored * read / time});
+                 bytes / stored * read / time, memory_bandwidth / 1e9,
+                 bytes / time / memory_bandwidth});
     }
   }
 
@@ -256,13 +257,14 @@ class SolverBenchmark {
 
 void run(const SolverOptions& options) {
   Table sweeps({"scene", "patches", "form", "sweep", "bytes", "per patch", "microseconds", "spread",
-                "GB/s", "read GB/s", "of read"});
+                "GB/s", "read GB/s", "of read", "memory GB/s", "of memory"});
   Table solves({"scene", "patches", "form", "method", "light", "form error", "sweeps 1 %", "us 1 %",
                 "sweeps 0.1 %", "us 0.1 %", "sweeps 0.01 %", "us 0.01 %"});
+  const double memory_bandwidth = measure_memory_bandwidth();
   for (const std::string& input : options.inputs) {
     const TransferData data = load_or_build(input, options.settings);
     SolverBenchmark benchmark(data, options);
-    benchmark.measure_sweeps(sweeps);
+    benchmark.measure_sweeps(memory_bandwidth, sweeps);
     if (options.sweeps_only) continue;
     benchmark.measure_transfer(solves);
     benchmark.measure_solves(solves);

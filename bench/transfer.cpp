@@ -32,9 +32,20 @@ struct TransferOptions {
   CommonOptions common{.repeats = 21};
 };
 
+/// From so many patches on there are fewer kinds: each takes minutes.
+constexpr std::size_t kHuge = ReportSettings::kHuge;
+
 ReportSettings settings_for(std::size_t patch_count) {
   ReportSettings settings;
   settings.patch_count = patch_count;
+  settings.form_factor_tolerances = {0.001, 0.003};
+  settings.links = false;
+  if (patch_count >= kHuge) {
+    settings.operators = {
+        {0.005, Precision::kQ16}, {0.02, Precision::kQ16}, {0.005, Precision::kF16}};
+    settings.ranks = {256};
+    return settings;
+  }
   settings.operators.clear();
   for (const double tolerance : {0.005, 0.02, 0.01, 0.002, 0.001}) {
     settings.operators.push_back({tolerance, Precision::kQ16});
@@ -46,8 +57,6 @@ ReportSettings settings_for(std::size_t patch_count) {
   for (const double tolerance : {0.02, 0.01}) {
     settings.operators.push_back({tolerance, Precision::kQ8});
   }
-  settings.form_factor_tolerances = {0.001, 0.003};
-  settings.links = false;
   return settings;
 }
 
@@ -63,7 +72,8 @@ struct Errors {
 /// One row: a product, or some sweeps of Gauss-Seidel, forward or symmetric.
 struct Entry {
   std::string name, form{};
-  std::size_t bytes = 0;  ///< that a product or a sweep reads
+  std::size_t bytes = 0;       ///< stored
+  std::size_t bytes_read = 0;  ///< by a product or a sweep, what it reads twice counted twice
   std::optional<double> build_seconds{};
   const TransferOperator* transfer = nullptr;  ///< null: it iterates
   const FormFactorOperator* form_factors = nullptr;
@@ -121,10 +131,15 @@ class TransferBenchmark {
     if (contestant.product) {
       const auto stored =
           std::ranges::find(contenders_.operators, contestant.transfer, &StoredOperator::name);
-      add(contestant, 0).transfer = stored->transfer.get();
+      Entry& entry = add(contestant, 0);
+      entry.transfer = stored->transfer.get();
+      entry.bytes_read = entry.transfer->bytes_per_apply();
     } else if (relaxes && compressed) {
+      const int reads = contestant.method == SolveMethod::kGaussSeidel ? 2 : 1;
       for (int sweeps = 1; sweeps <= kMostSweeps; ++sweeps) {
-        add(contestant, sweeps).form_factors = contenders_.form(contestant.form).get();
+        Entry& entry = add(contestant, sweeps);
+        entry.form_factors = contenders_.form(contestant.form).get();
+        entry.bytes_read = reads * entry.bytes;
       }
     }
   }
@@ -192,15 +207,17 @@ class TransferBenchmark {
                                     errors[0].max,
                                     errors[1].mean,
                                     errors[1].max};
-    row.resize(row.size() + 4);
+    row.resize(row.size() + 5);
     if (!times.empty()) {
       const Timing &read = times[2 * k], &work = times[2 * k + 1];
       const double read_seconds = read.median * std::max(entry.sweeps, 1);
-      auto cell = row.end() - 4;
+      auto cell = row.end() - 5;
       if (entry.build_seconds) *cell = *entry.build_seconds;
       *++cell = work.median * 1e6;
       *++cell = work.spread;
       *++cell = read_seconds / work.median;
+      *++cell = static_cast<double>(entry.bytes_read) / static_cast<double>(entry.bytes) *
+                read_seconds / work.median;
     }
     table.add(std::move(row));
   }
@@ -214,7 +231,7 @@ class TransferBenchmark {
 void run(const TransferOptions& options) {
   Table table({"scene", "patches", "kind", "form", "sweeps", "bytes_per_patch", "error_mean",
                "error_max", "patch_light_error_mean", "patch_light_error_max", "build_seconds",
-               "microseconds", "spread", "of_read"});
+               "microseconds", "spread", "of_read", "bandwidth_of_read"});
   for (const std::string& scene : options.scenes) {
     for (const std::size_t patch_count : options.patch_counts) {
       const ReportSettings settings = settings_for(patch_count);

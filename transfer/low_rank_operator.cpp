@@ -83,6 +83,12 @@ std::size_t LowRankOperator::bytes() const {
          storage_.core.size_bytes() + (first_bounce_ ? first_bounce_->bytes() : 0);
 }
 
+std::size_t LowRankOperator::bytes_per_apply() const {
+  const std::size_t twice = storage_.basis_f32.size_bytes() + storage_.basis_f16.size_bytes();
+  return 2 * twice + storage_.core.size_bytes() +
+         (first_bounce_ ? first_bounce_->bytes_per_gather() : 0);
+}
+
 std::size_t LowRankOperator::workspace_size() const {
   const std::size_t own =
       kChannelCount * stride() + (tile_count(patch_count()) + 2) * coefficient_size();

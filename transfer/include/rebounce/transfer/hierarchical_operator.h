@@ -144,8 +144,8 @@ class HierarchicalOperator final : public TransferOperator {
 
   std::size_t patch_count() const override { return storage_.area.size(); }
   std::size_t bytes() const override;
-  /// Bytes that an apply to one light reads: bases twice, to project light and to expand it.
-  std::size_t bytes_per_apply() const;
+  /// Bases are read twice, to project light and to expand it.
+  std::size_t bytes_per_apply() const override;
   std::string kind() const override { return "hierarchical"; }
   const PatchRoles& roles() const override { return storage_.roles; }
   std::size_t workspace_size() const override { return batch_workspace_size(1); }

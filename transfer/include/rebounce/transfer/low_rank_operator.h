@@ -53,6 +53,8 @@ class LowRankOperator final : public TransferOperator {
   std::size_t patch_count() const override { return storage_.area.size(); }
   /// With F where it is used: an apply reads it too.
   std::size_t bytes() const override;
+  /// The basis is read twice, to project light and to expand it.
+  std::size_t bytes_per_apply() const override;
   std::string kind() const override { return first_bounce_ ? "first-bounce" : "low-rank"; }
   std::size_t workspace_size() const override;
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,

@@ -28,6 +28,9 @@ class TransferOperator {
   /// Bytes of the stored operator, all three channels.
   virtual std::size_t bytes() const = 0;
 
+  /// Bytes of it that an apply to one light reads, those that it reads twice counted twice.
+  virtual std::size_t bytes_per_apply() const { return bytes(); }
+
   /// The kind as the command line names it: "dense", "hierarchical", "low-rank",
   /// "first-bounce".
   virtual std::string kind() const = 0;
