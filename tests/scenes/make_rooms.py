@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Writes the scenes that ./dev report measures beside the Cornell box, all of boxes, in metres:
+"""Writes scenes for reports and benches beside the Cornell box, all of boxes, in metres:
 
     two_rooms.gltf       two rooms with a door between them, closed
+    three_rooms.gltf     three furnished rooms in a row with doors between them, closed
     furnished_room.gltf  a room with table, chairs, sofa, bed and shelves, closed
     white_room.gltf      a room of reflectance 0.9 with two blocks, closed
     pavilion.gltf        columns under a roof before a wall, open to the sky, seen from outside
@@ -87,11 +88,8 @@ def two_rooms():
     wood = gltf.add_material("wood", [0.45, 0.3, 0.18])
     gltf.add_quads("first room", box((0, 0, 0), (length, height, depth), True, ("-x", "-y", "+x")), white)
     gltf.add_quads("second room", box((far, 0, 0), (far + length, height, depth), True, ("+x", "-y", "-x")), white)
-    hole = ((door[2], door[3], door[0], door[1]),)
-    ys, zs = (0, door[3], height), (0, door[0], door[1], depth)
-    partition = rectangles(0, length, -1, ys, zs, hole) + rectangles(0, far, 1, ys, zs, hole)
-    partition += box((length, 0, door[0]), (far, door[3], door[1]), True, ("-x", "+x", "-y"))
-    gltf.add_quads("partition", partition, white)
+    zs = (0, door[0], door[1], depth)
+    gltf.add_quads("partition", partition(length, far, height, zs, door), white)
     gltf.add_quads("red wall", rectangles(0, 0, 1, (0, height), (0, depth)), red)
     gltf.add_quads("blue wall", rectangles(0, far + length, -1, (0, height), (0, depth)), blue)
     floor = rectangles(1, 0, 1, zs, (0, length)) + rectangles(1, 0, 1, (door[0], door[1]), (length, far))
@@ -99,6 +97,50 @@ def two_rooms():
     gltf.add_quads("floor", floor, wood)
     gltf.add_quads("cupboard", standing((0.8, 0, 0.2), (2.0, 1.4, 0.7)), wood)
     gltf.add_quads("table", standing((5.6, 0, 1.4), (6.8, 0.75, 2.4)), white)
+    return gltf
+
+
+def partition(x0, x1, height, zs, door):
+    """A wall from `x0` to `x1` with a door (z0, z1, y0, y1), without its threshold.
+
+    `zs` are the lines of the floor, which the wall's edges have too.
+    """
+    hole = ((door[2], door[3], door[0], door[1]),)
+    ys = (0, door[3], height)
+    quads = rectangles(0, x0, -1, ys, zs, hole) + rectangles(0, x1, 1, ys, zs, hole)
+    return quads + box((x0, 0, door[0]), (x1, door[3], door[1]), True, ("-x", "+x", "-y"))
+
+
+def three_rooms():
+    gltf = document("Three rooms with doors", (0.4, 1.7, 3.6), (5.0, 1.0, 1.7))
+    white = gltf.add_material("white", [0.8, 0.8, 0.78])
+    red = gltf.add_material("red", [0.65, 0.12, 0.1])
+    blue = gltf.add_material("blue", [0.12, 0.2, 0.6])
+    wood = gltf.add_material("wood", [0.45, 0.3, 0.18])
+    cloth = gltf.add_material("cloth", [0.15, 0.35, 0.3])
+    height, depth, wall = 2.6, 4.0, 0.2
+    rooms = ((0.0, 4.2), (4.2 + wall, 8.0), (8.0 + wall, 12.4))  # from and to, x
+    doors = ((0.4, 1.3, 0.0, 2.1), (2.6, 3.5, 0.0, 2.1))
+    zs = (0, *doors[0][:2], *doors[1][:2], depth)
+    floor, walls = [], []
+    for x0, x1 in rooms:
+        walls += box((x0, 0, 0), (x1, height, depth), True, ("-x", "-y", "+x"))
+        floor += rectangles(1, 0, 1, zs, (x0, x1))
+    for (_, x0), (x1, _), door in zip(rooms, rooms[1:], doors):
+        walls += partition(x0, x1, height, zs, door)
+        floor += rectangles(1, 0, 1, door[:2], (x0, x1))
+    gltf.add_quads("walls", walls, white)
+    gltf.add_quads("red wall", rectangles(0, 0, 1, (0, height), zs), red)
+    gltf.add_quads("blue wall", rectangles(0, rooms[-1][1], -1, (0, height), zs), blue)
+    gltf.add_quads("floor", floor, wood)
+    gltf.add_quads("sofa", sofa(1.2, 0.1), cloth)
+    gltf.add_quads("shelves", shelves(0.05, 1.6), wood)
+    gltf.add_quads("low table", table((1.5, 1.8), (2.6, 2.5), 0.45), wood)
+    gltf.add_quads("table", table((5.4, 1.5), (6.9, 2.4), 0.75), wood)
+    for name, (x, z), back in (("chair north", (5.9, 0.95), "-z"), ("chair south", (5.9, 2.5), "+z")):
+        gltf.add_quads(name, chair(x, z, back), wood)
+    gltf.add_quads("bed", standing((10.2, 0, 0.4), (12.3, 0.45, 1.9)), cloth)
+    gltf.add_quads("cupboard", standing((8.3, 0, 0.1), (9.5, 2.0, 0.65)), white)
     return gltf
 
 
@@ -194,6 +236,7 @@ def pavilion():
 
 SCENES = {
     "two_rooms": two_rooms,
+    "three_rooms": three_rooms,
     "furnished_room": furnished_room,
     "white_room": white_room,
     "pavilion": pavilion,
