@@ -132,8 +132,9 @@ class SceneBench {
     for (std::size_t begin = 0; begin + count <= n; begin += n / 4) {
       const auto patches = order.subspan(begin, count);
       SolvedTransfer::Vectors a, b;
-      seconds += processor_seconds_of([&] { a = solved.columns(0, patches); });
-      b = exact.columns(0, patches);
+      SolvedTransfer::Workspace workspace;
+      seconds += processor_seconds_of([&] { a = solved.columns(0, patches, workspace); });
+      b = exact.columns(0, patches, workspace);
       error += (a - b).cast<double>().squaredNorm();
       norm += b.cast<double>().squaredNorm();
       Eigen::VectorXf light(count);

@@ -23,7 +23,7 @@ namespace rebounce {
 namespace {
 
 // Of the tolerance, the residual that columns are solved to. Measured: notes/operator.md.
-constexpr double kResidualPart = 0.2;
+constexpr double kResidualPart = 0.35;
 
 // The price of a value in the first stage, in first prices of the search for the tolerance. Errors
 // go about like the root of the price: a quarter of what the second stage may do.

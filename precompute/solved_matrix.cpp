@@ -50,26 +50,34 @@ void PanelMatrix::solve(const ClusterTree& tree, std::span<const Cluster> panels
   const SingleThreadedBlas single_threaded;
   std::exception_ptr failure;
   ParallelProgress loop(progress, groups.size());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < groups.size(); ++k) {
-    if (loop.stopped()) continue;
-    const auto [matrix, begin, count] = groups[k];
-    try {
-      const SolvedTransfer::Vectors solution = solved().columns(matrix, rows.subspan(begin, count));
-      for (std::size_t i = 0; i < place_.size(); ++i) {
-        const std::uint32_t row = place_[solved().patch()[i]];
-        if (row == kNone) continue;
-        panel_[matrix].row(row).segment(static_cast<Index>(begin), solution.cols()) =
-            solution.row(static_cast<Index>(i));
-      }
-    } catch (...) {
+#pragma omp parallel
+  {
+    SolvedTransfer::Workspace workspace;
+#pragma omp for schedule(dynamic, 1)
+    for (std::size_t k = 0; k < groups.size(); ++k) {
+      if (loop.stopped()) continue;
+      const auto [matrix, begin, count] = groups[k];
+      try {
+        keep(solved().columns(matrix, rows.subspan(begin, count), workspace), matrix, begin);
+      } catch (...) {
 #pragma omp critical
-      failure = std::current_exception();
+        failure = std::current_exception();
+      }
+      loop.advance();
     }
-    loop.advance();
   }
   if (failure) std::rethrow_exception(failure);
   loop.finish();
+}
+
+void PanelMatrix::keep(const SolvedTransfer::Vectors& columns, std::uint32_t matrix,
+                       std::size_t begin) {
+  for (std::size_t i = 0; i < place_.size(); ++i) {
+    const std::uint32_t row = place_[solved().patch()[i]];
+    if (row == kNone) continue;
+    panel_[matrix].row(row).segment(static_cast<Index>(begin), columns.cols()) =
+        columns.row(static_cast<Index>(i));
+  }
 }
 
 void PanelMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,

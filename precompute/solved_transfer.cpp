@@ -27,7 +27,7 @@ constexpr int kMostSteps = 500;
 
 // Eigenvectors that are told from the rest, no more than a part of all, and multiplications that
 // find them. Measured: notes/operator.md.
-constexpr Index kLeadingCount = 128, kLeadingPart = 8;
+constexpr Index kLeadingCount = 256, kLeadingPart = 8;
 constexpr int kLeadingSteps = 6;
 
 // Rows whose products are summed in single precision before they go into the double.
@@ -120,31 +120,35 @@ SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root
   return leading;
 }
 
-void SolvedTransfer::solve_leading(std::uint32_t matrix, Vectors& y, Vectors& r) const {
+void SolvedTransfer::solve_leading(std::uint32_t matrix, Workspace& workspace) const {
   const Leading& leading = leading_[matrix];
+  Vectors& r = workspace.residual;
   const MatrixXf seen = leading.vectors.transpose() * r;
   const Vectors part = leading.system.solve(seen.cast<double>()).cast<float>();
-  const Vectors gathered = leading.gathered * part;
-  y += gathered;
+  Vectors& gathered = workspace.arrived;
+  gathered.noalias() = leading.gathered * part;
+  workspace.solution += gathered;
   r += root_[matrix].asDiagonal() * gathered;
   r.noalias() -= leading.vectors * part;
 }
 
-void SolvedTransfer::solve(std::uint32_t matrix, Vectors& y) const {
+void SolvedTransfer::solve(std::uint32_t matrix, Workspace& workspace) const {
   const Eigen::VectorXf& root = root_[matrix];
+  Vectors &y = workspace.solution, &r = workspace.residual, &p = workspace.direction;
+  Vectors &sent = workspace.sent, &arrived = workspace.arrived;
   const Index rows = y.rows(), width = y.cols();
   const auto squares = [&](const Vectors& v) {
     return column_sums(rows, width, [&](Index i) { return v.row(i).array().square(); });
   };
-  Vectors r = root.asDiagonal() * y;
+  r.noalias() = root.asDiagonal() * y;
   const Sums allowed = residual_ * residual_ * squares(r);
-  solve_leading(matrix, y, r);
-  Vectors p = r, sent = root.asDiagonal() * p, arrived;
-  HierarchicalMatrix::Workspace workspace;
+  solve_leading(matrix, workspace);
+  p = r;
+  sent.noalias() = root.asDiagonal() * p;
   Sums rr = squares(r);
   for (int step = 0; (rr > allowed).any(); ++step) {
     if (step == kMostSteps) refuse();
-    form_factors_.multiply(0, sent, arrived, workspace);
+    form_factors_.multiply(0, sent, arrived, workspace.products);
     const Sums pq = column_sums(rows, width, [&](Index i) {
       return p.row(i).array().square() - sent.row(i).array() * arrived.row(i).array();
     });
@@ -164,14 +168,15 @@ void SolvedTransfer::solve(std::uint32_t matrix, Vectors& y) const {
   }
 }
 
-Vectors SolvedTransfer::columns(std::uint32_t matrix,
-                                std::span<const std::uint32_t> patches) const {
-  MatrixXf seen(patch().size(), patches.size());
+const Vectors& SolvedTransfer::columns(std::uint32_t matrix, std::span<const std::uint32_t> patches,
+                                       Workspace& workspace) const {
+  MatrixXf& seen = workspace.seen;
+  seen.resize(static_cast<Index>(patch().size()), static_cast<Index>(patches.size()));
   form_factors_.entries(0, patch(), patches, seen);
-  Vectors y = Vectors::Zero(position_count(), seen.cols());
-  y.topRows(seen.rows()) = seen;
-  solve(matrix, y);
-  return y;
+  workspace.solution.setZero(position_count(), seen.cols());
+  workspace.solution.topRows(seen.rows()) = seen;
+  solve(matrix, workspace);
+  return workspace.solution;
 }
 
 MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const {
@@ -181,20 +186,20 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
 #pragma omp parallel for schedule(dynamic, 1)
   for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
     const Index width = std::min(kSmallGroup, x.cols() - begin);
-    Vectors in = Vectors::Zero(position_count(), width), y;
+    Vectors in = Vectors::Zero(position_count(), width);
+    Workspace workspace;
     for (std::size_t k = 0; k < patch().size(); ++k) {
       in.row(static_cast<Index>(k)) = x.row(patch()[k]).segment(begin, width);
     }
-    HierarchicalMatrix::Workspace workspace;
-    form_factors_.multiply(0, in, y, workspace);
+    form_factors_.multiply(0, in, workspace.solution, workspace.products);
     try {
-      solve(matrix, y);
+      solve(matrix, workspace);
     } catch (...) {
 #pragma omp critical
       failure = std::current_exception();
     }
     for (std::size_t k = 0; k < patch().size(); ++k) {
-      result.row(patch()[k]).segment(begin, width) = y.row(static_cast<Index>(k));
+      result.row(patch()[k]).segment(begin, width) = workspace.solution.row(static_cast<Index>(k));
     }
   }
   if (failure) std::rethrow_exception(failure);

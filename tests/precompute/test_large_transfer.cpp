@@ -157,10 +157,11 @@ TEST(SolvedTransfer, ColumnsAreThoseOfTheDenseInverse) {
   for (const double residual : {1e-2, 1e-3, 1e-5}) {
     const SolvedTransfer solved(*room.form_factors, room.patches, residual);
     ASSERT_EQ(solved.matrix_count(), 3U);
+    SolvedTransfer::Workspace workspace;
     for (const std::size_t begin : {0U, 320U, 640U}) {
       const std::size_t count = std::min<std::size_t>(40, room.patches.size() - begin);
       const auto patches = solved.patch().subspan(begin, count);
-      const SolvedTransfer::Vectors columns = solved.columns(1, patches);
+      const SolvedTransfer::Vectors& columns = solved.columns(1, patches, workspace);
       double error = 0, norm = 0;
       for (std::size_t i = 0; i < room.patches.size(); ++i) {
         for (std::size_t j = 0; j < count; ++j) {
