@@ -104,7 +104,8 @@ std::string second_key(const std::string& first, const FittingLights& lights,
 
 LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
                                       const LargeTransferSettings& settings) {
-  constexpr std::size_t kVectors = 8;  // those of the solver, coefficients, entries of F
+  constexpr std::size_t kBlasBytes = 45'000'000;  // of OpenBLAS, for each thread that multiplies
+  constexpr std::size_t kVectors = 8;             // those of the solver, coefficients, entries of F
   constexpr std::size_t kTogether = SolvedTransfer::kTogether, kWidth = FirstStage::kPanelWidth;
   const std::size_t group = kVectors * patch_count * kTogether * sizeof(float);
   const std::size_t panel = patch_count * kWidth * matrix_count * sizeof(float);
@@ -124,7 +125,8 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
   for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
     const auto threads = static_cast<std::size_t>(plan.thread_count);
     plan.panel_count = (threads + groups_of_panel - 1) / groups_of_panel;
-    plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) + kept;
+    plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) +
+                      threads * kBlasBytes + kept;
     if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
 }
