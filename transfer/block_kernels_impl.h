@@ -55,22 +55,29 @@ constexpr std::size_t lane_of(std::size_t v, std::size_t light_stride) {
   return v / kChannels * light_stride + v % kChannels;
 }
 
+/// Products of kRows rows of `size` values with kVectors vectors, not yet added up over the lanes.
 template <typename V, std::size_t kRows, std::size_t kVectors, typename Value>
-REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, const float* x,
-                                         std::size_t x_stride, float* coefficient,
-                                         std::size_t light_stride) {
-  V sum[kVectors][kRows];
+REBOUNCE_INLINE inline void multiply_rows(const Value* rows, std::size_t size, const float* x,
+                                          std::size_t x_stride, V (&sum)[kVectors][kRows]) {
   unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
     unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[v][r] = V::zero(); });
   });
   for (std::size_t k = 0; k < size; k += V::kWidth) {
     V b[kRows];
-    unroll<kRows>([&](auto r) REBOUNCE_INLINE { b[r] = load_values<V>(basis + r * size + k); });
+    unroll<kRows>([&](auto r) REBOUNCE_INLINE { b[r] = load_values<V>(rows + r * size + k); });
     unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
       const V xv = V::load(x + v * x_stride + k);
       unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[v][r] = multiply_add(b[r], xv, sum[v][r]); });
     });
   }
+}
+
+template <typename V, std::size_t kRows, std::size_t kVectors, typename Value>
+REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, const float* x,
+                                         std::size_t x_stride, float* coefficient,
+                                         std::size_t light_stride) {
+  V sum[kVectors][kRows];
+  multiply_rows<V, kRows, kVectors>(basis, size, x, x_stride, sum);
   unroll<kVectors / kChannels>([&](auto l) REBOUNCE_INLINE {
     constexpr std::size_t kFirst = l * kChannels;
     store_side_by_side<kRows>(sums_of(sum[kFirst]), sums_of(sum[kFirst + 1]),
@@ -97,19 +104,23 @@ void project(const Value* values, std::span<const BasisPart> parts, PlanarVector
   }
 }
 
-/// y of kSize positions; ranks are dealt out among kSplit sums, so that there are twelve of them or
-/// more.
-template <typename V, std::size_t kSize, std::size_t kVectors, typename Value>
+/// Whether what comes out is added to what was there, or takes its place.
+enum class Output : std::uint8_t { kAdd, kSet };
+
+/// y of kSize positions, where at(v, r) points to the coefficient of vector v and rank r; ranks are
+/// dealt out among kSplit sums, so that there are twelve of them or more.
+template <typename V, std::size_t kSize, std::size_t kVectors, Output kOutput, typename Value,
+          typename At>
 REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
-                                         const float* coefficient, std::size_t light_stride,
-                                         float* y, std::size_t y_stride) {
+                                         const At& at, float* y, std::size_t y_stride) {
   constexpr std::size_t kWide = kSize / V::kWidth;
   constexpr std::size_t kSums = kVectors * kWide;
   constexpr std::size_t kSplit = kSums < 12 ? 12 / kSums : 1;
   V sum[kSplit][kVectors][kWide];
   unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
     unroll<kWide>([&](auto k) REBOUNCE_INLINE {
-      sum[0][v][k] = V::load(y + v * y_stride + k * V::kWidth);
+      sum[0][v][k] =
+          kOutput == Output::kAdd ? V::load(y + v * y_stride + k * V::kWidth) : V::zero();
       unroll<kSplit - 1>([&](auto s) REBOUNCE_INLINE { sum[s + 1][v][k] = V::zero(); });
     });
   });
@@ -118,7 +129,7 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
     unroll<kWide>([&](auto k)
                       REBOUNCE_INLINE { b[k] = load_values<V>(basis + r * size + k * V::kWidth); });
     unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
-      const V c = V::broadcast(coefficient[lane_of(v, light_stride) + r * kChannelLanes]);
+      const V c = V::broadcast(*at(v, r));
       unroll<kWide>([&](auto k)
                         REBOUNCE_INLINE { sum[s][v][k] = multiply_add(b[k], c, sum[s][v][k]); });
     });
@@ -137,6 +148,21 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
   });
 }
 
+/// y of all strips of `size` values within [k, end).
+template <typename V, std::size_t kVectors, Output kOutput, typename Value, typename At>
+REBOUNCE_INLINE inline void expand_strips(const Value* basis, std::size_t rank, std::size_t size,
+                                          const At& at, std::size_t k, std::size_t end, float* y,
+                                          std::size_t y_stride) {
+  const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
+    for (; k + kSize <= end; k += kSize) {
+      expand_strip<V, kSize, kVectors, kOutput>(basis + k, rank, size, at, y + k, y_stride);
+    }
+  };
+  if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
+  if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
+  add_strips.template operator()<16>();
+}
+
 template <typename V, typename Value>
 void expand(const Value* values, std::span<const BasisPart> parts,
             Coefficients<const float> coefficient, PlanarVectors<float> y) {
@@ -146,17 +172,12 @@ void expand(const Value* values, std::span<const BasisPart> parts,
         coefficient.data + std::size_t{part.coefficient + part.first_rank} * kChannelLanes;
     for_each_group<V>(y.count, [&]<std::size_t kVectors>(std::size_t v) REBOUNCE_INLINE {
       const float* const c = from + lane_of(v, coefficient.stride);
-      float* const yv = y.data + v * y.stride + part.position;
-      std::size_t k = part.first_place;
-      const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
-        for (; k + kSize <= part.last_place; k += kSize) {
-          expand_strip<V, kSize, kVectors>(basis + k, part.last_rank - part.first_rank, part.size,
-                                           c, coefficient.stride, yv + k, y.stride);
-        }
+      const auto at = [&](std::size_t w, std::size_t r) REBOUNCE_INLINE {
+        return c + lane_of(w, coefficient.stride) + r * kChannelLanes;
       };
-      if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
-      if constexpr (V::kStrip >= 32) add_strips.template operator()<32>();
-      add_strips.template operator()<16>();
+      expand_strips<V, kVectors, Output::kAdd>(basis, part.last_rank - part.first_rank, part.size,
+                                               at, part.first_place, part.last_place,
+                                               y.data + v * y.stride + part.position, y.stride);
     });
   }
 }
@@ -251,6 +272,45 @@ void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
     }
   }
 }
+
+/// One light: sums over columns as light is projected, sums over rows as it is expanded. A block is
+/// in the nearest cache when it is read for the second.
+template <typename V, typename Value>
+REBOUNCE_INLINE inline void multiply_dense_block(const Value* values, const DenseBlock& block,
+                                                 PlanarVectors<const float> x, float* out) {
+  constexpr std::size_t kRows = 4;
+  if (block.direction != Direction::kToColumns) {
+    float* const to = out + std::size_t{block.row_out} * kChannelLanes;
+    for (std::size_t r = 0; r < block.rows; r += kRows) {
+      V sum[kChannels][kRows];
+      multiply_rows<V, kRows, kChannels>(values + r * block.columns, block.columns,
+                                         x.data + block.column_position, x.stride, sum);
+      unroll<kChannels>([&](auto c)
+                            REBOUNCE_INLINE { sums_of(sum[c]).store(to + c * block.rows + r); });
+    }
+  }
+  if (block.direction != Direction::kToRows) {
+    const float* const from = x.data + block.row_position;
+    const auto at = [&](std::size_t c, std::size_t r)
+                        REBOUNCE_INLINE { return from + c * x.stride + r; };
+    expand_strips<V, kChannels, Output::kSet>(
+        values, block.rows, block.columns, at, 0, block.columns,
+        out + std::size_t{block.column_out} * kChannelLanes, block.columns);
+  }
+}
+
+template <typename V, typename Value>
+void multiply_dense(const Value* values, std::span<const DenseBlock> blocks,
+                    PlanarVectors<const float> x, Coefficients<float> out) {
+  for (const DenseBlock& block : blocks) {
+    for (std::size_t l = 0; l < x.count / kChannels; ++l) {
+      multiply_dense_block<V>(values + block.values, block,
+                              {x.data + l * kChannels * x.stride, x.stride, kChannels},
+                              out.data + l * out.stride);
+    }
+  }
+}
+
 template <typename V, typename Value>
 constexpr BasisKernels<Value> make_basis_kernels() {
   return {project<V, Value>, expand<V, Value>};
@@ -263,8 +323,8 @@ constexpr BlockKernelSet make_block_kernels(const char* instruction_set) {
           make_basis_kernels<V, std::uint16_t>(),
           {project_integers<N>, expand_integers<N>},
           make_basis_kernels<V, std::int8_t>(),
-          multiply_cores<V, float>,
-          multiply_cores<V, std::uint16_t>};
+          {multiply_cores<V, float>, multiply_dense<V, float>},
+          {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>}};
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace {
 
 struct FourSums {
   __m128 v;
+  void store(float* p) const { _mm_storeu_ps(p, v); }
 };
 
 /// Stores the first kCount sums of three channels, those of a lane side by side in four floats.
