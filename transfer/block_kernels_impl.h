@@ -50,9 +50,30 @@ REBOUNCE_INLINE inline auto sums_of(const V (&sum)[kCount]) {
   }
 }
 
+/// Stores the sums over the lanes of kRows vectors of three channels, those of a row side by side.
+template <std::size_t kRows, typename V>
+REBOUNCE_INLINE inline void store_sums_side_by_side(const V (&red)[kRows], const V (&green)[kRows],
+                                                    const V (&blue)[kRows], float* p) {
+  if constexpr (kRows == 4 && V::kWidth == 4 * kChannelLanes) {
+    V::sums_side_by_side(red, green, blue).store(p);
+  } else {
+    store_side_by_side<kRows>(sums_of(red), sums_of(green), sums_of(blue), p);
+  }
+}
+
 /// Where the coefficient of vector v, a channel of a light, is among those of a rank.
 constexpr std::size_t lane_of(std::size_t v, std::size_t light_stride) {
   return v / kChannels * light_stride + v % kChannels;
+}
+
+/// Values that are read in order, as those of bases and dense blocks are.
+template <typename V, typename Value>
+REBOUNCE_INLINE inline V load_ahead(const Value* values) {
+  constexpr std::size_t kLine = 64;
+  if constexpr (V::kWidth * sizeof(float) == kLine) {
+    __builtin_prefetch(values + kAhead / sizeof(Value));
+  }
+  return load_values<V>(values);
 }
 
 /// Products of kRows rows of `size` values with kVectors vectors, not yet added up over the lanes.
@@ -64,7 +85,7 @@ REBOUNCE_INLINE inline void multiply_rows(const Value* rows, std::size_t size, c
   });
   for (std::size_t k = 0; k < size; k += V::kWidth) {
     V b[kRows];
-    unroll<kRows>([&](auto r) REBOUNCE_INLINE { b[r] = load_values<V>(rows + r * size + k); });
+    unroll<kRows>([&](auto r) REBOUNCE_INLINE { b[r] = load_ahead<V>(rows + r * size + k); });
     unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
       const V xv = V::load(x + v * x_stride + k);
       unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[v][r] = multiply_add(b[r], xv, sum[v][r]); });
@@ -80,8 +101,8 @@ REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, c
   multiply_rows<V, kRows, kVectors>(basis, size, x, x_stride, sum);
   unroll<kVectors / kChannels>([&](auto l) REBOUNCE_INLINE {
     constexpr std::size_t kFirst = l * kChannels;
-    store_side_by_side<kRows>(sums_of(sum[kFirst]), sums_of(sum[kFirst + 1]),
-                              sums_of(sum[kFirst + 2]), coefficient + l * light_stride);
+    store_sums_side_by_side<kRows>(sum[kFirst], sum[kFirst + 1], sum[kFirst + 2],
+                                   coefficient + l * light_stride);
   });
 }
 
@@ -127,7 +148,7 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
   const auto add_rank = [&](std::size_t r, auto s) REBOUNCE_INLINE {
     V b[kWide];
     unroll<kWide>([&](auto k)
-                      REBOUNCE_INLINE { b[k] = load_values<V>(basis + r * size + k * V::kWidth); });
+                      REBOUNCE_INLINE { b[k] = load_ahead<V>(basis + r * size + k * V::kWidth); });
     unroll<kVectors>([&](auto v) REBOUNCE_INLINE {
       const V c = V::broadcast(*at(v, r));
       unroll<kWide>([&](auto k)

@@ -1,6 +1,7 @@
 #include "cluster_sweep_plan.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace rebounce {
 namespace {
@@ -12,6 +13,11 @@ using Direction = CoreBlock::Direction;
 
 template <typename T>
 using StepVectors = std::vector<std::vector<T>>;
+
+/// Cores of a step are independent; those of one shape take the same branches.
+std::pair<std::uint32_t, std::uint32_t> shape(const CoreBlock& core) {
+  return {core.columns, core.rows};
+}
 
 /// Bases or products while they are gathered.
 struct BasesOfSteps {
@@ -25,7 +31,8 @@ struct BasesOfSteps {
 struct ProductsOfSteps {
   ProductsOfSteps(std::size_t step_count, Direction to)
       : direction(to), cores(step_count), dense(step_count) {}
-  ClusterSweepPlan::Products made() const {
+  ClusterSweepPlan::Products made() {
+    for (std::vector<CoreBlock>& step : cores) std::ranges::stable_sort(step, {}, shape);
     return {ClusterSweepPlan::ByStep(cores), ClusterSweepPlan::ByStep(dense)};
   }
   Direction direction;

@@ -56,6 +56,24 @@ struct Vector16 {
     };
     return {halves(halves(a[0].v, a[1].v), halves(a[2].v, a[3].v))};
   }
+  /// The sums over the lanes of four vectors of each channel, (vector)(channel).
+  static Vector16 sums_side_by_side(const Vector16 (&red)[4], const Vector16 (&green)[4],
+                                    const Vector16 (&blue)[4]) {
+    const auto pair = [](Vector16 a, Vector16 b) REBOUNCE_INLINE {  // (a)(b)(a)(b) in each four
+      return _mm512_add_ps(_mm512_unpacklo_ps(a.v, b.v), _mm512_unpackhi_ps(a.v, b.v));
+    };
+    const __m512 blues[2] = {pair(blue[0], blue[1]), pair(blue[2], blue[3])};
+    const auto even = [&](int k) REBOUNCE_INLINE -> Vector16 {
+      const __m512 rg = pair(red[k], green[k]), b = blues[k / 2];
+      return {_mm512_add_ps(_mm512_shuffle_ps(rg, b, 0x44), _mm512_shuffle_ps(rg, b, 0xEE))};
+    };
+    const auto odd = [&](int k) REBOUNCE_INLINE -> Vector16 {
+      const __m512 rg = pair(red[k], green[k]), b = blues[k / 2];
+      return {_mm512_add_ps(_mm512_shuffle_ps(rg, b, 0x14), _mm512_shuffle_ps(rg, b, 0xBE))};
+    };
+    const Vector16 row[4] = {even(0), odd(1), even(2), odd(3)};
+    return sums_of_fours(row);
+  }
   friend Vector16 add(Vector16 a, Vector16 b) { return {_mm512_add_ps(a.v, b.v)}; }
   friend Vector16 multiply(Vector16 a, Vector16 b) { return {_mm512_mul_ps(a.v, b.v)}; }
   friend Vector16 multiply_add(Vector16 a, Vector16 b, Vector16 c) {

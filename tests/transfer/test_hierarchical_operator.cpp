@@ -504,6 +504,39 @@ void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& valu
   }
 }
 
+template <typename Value>
+void check_dense(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+                 const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
+                 std::size_t lights) {
+  using Direction = DenseBlock::Direction;
+  constexpr std::uint32_t kRow = 48, kColumn = 192, kRowOut = 3, kColumnOut = 101, kEnd = 304;
+  constexpr std::size_t kFloats = kEnd * kChannelLanes;
+  Random random;
+  const std::vector<float> x = random.floats(3 * lights * kEnd);
+  for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
+    const std::vector<DenseBlock> blocks{
+        {8, rows, columns, kRow, kColumn, kRowOut, kColumnOut, direction}};
+    std::vector<float> out(lights * kFloats, kUntouched), expected = out;
+    kernels.multiply_dense(values.data(), blocks, {x.data(), kEnd, 3 * lights},
+                           {out.data(), kFloats});
+    for (std::size_t v = 0; v < 3 * lights; ++v) {
+      float* const of_light = expected.data() + v / 3 * kFloats;
+      float* const to_rows = of_light + kRowOut * kChannelLanes + v % 3 * rows;
+      float* const to_columns = of_light + kColumnOut * kChannelLanes + v % 3 * columns;
+      if (direction != Direction::kToColumns) std::fill_n(to_rows, rows, 0.0F);
+      if (direction != Direction::kToRows) std::fill_n(to_columns, columns, 0.0F);
+      for (std::uint32_t i = 0; i < rows; ++i) {
+        for (std::uint32_t j = 0; j < columns; ++j) {
+          const float entry = plain[8 + i * columns + j];
+          if (direction != Direction::kToColumns) to_rows[i] += entry * x[v * kEnd + kColumn + j];
+          if (direction != Direction::kToRows) to_columns[j] += entry * x[v * kEnd + kRow + i];
+        }
+      }
+    }
+    for (std::size_t k = 0; k < out.size(); ++k) EXPECT_NEAR(out[k], expected[k], kAllowed);
+  }
+}
+
 void check_kernels(const BlockKernelSet& kernels) {
   SCOPED_TRACE(kernels.instruction_set);
   Random random;
@@ -523,12 +556,18 @@ void check_kernels(const BlockKernelSet& kernels) {
       }
       const auto rows = static_cast<std::uint32_t>(rank);
       for (const std::uint32_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
-        check_core(kernels.cores_f32, values, values, rows, columns, lights);
-        check_core(kernels.cores_f16, half, values, rows, columns, lights);
+        check_core(kernels.cores_f32.multiply, values, values, rows, columns, lights);
+        check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights);
       }
     }
-    check_core(kernels.cores_f32, values, values, 48, 96, lights);
-    check_core(kernels.cores_f16, half, values, 96, 32, lights);
+    for (const std::uint32_t rows : {16U, 32U, 80U}) {
+      for (const std::uint32_t columns : {16U, 32U, 96U}) {
+        check_dense(kernels.cores_f32, values, values, rows, columns, lights);
+        check_dense(kernels.cores_f16, half, values, rows, columns, lights);
+      }
+    }
+    check_core(kernels.cores_f32.multiply, values, values, 48, 96, lights);
+    check_core(kernels.cores_f16.multiply, half, values, 96, 32, lights);
   }
   check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
 }
