@@ -105,6 +105,10 @@ struct CoreKernels {
   /// coefficients they are [channel][rows] and [channel][columns].
   void (*multiply_dense)(const Value* values, std::span<const DenseBlock> blocks,
                          PlanarVectors<const float> x, Coefficients<float> out);
+
+  /// y(row) += scale S x(column) and y(column) += scale S^T x(row) likewise, of one light.
+  void (*add_dense)(const Value* values, std::span<const DenseBlock> blocks,
+                    PlanarVectors<const float> x, float scale, PlanarVectors<float> y);
 };
 
 struct BlockKernelSet {

@@ -125,15 +125,16 @@ void project(const Value* values, std::span<const BasisPart> parts, PlanarVector
   }
 }
 
-/// Whether what comes out is added to what was there, or takes its place.
-enum class Output : std::uint8_t { kAdd, kSet };
+/// Whether what comes out is added to what was there, a multiple of it is, or it takes its place.
+enum class Output : std::uint8_t { kAdd, kAddScaled, kSet };
 
 /// y of kSize positions, where at(v, r) points to the coefficient of vector v and rank r; ranks are
 /// dealt out among kSplit sums, so that there are twelve of them or more.
 template <typename V, std::size_t kSize, std::size_t kVectors, Output kOutput, typename Value,
           typename At>
 REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
-                                         const At& at, float* y, std::size_t y_stride) {
+                                         const At& at, float* y, std::size_t y_stride,
+                                         float scale) {
   constexpr std::size_t kWide = kSize / V::kWidth;
   constexpr std::size_t kSums = kVectors * kWide;
   constexpr std::size_t kSplit = kSums < 12 ? 12 / kSums : 1;
@@ -164,7 +165,11 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
     unroll<kWide>([&](auto k) REBOUNCE_INLINE {
       V total = sum[0][v][k];
       unroll<kSplit - 1>([&](auto s) REBOUNCE_INLINE { total = add(total, sum[s + 1][v][k]); });
-      total.store(y + v * y_stride + k * V::kWidth);
+      float* const to = y + v * y_stride + k * V::kWidth;
+      if constexpr (kOutput == Output::kAddScaled) {
+        total = multiply_add(V::broadcast(scale), total, V::load(to));
+      }
+      total.store(to);
     });
   });
 }
@@ -173,10 +178,10 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
 template <typename V, std::size_t kVectors, Output kOutput, typename Value, typename At>
 REBOUNCE_INLINE inline void expand_strips(const Value* basis, std::size_t rank, std::size_t size,
                                           const At& at, std::size_t k, std::size_t end, float* y,
-                                          std::size_t y_stride) {
+                                          std::size_t y_stride, float scale = 1) {
   const auto add_strips = [&]<std::size_t kSize>() REBOUNCE_INLINE {
     for (; k + kSize <= end; k += kSize) {
-      expand_strip<V, kSize, kVectors, kOutput>(basis + k, rank, size, at, y + k, y_stride);
+      expand_strip<V, kSize, kVectors, kOutput>(basis + k, rank, size, at, y + k, y_stride, scale);
     }
   };
   if constexpr (V::kStrip >= 64) add_strips.template operator()<64>();
@@ -277,8 +282,17 @@ void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
   for (std::size_t l = 0; l < light_count; ++l) {
     const float* const from = in.data + l * in.stride;
     float* const to = out.data + l * out.stride;
-    for (const CoreBlock& core : cores) {
+    for (std::size_t k = 0; k < cores.size(); ++k) {
+      const CoreBlock& core = cores[k];
       const Value* const s = values + core.values;
+#ifdef PC
+      if (k + PC < cores.size()) {
+        __builtin_prefetch(values + cores[k + PC].values);
+#ifdef PC2
+        __builtin_prefetch(values + cores[k + PC].values + 32);
+#endif
+      }
+#endif
       switch (core.direction) {
         case Direction::kBoth:
           multiply_core<V, Direction::kBoth>(s, core, lanes, from, to);
@@ -294,30 +308,52 @@ void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
   }
 }
 
+/// Where the products of a dense block with a light are put.
+struct DenseOutput {
+  PlanarVectors<float> rows, columns;
+  float scale;
+};
+
 /// One light: sums over columns as light is projected, sums over rows as it is expanded. A block is
 /// in the nearest cache when it is read for the second.
-template <typename V, typename Value>
+template <typename V, Output kOutput, typename Value>
 REBOUNCE_INLINE inline void multiply_dense_block(const Value* values, const DenseBlock& block,
-                                                 PlanarVectors<const float> x, float* out) {
+                                                 PlanarVectors<const float> x,
+                                                 const DenseOutput& out) {
   constexpr std::size_t kRows = 4;
   if (block.direction != Direction::kToColumns) {
-    float* const to = out + std::size_t{block.row_out} * kChannelLanes;
     for (std::size_t r = 0; r < block.rows; r += kRows) {
       V sum[kChannels][kRows];
       multiply_rows<V, kRows, kChannels>(values + r * block.columns, block.columns,
                                          x.data + block.column_position, x.stride, sum);
-      unroll<kChannels>([&](auto c)
-                            REBOUNCE_INLINE { sums_of(sum[c]).store(to + c * block.rows + r); });
+      unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
+        float* const to = out.rows.data + c * out.rows.stride + r;
+        if constexpr (kOutput == Output::kSet) {
+          sums_of(sum[c]).store(to);
+        } else {
+          sums_of(sum[c]).add_to(to, out.scale);
+        }
+      });
     }
   }
   if (block.direction != Direction::kToRows) {
     const float* const from = x.data + block.row_position;
     const auto at = [&](std::size_t c, std::size_t r)
                         REBOUNCE_INLINE { return from + c * x.stride + r; };
-    expand_strips<V, kChannels, Output::kSet>(
-        values, block.rows, block.columns, at, 0, block.columns,
-        out + std::size_t{block.column_out} * kChannelLanes, block.columns);
+    expand_strips<V, kChannels, kOutput>(values, block.rows, block.columns, at, 0, block.columns,
+                                         out.columns.data, out.columns.stride, out.scale);
   }
+}
+
+template <typename Value>
+inline void ask_for(const Value* values, const DenseBlock& block) {
+#ifdef PD
+  constexpr std::size_t kLineValues = 64 / sizeof(Value);
+  const std::size_t count = std::size_t{block.rows} * block.columns;
+  for (std::size_t k = 0; k < count; k += kLineValues) {
+    __builtin_prefetch(values + block.values + k);
+  }
+#endif
 }
 
 template <typename V, typename Value>
@@ -325,10 +361,28 @@ void multiply_dense(const Value* values, std::span<const DenseBlock> blocks,
                     PlanarVectors<const float> x, Coefficients<float> out) {
   for (const DenseBlock& block : blocks) {
     for (std::size_t l = 0; l < x.count / kChannels; ++l) {
-      multiply_dense_block<V>(values + block.values, block,
-                              {x.data + l * kChannels * x.stride, x.stride, kChannels},
-                              out.data + l * out.stride);
+      float* const of_light = out.data + l * out.stride;
+      const DenseOutput output{
+          {of_light + std::size_t{block.row_out} * kChannelLanes, block.rows, kChannels},
+          {of_light + std::size_t{block.column_out} * kChannelLanes, block.columns, kChannels},
+          1};
+      multiply_dense_block<V, Output::kSet>(
+          values + block.values, block, {x.data + l * kChannels * x.stride, x.stride, kChannels},
+          output);
     }
+  }
+}
+
+template <typename V, typename Value>
+void add_dense(const Value* values, std::span<const DenseBlock> blocks,
+               PlanarVectors<const float> x, float scale, PlanarVectors<float> y) {
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    const DenseBlock& block = blocks[k];
+    if (k + 1 < blocks.size()) ask_for(values, blocks[k + 1]);
+    const DenseOutput output{{y.data + block.row_position, y.stride, kChannels},
+                             {y.data + block.column_position, y.stride, kChannels},
+                             scale};
+    multiply_dense_block<V, Output::kAddScaled>(values + block.values, block, x, output);
   }
 }
 
@@ -344,8 +398,9 @@ constexpr BlockKernelSet make_block_kernels(const char* instruction_set) {
           make_basis_kernels<V, std::uint16_t>(),
           {project_integers<N>, expand_integers<N>},
           make_basis_kernels<V, std::int8_t>(),
-          {multiply_cores<V, float>, multiply_dense<V, float>},
-          {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>}};
+          {multiply_cores<V, float>, multiply_dense<V, float>, add_dense<V, float>},
+          {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>,
+           add_dense<V, std::uint16_t>}};
 }
 
 }  // namespace

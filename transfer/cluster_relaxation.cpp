@@ -90,8 +90,7 @@ class ClusterRelaxation final : public Relaxation {
         upper_(positions()),
         received_(positions()),
         sent_(plan_.coefficient_count),
-        arrived_(plan_.coefficient_count),
-        product_(most_dense_positions(exchange)) {}
+        arrived_(plan_.coefficient_count) {}
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     area_ = problem.area;
@@ -132,16 +131,6 @@ class ClusterRelaxation final : public Relaxation {
 
   std::size_t positions() const {
     return HierarchicalOperator::position_count(exchange_.area.size());
-  }
-
-  static std::size_t most_dense_positions(const HierarchicalOperator::Storage& exchange) {
-    std::uint32_t most = 0;
-    for (const TransferBlock& block : exchange.blocks) {
-      if (block.kind == TransferBlock::Kind::kDense) {
-        most = std::max({most, block.row_count, block.column_count});
-      }
-    }
-    return most;
   }
 
   double sweep_forward() {
@@ -221,35 +210,20 @@ class ClusterRelaxation final : public Relaxation {
 
   void send_to_rows(const Plan::Products& products, std::size_t step) {
     multiply(products.cores.at(step));
-    for (const DenseBlock& block : products.dense.at(step)) {
-      multiply_dense(block);
-      add_product(block.rows, lower_, block.row_position);
-    }
+    add_dense(products.dense.at(step), lower_);
   }
 
   void send_to_columns(const Plan::Products& products, std::size_t step) {
     multiply(products.cores.at(step));
-    for (const DenseBlock& block : products.dense.at(step)) {
-      multiply_dense(block);
-      add_product(block.columns, upper_, block.column_position);
-    }
+    add_dense(products.dense.at(step), upper_);
   }
 
   void multiply(std::span<const CoreBlock> cores) {
     cores_.multiply(core_values_, cores, lanes_, 1, sent_.from(0), arrived_.to(0));
   }
 
-  void multiply_dense(const DenseBlock& block) {
-    cores_.multiply_dense(core_values_, {&block, 1}, radiosity_.from(0), product_.to(0));
-  }
-
-  /// Of a dense block.
-  void add_product(std::size_t count, Planes& to, std::size_t begin) {
-    const float* const product = product_.to(0).data;
-    for (int c = 0; c < kChannelCount; ++c) {
-      float* const y = &to.at(c, begin);
-      for (std::size_t k = 0; k < count; ++k) y[k] += dense_scale_ * product[c * count + k];
-    }
+  void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
+    cores_.add_dense(core_values_, blocks, radiosity_.from(0), dense_scale_, to.to(0));
   }
 
   /// Relaxes the positions of a block on the diagonal.
@@ -350,7 +324,6 @@ class ClusterRelaxation final : public Relaxation {
   Planes light_, reflectance_, radiosity_;  ///< A^1/2 M0, rho x value_scale, A^1/2 B
   Planes lower_, upper_, received_;         ///< L x, L^T x, and both and D x
   CoefficientArray sent_, arrived_;         ///< coefficients of x, of cores
-  CoefficientArray product_;                ///< of a dense block
   std::span<const float> area_;
   Known known_ = Known::kNothing;
   bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of x
