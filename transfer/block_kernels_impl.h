@@ -275,6 +275,16 @@ REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& 
                                  });
 }
 
+// Cores are asked for this many before their turn: sweeps and applies leave out what lies between
+// them. Most have two cache lines at most.
+constexpr std::size_t kCoresAhead = 8;
+
+inline void ask_for_two_lines(const void* p) {
+  constexpr std::size_t kLine = 64;
+  __builtin_prefetch(p);
+  __builtin_prefetch(static_cast<const char*>(p) + kLine);
+}
+
 template <typename V, typename Value>
 void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
                     const ChannelLanes& lanes, std::size_t light_count,
@@ -285,14 +295,9 @@ void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
     for (std::size_t k = 0; k < cores.size(); ++k) {
       const CoreBlock& core = cores[k];
       const Value* const s = values + core.values;
-#ifdef PC
-      if (k + PC < cores.size()) {
-        __builtin_prefetch(values + cores[k + PC].values);
-#ifdef PC2
-        __builtin_prefetch(values + cores[k + PC].values + 32);
-#endif
+      if (k + kCoresAhead < cores.size()) {
+        ask_for_two_lines(values + cores[k + kCoresAhead].values);
       }
-#endif
       switch (core.direction) {
         case Direction::kBoth:
           multiply_core<V, Direction::kBoth>(s, core, lanes, from, to);
@@ -345,17 +350,6 @@ REBOUNCE_INLINE inline void multiply_dense_block(const Value* values, const Dens
   }
 }
 
-template <typename Value>
-inline void ask_for(const Value* values, const DenseBlock& block) {
-#ifdef PD
-  constexpr std::size_t kLineValues = 64 / sizeof(Value);
-  const std::size_t count = std::size_t{block.rows} * block.columns;
-  for (std::size_t k = 0; k < count; k += kLineValues) {
-    __builtin_prefetch(values + block.values + k);
-  }
-#endif
-}
-
 template <typename V, typename Value>
 void multiply_dense(const Value* values, std::span<const DenseBlock> blocks,
                     PlanarVectors<const float> x, Coefficients<float> out) {
@@ -376,9 +370,7 @@ void multiply_dense(const Value* values, std::span<const DenseBlock> blocks,
 template <typename V, typename Value>
 void add_dense(const Value* values, std::span<const DenseBlock> blocks,
                PlanarVectors<const float> x, float scale, PlanarVectors<float> y) {
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const DenseBlock& block = blocks[k];
-    if (k + 1 < blocks.size()) ask_for(values, blocks[k + 1]);
+  for (const DenseBlock& block : blocks) {
     const DenseOutput output{{y.data + block.row_position, y.stride, kChannels},
                              {y.data + block.column_position, y.stride, kChannels},
                              scale};
