@@ -95,6 +95,13 @@ struct DenseBlock {
   Direction direction;
 };
 
+/// Positions at an end of a dense block, whose bases are the identity: `count` of the `size` that
+/// it has, from `first` on.
+struct DenseEnd {
+  std::uint32_t position, count, coefficient;
+  std::uint32_t first, size;
+};
+
 /// Products with cores and dense blocks, for one instruction set.
 template <typename Value>
 struct CoreKernels {
@@ -105,6 +112,10 @@ struct CoreKernels {
   /// coefficients they are [channel][rows] and [channel][columns].
   void (*multiply_dense)(const Value* values, std::span<const DenseBlock> blocks,
                          PlanarVectors<const float> x, Coefficients<float> out);
+
+  /// y(position) += scale times what multiply_dense has put at each end, for each light of y.
+  void (*add_products)(std::span<const DenseEnd> ends, Coefficients<const float> products,
+                       float scale, PlanarVectors<float> y);
 
   /// y(row) += scale S x(column) and y(column) += scale S^T x(row) likewise, of one light.
   void (*add_dense)(const Value* values, std::span<const DenseBlock> blocks,

@@ -367,6 +367,23 @@ void multiply_dense(const Value* values, std::span<const DenseBlock> blocks,
   }
 }
 
+template <typename V>
+void add_products(std::span<const DenseEnd> ends, Coefficients<const float> products, float scale,
+                  PlanarVectors<float> y) {
+  const V factor = V::broadcast(scale);
+  for (const DenseEnd& end : ends) {
+    for (std::size_t v = 0; v < y.count; ++v) {
+      const float* const from = products.data + v / kChannels * products.stride +
+                                std::size_t{end.coefficient} * kChannelLanes +
+                                v % kChannels * end.size + end.first;
+      float* const to = y.data + v * y.stride + end.position;
+      for (std::size_t k = 0; k < end.count; k += V::kWidth) {
+        multiply_add(factor, V::load(from + k), V::load(to + k)).store(to + k);
+      }
+    }
+  }
+}
+
 template <typename V, typename Value>
 void add_dense(const Value* values, std::span<const DenseBlock> blocks,
                PlanarVectors<const float> x, float scale, PlanarVectors<float> y) {
@@ -385,14 +402,15 @@ constexpr BasisKernels<Value> make_basis_kernels() {
 
 template <typename V, typename N>
 constexpr BlockKernelSet make_block_kernels(const char* instruction_set) {
-  return {instruction_set,
-          make_basis_kernels<V, float>(),
-          make_basis_kernels<V, std::uint16_t>(),
-          {project_integers<N>, expand_integers<N>},
-          make_basis_kernels<V, std::int8_t>(),
-          {multiply_cores<V, float>, multiply_dense<V, float>, add_dense<V, float>},
-          {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>,
-           add_dense<V, std::uint16_t>}};
+  return {
+      instruction_set,
+      make_basis_kernels<V, float>(),
+      make_basis_kernels<V, std::uint16_t>(),
+      {project_integers<N>, expand_integers<N>},
+      make_basis_kernels<V, std::int8_t>(),
+      {multiply_cores<V, float>, multiply_dense<V, float>, add_products<V>, add_dense<V, float>},
+      {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>, add_products<V>,
+       add_dense<V, std::uint16_t>}};
 }
 
 }  // namespace

@@ -88,7 +88,7 @@ class Phases {
     bases_.project(basis_, parts, constant(work_.x), work_.sent);
   }
 
-  void take_light(const HierarchicalPlan::DenseEnd& end) const {
+  void take_light(const DenseEnd& end) const {
     for (std::size_t v = 0; v < work_.x.count; ++v) {
       const float* const x = work_.x.data + v * work_.x.stride + end.position;
       float* const lane = lane_of(work_.sent, v, end.coefficient);
@@ -108,20 +108,11 @@ class Phases {
     bases_.expand(basis_, parts, constant(work_.arrived), work_.y);
   }
 
-  void add_light(const HierarchicalPlan::DenseEnd& end) const {
-    for (std::size_t v = 0; v < work_.y.count; ++v) {
-      float* const y = work_.y.data + v * work_.y.stride + end.position;
-      if (lanes_.matrix_count > 1) {
-        const float* const lane = lane_of(work_.arrived, v, end.coefficient + end.first);
-        for (std::size_t k = 0; k < end.count; ++k) {
-          y[k] += product_scale_ * lane[k * kChannelLanes];
-        }
-      } else {
-        const float* const product = work_.arrived.data + v / kChannelCount * work_.arrived.stride +
-                                     end.coefficient * kChannelLanes +
-                                     v % kChannelCount * end.size + end.first;
-        for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale_ * product[k];
-      }
+  void add_light(std::span<const DenseEnd> ends) const {
+    if (lanes_.matrix_count == 1) {
+      cores_.add_products(ends, constant(work_.arrived), product_scale_, work_.y);
+    } else {
+      for (const DenseEnd& end : ends) add_coefficients(end);
     }
   }
 
@@ -130,6 +121,14 @@ class Phases {
   static float* lane_of(const Coefficients<float>& coefficients, std::size_t v, std::size_t first) {
     return coefficients.data + v / kChannelCount * coefficients.stride + first * kChannelLanes +
            v % kChannelCount;
+  }
+
+  void add_coefficients(const DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.y.count; ++v) {
+      const float* const lane = lane_of(work_.arrived, v, end.coefficient + end.first);
+      float* const y = work_.y.data + v * work_.y.stride + end.position;
+      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale_ * lane[k * kChannelLanes];
+    }
   }
 
   const BasisKernels<Basis>& bases_;
@@ -214,10 +213,7 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
       const HierarchicalPlan::Arrival& arrival = plan.arrivals[k - 1];
       clear(work.y, arrival.begin, arrival.end);
       phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
-      for (const HierarchicalPlan::DenseEnd& end :
-           between(plan.dense_out, arrival.first_dense, arrival.last_dense)) {
-        phases.add_light(end);
-      }
+      phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
       const std::span targets(plan.targets);
       exchange.scatter(targets.subspan(arrival.first_target, arrival.target_count()),
                        indirect_irradiance);

@@ -135,8 +135,8 @@ class Planner {
     }
   }
 
-  static Plan::DenseEnd whole_end(std::uint32_t position, std::uint32_t count,
-                                  std::uint32_t coefficient) {
+  static DenseEnd whole_end(std::uint32_t position, std::uint32_t count,
+                            std::uint32_t coefficient) {
     return {position, count, coefficient, 0, count};
   }
 
@@ -150,7 +150,7 @@ class Planner {
   }
 
   /// What goes into a core and comes out of it; of low rank, whatever the positions.
-  void add_way(bool dense, const Plan::DenseEnd& from, const Plan::DenseEnd& to) {
+  void add_way(bool dense, const DenseEnd& from, const DenseEnd& to) {
     if (dense) {
       if (storage_.matrix_count > 1) plan_.dense_in.push_back(from);
       dense_out_.push_back(to);
@@ -291,7 +291,7 @@ class Planner {
   }
 
   void add_dense_ends(std::uint32_t begin, std::uint32_t end) {
-    for (const Plan::DenseEnd& whole : dense_out_) {
+    for (const DenseEnd& whole : dense_out_) {
       const std::uint32_t from = std::max(begin, whole.position);
       const std::uint32_t to = std::min(end, whole.position + whole.count);
       if (from < to) {
@@ -315,8 +315,8 @@ class Planner {
   Plan& plan_;
   std::size_t positions_;
   WantedRuns wanted_, lit_;
-  std::vector<bool> in_, out_;  ///< which coefficients are needed, before and after cores
-  std::vector<Plan::DenseEnd> dense_out_;  ///< whole
+  std::vector<bool> in_, out_;       ///< which coefficients are needed, before and after cores
+  std::vector<DenseEnd> dense_out_;  ///< whole
 };
 
 }  // namespace

@@ -15,13 +15,6 @@ namespace rebounce {
 /// own, whatever thread works on them: no sum depends on the number of threads.
 class HierarchicalPlan {
  public:
-  /// Positions at an end of a dense block, whose bases are the identity: `count` of the `size` that
-  /// it has, from `first` on.
-  struct DenseEnd {
-    std::uint32_t position, count, coefficient;
-    std::uint32_t first, size;
-  };
-
   /// Positions that one thread works out from the first addition to the last.
   struct Arrival {
     std::uint32_t begin, end;  ///< positions, multiples of kAlignment
