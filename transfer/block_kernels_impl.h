@@ -319,27 +319,107 @@ struct DenseOutput {
   float scale;
 };
 
+template <Output kOutput, typename Sums>
+REBOUNCE_INLINE inline void put(const Sums& sums, float* to, float scale) {
+  if constexpr (kOutput == Output::kSet) {
+    sums.store(to);
+  } else {
+    sums.add_to(to, scale);
+  }
+}
+
+/// Sums over the columns of as many rows as V is wide; multiply(r, sum) makes the vectors of four
+/// rows from r on, not yet added up over the lanes.
+template <typename V, Output kOutput, typename Multiply>
+REBOUNCE_INLINE inline void put_row_sums(const Multiply& multiply, std::size_t row_count,
+                                         const DenseOutput& out) {
+  constexpr std::size_t kRows = 4;
+  const auto place = [&](std::size_t c, std::size_t r) {
+    return out.rows.data + c * out.rows.stride + r;
+  };
+  for (std::size_t r = 0; r < row_count;) {
+    V sum[kChannels][kRows];
+    if constexpr (V::kWidth == 16) {
+      alignas(64) float fours[kChannels][4][16];
+      for (std::size_t g = 0; g < 4; ++g, r += kRows) {
+        multiply(r, sum);
+        unroll<kChannels>([&](auto c)
+                              REBOUNCE_INLINE { V::sums_in_fours(sum[c]).store(fours[c][g]); });
+      }
+      unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
+        const V four[4] = {V::load(fours[c][0]), V::load(fours[c][1]), V::load(fours[c][2]),
+                           V::load(fours[c][3])};
+        put<kOutput>(V::sums_of_fours(four), place(c, r - 16), out.scale);
+      });
+    } else {
+      multiply(r, sum);
+      unroll<kChannels>(
+          [&](auto c) REBOUNCE_INLINE { put<kOutput>(sums_of(sum[c]), place(c, r), out.scale); });
+      r += kRows;
+    }
+  }
+}
+
+/// Both ways at once, where the sums over rows stay in registers.
+template <typename V, std::size_t kWide, Output kOutput, typename Value>
+REBOUNCE_INLINE inline void multiply_narrow_block(const Value* values, const DenseBlock& block,
+                                                  PlanarVectors<const float> x,
+                                                  const DenseOutput& out) {
+  constexpr std::size_t kColumns = kWide * V::kWidth, kRows = 4;
+  const float *const row_x = x.data + block.row_position, *const column_x =
+                                                              x.data + block.column_position;
+  V to_columns[kChannels][kWide];
+  unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
+    unroll<kWide>([&](auto w) REBOUNCE_INLINE { to_columns[c][w] = V::zero(); });
+  });
+  const auto multiply = [&](std::size_t row, V(&sum)[kChannels][kRows]) REBOUNCE_INLINE {
+    unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
+      unroll<kRows>([&](auto r) REBOUNCE_INLINE { sum[c][r] = V::zero(); });
+    });
+    unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+      V b[kRows];
+      unroll<kRows>([&](auto r) REBOUNCE_INLINE {
+        b[r] = load_ahead<V>(values + (row + r) * kColumns + w * V::kWidth);
+      });
+      unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
+        const V xc = V::load(column_x + c * x.stride + w * V::kWidth);
+        unroll<kRows>([&](auto r) REBOUNCE_INLINE {
+          sum[c][r] = multiply_add(b[r], xc, sum[c][r]);
+          to_columns[c][w] =
+              multiply_add(b[r], V::broadcast(row_x[c * x.stride + row + r]), to_columns[c][w]);
+        });
+      });
+    });
+  };
+  put_row_sums<V, kOutput>(multiply, block.rows, out);
+  unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
+    unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+      put<kOutput>(to_columns[c][w], out.columns.data + c * out.columns.stride + w * V::kWidth,
+                   out.scale);
+    });
+  });
+}
+
 /// One light: sums over columns as light is projected, sums over rows as it is expanded. A block is
 /// in the nearest cache when it is read for the second.
 template <typename V, Output kOutput, typename Value>
 REBOUNCE_INLINE inline void multiply_dense_block(const Value* values, const DenseBlock& block,
                                                  PlanarVectors<const float> x,
                                                  const DenseOutput& out) {
-  constexpr std::size_t kRows = 4;
-  if (block.direction != Direction::kToColumns) {
-    for (std::size_t r = 0; r < block.rows; r += kRows) {
-      V sum[kChannels][kRows];
-      multiply_rows<V, kRows, kChannels>(values + r * block.columns, block.columns,
-                                         x.data + block.column_position, x.stride, sum);
-      unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
-        float* const to = out.rows.data + c * out.rows.stride + r;
-        if constexpr (kOutput == Output::kSet) {
-          sums_of(sum[c]).store(to);
-        } else {
-          sums_of(sum[c]).add_to(to, out.scale);
-        }
-      });
+  if constexpr (V::kWidth == 16) {
+    if (block.direction == Direction::kBoth && block.columns == 16) {
+      return multiply_narrow_block<V, 1, kOutput>(values, block, x, out);
     }
+    if (block.direction == Direction::kBoth && block.columns == 32) {
+      return multiply_narrow_block<V, 2, kOutput>(values, block, x, out);
+    }
+  }
+  if (block.direction != Direction::kToColumns) {
+    const auto multiply = [&](std::size_t r, V(&sum)[kChannels][4]) REBOUNCE_INLINE {
+      multiply_rows<V, 4, kChannels>(values + r * block.columns, block.columns,
+                                     x.data + block.column_position, x.stride, sum);
+    };
+    put_row_sums<V, kOutput>(multiply, block.rows, out);
   }
   if (block.direction != Direction::kToRows) {
     const float* const from = x.data + block.row_position;

@@ -36,6 +36,9 @@ struct Vector16 {
   static Vector16 zero() { return {_mm512_setzero_ps()}; }
   static Vector16 broadcast(float x) { return {_mm512_set1_ps(x)}; }
   void store(float* p) const { _mm512_storeu_ps(p, v); }
+  void add_to(float* p, float scale) const {
+    multiply_add(broadcast(scale), *this, load(p)).store(p);
+  }
   void store_some(float* p, std::size_t count) const { _mm512_mask_storeu_ps(p, first(count), v); }
   float sum() const { return _mm512_reduce_add_ps(v); }
   /// The sums over the lanes of four vectors.
@@ -55,6 +58,14 @@ struct Vector16 {
       return _mm512_add_ps(_mm512_shuffle_f32x4(x, y, 0x88), _mm512_shuffle_f32x4(x, y, 0xDD));
     };
     return {halves(halves(a[0].v, a[1].v), halves(a[2].v, a[3].v))};
+  }
+  /// Sums over every fourth lane of four vectors, which are in the lanes of each four.
+  static Vector16 sums_in_fours(const Vector16 (&a)[4]) {
+    const auto pair = [](__m512 x, __m512 y) REBOUNCE_INLINE {
+      return _mm512_add_ps(_mm512_unpacklo_ps(x, y), _mm512_unpackhi_ps(x, y));
+    };
+    const __m512 ab = pair(a[0].v, a[1].v), cd = pair(a[2].v, a[3].v);
+    return {_mm512_add_ps(_mm512_shuffle_ps(ab, cd, 0x44), _mm512_shuffle_ps(ab, cd, 0xEE))};
   }
   /// The sums over the lanes of four vectors of each channel, (vector)(channel).
   static Vector16 sums_side_by_side(const Vector16 (&red)[4], const Vector16 (&green)[4],
