@@ -504,36 +504,93 @@ void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& valu
   }
 }
 
+/// A dense block between its products: those that are put in places of coefficients, their ends
+/// added to light, and those that are added to light at once.
 template <typename Value>
-void check_dense(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
-                 const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
-                 std::size_t lights) {
-  using Direction = DenseBlock::Direction;
-  constexpr std::uint32_t kRow = 48, kColumn = 192, kRowOut = 3, kColumnOut = 101, kEnd = 304;
-  constexpr std::size_t kFloats = kEnd * kChannelLanes;
-  Random random;
-  const std::vector<float> x = random.floats(3 * lights * kEnd);
-  for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
-    const std::vector<DenseBlock> blocks{
-        {8, rows, columns, kRow, kColumn, kRowOut, kColumnOut, direction}};
-    std::vector<float> out(lights * kFloats, kUntouched), expected = out;
-    kernels.multiply_dense(values.data(), blocks, {x.data(), kEnd, 3 * lights},
-                           {out.data(), kFloats});
-    for (std::size_t v = 0; v < 3 * lights; ++v) {
+class DenseCheck {
+ public:
+  DenseCheck(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+             std::span<const float> plain, std::size_t lights)
+      : kernels_(kernels), values_(values), plain_(plain.subspan(kFirst)), lights_(lights) {
+    Random random;
+    x_ = random.floats(3 * lights * kEnd);
+    y_ = random.floats(3 * lights * kEnd);
+  }
+
+  void check(std::uint32_t rows, std::uint32_t columns, DenseBlock::Direction direction) {
+    const DenseBlock block{kFirst, rows, columns, kRow, kColumn, kRowOut, kColumnOut, direction};
+    std::vector<float> out(lights_ * kFloats, kUntouched);
+    kernels_.multiply_dense(values_.data(), {&block, 1}, x(), {out.data(), kFloats});
+    std::vector<float> expected = out, sum = y_, ends = y_, at_once = y_;
+    for (std::size_t v = 0; v < 3 * lights_; ++v) {
+      const float* const light = x_.data() + v * kEnd;
       float* const of_light = expected.data() + v / 3 * kFloats;
-      float* const to_rows = of_light + kRowOut * kChannelLanes + v % 3 * rows;
-      float* const to_columns = of_light + kColumnOut * kChannelLanes + v % 3 * columns;
-      if (direction != Direction::kToColumns) std::fill_n(to_rows, rows, 0.0F);
-      if (direction != Direction::kToRows) std::fill_n(to_columns, columns, 0.0F);
-      for (std::uint32_t i = 0; i < rows; ++i) {
+      for (std::uint32_t i = 0; i < rows && direction != Direction::kToColumns; ++i) {
+        float product = 0;
         for (std::uint32_t j = 0; j < columns; ++j) {
-          const float entry = plain[8 + i * columns + j];
-          if (direction != Direction::kToColumns) to_rows[i] += entry * x[v * kEnd + kColumn + j];
-          if (direction != Direction::kToRows) to_columns[j] += entry * x[v * kEnd + kRow + i];
+          product += plain_[i * columns + j] * light[kColumn + j];
         }
+        of_light[kRowOut * kChannelLanes + v % 3 * rows + i] = product;
+        sum[v * kEnd + kRow + i] += 0.25F * product;
+      }
+      for (std::uint32_t j = 0; j < columns && direction != Direction::kToRows; ++j) {
+        float product = 0;
+        for (std::uint32_t i = 0; i < rows; ++i) {
+          product += plain_[i * columns + j] * light[kRow + i];
+        }
+        of_light[kColumnOut * kChannelLanes + v % 3 * columns + j] = product;
+        sum[v * kEnd + kColumn + j] += 0.25F * product;
       }
     }
-    for (std::size_t k = 0; k < out.size(); ++k) EXPECT_NEAR(out[k], expected[k], kAllowed);
+    expect_near(out, expected);
+    // An end in two parts, as where positions are cut.
+    std::vector<DenseEnd> all_ends;
+    if (direction != Direction::kToColumns) all_ends.push_back({kRow, rows, kRowOut, 0, rows});
+    if (direction != Direction::kToRows) {
+      all_ends.push_back({kColumn, 16, kColumnOut, 0, columns});
+      if (columns > 16) {
+        all_ends.push_back({kColumn + 16, columns - 16, kColumnOut, 16, columns});
+      }
+    }
+    kernels_.add_products(all_ends, {out.data(), kFloats}, 0.25F, {ends.data(), kEnd, 3 * lights_});
+    expect_near(ends, sum);
+    kernels_.add_dense(values_.data(), {&block, 1}, {x_.data(), kEnd, 3}, 0.25F,
+                       {at_once.data(), kEnd, 3});
+    expect_near(std::span(at_once).first(3 * kEnd), std::span(sum).first(3 * kEnd));
+  }
+
+ private:
+  using Direction = DenseBlock::Direction;
+
+  static constexpr std::uint32_t kFirst = 8, kRow = 48, kColumn = 192, kRowOut = 3;
+  static constexpr std::uint32_t kColumnOut = 101, kEnd = 304;
+  static constexpr std::size_t kFloats = kEnd * kChannelLanes;
+
+  PlanarVectors<const float> x() const { return {x_.data(), kEnd, 3 * lights_}; }
+
+  static void expect_near(std::span<const float> got, std::span<const float> expected) {
+    for (std::size_t k = 0; k < got.size(); ++k) EXPECT_NEAR(got[k], expected[k], kAllowed) << k;
+  }
+
+  const CoreKernels<Value>& kernels_;
+  const std::vector<Value>& values_;
+  std::span<const float> plain_;
+  std::size_t lights_;
+  std::vector<float> x_, y_;
+};
+
+template <typename Value>
+void check_dense(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+                 const std::vector<float>& plain, std::size_t lights) {
+  using Direction = DenseBlock::Direction;
+  DenseCheck<Value> dense(kernels, values, plain, lights);
+  for (const std::uint32_t rows : {16U, 32U, 80U}) {
+    for (const std::uint32_t columns : {16U, 32U, 96U}) {
+      for (const Direction direction :
+           {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
+        dense.check(rows, columns, direction);
+      }
+    }
   }
 }
 
@@ -560,12 +617,8 @@ void check_kernels(const BlockKernelSet& kernels) {
         check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights);
       }
     }
-    for (const std::uint32_t rows : {16U, 32U, 80U}) {
-      for (const std::uint32_t columns : {16U, 32U, 96U}) {
-        check_dense(kernels.cores_f32, values, values, rows, columns, lights);
-        check_dense(kernels.cores_f16, half, values, rows, columns, lights);
-      }
-    }
+    check_dense(kernels.cores_f32, values, values, lights);
+    check_dense(kernels.cores_f16, half, values, lights);
     check_core(kernels.cores_f32.multiply, values, values, 48, 96, lights);
     check_core(kernels.cores_f16.multiply, half, values, 96, 32, lights);
   }
