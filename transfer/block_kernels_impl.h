@@ -210,18 +210,29 @@ void expand(const Value* values, std::span<const BasisPart> parts,
 
 using Direction = CoreBlock::Direction;
 
+/// Neighbouring entries of a row of a core, whose next ones are `step` values on.
+template <typename V, std::size_t kWide, typename Entries, typename Value>
+REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std::size_t step,
+                                     V (&b)[kWide]) {
+  if constexpr (Entries::kWholeRows) {
+    entry.load_row(row, b);
+  } else {
+    unroll<kWide>([&](auto w) REBOUNCE_INLINE { b[w] = entry.load(row + w * step); });
+  }
+}
+
 /// Columns from `begin` on, as many as fill kWide vectors or are left, for one light. The lanes of
 /// a vector are the channels of neighbouring entries of a row: ranks are 5 in the mean, and vectors
 /// of as many entries as there are lanes would be two thirds empty. Lanes beyond the last column
 /// read on into the next row: what comes in there is zero, and what comes out is not stored.
-template <typename V, Direction kDirection, std::size_t kWide, typename Value>
+template <typename V, Direction kDirection, std::size_t kWide, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBlock& core,
                                              std::size_t begin, const ChannelLanes& lanes,
                                              const float* in, float* out) {
   constexpr bool kToRows = kDirection != Direction::kToColumns;
   constexpr bool kToColumns = kDirection != Direction::kToRows;
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes, kLast = kWide - 1;
-  const typename V::template EntryLanes<Value> entry(lanes);
+  const Entries entry(lanes);
   const std::size_t step = core.columns * lanes.matrix_count;
   const std::size_t last_lanes =
       (std::min(core.columns - begin, kWide * kEntries) - kLast * kEntries) * kChannelLanes;
@@ -242,13 +253,14 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBloc
     V product[kEntries];
     unroll<kEntries>([&](auto r) REBOUNCE_INLINE { product[r] = V::zero(); });
     unroll<kRows>([&](auto r) REBOUNCE_INLINE {
+      V b[kWide];
+      load_row(entry, s + (i + r) * step, kEntries * lanes.matrix_count, b);
       unroll<kWide>([&](auto w) REBOUNCE_INLINE {
-        const V b = entry.load(s + (i + r) * step + w * kEntries * lanes.matrix_count);
         if constexpr (kToColumns) {
           to_columns[w] =
-              multiply_add(b, V::repeat_four(row_in + (i + r) * kChannelLanes), to_columns[w]);
+              multiply_add(b[w], V::repeat_four(row_in + (i + r) * kChannelLanes), to_columns[w]);
         }
-        if constexpr (kToRows) product[r] = multiply_add(b, from_columns[w], product[r]);
+        if constexpr (kToRows) product[r] = multiply_add(b[w], from_columns[w], product[r]);
       });
     });
     if constexpr (kToRows) {
@@ -264,13 +276,13 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBloc
   }
 }
 
-template <typename V, Direction kDirection, typename Value>
+template <typename V, Direction kDirection, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& core,
                                           const ChannelLanes& lanes, const float* in, float* out) {
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes;
   for_each_rows<V::kCoreVectors>((core.columns + kEntries - 1) / kEntries,
                                  [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
-                                   multiply_columns<V, kDirection, kWide>(
+                                   multiply_columns<V, kDirection, kWide, Entries>(
                                        values, core, first * kEntries, lanes, in, out);
                                  });
 }
@@ -285,10 +297,10 @@ inline void ask_for_two_lines(const void* p) {
   __builtin_prefetch(static_cast<const char*>(p) + kLine);
 }
 
-template <typename V, typename Value>
-void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
-                    const ChannelLanes& lanes, std::size_t light_count,
-                    Coefficients<const float> in, Coefficients<float> out) {
+template <typename V, typename Entries, typename Value>
+void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
+                         const ChannelLanes& lanes, std::size_t light_count,
+                         Coefficients<const float> in, Coefficients<float> out) {
   for (std::size_t l = 0; l < light_count; ++l) {
     const float* const from = in.data + l * in.stride;
     float* const to = out.data + l * out.stride;
@@ -300,17 +312,31 @@ void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
       }
       switch (core.direction) {
         case Direction::kBoth:
-          multiply_core<V, Direction::kBoth>(s, core, lanes, from, to);
+          multiply_core<V, Direction::kBoth, Entries>(s, core, lanes, from, to);
           break;
         case Direction::kToRows:
-          multiply_core<V, Direction::kToRows>(s, core, lanes, from, to);
+          multiply_core<V, Direction::kToRows, Entries>(s, core, lanes, from, to);
           break;
         case Direction::kToColumns:
-          multiply_core<V, Direction::kToColumns>(s, core, lanes, from, to);
+          multiply_core<V, Direction::kToColumns, Entries>(s, core, lanes, from, to);
           break;
       }
     }
   }
+}
+
+template <typename V, typename Value>
+void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
+                    const ChannelLanes& lanes, std::size_t light_count,
+                    Coefficients<const float> in, Coefficients<float> out) {
+  if constexpr (V::kWidth == 16) {
+    if (lanes.matrix_count == 1) {
+      using Entries = typename V::OneMatrixEntries;
+      return multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out);
+    }
+  }
+  using Entries = typename V::template EntryLanes<Value>;
+  multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out);
 }
 
 /// Where the products of a dense block with a light are put.

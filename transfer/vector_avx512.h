@@ -93,6 +93,7 @@ struct Vector16 {
 
   template <typename Value>
   class EntryLanes;
+  class OneMatrixEntries;
 
  private:
   static __mmask16 first(std::size_t count) { return static_cast<__mmask16>((1U << count) - 1); }
@@ -101,6 +102,7 @@ struct Vector16 {
 template <>
 class Vector16::EntryLanes<float> {
  public:
+  static constexpr bool kWholeRows = false;
   explicit EntryLanes(const ChannelLanes& lanes)
       : lane_(_mm512_cvtepu16_epi32(
             _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())))) {}
@@ -113,6 +115,7 @@ class Vector16::EntryLanes<float> {
 template <>
 class Vector16::EntryLanes<std::uint16_t> {
  public:
+  static constexpr bool kWholeRows = false;
   explicit EntryLanes(const ChannelLanes& lanes)
       : lane_(_mm512_cvtepu16_epi32(
             _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())))) {}
@@ -123,6 +126,25 @@ class Vector16::EntryLanes<std::uint16_t> {
 
  private:
   __m512i lane_;
+};
+
+/// Where the channels share a matrix, the sixteen entries of four vectors are converted once.
+class Vector16::OneMatrixEntries {
+ public:
+  static constexpr bool kWholeRows = true;
+  explicit OneMatrixEntries(const ChannelLanes&) {
+    const __m512i first = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+    for (int w = 0; w < 4; ++w) lane_[w] = _mm512_add_epi32(first, _mm512_set1_epi32(4 * w));
+  }
+  template <std::size_t kWide, typename Value>
+  void load_row(const Value* p, Vector16 (&b)[kWide]) const {
+    static_assert(kWide <= 4);
+    const Vector16 row = load_values<Vector16>(p);
+    for (std::size_t w = 0; w < kWide; ++w) b[w] = {_mm512_permutexvar_ps(lane_[w], row.v)};
+  }
+
+ private:
+  __m512i lane_[4];
 };
 
 }  // namespace

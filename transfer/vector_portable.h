@@ -76,6 +76,7 @@ struct Vector4 {
   template <typename Value>
   class EntryLanes {
    public:
+    static constexpr bool kWholeRows = false;
     explicit EntryLanes(const ChannelLanes& lanes) : lanes_(lanes) {}
     Vector4 load(const Value* p) const {
       Value four[kWidth];

@@ -468,21 +468,22 @@ void check_integer_bases(const BasisKernels<std::int16_t>& kernels, std::size_t 
 template <typename Value>
 void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
                 const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
-                std::size_t lights) {
+                std::size_t lights, std::uint32_t matrices = 2) {
   using Direction = CoreBlock::Direction;
-  constexpr std::uint32_t kMatrices = 2, kRow = 3, kColumn = 99, kEnd = 200;
-  constexpr std::array<std::uint32_t, 3> kMatrix{1, 0, 1};
+  constexpr std::uint32_t kRow = 3, kColumn = 99, kEnd = 200;
+  const std::uint32_t last = matrices - 1;
+  const std::array<std::uint32_t, 3> matrix{last, 0, last};
   Random random;
   const std::vector<float> in = random.floats(lights * kEnd * kChannelLanes);
   for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
     const std::vector<CoreBlock> cores{{8, rows, columns, kRow, kColumn, direction}};
     std::vector<float> out(lights * kEnd * kChannelLanes, kUntouched);
-    multiply_cores(values.data(), cores, ChannelLanes(kMatrix, kMatrices), lights,
+    multiply_cores(values.data(), cores, ChannelLanes(matrix, matrices), lights,
                    {in.data(), kEnd * kChannelLanes}, {out.data(), kEnd * kChannelLanes});
     for (std::size_t v = 0; v < 3 * lights; ++v) {
       const auto at = [v](std::size_t k) { return (v / 3 * kEnd + k) * kChannelLanes + v % 3; };
       const auto entry = [&](std::size_t i, std::size_t j) {
-        return plain[8 + (i * columns + j) * kMatrices + kMatrix[v % 3]];
+        return plain[8 + (i * columns + j) * matrices + matrix[v % 3]];
       };
       for (std::uint32_t k = 0; k < kEnd; ++k) {
         double expected = kUntouched;
@@ -615,6 +616,8 @@ void check_kernels(const BlockKernelSet& kernels) {
       for (const std::uint32_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
         check_core(kernels.cores_f32.multiply, values, values, rows, columns, lights);
         check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights);
+        check_core(kernels.cores_f32.multiply, values, values, rows, columns, lights, 1);
+        check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights, 1);
       }
     }
     check_dense(kernels.cores_f32, values, values, lights);
