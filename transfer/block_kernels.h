@@ -83,14 +83,53 @@ using CoreKernel = void (*)(const Value* values, std::span<const CoreBlock> core
                             const ChannelLanes& lanes, std::size_t light_count,
                             Coefficients<const float> in, Coefficients<float> out);
 
+/// A dense block of the only matrix of an operator, [rows][columns], both multiples of
+/// HierarchicalOperator::kAlignment.
+struct DenseBlock {
+  using Direction = CoreBlock::Direction;
+
+  std::uint64_t values;
+  std::uint32_t rows, columns;
+  std::uint32_t row_position, column_position;
+  std::uint32_t row_out, column_out;  ///< coefficients in whose places the products are put
+  Direction direction;
+};
+
+/// Positions at an end of a dense block, whose bases are the identity: `count` of the `size` that
+/// it has, from `first` on.
+struct DenseEnd {
+  std::uint32_t position, count, coefficient;
+  std::uint32_t first, size;
+};
+
+/// Products with cores and dense blocks, for one instruction set.
+template <typename Value>
+struct CoreKernels {
+  CoreKernel<Value> multiply;
+
+  /// out(row_out) = S x(column) and out(column_out) = S^T x(row), as its direction says, for one
+  /// block after the other and each light of x; what was there before is overwritten. Unlike
+  /// coefficients they are [channel][rows] and [channel][columns].
+  void (*multiply_dense)(const Value* values, std::span<const DenseBlock> blocks,
+                         PlanarVectors<const float> x, Coefficients<float> out);
+
+  /// y(position) += scale times what multiply_dense has put at each end, for each light of y.
+  void (*add_products)(std::span<const DenseEnd> ends, Coefficients<const float> products,
+                       float scale, PlanarVectors<float> y);
+
+  /// y(row) += scale S x(column) and y(column) += scale S^T x(row) likewise, of one light.
+  void (*add_dense)(const Value* values, std::span<const DenseBlock> blocks,
+                    PlanarVectors<const float> x, float scale, PlanarVectors<float> y);
+};
+
 struct BlockKernelSet {
   const char* instruction_set;
   BasisKernels<float> bases_f32;
   BasisKernels<std::uint16_t> bases_f16;
   BasisKernels<std::int16_t> bases_q16;
   BasisKernels<std::int8_t> bases_q8;
-  CoreKernel<float> cores_f32;
-  CoreKernel<std::uint16_t> cores_f16;
+  CoreKernels<float> cores_f32;
+  CoreKernels<std::uint16_t> cores_f16;
 };
 
 extern const BlockKernelSet kBlockKernelsPortable;

@@ -3,6 +3,9 @@
 //   x' = A^1/2 M0 + rho (L x' + D x + L^T x), a backward sweep the same with L and L^T exchanged.
 // L x' of a forward sweep is what the backward sweep after it needs as its "values before", and the
 // other way round: V. Conrad, Y. Wallach, "Alternating methods for sets of linear equations", 1979.
+// A forward sweep after a forward one finds L^T x as it goes: a column of blocks is multiplied with
+// the values before of its rows right before its own positions are relaxed, and with what became of
+// them right after, so that it is read from the nearer caches the second time.
 
 #include "cluster_relaxation.h"
 
@@ -70,11 +73,11 @@ template <typename Basis, typename Value>
 class ClusterRelaxation final : public Relaxation {
  public:
   ClusterRelaxation(const HierarchicalOperator::Storage& exchange, const BasisKernels<Basis>& bases,
-                    CoreKernel<Value> multiply_cores, const Basis* basis_values,
+                    const CoreKernels<Value>& cores, const Basis* basis_values,
                     const Value* core_values, float basis_scale)
       : exchange_(exchange),
         bases_(bases),
-        multiply_cores_(multiply_cores),
+        cores_(cores),
         basis_values_(basis_values),
         core_values_(core_values),
         value_scale_(product_scale(exchange.precision)),
@@ -101,6 +104,7 @@ class ClusterRelaxation final : public Relaxation {
       }
     }
     known_ = Known::kNothing;
+    rows_are_sent_ = false;
   }
 
   double sweep(SweepDirection direction) override {
@@ -130,21 +134,21 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   double sweep_forward() {
-    if (known_ != Known::kUpper) {
-      pass_backward([](const Plan::Step&) { return 0.0; });
-    }
+    const bool alternating = known_ == Known::kUpper;
+    if (!alternating && !rows_are_sent_) send_rows();
     known_ = Known::kLower;
-    return pass_forward(
-        [this](const Plan::Step& step) { return relax(step, SweepDirection::kForward); });
+    rows_are_sent_ = !alternating;
+    return alternating ? pass_forward([this](std::size_t step) {
+      return relax(plan_.steps[step], SweepDirection::kForward);
+    })
+                       : pass_both_ways();
   }
 
   double sweep_backward() {
-    if (known_ != Known::kLower) {
-      pass_forward([](const Plan::Step&) { return 0.0; });
-    }
+    if (known_ != Known::kLower) pass_forward([](std::size_t) { return 0.0; });
     known_ = Known::kUpper;
-    return pass_backward(
-        [this](const Plan::Step& step) { return relax(step, SweepDirection::kBackward); });
+    rows_are_sent_ = true;
+    return pass_backward();
   }
 
   /// lower = L x, diagonal block after diagonal block; `visit` may change what a step holds of x
@@ -153,87 +157,73 @@ class ClusterRelaxation final : public Relaxation {
   double pass_forward(const Visit& visit) {
     lower_.clear();
     double sum = 0;
-    Plan::Step before;
-    for (const Plan::Step& step : plan_.steps) {
-      for (auto k = before.last_row_product; k < step.last_row_product; ++k) {
-        send_to_rows(plan_.row_products[k]);
-      }
-      for (auto k = before.last_row_bases; k < step.last_row_bases; ++k) {
-        expand(plan_.row_bases[k], lower_);
-      }
-      sum += visit(step);
-      for (auto k = before.last_column_bases; k < step.last_column_bases; ++k) {
-        project(plan_.column_bases[k]);
-      }
-      before = step;
+    for (std::size_t s = 0; s < plan_.steps.size(); ++s) {
+      send_to_rows(plan_.to_beginning_rows, s);
+      expand(plan_.row_bases.beginning.at(s), lower_);
+      sum += visit(s);
+      project(plan_.column_bases.ending.at(s));
     }
     return sum;
   }
 
-  /// upper = L^T x, from the last diagonal block to the first.
-  template <typename Visit>
-  double pass_backward(const Visit& visit) {
+  /// upper = L^T x' of what becomes of x, from the last diagonal block to the first.
+  double pass_backward() {
     upper_.clear();
     double sum = 0;
     for (std::size_t s = plan_.steps.size(); s-- > 0;) {
-      const Plan::Step& step = plan_.steps[s];
-      const Plan::Step before = s > 0 ? plan_.steps[s - 1] : Plan::Step();
-      for (auto k = before.last_column_product; k < step.last_column_product; ++k) {
-        send_to_columns(plan_.column_products[k]);
-      }
-      for (auto k = before.last_column_bases; k < step.last_column_bases; ++k) {
-        expand(plan_.column_bases[k], upper_);
-      }
-      sum += visit(step);
-      for (auto k = before.last_row_bases; k < step.last_row_bases; ++k) {
-        project(plan_.row_bases[k]);
-      }
+      send_to_columns(plan_.to_ending_columns, s);
+      expand(plan_.column_bases.ending.at(s), upper_);
+      sum += relax(plan_.steps[s], SweepDirection::kBackward);
+      project(plan_.row_bases.beginning.at(s));
     }
     return sum;
   }
 
-  void project(const BasisPart& basis) {
-    bases_.project(basis_values_, {&basis, 1}, radiosity_.from(0), sent_.to(0));
-  }
-
-  void expand(const BasisPart& basis, Planes& arrived) {
-    bases_.expand(basis_values_, {&basis, 1}, arrived_.from(0), arrived.to(0));
-  }
-
-  void send_to_rows(const Plan::Product& product) {
-    const CoreBlock& core = product.core;
-    if (product.dense) send(product.column_begin, core.columns, core.column);
-    multiply(core, CoreBlock::Direction::kToRows);
-    if (product.dense) add_arrived(core.row, core.rows, lower_, product.row_begin);
-  }
-
-  void send_to_columns(const Plan::Product& product) {
-    const CoreBlock& core = product.core;
-    if (product.dense) send(product.row_begin, core.rows, core.row);
-    multiply(core, CoreBlock::Direction::kToColumns);
-    if (product.dense) add_arrived(core.column, core.columns, upper_, product.column_begin);
-  }
-
-  void multiply(CoreBlock core, CoreBlock::Direction direction) {
-    core.direction = direction;
-    multiply_cores_(core_values_, {&core, 1}, lanes_, 1, sent_.from(0), arrived_.to(0));
-  }
-
-  /// Of a dense block, radiosity as it is for coefficients.
-  void send(std::size_t begin, std::size_t count, std::size_t coefficient) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      for (std::size_t k = 0; k < count; ++k) {
-        sent_.at(c, coefficient + k) = radiosity_.at(c, begin + k);
-      }
+  /// upper = L^T x and lower = L x' of what becomes of x; what the rows send of x must be there.
+  double pass_both_ways() {
+    lower_.clear();
+    upper_.clear();
+    double sum = 0;
+    for (std::size_t s = 0; s < plan_.steps.size(); ++s) {
+      send_to_columns(plan_.to_beginning_columns, s);
+      expand(plan_.column_bases.beginning.at(s), upper_);
+      expand(plan_.row_bases.beginning.at(s), lower_);
+      sum += relax(plan_.steps[s], SweepDirection::kForward);
+      project(plan_.column_bases.ending.at(s));
+      send_to_rows(plan_.from_ending_columns, s);
+      project(plan_.row_bases.ending.at(s));
     }
+    return sum;
   }
 
-  void add_arrived(std::size_t coefficient, std::size_t count, Planes& to, std::size_t begin) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      for (std::size_t k = 0; k < count; ++k) {
-        to.at(c, begin + k) += dense_scale_ * arrived_.at(c, coefficient + k);
-      }
-    }
+  void send_rows() {
+    for (std::size_t s = 0; s < plan_.steps.size(); ++s) project(plan_.row_bases.ending.at(s));
+  }
+
+  void project(std::span<const BasisPart> bases) {
+    bases_.project(basis_values_, bases, radiosity_.from(0), sent_.to(0));
+  }
+
+  void expand(std::span<const BasisPart> bases, Planes& arrived) {
+    bases_.expand(basis_values_, bases, arrived_.from(0), arrived.to(0));
+  }
+
+  void send_to_rows(const Plan::Products& products, std::size_t step) {
+    multiply(products.cores.at(step));
+    add_dense(products.dense.at(step), lower_);
+  }
+
+  void send_to_columns(const Plan::Products& products, std::size_t step) {
+    multiply(products.cores.at(step));
+    add_dense(products.dense.at(step), upper_);
+  }
+
+  void multiply(std::span<const CoreBlock> cores) {
+    cores_.multiply(core_values_, cores, lanes_, 1, sent_.from(0), arrived_.to(0));
+  }
+
+  void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
+    cores_.add_dense(core_values_, blocks, radiosity_.from(0), dense_scale_, to.to(0));
   }
 
   /// Relaxes the positions of a block on the diagonal.
@@ -247,9 +237,10 @@ class ClusterRelaxation final : public Relaxation {
     }
     if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
     if (block.row_rank > 0) {
-      project(step.basis);
-      multiply(diagonal_core(step, block.row_rank, block.row_rank), CoreBlock::Direction::kToRows);
-      expand(step.basis, received_);
+      const CoreBlock core = diagonal_core(step, block.row_rank, block.row_rank);
+      project({&step.basis, 1});
+      multiply({&core, 1});
+      expand({&step.basis, 1}, received_);
     }
     return relax_at_once(begin, end);
   }
@@ -287,19 +278,24 @@ class ClusterRelaxation final : public Relaxation {
 
   double relax_rows(const Plan::Step& step, SweepDirection direction) {
     const std::uint32_t begin = step.diagonal.row_begin, size = step.diagonal.row_count;
-    send(begin, size, step.coefficient);
+    for (std::uint32_t k = 0; k < size; ++k) send(begin + k, step.coefficient + k);
     CoreBlock row_block = diagonal_core(step, 1, size);
     double changed_squared = 0;
     for (std::uint32_t k = 0; k < size; ++k) {
       const std::uint32_t row = direction == SweepDirection::kForward ? k : size - 1 - k;
       row_block.values = step.values + std::uint64_t{row} * size;
-      multiply(row_block, CoreBlock::Direction::kToRows);
+      multiply({&row_block, 1});
       changed_squared += relax_position(begin + row, step.coefficient);
-      for (int c = 0; c < kChannelCount; ++c) {
-        sent_.at(c, step.coefficient + row) = radiosity_.at(c, begin + row);
-      }
+      send(begin + row, step.coefficient + row);
     }
     return changed_squared;
+  }
+
+  /// Within a dense block, radiosity as it is for a coefficient.
+  void send(std::size_t position, std::size_t coefficient) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      sent_.at(c, coefficient) = radiosity_.at(c, position);
+    }
   }
 
   /// `inside`: the coefficient that has come from within its block.
@@ -318,7 +314,7 @@ class ClusterRelaxation final : public Relaxation {
 
   const HierarchicalOperator::Storage& exchange_;
   const BasisKernels<Basis>& bases_;
-  CoreKernel<Value> multiply_cores_;
+  const CoreKernels<Value>& cores_;
   ChannelLanes lanes_{{0, 0, 0}, 1};  ///< one matrix for all channels
   const Basis* basis_values_;
   const Value* core_values_;
@@ -330,6 +326,7 @@ class ClusterRelaxation final : public Relaxation {
   CoefficientArray sent_, arrived_;         ///< coefficients of x, of cores
   std::span<const float> area_;
   Known known_ = Known::kNothing;
+  bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of x
 };
 
 }  // namespace

@@ -1,30 +1,44 @@
 #include "cluster_sweep_plan.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace rebounce {
 namespace {
 
 constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
 
-using Product = ClusterSweepPlan::Product;
 using Step = ClusterSweepPlan::Step;
+using Direction = CoreBlock::Direction;
 
-/// Blocks by the step that they belong to.
 template <typename T>
-using ByStep = std::vector<std::vector<T>>;
+using StepVectors = std::vector<std::vector<T>>;
 
-/// One after the other; `last` is where each step's end.
-template <typename T>
-std::vector<T> concatenate(const ByStep<T>& by_step, std::vector<Step>& steps,
-                           std::uint32_t Step::*last) {
-  std::vector<T> all;
-  for (std::size_t s = 0; s < steps.size(); ++s) {
-    all.insert(all.end(), by_step[s].begin(), by_step[s].end());
-    steps[s].*last = static_cast<std::uint32_t>(all.size());
-  }
-  return all;
+/// Cores of a step are independent; those of one shape take the same branches.
+std::pair<std::uint32_t, std::uint32_t> shape(const CoreBlock& core) {
+  return {core.columns, core.rows};
 }
+
+/// Bases or products while they are gathered.
+struct BasesOfSteps {
+  explicit BasesOfSteps(std::size_t step_count) : beginning(step_count), ending(step_count) {}
+  ClusterSweepPlan::Bases made() const {
+    return {ClusterSweepPlan::ByStep(beginning), ClusterSweepPlan::ByStep(ending)};
+  }
+  StepVectors<BasisPart> beginning, ending;
+};
+
+struct ProductsOfSteps {
+  ProductsOfSteps(std::size_t step_count, Direction to)
+      : direction(to), cores(step_count), dense(step_count) {}
+  ClusterSweepPlan::Products made() {
+    for (std::vector<CoreBlock>& step : cores) std::ranges::stable_sort(step, {}, shape);
+    return {ClusterSweepPlan::ByStep(cores), ClusterSweepPlan::ByStep(dense)};
+  }
+  Direction direction;
+  StepVectors<CoreBlock> cores;
+  StepVectors<DenseBlock> dense;
+};
 
 class Planner {
  public:
@@ -36,17 +50,33 @@ class Planner {
 
   void run() {
     add_steps();
-    row_bases_.resize(plan_.steps.size());
-    column_bases_ = row_bases_;
-    row_products_.resize(plan_.steps.size());
-    column_products_ = row_products_;
+    const std::size_t count = plan_.steps.size();
+    BasesOfSteps row_bases(count), column_bases(count);
+    ProductsOfSteps to_beginning_rows(count, Direction::kToRows),
+        to_beginning_columns(count, Direction::kToColumns),
+        to_ending_columns(count, Direction::kToColumns),
+        from_ending_columns(count, Direction::kToRows);
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      if (has_values(blocks_[b]) && !blocks_[b].on_diagonal()) add_block(b);
+      const TransferBlock& block = blocks_[b];
+      if (!has_values(block) || block.on_diagonal()) continue;
+      const Steps rows = steps_of(block.row_begin, block.row_count);
+      const Steps columns = steps_of(block.column_begin, block.column_count);
+      if (block.kind == TransferBlock::Kind::kLowRank) {
+        const HierarchicalLayout::Place& place = layout_.places[b];
+        add_basis(row_bases, rows, basis_of(block, place.row, block.row_rank));
+        add_basis(column_bases, columns, basis_of(block, place.column, block.column_rank));
+      }
+      add_product(to_beginning_rows, rows.first, b);
+      add_product(to_beginning_columns, columns.first, b);
+      add_product(to_ending_columns, columns.last, b);
+      add_product(from_ending_columns, columns.last, b);
     }
-    plan_.row_bases = concatenate(row_bases_, plan_.steps, &Step::last_row_bases);
-    plan_.column_bases = concatenate(column_bases_, plan_.steps, &Step::last_column_bases);
-    plan_.row_products = concatenate(row_products_, plan_.steps, &Step::last_row_product);
-    plan_.column_products = concatenate(column_products_, plan_.steps, &Step::last_column_product);
+    plan_.row_bases = row_bases.made();
+    plan_.column_bases = column_bases.made();
+    plan_.to_beginning_rows = to_beginning_rows.made();
+    plan_.to_beginning_columns = to_beginning_columns.made();
+    plan_.to_ending_columns = to_ending_columns.made();
+    plan_.from_ending_columns = from_ending_columns.made();
     plan_.coefficient_count = layout_.coefficient_count;
   }
 
@@ -103,28 +133,40 @@ class Planner {
             .last_place = cluster.size};
   }
 
-  void add_block(std::size_t b) {
+  /// In which positions begin and end.
+  struct Steps {
+    std::uint32_t first, last;
+  };
+
+  Steps steps_of(std::uint32_t begin, std::uint32_t count) const {
+    return {step_at_[begin / kAlignment], step_at_[(begin + count) / kAlignment - 1]};
+  }
+
+  void add_product(ProductsOfSteps& products, std::uint32_t step, std::size_t b) const {
     const TransferBlock& block = blocks_[b];
     const HierarchicalLayout::Place& place = layout_.places[b];
-    const std::uint32_t row_step = step_at_[block.row_begin / kAlignment];
-    const std::uint32_t column_step =
-        step_at_[(block.column_begin + block.column_count) / kAlignment - 1];
-    const bool dense = block.kind == TransferBlock::Kind::kDense;
-    const Product product{.core = {.values = place.values,
-                                   .rows = dense ? block.row_count : block.row_rank,
-                                   .columns = dense ? block.column_count : block.column_rank,
-                                   .row = place.row.coefficient,
-                                   .column = place.column.coefficient,
-                                   .direction = CoreBlock::Direction::kBoth},
-                          .row_begin = block.row_begin,
-                          .column_begin = block.column_begin,
-                          .dense = dense};
-    if (!dense) {
-      add_basis(row_bases_[row_step], basis_of(block, place.row, block.row_rank));
-      add_basis(column_bases_[column_step], basis_of(block, place.column, block.column_rank));
+    if (block.kind == TransferBlock::Kind::kDense) {
+      products.dense[step].push_back({.values = place.values,
+                                      .rows = block.row_count,
+                                      .columns = block.column_count,
+                                      .row_position = block.row_begin,
+                                      .column_position = block.column_begin,
+                                      .row_out = 0,
+                                      .column_out = 0,
+                                      .direction = products.direction});
+    } else {
+      products.cores[step].push_back({.values = place.values,
+                                      .rows = block.row_rank,
+                                      .columns = block.column_rank,
+                                      .row = place.row.coefficient,
+                                      .column = place.column.coefficient,
+                                      .direction = products.direction});
     }
-    row_products_[row_step].push_back(product);
-    column_products_[column_step].push_back(product);
+  }
+
+  static void add_basis(BasesOfSteps& bases, const Steps& steps, const BasisPart& basis) {
+    add_basis(bases.beginning[steps.first], basis);
+    add_basis(bases.ending[steps.last], basis);
   }
 
   /// Joins bases that follow each other.
@@ -142,8 +184,6 @@ class Planner {
   HierarchicalLayout layout_;
   ClusterSweepPlan& plan_;
   std::vector<std::uint32_t> step_at_;  ///< of each kAlignment positions
-  ByStep<BasisPart> row_bases_, column_bases_;
-  ByStep<Product> row_products_, column_products_;
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "block_kernels.h"
@@ -13,31 +14,56 @@ namespace rebounce {
 /// positions send in a forward sweep, and send in a backward one; those below it the other way
 /// round.
 struct ClusterSweepPlan {
-  /// A core or a dense block below the diagonal; its row and column are coefficients.
-  struct Product {
-    CoreBlock core;
-    std::uint32_t row_begin, column_begin;  ///< positions
-    bool dense;
-  };
-
-  /// A block on the diagonal, and ranges of what belongs to it.
+  /// A block on the diagonal.
   struct Step {
     TransferBlock diagonal;
     BasisPart basis{};         ///< U^T
     std::uint64_t values = 0;  ///< S or the entries
     std::uint32_t coefficient = 0;
-    std::uint32_t last_row_bases = 0, last_column_bases = 0;  ///< one past, from the step before on
-    std::uint32_t last_row_product = 0, last_column_product = 0;
+  };
+
+  /// What is done at each step.
+  template <typename T>
+  class ByStep {
+   public:
+    ByStep() = default;
+    explicit ByStep(const std::vector<std::vector<T>>& by_step) {
+      for (const std::vector<T>& step : by_step) {
+        all_.insert(all_.end(), step.begin(), step.end());
+        last_.push_back(all_.size());
+      }
+    }
+    std::span<const T> at(std::size_t step) const {
+      const std::size_t first = step > 0 ? last_[step - 1] : 0;
+      return std::span(all_).subspan(first, last_[step] - first);
+    }
+
+   private:
+    std::vector<T> all_;
+    std::vector<std::size_t> last_;
+  };
+
+  /// Bases of the row ends or of the column ends of blocks, at the steps in which their clusters
+  /// begin, and at those in which they end; those that follow each other are joined.
+  struct Bases {
+    ByStep<BasisPart> beginning, ending;
+  };
+
+  /// Blocks below the diagonal in one direction. The products of dense ones are put in the place of
+  /// the first coefficients.
+  struct Products {
+    ByStep<CoreBlock> cores;
+    ByStep<DenseBlock> dense;
   };
 
   explicit ClusterSweepPlan(const HierarchicalOperator::Storage& storage);
 
   std::vector<Step> steps;  ///< by position
-  /// Bases of row ends of clusters that begin in a step's block, of column ends of clusters that
-  /// end in it; those that follow each other are joined.
-  std::vector<BasisPart> row_bases, column_bases;
-  /// Blocks whose rows begin in a step's block, and blocks whose columns end in it.
-  std::vector<Product> row_products, column_products;
+  Bases row_bases, column_bases;
+  Products to_beginning_rows;     ///< at the step in which their rows begin
+  Products to_beginning_columns;  ///< at the step in which their columns begin
+  Products to_ending_columns;     ///< at the step in which their columns end
+  Products from_ending_columns;   ///< to rows, likewise
   std::uint32_t coefficient_count = 0;
 };
 

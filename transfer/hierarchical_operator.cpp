@@ -73,11 +73,11 @@ std::span<const T> between(const std::vector<T>& all, std::uint32_t first, std::
 template <typename Basis, typename Value>
 class Phases {
  public:
-  Phases(const BasisKernels<Basis>& bases, CoreKernel<Value> multiply_cores, const Basis* basis,
+  Phases(const BasisKernels<Basis>& bases, const CoreKernels<Value>& cores, const Basis* basis,
          const Value* value, const ChannelLanes& lanes, float product_scale,
          const WorkVectors& work)
       : bases_(bases),
-        multiply_cores_(multiply_cores),
+        cores_(cores),
         basis_(basis),
         value_(value),
         lanes_(lanes),
@@ -88,7 +88,7 @@ class Phases {
     bases_.project(basis_, parts, constant(work_.x), work_.sent);
   }
 
-  void take_light(const HierarchicalPlan::DenseEnd& end) const {
+  void take_light(const DenseEnd& end) const {
     for (std::size_t v = 0; v < work_.x.count; ++v) {
       const float* const x = work_.x.data + v * work_.x.stride + end.position;
       float* const lane = lane_of(work_.sent, v, end.coefficient);
@@ -97,18 +97,22 @@ class Phases {
   }
 
   void multiply(std::span<const CoreBlock> cores) const {
-    multiply_cores_(value_, cores, lanes_, work_.light_count, constant(work_.sent), work_.arrived);
+    cores_.multiply(value_, cores, lanes_, work_.light_count, constant(work_.sent), work_.arrived);
+  }
+
+  void multiply_dense(std::span<const DenseBlock> blocks) const {
+    cores_.multiply_dense(value_, blocks, constant(work_.x), work_.arrived);
   }
 
   void expand(std::span<const BasisPart> parts) const {
     bases_.expand(basis_, parts, constant(work_.arrived), work_.y);
   }
 
-  void add_light(const HierarchicalPlan::DenseEnd& end) const {
-    for (std::size_t v = 0; v < work_.y.count; ++v) {
-      const float* const lane = lane_of(work_.arrived, v, end.coefficient);
-      float* const y = work_.y.data + v * work_.y.stride + end.position;
-      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale_ * lane[k * kChannelLanes];
+  void add_light(std::span<const DenseEnd> ends) const {
+    if (lanes_.matrix_count == 1) {
+      cores_.add_products(ends, constant(work_.arrived), product_scale_, work_.y);
+    } else {
+      for (const DenseEnd& end : ends) add_coefficients(end);
     }
   }
 
@@ -119,8 +123,16 @@ class Phases {
            v % kChannelCount;
   }
 
+  void add_coefficients(const DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.y.count; ++v) {
+      const float* const lane = lane_of(work_.arrived, v, end.coefficient + end.first);
+      float* const y = work_.y.data + v * work_.y.stride + end.position;
+      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale_ * lane[k * kChannelLanes];
+    }
+  }
+
   const BasisKernels<Basis>& bases_;
-  CoreKernel<Value> multiply_cores_;
+  const CoreKernels<Value>& cores_;
   const Basis* basis_;
   const Value* value_;
   const ChannelLanes& lanes_;
@@ -187,6 +199,11 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
       phases.project(
           between(plan.projections, plan.projection_parts[part], plan.projection_parts[part + 1]));
     }
+#pragma omp for schedule(dynamic, 1) nowait
+    for (std::size_t part = 0; part < plan.dense_parts.size() - 1; ++part) {
+      phases.multiply_dense(
+          between(plan.dense, plan.dense_parts[part], plan.dense_parts[part + 1]));
+    }
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.core_parts.size() - 1; ++part) {
       phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]));
@@ -196,10 +213,7 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
       const HierarchicalPlan::Arrival& arrival = plan.arrivals[k - 1];
       clear(work.y, arrival.begin, arrival.end);
       phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
-      for (const HierarchicalPlan::DenseEnd& end :
-           between(plan.dense_out, arrival.first_dense, arrival.last_dense)) {
-        phases.add_light(end);
-      }
+      phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
       const std::span targets(plan.targets);
       exchange.scatter(targets.subspan(arrival.first_target, arrival.target_count()),
                        indirect_irradiance);
@@ -254,9 +268,8 @@ std::size_t HierarchicalOperator::bytes() const {
 }
 
 std::size_t HierarchicalOperator::bytes_per_apply() const {
-  const auto bytes_of_bases = [this](const auto&, auto, const auto* basis, const auto*, float) {
-    return layout_->basis_value_count * sizeof(*basis);
-  };
+  const auto bytes_of_bases = [this](const auto&, const auto&, const auto* basis, const auto*,
+                                     float) { return layout_->basis_value_count * sizeof(*basis); };
   return bytes() + with_kernels_of(storage_, *layout_, bytes_of_bases);
 }
 
@@ -282,9 +295,9 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
       indirect_irradiance[light * patch_count() + p] = {0, 0, 0};
     }
   }
-  const auto apply_phases = [&](const auto& bases, auto multiply_cores, const auto* basis,
+  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
                                 const auto* core, float basis_scale) {
-    const Phases phases(bases, multiply_cores, basis, core, lanes, basis_scale * basis_scale, work);
+    const Phases phases(bases, cores, basis, core, lanes, basis_scale * basis_scale, work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
   with_kernels_of(storage_, *layout_, apply_phases);

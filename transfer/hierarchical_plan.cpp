@@ -90,8 +90,9 @@ class Planner {
     plan_.projection_parts = share_out(plan_.projections, [](const BasisPart& part) {
       return std::uint64_t{part.last_rank - part.first_rank} * part.size;
     });
-    plan_.core_parts = share_out(
-        plan_.cores, [](const CoreBlock& core) { return std::uint64_t{core.rows} * core.columns; });
+    const auto entries = [](const auto& core) { return std::uint64_t{core.rows} * core.columns; };
+    plan_.core_parts = share_out(plan_.cores, entries);
+    plan_.dense_parts = share_out(plan_.dense, entries);
   }
 
  private:
@@ -111,16 +112,32 @@ class Planner {
                          .direction = !to_columns ? Direction::kToRows
                                       : !to_rows  ? Direction::kToColumns
                                                   : Direction::kBoth};
-    plan_.cores.push_back(core);
+    if (dense && storage_.matrix_count == 1) {
+      plan_.dense.push_back({.values = core.values,
+                             .rows = core.rows,
+                             .columns = core.columns,
+                             .row_position = block.row_begin,
+                             .column_position = block.column_begin,
+                             .row_out = core.row,
+                             .column_out = core.column,
+                             .direction = core.direction});
+    } else {
+      plan_.cores.push_back(core);
+    }
     plan_.value_count += std::uint64_t{storage_.matrix_count} * core.rows * core.columns;
     if (to_rows) {
-      add_way(dense, {block.column_begin, core.columns, core.column},
-              {block.row_begin, core.rows, core.row});
+      add_way(dense, whole_end(block.column_begin, core.columns, core.column),
+              whole_end(block.row_begin, core.rows, core.row));
     }
     if (to_columns) {
-      add_way(dense, {block.row_begin, core.rows, core.row},
-              {block.column_begin, core.columns, core.column});
+      add_way(dense, whole_end(block.row_begin, core.rows, core.row),
+              whole_end(block.column_begin, core.columns, core.column));
     }
+  }
+
+  static DenseEnd whole_end(std::uint32_t position, std::uint32_t count,
+                            std::uint32_t coefficient) {
+    return {position, count, coefficient, 0, count};
   }
 
   struct Positions {
@@ -133,9 +150,9 @@ class Planner {
   }
 
   /// What goes into a core and comes out of it; of low rank, whatever the positions.
-  void add_way(bool dense, const Plan::DenseEnd& from, const Plan::DenseEnd& to) {
+  void add_way(bool dense, const DenseEnd& from, const DenseEnd& to) {
     if (dense) {
-      plan_.dense_in.push_back(from);
+      if (storage_.matrix_count > 1) plan_.dense_in.push_back(from);
       dense_out_.push_back(to);
     } else {
       mark(in_, from.coefficient, from.count);
@@ -274,11 +291,12 @@ class Planner {
   }
 
   void add_dense_ends(std::uint32_t begin, std::uint32_t end) {
-    for (const Plan::DenseEnd& whole : dense_out_) {
+    for (const DenseEnd& whole : dense_out_) {
       const std::uint32_t from = std::max(begin, whole.position);
       const std::uint32_t to = std::min(end, whole.position + whole.count);
       if (from < to) {
-        plan_.dense_out.push_back({from, to - from, whole.coefficient + from - whole.position});
+        plan_.dense_out.push_back(
+            {from, to - from, whole.coefficient, from - whole.position, whole.size});
       }
     }
   }
@@ -297,8 +315,8 @@ class Planner {
   Plan& plan_;
   std::size_t positions_;
   WantedRuns wanted_, lit_;
-  std::vector<bool> in_, out_;  ///< which coefficients are needed, before and after cores
-  std::vector<Plan::DenseEnd> dense_out_;  ///< whole
+  std::vector<bool> in_, out_;       ///< which coefficients are needed, before and after cores
+  std::vector<DenseEnd> dense_out_;  ///< whole
 };
 
 }  // namespace

@@ -15,11 +15,6 @@ namespace rebounce {
 /// own, whatever thread works on them: no sum depends on the number of threads.
 class HierarchicalPlan {
  public:
-  /// Positions at an end of a dense block, whose bases are the identity.
-  struct DenseEnd {
-    std::uint32_t position, count, coefficient;
-  };
-
   /// Positions that one thread works out from the first addition to the last.
   struct Arrival {
     std::uint32_t begin, end;  ///< positions, multiples of kAlignment
@@ -37,13 +32,15 @@ class HierarchicalPlan {
 
   std::vector<BasisPart> projections;
   std::vector<CoreBlock> cores;
+  std::vector<DenseBlock>
+      dense;  ///< where there is one matrix; of several they are among the cores
   std::vector<BasisPart> expansions;
-  std::vector<DenseEnd> dense_in, dense_out;  ///< those out cut at the arrivals
+  std::vector<DenseEnd> dense_in, dense_out;  ///< those in of cores; those out cut at the arrivals
   std::vector<std::uint32_t> targets;
   std::vector<std::uint32_t> dark;
   std::vector<Arrival> arrivals;
   /// [first, last) of the parts of about equal work that threads take in turn.
-  std::vector<std::uint32_t> projection_parts, core_parts;
+  std::vector<std::uint32_t> projection_parts, core_parts, dense_parts;
   std::uint64_t value_count = 0;  ///< that are read, each counted once
 };
 

@@ -79,6 +79,7 @@ struct Vector8 {
 template <>
 class Vector8::EntryLanes<float> {
  public:
+  static constexpr bool kWholeRows = false;
   explicit EntryLanes(const ChannelLanes& lanes)
       : lane_(_mm256_cvtepu16_epi32(
             _mm_load_si128(reinterpret_cast<const __m128i*>(lanes.value.data())))) {}
@@ -93,6 +94,7 @@ class Vector8::EntryLanes<float> {
 template <>
 class Vector8::EntryLanes<std::uint16_t> {
  public:
+  static constexpr bool kWholeRows = false;
   explicit EntryLanes(const ChannelLanes& lanes)
       : byte_(_mm_add_epi16(
             _mm_mullo_epi16(_mm_load_si128(reinterpret_cast<const __m128i*>(lanes.value.data())),

@@ -36,6 +36,9 @@ struct Vector16 {
   static Vector16 zero() { return {_mm512_setzero_ps()}; }
   static Vector16 broadcast(float x) { return {_mm512_set1_ps(x)}; }
   void store(float* p) const { _mm512_storeu_ps(p, v); }
+  void add_to(float* p, float scale) const {
+    multiply_add(broadcast(scale), *this, load(p)).store(p);
+  }
   void store_some(float* p, std::size_t count) const { _mm512_mask_storeu_ps(p, first(count), v); }
   float sum() const { return _mm512_reduce_add_ps(v); }
   /// The sums over the lanes of four vectors.
@@ -56,6 +59,32 @@ struct Vector16 {
     };
     return {halves(halves(a[0].v, a[1].v), halves(a[2].v, a[3].v))};
   }
+  /// Sums over every fourth lane of four vectors, which are in the lanes of each four.
+  static Vector16 sums_in_fours(const Vector16 (&a)[4]) {
+    const auto pair = [](__m512 x, __m512 y) REBOUNCE_INLINE {
+      return _mm512_add_ps(_mm512_unpacklo_ps(x, y), _mm512_unpackhi_ps(x, y));
+    };
+    const __m512 ab = pair(a[0].v, a[1].v), cd = pair(a[2].v, a[3].v);
+    return {_mm512_add_ps(_mm512_shuffle_ps(ab, cd, 0x44), _mm512_shuffle_ps(ab, cd, 0xEE))};
+  }
+  /// The sums over the lanes of four vectors of each channel, (vector)(channel).
+  static Vector16 sums_side_by_side(const Vector16 (&red)[4], const Vector16 (&green)[4],
+                                    const Vector16 (&blue)[4]) {
+    const auto pair = [](Vector16 a, Vector16 b) REBOUNCE_INLINE {  // (a)(b)(a)(b) in each four
+      return _mm512_add_ps(_mm512_unpacklo_ps(a.v, b.v), _mm512_unpackhi_ps(a.v, b.v));
+    };
+    const __m512 blues[2] = {pair(blue[0], blue[1]), pair(blue[2], blue[3])};
+    const auto even = [&](int k) REBOUNCE_INLINE -> Vector16 {
+      const __m512 rg = pair(red[k], green[k]), b = blues[k / 2];
+      return {_mm512_add_ps(_mm512_shuffle_ps(rg, b, 0x44), _mm512_shuffle_ps(rg, b, 0xEE))};
+    };
+    const auto odd = [&](int k) REBOUNCE_INLINE -> Vector16 {
+      const __m512 rg = pair(red[k], green[k]), b = blues[k / 2];
+      return {_mm512_add_ps(_mm512_shuffle_ps(rg, b, 0x14), _mm512_shuffle_ps(rg, b, 0xBE))};
+    };
+    const Vector16 row[4] = {even(0), odd(1), even(2), odd(3)};
+    return sums_of_fours(row);
+  }
   friend Vector16 add(Vector16 a, Vector16 b) { return {_mm512_add_ps(a.v, b.v)}; }
   friend Vector16 multiply(Vector16 a, Vector16 b) { return {_mm512_mul_ps(a.v, b.v)}; }
   friend Vector16 multiply_add(Vector16 a, Vector16 b, Vector16 c) {
@@ -64,6 +93,7 @@ struct Vector16 {
 
   template <typename Value>
   class EntryLanes;
+  class OneMatrixEntries;
 
  private:
   static __mmask16 first(std::size_t count) { return static_cast<__mmask16>((1U << count) - 1); }
@@ -72,6 +102,7 @@ struct Vector16 {
 template <>
 class Vector16::EntryLanes<float> {
  public:
+  static constexpr bool kWholeRows = false;
   explicit EntryLanes(const ChannelLanes& lanes)
       : lane_(_mm512_cvtepu16_epi32(
             _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())))) {}
@@ -84,6 +115,7 @@ class Vector16::EntryLanes<float> {
 template <>
 class Vector16::EntryLanes<std::uint16_t> {
  public:
+  static constexpr bool kWholeRows = false;
   explicit EntryLanes(const ChannelLanes& lanes)
       : lane_(_mm512_cvtepu16_epi32(
             _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())))) {}
@@ -94,6 +126,25 @@ class Vector16::EntryLanes<std::uint16_t> {
 
  private:
   __m512i lane_;
+};
+
+/// Where the channels share a matrix, the sixteen entries of four vectors are converted once.
+class Vector16::OneMatrixEntries {
+ public:
+  static constexpr bool kWholeRows = true;
+  explicit OneMatrixEntries(const ChannelLanes&) {
+    const __m512i first = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+    for (int w = 0; w < 4; ++w) lane_[w] = _mm512_add_epi32(first, _mm512_set1_epi32(4 * w));
+  }
+  template <std::size_t kWide, typename Value>
+  void load_row(const Value* p, Vector16 (&b)[kWide]) const {
+    static_assert(kWide <= 4);
+    const Vector16 row = load_values<Vector16>(p);
+    for (std::size_t w = 0; w < kWide; ++w) b[w] = {_mm512_permutexvar_ps(lane_[w], row.v)};
+  }
+
+ private:
+  __m512i lane_[4];
 };
 
 }  // namespace

@@ -48,6 +48,9 @@ struct Vector4 {
   static Vector4 zero() { return broadcast(0); }
   static Vector4 broadcast(float x) { return {Floats{x, x, x, x}}; }
   void store(float* p) const { std::memcpy(p, &v, sizeof v); }
+  void add_to(float* p, float scale) const {
+    multiply_add(broadcast(scale), *this, load(p)).store(p);
+  }
   void store_some(float* p, std::size_t count) const {
     for (std::size_t k = 0; k < count; ++k) p[k] = v[k];
   }
@@ -73,6 +76,7 @@ struct Vector4 {
   template <typename Value>
   class EntryLanes {
    public:
+    static constexpr bool kWholeRows = false;
     explicit EntryLanes(const ChannelLanes& lanes) : lanes_(lanes) {}
     Vector4 load(const Value* p) const {
       Value four[kWidth];

@@ -11,6 +11,10 @@ namespace {
 
 struct FourSums {
   __m128 v;
+  void store(float* p) const { _mm_storeu_ps(p, v); }
+  void add_to(float* p, float scale) const {
+    _mm_storeu_ps(p, _mm_add_ps(_mm_mul_ps(_mm_set1_ps(scale), v), _mm_loadu_ps(p)));
+  }
 };
 
 /// Stores the first kCount sums of three channels, those of a lane side by side in four floats.

@@ -123,7 +123,7 @@ TEST(CompressedFormFactors, SweepsAreGaussSeidelInEveryOrderOfDirections) {
       relaxation->begin(system.problem(), start);
       std::vector<Float3> radiosity(421);
       for (const SweepDirection direction :
-           {kForward, kForward, kBackward, kForward, kBackward, kBackward}) {
+           {kForward, kForward, kBackward, kForward, kForward, kBackward, kBackward}) {
         relaxation->sweep(direction);
         relaxation->end(radiosity);
         system.sweep(expected, direction);

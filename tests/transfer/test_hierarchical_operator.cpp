@@ -468,21 +468,22 @@ void check_integer_bases(const BasisKernels<std::int16_t>& kernels, std::size_t 
 template <typename Value>
 void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
                 const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
-                std::size_t lights) {
+                std::size_t lights, std::uint32_t matrices = 2) {
   using Direction = CoreBlock::Direction;
-  constexpr std::uint32_t kMatrices = 2, kRow = 3, kColumn = 99, kEnd = 200;
-  constexpr std::array<std::uint32_t, 3> kMatrix{1, 0, 1};
+  constexpr std::uint32_t kRow = 3, kColumn = 99, kEnd = 200;
+  const std::uint32_t last = matrices - 1;
+  const std::array<std::uint32_t, 3> matrix{last, 0, last};
   Random random;
   const std::vector<float> in = random.floats(lights * kEnd * kChannelLanes);
   for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
     const std::vector<CoreBlock> cores{{8, rows, columns, kRow, kColumn, direction}};
     std::vector<float> out(lights * kEnd * kChannelLanes, kUntouched);
-    multiply_cores(values.data(), cores, ChannelLanes(kMatrix, kMatrices), lights,
+    multiply_cores(values.data(), cores, ChannelLanes(matrix, matrices), lights,
                    {in.data(), kEnd * kChannelLanes}, {out.data(), kEnd * kChannelLanes});
     for (std::size_t v = 0; v < 3 * lights; ++v) {
       const auto at = [v](std::size_t k) { return (v / 3 * kEnd + k) * kChannelLanes + v % 3; };
       const auto entry = [&](std::size_t i, std::size_t j) {
-        return plain[8 + (i * columns + j) * kMatrices + kMatrix[v % 3]];
+        return plain[8 + (i * columns + j) * matrices + matrix[v % 3]];
       };
       for (std::uint32_t k = 0; k < kEnd; ++k) {
         double expected = kUntouched;
@@ -499,6 +500,96 @@ void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& valu
           }
         }
         EXPECT_NEAR(out[at(k)], expected, kAllowed);
+      }
+    }
+  }
+}
+
+/// A dense block between its products: those that are put in places of coefficients, their ends
+/// added to light, and those that are added to light at once.
+template <typename Value>
+class DenseCheck {
+ public:
+  DenseCheck(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+             std::span<const float> plain, std::size_t lights)
+      : kernels_(kernels), values_(values), plain_(plain.subspan(kFirst)), lights_(lights) {
+    Random random;
+    x_ = random.floats(3 * lights * kEnd);
+    y_ = random.floats(3 * lights * kEnd);
+  }
+
+  void check(std::uint32_t rows, std::uint32_t columns, DenseBlock::Direction direction) {
+    const DenseBlock block{kFirst, rows, columns, kRow, kColumn, kRowOut, kColumnOut, direction};
+    std::vector<float> out(lights_ * kFloats, kUntouched);
+    kernels_.multiply_dense(values_.data(), {&block, 1}, x(), {out.data(), kFloats});
+    std::vector<float> expected = out, sum = y_, ends = y_, at_once = y_;
+    for (std::size_t v = 0; v < 3 * lights_; ++v) {
+      const float* const light = x_.data() + v * kEnd;
+      float* const of_light = expected.data() + v / 3 * kFloats;
+      for (std::uint32_t i = 0; i < rows && direction != Direction::kToColumns; ++i) {
+        float product = 0;
+        for (std::uint32_t j = 0; j < columns; ++j) {
+          product += plain_[i * columns + j] * light[kColumn + j];
+        }
+        of_light[kRowOut * kChannelLanes + v % 3 * rows + i] = product;
+        sum[v * kEnd + kRow + i] += 0.25F * product;
+      }
+      for (std::uint32_t j = 0; j < columns && direction != Direction::kToRows; ++j) {
+        float product = 0;
+        for (std::uint32_t i = 0; i < rows; ++i) {
+          product += plain_[i * columns + j] * light[kRow + i];
+        }
+        of_light[kColumnOut * kChannelLanes + v % 3 * columns + j] = product;
+        sum[v * kEnd + kColumn + j] += 0.25F * product;
+      }
+    }
+    expect_near(out, expected);
+    // An end in two parts, as where positions are cut.
+    std::vector<DenseEnd> all_ends;
+    if (direction != Direction::kToColumns) all_ends.push_back({kRow, rows, kRowOut, 0, rows});
+    if (direction != Direction::kToRows) {
+      all_ends.push_back({kColumn, 16, kColumnOut, 0, columns});
+      if (columns > 16) {
+        all_ends.push_back({kColumn + 16, columns - 16, kColumnOut, 16, columns});
+      }
+    }
+    kernels_.add_products(all_ends, {out.data(), kFloats}, 0.25F, {ends.data(), kEnd, 3 * lights_});
+    expect_near(ends, sum);
+    kernels_.add_dense(values_.data(), {&block, 1}, {x_.data(), kEnd, 3}, 0.25F,
+                       {at_once.data(), kEnd, 3});
+    expect_near(std::span(at_once).first(3 * kEnd), std::span(sum).first(3 * kEnd));
+  }
+
+ private:
+  using Direction = DenseBlock::Direction;
+
+  static constexpr std::uint32_t kFirst = 8, kRow = 48, kColumn = 192, kRowOut = 3;
+  static constexpr std::uint32_t kColumnOut = 101, kEnd = 304;
+  static constexpr std::size_t kFloats = kEnd * kChannelLanes;
+
+  PlanarVectors<const float> x() const { return {x_.data(), kEnd, 3 * lights_}; }
+
+  static void expect_near(std::span<const float> got, std::span<const float> expected) {
+    for (std::size_t k = 0; k < got.size(); ++k) EXPECT_NEAR(got[k], expected[k], kAllowed) << k;
+  }
+
+  const CoreKernels<Value>& kernels_;
+  const std::vector<Value>& values_;
+  std::span<const float> plain_;
+  std::size_t lights_;
+  std::vector<float> x_, y_;
+};
+
+template <typename Value>
+void check_dense(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+                 const std::vector<float>& plain, std::size_t lights) {
+  using Direction = DenseBlock::Direction;
+  DenseCheck<Value> dense(kernels, values, plain, lights);
+  for (const std::uint32_t rows : {16U, 32U, 80U}) {
+    for (const std::uint32_t columns : {16U, 32U, 96U}) {
+      for (const Direction direction :
+           {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
+        dense.check(rows, columns, direction);
       }
     }
   }
@@ -523,12 +614,16 @@ void check_kernels(const BlockKernelSet& kernels) {
       }
       const auto rows = static_cast<std::uint32_t>(rank);
       for (const std::uint32_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
-        check_core(kernels.cores_f32, values, values, rows, columns, lights);
-        check_core(kernels.cores_f16, half, values, rows, columns, lights);
+        check_core(kernels.cores_f32.multiply, values, values, rows, columns, lights);
+        check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights);
+        check_core(kernels.cores_f32.multiply, values, values, rows, columns, lights, 1);
+        check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights, 1);
       }
     }
-    check_core(kernels.cores_f32, values, values, 48, 96, lights);
-    check_core(kernels.cores_f16, half, values, 96, 32, lights);
+    check_dense(kernels.cores_f32, values, values, lights);
+    check_dense(kernels.cores_f16, half, values, lights);
+    check_core(kernels.cores_f32.multiply, values, values, 48, 96, lights);
+    check_core(kernels.cores_f16.multiply, half, values, 96, 32, lights);
   }
   check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
 }
