@@ -366,7 +366,7 @@ REBOUNCE_INLINE inline void put_row_sums(const Multiply& multiply, std::size_t r
   for (std::size_t r = 0; r < row_count;) {
     V sum[kChannels][kRows];
     if constexpr (V::kWidth == 16) {
-      alignas(64) float fours[kChannels][4][16];
+      alignas(64) float fours[kChannels][4][V::kWidth];
       for (std::size_t g = 0; g < 4; ++g, r += kRows) {
         multiply(r, sum);
         unroll<kChannels>([&](auto c)
@@ -375,7 +375,7 @@ REBOUNCE_INLINE inline void put_row_sums(const Multiply& multiply, std::size_t r
       unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
         const V four[4] = {V::load(fours[c][0]), V::load(fours[c][1]), V::load(fours[c][2]),
                            V::load(fours[c][3])};
-        put<kOutput>(V::sums_of_fours(four), place(c, r - 16), out.scale);
+        put<kOutput>(V::sums_of_fours(four), place(c, r - V::kWidth), out.scale);
       });
     } else {
       multiply(r, sum);
@@ -392,8 +392,8 @@ REBOUNCE_INLINE inline void multiply_narrow_block(const Value* values, const Den
                                                   PlanarVectors<const float> x,
                                                   const DenseOutput& out) {
   constexpr std::size_t kColumns = kWide * V::kWidth, kRows = 4;
-  const float *const row_x = x.data + block.row_position, *const column_x =
-                                                              x.data + block.column_position;
+  const float* const row_x = x.data + block.row_position;
+  const float* const column_x = x.data + block.column_position;
   V to_columns[kChannels][kWide];
   unroll<kChannels>([&](auto c) REBOUNCE_INLINE {
     unroll<kWide>([&](auto w) REBOUNCE_INLINE { to_columns[c][w] = V::zero(); });

@@ -50,33 +50,8 @@ class Planner {
 
   void run() {
     add_steps();
-    const std::size_t count = plan_.steps.size();
-    BasesOfSteps row_bases(count), column_bases(count);
-    ProductsOfSteps to_beginning_rows(count, Direction::kToRows),
-        to_beginning_columns(count, Direction::kToColumns),
-        to_ending_columns(count, Direction::kToColumns),
-        from_ending_columns(count, Direction::kToRows);
-    for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      const TransferBlock& block = blocks_[b];
-      if (!has_values(block) || block.on_diagonal()) continue;
-      const Steps rows = steps_of(block.row_begin, block.row_count);
-      const Steps columns = steps_of(block.column_begin, block.column_count);
-      if (block.kind == TransferBlock::Kind::kLowRank) {
-        const HierarchicalLayout::Place& place = layout_.places[b];
-        add_basis(row_bases, rows, basis_of(block, place.row, block.row_rank));
-        add_basis(column_bases, columns, basis_of(block, place.column, block.column_rank));
-      }
-      add_product(to_beginning_rows, rows.first, b);
-      add_product(to_beginning_columns, columns.first, b);
-      add_product(to_ending_columns, columns.last, b);
-      add_product(from_ending_columns, columns.last, b);
-    }
-    plan_.row_bases = row_bases.made();
-    plan_.column_bases = column_bases.made();
-    plan_.to_beginning_rows = to_beginning_rows.made();
-    plan_.to_beginning_columns = to_beginning_columns.made();
-    plan_.to_ending_columns = to_ending_columns.made();
-    plan_.from_ending_columns = from_ending_columns.made();
+    add_bases();
+    add_products();
     plan_.coefficient_count = layout_.coefficient_count;
   }
 
@@ -133,6 +108,43 @@ class Planner {
             .last_place = cluster.size};
   }
 
+  void add_bases() {
+    BasesOfSteps rows(plan_.steps.size()), columns(plan_.steps.size());
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      const TransferBlock& block = blocks_[b];
+      if (!is_below_diagonal(block) || block.kind == TransferBlock::Kind::kDense) continue;
+      const HierarchicalLayout::Place& place = layout_.places[b];
+      add_basis(rows, rows_of(block), basis_of(block, place.row, block.row_rank));
+      add_basis(columns, columns_of(block), basis_of(block, place.column, block.column_rank));
+    }
+    plan_.row_bases = rows.made();
+    plan_.column_bases = columns.made();
+  }
+
+  void add_products() {
+    const std::size_t count = plan_.steps.size();
+    ProductsOfSteps to_beginning_rows(count, Direction::kToRows),
+        to_beginning_columns(count, Direction::kToColumns),
+        to_ending_columns(count, Direction::kToColumns),
+        from_ending_columns(count, Direction::kToRows);
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      if (!is_below_diagonal(blocks_[b])) continue;
+      const Steps rows = rows_of(blocks_[b]), columns = columns_of(blocks_[b]);
+      add_product(to_beginning_rows, rows.first, b);
+      add_product(to_beginning_columns, columns.first, b);
+      add_product(to_ending_columns, columns.last, b);
+      add_product(from_ending_columns, columns.last, b);
+    }
+    plan_.to_beginning_rows = to_beginning_rows.made();
+    plan_.to_beginning_columns = to_beginning_columns.made();
+    plan_.to_ending_columns = to_ending_columns.made();
+    plan_.from_ending_columns = from_ending_columns.made();
+  }
+
+  static bool is_below_diagonal(const TransferBlock& block) {
+    return has_values(block) && !block.on_diagonal();
+  }
+
   /// In which positions begin and end.
   struct Steps {
     std::uint32_t first, last;
@@ -140,6 +152,13 @@ class Planner {
 
   Steps steps_of(std::uint32_t begin, std::uint32_t count) const {
     return {step_at_[begin / kAlignment], step_at_[(begin + count) / kAlignment - 1]};
+  }
+
+  Steps rows_of(const TransferBlock& block) const {
+    return steps_of(block.row_begin, block.row_count);
+  }
+  Steps columns_of(const TransferBlock& block) const {
+    return steps_of(block.column_begin, block.column_count);
   }
 
   void add_product(ProductsOfSteps& products, std::uint32_t step, std::size_t b) const {
