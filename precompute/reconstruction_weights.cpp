@@ -213,10 +213,11 @@ class ReconstructionWeights {
     is_covered_.assign(receivers_.size(), 1);
     const std::vector<std::uint8_t> covered = find_covered();
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
+      const std::uint32_t patch = shown_patch_[t];
+      if (patch == kNone) continue;
       const TriangleCorners p = corners_of(mesh_, t);
       const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double area = glm::length(cross);
-      const std::uint32_t patch = shown_patch_[t];
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t v = mesh_.triangle[t][k];
         normal[v] += cross;
@@ -224,7 +225,6 @@ class ReconstructionWeights {
           largest[v] = area;
           receivers_[v].inset = glm::vec3(glm::mix(p[k], (p[0] + p[1] + p[2]) / 3.0, kProbeInset));
         }
-        if (patch == kNone) continue;
         receivers_[v].is_shown = true;
         if (covered[t] == 0) is_covered_[v] = 0;
         size_sum[v] += std::sqrt(area_[patch]);

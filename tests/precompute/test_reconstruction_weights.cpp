@@ -8,6 +8,7 @@
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/runtime/triangle.h"
 #include "test_scenes.h"
+#include "vertex_split.h"
 
 namespace rebounce {
 namespace {
@@ -212,6 +213,43 @@ TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
       shown += model.mesh.weight[k] * value[model.mesh.weight_patch[k]];
     }
     EXPECT_NEAR(shown, 1, 1e-5);
+  }
+}
+
+TEST(ReconstructionWeights, WhatHasNoPatchShowsTheLightBesideIt) {
+  // What is taken for hidden shows light where it meets others in the open, unless it is walled in.
+  const std::vector<glm::dvec3> corner = {{0, 0, 0}, {0, 0, 0.2}, {0.2, 0, 0.2}};
+  for (const bool walled : {false, true}) {
+    Scene scene = test::empty_scene();
+    add_tiled_floor(scene, 10);
+    for (int k = 0; walled && k < 3; ++k) {
+      const glm::dvec3 a = corner[k], b = corner[(k + 1) % 3], up(0, 0.1, 0);
+      const std::vector<glm::dvec3> wall = {b, a, a + up, b + up};
+      test::add_polygon(scene, wall);
+    }
+    PatchModel model = make_patch_model(std::move(scene), {.patch_count = 100});
+    const auto is_hidden = [](const glm::dvec3& p) {
+      return p.y < 1e-6 && p.x > -1e-6 && p.z < 0.2 + 1e-6 && p.x < p.z + 1e-6;
+    };
+    for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+      if (std::ranges::all_of(corners_of(model.mesh, t), is_hidden)) model.shown_patch[t] = kNone;
+    }
+    const RayTracer tracer = test::make_tracer(model);
+    split_vertices(model.shown_patch, tracer, 0, model.mesh);
+    const std::vector<float> absorbed(model.patches.size(), 0.0F);
+    compute_reconstruction_weights(model.shown_patch, absorbed, tracer, model.mesh);
+    int at_corners = 0;
+    for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+      if (model.shown_patch[t] != kNone) continue;
+      for (const std::uint32_t v : model.mesh.triangle[t]) {
+        const glm::dvec3 p = to_dvec3(model.mesh.position[v]);
+        if (std::ranges::none_of(corner, [&](const auto& q) { return distance(p, q) < 1e-5; }))
+          continue;
+        EXPECT_NEAR(shown_value(model, v, [](const Float3&) { return 1.0; }), walled ? 0 : 1, 1e-5);
+        ++at_corners;
+      }
+    }
+    EXPECT_GE(at_corners, 3);
   }
 }
 
