@@ -294,5 +294,30 @@ TEST(ReconstructionWeights, LightEndsWhereACoverDoes) {
   EXPECT_GT(even, 3 * (3 * beside) / 4) << "corners of triangles";
 }
 
+TEST(ReconstructionWeights, ASlotShowsWhatArrivesInIt) {
+  // Deep in a slot of 2 cm below a plate of 1.2 m all patches are covered: that nine tenths of
+  // their view give nothing says that it is dark there, not that they are half under something.
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 1);
+  test::add_box(scene, {-0.6, 0.02, -0.6}, {0.6, 0.03, 0.6}, false);
+  PatchModel model = make_patch_model(std::move(scene), {.patch_count = 300});
+  const auto reaches = [](const Float3& p, float edge) {
+    return p[1] < 0.01F && std::max(std::abs(p[0]), std::abs(p[2])) < edge;
+  };
+  std::vector<float> absorbed;
+  for (const Float3& p : model.patches.centroid) absorbed.push_back(reaches(p, 0.6F) ? 0.9F : 0);
+  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
+  int deep = 0;
+  for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+    if (model.shown_patch[t] == kNone) continue;
+    for (const std::uint32_t v : model.mesh.triangle[t]) {
+      if (!reaches(model.mesh.position[v], 0.3F)) continue;
+      EXPECT_NEAR(shown_value(model, v, [](const Float3&) { return 0.2; }), 0.2, 1e-5);
+      ++deep;
+    }
+  }
+  EXPECT_GT(deep, 30);
+}
+
 }  // namespace
 }  // namespace rebounce
