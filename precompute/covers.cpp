@@ -109,9 +109,11 @@ class CoverRefinement {
   std::vector<std::uint8_t> is_new_;  ///< of each triangle: made in this round
 };
 
-/// How many points of a triangle's front have something within `height` metres above them.
+/// How many points of a triangle's front have something within `height` metres above them; none of
+/// one without area: cuts through triangles as thin as floats can tell leave some.
 std::size_t count_covered(const TriangleCorners& corners, std::span<const glm::dvec2> points,
                           const RayTracer& tracer, double height) {
+  if (area_vector(corners) == glm::dvec3(0)) return 0;
   const glm::dvec3 up = front_normal(corners);
   std::array<Ray, kMostCoverPoints> room;
   const std::span<Ray> rays = std::span(room).first(points.size());

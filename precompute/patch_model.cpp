@@ -45,6 +45,7 @@ class PatchModelBuilder {
     drop_slivers();
     model_.scene_triangle_count = scene_.triangle.size();
     cut_at_contacts(scene_, settings);
+    drop_thin(0);
     report_progress(progress_, kAfterContacts);
     const OpacityMaps opacity = find_opacity_maps(scene_);
     const RayTracer tracer(scene_.position, scene_.triangle, opacity);
@@ -55,6 +56,7 @@ class PatchModelBuilder {
     const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
     inherit_sides(subdivide(scene_, patches_per_triangle(), settings, importances(tracer)));
     refine(tracer, scene_size);
+    drop_thin(0);  // what is as thin as floats can tell has lost its area by cuts
   }
 
   PatchModel build() {
@@ -348,7 +350,13 @@ class PatchModelBuilder {
   /// Takes out triangles whose height is below the precision of rays: what stands on them or looks
   /// at them cannot be told.
   void drop_slivers() {
-    const float thinnest = ray_offset_distance(scene_.position);
+    model_.sliver_count = drop_thin(ray_offset_distance(scene_.position));
+    if (scene_.triangle.empty()) throw Error("scene " + scene_.name + " has nothing but slivers");
+  }
+
+  /// Takes out triangles that are no higher than this, metres, and their sides if these are known.
+  /// Returns how many.
+  std::size_t drop_thin(double thinnest) {
     std::size_t kept = 0;
     for (std::size_t t = 0; t < scene_.triangle.size(); ++t) {
       const auto [a, b, c] = scene_.triangle[t];
@@ -356,16 +364,18 @@ class PatchModelBuilder {
                        r = to_dvec3(scene_.position[c]);
       const double longest =
           std::max({glm::distance(p, q), glm::distance(q, r), glm::distance(r, p)});
-      if (glm::length(glm::cross(q - p, r - p)) < thinnest * longest) continue;
+      if (glm::length(glm::cross(q - p, r - p)) <= thinnest * longest) continue;
       scene_.triangle[kept] = scene_.triangle[t];
       if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh[kept] = scene_.triangle_mesh[t];
+      if (!sides_.empty()) sides_[kept] = sides_[t];
       scene_.triangle_material[kept++] = scene_.triangle_material[t];
     }
-    model_.sliver_count = scene_.triangle.size() - kept;
-    if (kept == 0) throw Error("scene " + scene_.name + " has nothing but slivers");
+    const std::size_t dropped = scene_.triangle.size() - kept;
     scene_.triangle.resize(kept);
     scene_.triangle_material.resize(kept);
     if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh.resize(kept);
+    if (!sides_.empty()) sides_.resize(kept);
+    return dropped;
   }
 
   /// Covered sides show the light of what covers them at their middle.

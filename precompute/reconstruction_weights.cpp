@@ -128,6 +128,7 @@ class ReconstructionWeights {
 
   void compute(const Progress& progress) {
     const std::size_t count = mesh_.position.size();
+    shows_arriving_ = is_covered_;
     const GiverSearch search(mesh_, triangles_, area_, absorbed_, tracer_);
     std::vector<VertexWeights> weights(count);
     for (std::size_t begin = 0; begin < count; begin += kBatch) {
@@ -139,9 +140,13 @@ class ReconstructionWeights {
   }
 
  private:
+  auto is(Exposure exposure) const {
+    return [this, exposure](const Giver& giver) { return exposure_[giver.patch] == exposure; };
+  }
+
   /// The weights of vertices [begin, end) before the patches' means are looked after.
   void compute_batch(const GiverSearch& search, std::size_t begin, std::size_t end,
-                     std::vector<VertexWeights>& weights) const {
+                     std::vector<VertexWeights>& weights) {
 #pragma omp parallel
     {
       GiverSearch::Scratch scratch(search);
@@ -150,7 +155,8 @@ class ReconstructionWeights {
         if (!receivers_[v].is_shown) continue;
         std::vector<Giver> givers = find_givers(search, v, scratch);
         centre_weights(receivers_[v], givers);
-        weights[v] = is_covered_[v] != 0 ? plain_weights(givers) : open_weights(givers);
+        if (std::ranges::all_of(givers, is(Exposure::kCovered))) shows_arriving_[v] = 1;
+        weights[v] = shows_arriving_[v] != 0 ? plain_weights(givers) : open_weights(givers);
       }
     }
   }
@@ -213,10 +219,11 @@ class ReconstructionWeights {
     is_covered_.assign(receivers_.size(), 1);
     const std::vector<std::uint8_t> covered = find_covered();
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
+      const std::uint32_t patch = shown_patch_[t];
+      if (patch == kNone) continue;
       const TriangleCorners p = corners_of(mesh_, t);
       const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
       const double area = glm::length(cross);
-      const std::uint32_t patch = shown_patch_[t];
       for (int k = 0; k < 3; ++k) {
         const std::uint32_t v = mesh_.triangle[t][k];
         normal[v] += cross;
@@ -224,7 +231,6 @@ class ReconstructionWeights {
           largest[v] = area;
           receivers_[v].inset = glm::vec3(glm::mix(p[k], (p[0] + p[1] + p[2]) / 3.0, kProbeInset));
         }
-        if (patch == kNone) continue;
         receivers_[v].is_shown = true;
         if (covered[t] == 0) is_covered_[v] = 0;
         size_sum[v] += std::sqrt(area_[patch]);
@@ -248,9 +254,6 @@ class ReconstructionWeights {
       return search.find(receivers_[v], own_patches_[v], reach, scratch);
     };
     std::vector<Giver> near = within(receivers_[v].reach);
-    const auto is = [&](Exposure e) {
-      return [this, e](const Giver& g) { return exposure_[g.patch] == e; };
-    };
     if (is_covered_[v] != 0) {
       for (const Exposure e : {Exposure::kCovered, Exposure::kMixed}) {
         if (std::ranges::any_of(near, is(e))) return only(near, is(e));
@@ -336,7 +339,7 @@ class ReconstructionWeights {
     mesh_.weight.clear();
     for (std::size_t v = 0; v < weights.size(); ++v) {
       for (const auto& [patch, weight] : weights[v]) {
-        const double open = is_covered_[v] != 0 ? 1.0 : 1.0 - absorbed_[patch];
+        const double open = shows_arriving_[v] != 0 ? 1.0 : 1.0 - absorbed_[patch];
         if (open <= 0) continue;
         mesh_.weight_patch.push_back(patch);
         mesh_.weight.push_back(static_cast<float>(weight / open));
@@ -356,6 +359,8 @@ class ReconstructionWeights {
   std::vector<Exposure> exposure_;        ///< [n]
   std::vector<Receiver> receivers_;       ///< [v]
   std::vector<std::uint8_t> is_covered_;  ///< [v] all triangles that show a patch are covered
+  /// [v] It is covered or all its patches are: what they receive is shown as it is.
+  std::vector<std::uint8_t> shows_arriving_;
 };
 
 }  // namespace

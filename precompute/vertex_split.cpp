@@ -46,13 +46,12 @@ class VertexSplitter {
  public:
   VertexSplitter(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
                  const RayTracer& tracer, double cover_height)
-      : mesh_(mesh), tracer_(tracer), place_(mesh.triangle.size(), Place::kHidden) {
+      : mesh_(mesh), tracer_(tracer), is_covered_(mesh.triangle.size(), 0) {
 #pragma omp parallel for schedule(dynamic, 256)
-    for (std::size_t t = 0; t < place_.size(); ++t) {
+    for (std::size_t t = 0; t < is_covered_.size(); ++t) {
       if (shown_patch[t] == kNone) continue;
       const TriangleCorners corners = corners_of(mesh, static_cast<std::uint32_t>(t));
-      const bool covered = is_covered(corners, tracer, cover_height);
-      place_[t] = covered ? Place::kCovered : Place::kOpen;
+      is_covered_[t] = is_covered(corners, tracer, cover_height) ? 1 : 0;
     }
   }
 
@@ -75,13 +74,12 @@ class VertexSplitter {
   }
 
  private:
-  /// Where the light of a triangle shows: nowhere, under something, or in the open.
-  enum class Place : std::uint8_t { kHidden, kCovered, kOpen };
-
-  /// True if triangles `a` and `b` are in like places, share an edge from `v`, and nothing stands
-  /// on it.
+  /// True if both triangles `a` and `b` are covered or neither is, they share an edge from `v`, and
+  /// nothing stands on it. What has no patch joins the open: what little of it can be seen is
+  /// there.
   bool are_joined(std::uint32_t v, std::uint32_t a, std::uint32_t b) const {
-    return place_[a] == place_[b] && std::ranges::any_of(mesh_.triangle[a], [&](std::uint32_t u) {
+    return is_covered_[a] == is_covered_[b] &&
+           std::ranges::any_of(mesh_.triangle[a], [&](std::uint32_t u) {
              return u != v && std::ranges::count(mesh_.triangle[b], u) > 0 &&
                     find_between(beside_edge(v, u, a), beside_edge(v, u, b), tracer_) == kNone;
            });
@@ -99,7 +97,7 @@ class VertexSplitter {
 
   const DisplayMesh& mesh_;
   const RayTracer& tracer_;
-  std::vector<Place> place_;  ///< of each triangle
+  std::vector<std::uint8_t> is_covered_;  ///< [t] it shows a patch, under something
 };
 
 }  // namespace

@@ -66,6 +66,18 @@ TEST(Covers, OnlyWhatIsWhollyCoveredIs) {
   EXPECT_FALSE(covered(kEnd - 0.18, 0.1)) << "a corner stands out";
 }
 
+TEST(Covers, NothingCoversATriangleWithoutArea) {
+  // Cuts leave some, and rays along no direction must not be traced.
+  Scene scene = floor_under_board();
+  const std::vector<glm::dvec3> line = {{-0.5, 0, 0}, {0, 0, 0}, {0.5, 0, 0}};
+  test::add_polygon(scene, line);
+  const RayTracer tracer(scene.position, scene.triangle);
+  EXPECT_EQ(covered_part({line[0], line[1], line[2]}, tracer, 0.1, 16), 0);
+  EXPECT_FALSE(is_covered({line[0], line[1], line[2]}, tracer, 0.1));
+  const std::vector<TriangleSides> sides(scene.triangle.size());
+  EXPECT_GT(refine_at_covers(scene, sides, tracer, 0.2, 500).size(), sides.size());
+}
+
 TEST(Covers, TrianglesAreSmallWhereACoverEnds) {
   Scene scene = floor_under_board();
   const RayTracer tracer(scene.position, scene.triangle);

@@ -8,6 +8,7 @@
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/runtime/triangle.h"
 #include "test_scenes.h"
+#include "vertex_split.h"
 
 namespace rebounce {
 namespace {
@@ -215,6 +216,43 @@ TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
   }
 }
 
+TEST(ReconstructionWeights, WhatHasNoPatchShowsTheLightBesideIt) {
+  // What is taken for hidden shows light where it meets others in the open, unless it is walled in.
+  const std::vector<glm::dvec3> corner = {{0, 0, 0}, {0, 0, 0.2}, {0.2, 0, 0.2}};
+  for (const bool walled : {false, true}) {
+    Scene scene = test::empty_scene();
+    add_tiled_floor(scene, 10);
+    for (int k = 0; walled && k < 3; ++k) {
+      const glm::dvec3 a = corner[k], b = corner[(k + 1) % 3], up(0, 0.1, 0);
+      const std::vector<glm::dvec3> wall = {b, a, a + up, b + up};
+      test::add_polygon(scene, wall);
+    }
+    PatchModel model = make_patch_model(std::move(scene), {.patch_count = 100});
+    const auto is_hidden = [](const glm::dvec3& p) {
+      return p.y < 1e-6 && p.x > -1e-6 && p.z < 0.2 + 1e-6 && p.x < p.z + 1e-6;
+    };
+    for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+      if (std::ranges::all_of(corners_of(model.mesh, t), is_hidden)) model.shown_patch[t] = kNone;
+    }
+    const RayTracer tracer = test::make_tracer(model);
+    split_vertices(model.shown_patch, tracer, 0, model.mesh);
+    const std::vector<float> absorbed(model.patches.size(), 0.0F);
+    compute_reconstruction_weights(model.shown_patch, absorbed, tracer, model.mesh);
+    int at_corners = 0;
+    for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+      if (model.shown_patch[t] != kNone) continue;
+      for (const std::uint32_t v : model.mesh.triangle[t]) {
+        const glm::dvec3 p = to_dvec3(model.mesh.position[v]);
+        if (std::ranges::none_of(corner, [&](const auto& q) { return distance(p, q) < 1e-5; }))
+          continue;
+        EXPECT_NEAR(shown_value(model, v, [](const Float3&) { return 1.0; }), walled ? 0 : 1, 1e-5);
+        ++at_corners;
+      }
+    }
+    EXPECT_GE(at_corners, 3);
+  }
+}
+
 TEST(ReconstructionWeights, LightEndsWhereACoverDoes) {
   // A plate of 0.8 m 2 mm above a floor of 2 m: below it dim, beside it white. What is below shows
   // what arrives there, however much of its view the plate's back takes.
@@ -254,6 +292,31 @@ TEST(ReconstructionWeights, LightEndsWhereACoverDoes) {
   EXPECT_GT(beside, 100U);
   EXPECT_GT(between, 10U);
   EXPECT_GT(even, 3 * (3 * beside) / 4) << "corners of triangles";
+}
+
+TEST(ReconstructionWeights, ASlotShowsWhatArrivesInIt) {
+  // Deep in a slot of 2 cm below a plate of 1.2 m all patches are covered: that nine tenths of
+  // their view give nothing says that it is dark there, not that they are half under something.
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 1);
+  test::add_box(scene, {-0.6, 0.02, -0.6}, {0.6, 0.03, 0.6}, false);
+  PatchModel model = make_patch_model(std::move(scene), {.patch_count = 300});
+  const auto reaches = [](const Float3& p, float edge) {
+    return p[1] < 0.01F && std::max(std::abs(p[0]), std::abs(p[2])) < edge;
+  };
+  std::vector<float> absorbed;
+  for (const Float3& p : model.patches.centroid) absorbed.push_back(reaches(p, 0.6F) ? 0.9F : 0);
+  compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model), model.mesh);
+  int deep = 0;
+  for (std::uint32_t t = 0; t < model.mesh.triangle.size(); ++t) {
+    if (model.shown_patch[t] == kNone) continue;
+    for (const std::uint32_t v : model.mesh.triangle[t]) {
+      if (!reaches(model.mesh.position[v], 0.3F)) continue;
+      EXPECT_NEAR(shown_value(model, v, [](const Float3&) { return 0.2; }), 0.2, 1e-5);
+      ++deep;
+    }
+  }
+  EXPECT_GT(deep, 30);
 }
 
 }  // namespace
