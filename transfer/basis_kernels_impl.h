@@ -67,10 +67,7 @@ constexpr std::size_t lane_of(std::size_t v, std::size_t light_stride) {
 /// Values that are read in order, as those of bases and dense blocks are.
 template <typename V, typename Value>
 REBOUNCE_INLINE inline V load_ahead(const Value* values) {
-  constexpr std::size_t kLine = 64;
-  if constexpr (V::kWidth * sizeof(float) == kLine) {
-    __builtin_prefetch(values + kAhead / sizeof(Value));
-  }
+  ask_ahead<V::kWidth * sizeof(float)>(values);
   return load_values<V>(values);
 }
 

@@ -108,23 +108,22 @@ template <typename V, Output kOutput, typename Value>
 REBOUNCE_INLINE inline void multiply_dense_block(const Value* values, const DenseBlock& block,
                                                  PlanarVectors<const float> x,
                                                  const DenseOutput& out) {
-  using Direction = DenseBlock::Direction;
   if constexpr (V::kWidth == 16) {
-    if (block.direction == Direction::kBoth && block.columns == 16) {
+    if (block.direction == DenseBlock::Direction::kBoth && block.columns == 16) {
       return multiply_narrow_block<V, 1, kOutput>(values, block, x, out);
     }
-    if (block.direction == Direction::kBoth && block.columns == 32) {
+    if (block.direction == DenseBlock::Direction::kBoth && block.columns == 32) {
       return multiply_narrow_block<V, 2, kOutput>(values, block, x, out);
     }
   }
-  if (block.direction != Direction::kToColumns) {
+  if (block.direction != DenseBlock::Direction::kToColumns) {
     const auto multiply = [&](std::size_t r, V(&sum)[kChannels][4]) REBOUNCE_INLINE {
       multiply_rows<V, 4, kChannels>(values + r * block.columns, block.columns,
                                      x.data + block.column_position, x.stride, sum);
     };
     put_row_sums<V, kOutput>(multiply, block.rows, out);
   }
-  if (block.direction != Direction::kToRows) {
+  if (block.direction != DenseBlock::Direction::kToRows) {
     const float* const from = x.data + block.row_position;
     const auto at = [&](std::size_t c, std::size_t r)
                         REBOUNCE_INLINE { return from + c * x.stride + r; };

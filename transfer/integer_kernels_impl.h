@@ -110,17 +110,10 @@ inline StripBasis strip_at(const std::int16_t* values, const BasisPart& part, st
           width * kRankGroup};
 }
 
-// How far ahead of what is read values are asked for, in bytes: the processor itself looks no
-// farther than the end of a page. Measured: notes/operator.md.
-constexpr std::size_t kAhead = 4096;
-
-/// Values of a basis. Only vectors that are whole cache lines ask for others.
+/// Values of a basis.
 template <typename N>
 REBOUNCE_INLINE inline N load_basis(const std::int16_t* values) {
-  constexpr std::size_t kLine = 64;
-  if constexpr (N::kWidth * sizeof(std::int16_t) == kLine) {
-    __builtin_prefetch(values + kAhead / sizeof(std::int16_t));
-  }
+  ask_ahead<N::kWidth * sizeof(std::int16_t)>(values);
   return N::load(values);
 }
 

@@ -23,6 +23,15 @@
 namespace rebounce {
 namespace {
 
+/// Asks for values that are read in order before their turn. Only registers of kRegister bytes that
+/// are whole cache lines do: others would ask too often.
+template <std::size_t kRegister, typename Value>
+REBOUNCE_INLINE inline void ask_ahead(const Value* values) {
+  // The processor itself looks no farther than the end of a page. Measured: notes/operator.md.
+  constexpr std::size_t kLine = 64, kAhead = 4096;
+  if constexpr (kRegister == kLine) __builtin_prefetch(values + kAhead / sizeof(Value));
+}
+
 template <typename V>
 inline V load_values(const float* p) {
   return V::load(p);
