@@ -42,20 +42,20 @@ ReportSettings settings_for(std::size_t patch_count) {
   settings.links = false;
   if (patch_count >= kHuge) {
     settings.operators = {
-        {0.005, Precision::kQ16}, {0.02, Precision::kQ16}, {0.005, Precision::kF16}};
+        {0.005, Precision::kQ8}, {0.02, Precision::kQ8}, {0.005, Precision::kQ16}};
     settings.ranks = {256};
     return settings;
   }
   settings.operators.clear();
   for (const double tolerance : {0.005, 0.02, 0.01, 0.002, 0.001}) {
-    settings.operators.push_back({tolerance, Precision::kQ16});
+    settings.operators.push_back({tolerance, Precision::kQ8});
   }
   for (const double tolerance : {0.02, 0.005, 0.001}) {
     settings.operators.push_back({tolerance, Precision::kF16});
     settings.operators.push_back({tolerance, Precision::kF32});
   }
-  for (const double tolerance : {0.02, 0.01}) {
-    settings.operators.push_back({tolerance, Precision::kQ8});
+  for (const double tolerance : {0.02, 0.005}) {
+    settings.operators.push_back({tolerance, Precision::kQ16});
   }
   return settings;
 }

@@ -84,16 +84,15 @@ Spectrum right_spectrum(const MatrixXd& a) {
 }
 
 /// The number of directions, at most `largest`, with the least total cost if rank k takes
-/// `value_count(k)` values and each unit of missing energy counts `weight` times.
-template <typename ValueCount>
+/// `size(k)` and each unit of missing energy counts `weight` times.
+template <typename Size>
 Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCost& cost,
-                    double weight, const ValueCount& value_count) {
+                    double weight, const Size& size) {
   Index best = 0;
   double least = cost.total(weight * spectrum.missing[0], 0);
   const Index end = std::min<Index>(largest, spectrum.directions.cols());
   for (Index k = 1; k <= end; ++k) {
-    const double total =
-        cost.total(weight * spectrum.missing[k], static_cast<double>(value_count(k)));
+    const double total = cost.total(weight * spectrum.missing[k], size(k));
     if (total < least) {
       least = total;
       best = k;
@@ -104,7 +103,7 @@ Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCo
 
 Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cost, double limit) {
   const Index per_rank = block.on_diagonal ? block.rows() : block.rows() + block.columns();
-  const double affordable = limit / (cost.price * static_cast<double>(per_rank));
+  const double affordable = limit / (cost.price * cost.size(per_rank, 0));
   const Index largest = block.rows() > kLargeBlock ? block.rows() / 4 : block.rows();
   return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
 }
@@ -113,8 +112,8 @@ void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index large
                        const CompressionCost& cost, LowRankBlock& result) {
   const Index m = block.rows(), matrices = block.matrix_count;
   // What is missing from the rows is missing from the columns too.
-  const Index rank =
-      cheapest_rank(rows, largest, cost, 2, [&](Index k) { return m * k + matrices * k * k; });
+  const Index rank = cheapest_rank(rows, largest, cost, 2,
+                                   [&](Index k) { return cost.size(m * k, matrices * k * k); });
   result.row_basis = rows.directions.leftCols(rank);
   double kept = 0;
   for (Index c = 0; c < matrices; ++c) {
@@ -128,8 +127,8 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
               const CompressionCost& cost, LowRankBlock& result) {
   const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
   // Half of a core for the rows and half for the columns.
-  const Index row_rank =
-      cheapest_rank(rows, largest, cost, 1, [&](Index k) { return m * k + matrices * k * k / 2; });
+  const Index row_rank = cheapest_rank(
+      rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, matrices * k * k / 2); });
   result.row_basis = rows.directions.leftCols(row_rank);
   result.error_squared = rows.missing[row_rank];
   MatrixXd projected(matrices * row_rank, n);
@@ -139,8 +138,9 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
   Index column_rank = 0;
   if (row_rank > 0) {
     const Spectrum columns = right_spectrum(projected);
-    column_rank = cheapest_rank(columns, largest, cost, 1,
-                                [&](Index k) { return n * k + matrices * row_rank * k / 2; });
+    column_rank = cheapest_rank(columns, largest, cost, 1, [&](Index k) {
+      return cost.size(n * k, matrices * row_rank * k / 2);
+    });
     result.column_basis = columns.directions.leftCols(column_rank);
     result.error_squared += columns.missing[column_rank];
   } else {
@@ -149,12 +149,6 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
   for (Index c = 0; c < matrices; ++c) {
     result.cores.push_back(projected.middleRows(c * row_rank, row_rank) * result.column_basis);
   }
-}
-
-double value_count(const LowRankBlock& block) {
-  Index count = block.row_basis.size() + block.column_basis.size();
-  for (const MatrixXd& core : block.cores) count += core.size();
-  return static_cast<double>(count);
 }
 
 }  // namespace
@@ -169,7 +163,8 @@ std::optional<LowRankBlock> compress_block(const WideBlock& block, const Compres
   } else {
     truncate(block, rows, largest, cost, result);
   }
-  if (cost.total(result.error_squared, value_count(result)) >= limit) return std::nullopt;
+  const double size = cost.size(result.basis_values(), result.core_values());
+  if (cost.total(result.error_squared, size) >= limit) return std::nullopt;
   return result;
 }
 

@@ -25,17 +25,27 @@ struct LowRankBlock {
   Eigen::MatrixXd column_basis;        ///< [columns][column rank], likewise
   std::vector<Eigen::MatrixXd> cores;  ///< [matrices], [row rank][column rank]
   double error_squared = 0;            ///< Frobenius, of all matrices together
+
+  Eigen::Index basis_values() const { return row_basis.size() + column_basis.size(); }
+  Eigen::Index core_values() const {
+    return cores.empty() ? 0 : static_cast<Eigen::Index>(cores.size()) * cores.front().size();
+  }
 };
 
-/// What the construction minimises: error² + price x values, summed over the blocks. For every
+/// What the construction minimises: error² + price x size, summed over the blocks. For every
 /// price this is the smallest operator of its error (and the most exact one of its size) that the
 /// cluster tree admits.
 struct CompressionCost {
-  double price = 0;         ///< squared error that one stored value is worth
+  double price = 0;  ///< squared error that one stored value of a core or dense block is worth
   double multiplicity = 1;  ///< 2 for a block that stands for its mirror image as well
+  double basis_value = 1;   ///< size of a value of a basis, in values of cores
 
-  double total(double error_squared, double value_count) const {
-    return multiplicity * error_squared + price * value_count;
+  /// Of bases and cores with so many values.
+  double size(Eigen::Index bases, Eigen::Index cores) const {
+    return basis_value * static_cast<double>(bases) + static_cast<double>(cores);
+  }
+  double total(double error_squared, double size) const {
+    return multiplicity * error_squared + price * size;
   }
 };
 

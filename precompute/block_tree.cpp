@@ -48,11 +48,11 @@ class PieceCompressor {
  public:
   PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
                   const std::vector<ClusterWeight>& weights, const WantedBlocks& wanted,
-                  double price, const BlockPiece& piece)
+                  const CompressionCost& cost, const BlockPiece& piece)
       : tree_(tree),
         weights_(weights),
         wanted_(wanted),
-        price_(price),
+        cost_(cost),
         row_(piece.row),
         column_(piece.column),
         row_begin_(tree.clusters[piece.row].begin),
@@ -117,9 +117,10 @@ class PieceCompressor {
                               .column_begin = columns.begin,
                               .column_count = columns.count};
     const WideBlock block = weighted_block(place, row, column);
-    const CompressionCost cost{price_, multiplicity(row, column)};
+    CompressionCost cost = cost_;
+    cost.multiplicity = multiplicity(row, column);
     const double zero_cost = cost.total(block.entries.squaredNorm(), kBlockOverhead);
-    const double overhead = price_ * kBlockOverhead;
+    const double overhead = cost.price * kBlockOverhead;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
     const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
     const bool leaves = rows.is_leaf() && columns.is_leaf();
@@ -161,7 +162,7 @@ class PieceCompressor {
     const WideBlock block = wide_block(place);
     BlockPart part{{place}, {}, 0};
     for (Index m = 0; m < block.matrix_count; ++m) append_rows(block.matrix(m), part.values);
-    part.cost = price_ * (kBlockOverhead + static_cast<double>(part.values.size()));
+    part.cost = cost_.price * (kBlockOverhead + static_cast<double>(part.values.size()));
     return part;
   }
 
@@ -189,15 +190,15 @@ class PieceCompressor {
     append_columns(block.row_basis, part.values);
     append_columns(block.column_basis, part.values);
     for (const Eigen::MatrixXd& core : block.cores) append_rows(core, part.values);
-    part.cost =
-        cost.total(block.error_squared, kBlockOverhead + static_cast<double>(part.values.size()));
+    part.cost = cost.total(block.error_squared,
+                           kBlockOverhead + cost.size(block.basis_values(), block.core_values()));
     return part;
   }
 
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
   const WantedBlocks& wanted_;
-  double price_;
+  CompressionCost cost_;
   std::uint32_t row_, column_, row_begin_, column_begin_;
   std::vector<Eigen::MatrixXf> matrices_;
 };
@@ -247,13 +248,14 @@ std::vector<BlockPiece> BlockTreeCompressor::pieces() const {
 BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double price,
                                         const Progress& progress) const {
   const SingleThreadedBlas single_threaded;
+  const CompressionCost cost{.price = price, .basis_value = basis_value_};
   std::vector<BlockPart> parts(pieces.size());
   ParallelProgress loop(progress, pieces.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (loop.stopped()) continue;
     if (wants(pieces[k])) {
-      parts[k] = PieceCompressor(matrix_, tree_, weights_, wanted_, price, pieces[k]).compress();
+      parts[k] = PieceCompressor(matrix_, tree_, weights_, wanted_, cost, pieces[k]).compress();
     }
     loop.advance();
   }

@@ -37,16 +37,21 @@ std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t larg
 
 /// Compresses one matrix at any number of prices.
 ///
-/// What is minimised is error² + price x values, in which the error is that of the
-/// symmetric form in the Frobenius norm, with the weights of light_weights.h on both sides, or on
-/// the side that light comes from where but one direction is wanted. Where the roles of the matrix
-/// want none there is no block.
+/// What is minimised is error² + price x size, in which the error is that of the symmetric form in
+/// the Frobenius norm, with the weights of light_weights.h on both sides, or on the side that light
+/// comes from where but one direction is wanted. Where the roles of the matrix want none there is
+/// no block.
 class BlockTreeCompressor {
  public:
-  /// All that is given must outlive the object; `weights` has one entry for each cluster.
+  /// All that is given must outlive the object; `weights` has one entry for each cluster, and
+  /// `basis_value` is the size of a value of a basis, where one of a core is 1.
   BlockTreeCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
-                      const std::vector<ClusterWeight>& weights)
-      : matrix_(matrix), tree_(tree), weights_(weights), wanted_(matrix.roles(), tree) {}
+                      const std::vector<ClusterWeight>& weights, double basis_value = 1)
+      : matrix_(matrix),
+        tree_(tree),
+        weights_(weights),
+        wanted_(matrix.roles(), tree),
+        basis_value_(basis_value) {}
 
   /// All pieces, with sides of largest_piece at most.
   std::vector<BlockPiece> pieces() const;
@@ -66,6 +71,7 @@ class BlockTreeCompressor {
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
   WantedBlocks wanted_;
+  double basis_value_;
 };
 
 }  // namespace rebounce

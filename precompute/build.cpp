@@ -74,11 +74,9 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model, const Patc
   }
   if (!settings.precision) {
     const bool dense = settings.operator_kind == OperatorKind::kDense;
-    settings.precision = hierarchical ? Precision::kQ16 : dense ? Precision::kF32 : Precision::kF16;
+    settings.precision = hierarchical ? Precision::kQ8 : dense ? Precision::kF32 : Precision::kF16;
   }
-  const bool integers =
-      settings.precision == Precision::kQ16 || settings.precision == Precision::kQ8;
-  if (integers && !hierarchical) {
+  if (has_integer_bases(*settings.precision) && !hierarchical) {
     throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
   }
   if (!hierarchical) settings.tolerance = 0;

@@ -87,18 +87,26 @@ struct KeptParts {
   std::string prefix;
 };
 
+/// What a value of a basis takes, in values of cores: bytes, with the remainders of some, beside
+/// halves.
+double basis_value(Precision precision) {
+  return precision == Precision::kQ8 ? 0.55 : 1;
+}
+
 /// A compressor with all that it looks at.
 class Compression {
  public:
-  Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping)
+  Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping,
+              double basis_value)
       : matrix_(matrix),
+        basis_value_(basis_value),
         truth_(matrix, with_uniform(patches.size(), shaping)),
         frame_(frame_of(matrix, patches, truth_)) {}
 
   HierarchicalOperator::Storage at(double price, const KeptParts& kept,
                                    const Progress& progress) const {
     const std::vector<ClusterWeight> weights = frame_.weights();
-    const BlockTreeCompressor compressor(matrix_, frame_.tree, weights);
+    const BlockTreeCompressor compressor(matrix_, frame_.tree, weights, basis_value_);
     const std::vector<BlockPiece> pieces = compressor.pieces();
     const std::size_t together = kept.checkpoint.keeps() ? kKeptPieces : pieces.size();
     const auto all = static_cast<double>(pieces.size());
@@ -130,6 +138,7 @@ class Compression {
 
  private:
   const SymmetricMatrix& matrix_;
+  double basis_value_;
   LitTruth truth_;
   CompressionFrame frame_;
 };
@@ -169,7 +178,7 @@ double first_price(double tolerance, std::size_t patch_count) {
 HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
                                               const PatchTable& patches, Exitances shaping,
                                               double price, const Progress& progress) {
-  return Compression(matrix, patches, shaping).at(price, {BlockCheckpoint(), {}}, progress);
+  return Compression(matrix, patches, shaping, 1).at(price, {BlockCheckpoint(), {}}, progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
@@ -177,7 +186,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
   const LitTruth judging = judging_truth(matrix, lights.judging);
-  Compression compression(matrix, patches, lights.shaping);
+  Compression compression(matrix, patches, lights.shaping, basis_value(settings.precision));
   const double tolerance = settings.tolerance;
   PriceSearch search(compression.price_of(first_price(tolerance, patches.size())),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});

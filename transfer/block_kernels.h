@@ -64,6 +64,9 @@ struct CoreBlock {
   std::uint32_t rows, columns;
   std::uint32_t row, column;  ///< first coefficients at its ends
   Direction direction;
+  /// Of the coefficients at its ends, those of remainders, after its own
+  /// (HierarchicalOperator::kRemainderScale).
+  std::uint32_t row_remainders = 0, column_remainders = 0;
 };
 
 /// What serves the channels of an entry of kMatrices neighbouring values: lanes of four entries.
@@ -76,12 +79,13 @@ struct ChannelLanes {
 };
 
 /// out(row) = S in(column) and out(column) = S^T in(row), as its direction says, for one core after
-/// the other and each light; what was there before is overwritten. Sixteen values are read from the
-/// beginning of each entry.
+/// the other and each light; what was there before is overwritten. Coefficients of remainders are
+/// added to those that they belong to, and become zero; those that come out are written too.
+/// Sixteen values are read from the beginning of each entry.
 template <typename Value>
 using CoreKernel = void (*)(const Value* values, std::span<const CoreBlock> cores,
                             const ChannelLanes& lanes, std::size_t light_count,
-                            Coefficients<const float> in, Coefficients<float> out);
+                            Coefficients<float> in, Coefficients<float> out);
 
 /// A dense block of the only matrix of an operator, [rows][columns], both multiples of
 /// HierarchicalOperator::kAlignment.

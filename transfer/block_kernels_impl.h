@@ -19,14 +19,19 @@ constexpr BasisKernels<Value> make_basis_kernels() {
   return {project<V, Value>, expand<V, Value>};
 }
 
+template <typename N, typename Value>
+constexpr BasisKernels<Value> make_integer_kernels() {
+  return {project_integers<N, Value>, expand_integers<N, Value>};
+}
+
 template <typename V, typename N>
 constexpr BlockKernelSet make_block_kernels(const char* instruction_set) {
   return {
       instruction_set,
       make_basis_kernels<V, float>(),
       make_basis_kernels<V, std::uint16_t>(),
-      {project_integers<N>, expand_integers<N>},
-      make_basis_kernels<V, std::int8_t>(),
+      make_integer_kernels<N, std::int16_t>(),
+      make_integer_kernels<N, std::int8_t>(),
       {multiply_cores<V, float>, multiply_dense<V, float>, add_products<V>, add_dense<V, float>},
       {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>, add_products<V>,
        add_dense<V, std::uint16_t>}};

@@ -219,7 +219,7 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void multiply(std::span<const CoreBlock> cores) {
-    cores_.multiply(core_values_, cores, lanes_, 1, sent_.from(0), arrived_.to(0));
+    cores_.multiply(core_values_, cores, lanes_, 1, sent_.to(0), arrived_.to(0));
   }
 
   void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
@@ -237,7 +237,8 @@ class ClusterRelaxation final : public Relaxation {
     }
     if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
     if (block.row_rank > 0) {
-      const CoreBlock core = diagonal_core(step, block.row_rank, block.row_rank);
+      CoreBlock core = diagonal_core(step, block.row_rank, block.row_rank);
+      core.row_remainders = core.column_remainders = block.row_remainders;
       project({&step.basis, 1});
       multiply({&core, 1});
       expand({&step.basis, 1}, received_);

@@ -61,7 +61,7 @@ class Planner {
       if (!blocks_[b].on_diagonal()) continue;
       const HierarchicalLayout::Place& place = layout_.places[b];
       plan_.steps.push_back({.diagonal = blocks_[b],
-                             .basis = basis_of(blocks_[b], place.row, blocks_[b].row_rank),
+                             .basis = basis_of(blocks_[b], place.row, blocks_[b].row_vectors()),
                              .values = place.values,
                              .coefficient = place.row.coefficient});
     }
@@ -114,8 +114,8 @@ class Planner {
       const TransferBlock& block = blocks_[b];
       if (!is_below_diagonal(block) || block.kind == TransferBlock::Kind::kDense) continue;
       const HierarchicalLayout::Place& place = layout_.places[b];
-      add_basis(rows, rows_of(block), basis_of(block, place.row, block.row_rank));
-      add_basis(columns, columns_of(block), basis_of(block, place.column, block.column_rank));
+      add_basis(rows, rows_of(block), basis_of(block, place.row, block.row_vectors()));
+      add_basis(columns, columns_of(block), basis_of(block, place.column, block.column_vectors()));
     }
     plan_.row_bases = rows.made();
     plan_.column_bases = columns.made();
@@ -179,7 +179,9 @@ class Planner {
                                       .columns = block.column_rank,
                                       .row = place.row.coefficient,
                                       .column = place.column.coefficient,
-                                      .direction = products.direction});
+                                      .direction = products.direction,
+                                      .row_remainders = block.row_remainders,
+                                      .column_remainders = block.column_remainders});
     }
   }
 

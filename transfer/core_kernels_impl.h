@@ -8,6 +8,7 @@
 #include <span>
 
 #include "block_kernels.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "vector_load.h"
 
 namespace rebounce {
@@ -92,6 +93,47 @@ REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& 
                                  });
 }
 
+/// Adds what came in for remainders to the coefficients that they belong to. Not twice, if a core
+/// is multiplied again with what came in.
+REBOUNCE_INLINE inline void fold_remainders(float* in, std::size_t rank, std::size_t remainders) {
+  constexpr float kScale = 1 / HierarchicalOperator::kRemainderScale;
+  float* const remainder = in + rank * kChannelLanes;
+  for (std::size_t k = 0; k < remainders * kChannelLanes; ++k) {
+    in[k] += kScale * remainder[k];
+    remainder[k] = 0;
+  }
+}
+
+/// What goes out to remainders.
+REBOUNCE_INLINE inline void spread_remainders(float* out, std::size_t rank,
+                                              std::size_t remainders) {
+  constexpr float kScale = 1 / HierarchicalOperator::kRemainderScale;
+  float* const remainder = out + rank * kChannelLanes;
+  for (std::size_t k = 0; k < remainders * kChannelLanes; ++k) remainder[k] = kScale * out[k];
+}
+
+/// A core in its direction, with the remainders at its ends.
+template <typename V, Direction kDirection, typename Entries, typename Value>
+REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CoreBlock& core,
+                                          const ChannelLanes& lanes, float* in, float* out) {
+  float* const row = in + std::size_t{core.row} * kChannelLanes;
+  float* const column = in + std::size_t{core.column} * kChannelLanes;
+  if constexpr (kDirection != Direction::kToColumns) {
+    fold_remainders(column, core.columns, core.column_remainders);
+  }
+  if constexpr (kDirection != Direction::kToRows) {
+    fold_remainders(row, core.rows, core.row_remainders);
+  }
+  multiply_core<V, kDirection, Entries>(values, core, lanes, in, out);
+  if constexpr (kDirection != Direction::kToColumns) {
+    spread_remainders(out + std::size_t{core.row} * kChannelLanes, core.rows, core.row_remainders);
+  }
+  if constexpr (kDirection != Direction::kToRows) {
+    spread_remainders(out + std::size_t{core.column} * kChannelLanes, core.columns,
+                      core.column_remainders);
+  }
+}
+
 // Cores are asked for this many before their turn: sweeps and applies leave out what lies between
 // them. Most have two cache lines at most.
 constexpr std::size_t kCoresAhead = 8;
@@ -104,10 +146,10 @@ inline void ask_for_two_lines(const void* p) {
 
 template <typename V, typename Entries, typename Value>
 void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
-                         const ChannelLanes& lanes, std::size_t light_count,
-                         Coefficients<const float> in, Coefficients<float> out) {
+                         const ChannelLanes& lanes, std::size_t light_count, Coefficients<float> in,
+                         Coefficients<float> out) {
   for (std::size_t l = 0; l < light_count; ++l) {
-    const float* const from = in.data + l * in.stride;
+    float* const from = in.data + l * in.stride;
     float* const to = out.data + l * out.stride;
     for (std::size_t k = 0; k < cores.size(); ++k) {
       const CoreBlock& core = cores[k];
@@ -117,13 +159,13 @@ void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
       }
       switch (core.direction) {
         case Direction::kBoth:
-          multiply_core<V, Direction::kBoth, Entries>(s, core, lanes, from, to);
+          multiply_ends<V, Direction::kBoth, Entries>(s, core, lanes, from, to);
           break;
         case Direction::kToRows:
-          multiply_core<V, Direction::kToRows, Entries>(s, core, lanes, from, to);
+          multiply_ends<V, Direction::kToRows, Entries>(s, core, lanes, from, to);
           break;
         case Direction::kToColumns:
-          multiply_core<V, Direction::kToColumns, Entries>(s, core, lanes, from, to);
+          multiply_ends<V, Direction::kToColumns, Entries>(s, core, lanes, from, to);
           break;
       }
     }
@@ -132,8 +174,8 @@ void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
 
 template <typename V, typename Value>
 void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
-                    const ChannelLanes& lanes, std::size_t light_count,
-                    Coefficients<const float> in, Coefficients<float> out) {
+                    const ChannelLanes& lanes, std::size_t light_count, Coefficients<float> in,
+                    Coefficients<float> out) {
   if constexpr (V::kWidth == 16) {
     if (lanes.matrix_count == 1) {
       using Entries = typename V::OneMatrixEntries;

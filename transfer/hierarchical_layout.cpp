@@ -31,11 +31,11 @@ void visit_ends(std::span<const TransferBlock> blocks,
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
     if (!is_low_rank(block)) continue;
-    visit(places[b].row, block.row_begin, block.row_count, block.row_rank);
+    visit(places[b].row, block.row_begin, block.row_count, block.row_vectors());
     if (block.on_diagonal()) {
       places[b].column = places[b].row;
     } else {
-      visit(places[b].column, block.column_begin, block.column_count, block.column_rank);
+      visit(places[b].column, block.column_begin, block.column_count, block.column_vectors());
     }
   }
 }
@@ -56,7 +56,7 @@ bool has_values(const TransferBlock& block) {
 HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
                                        std::uint32_t matrix_count, Precision precision)
     : places(blocks.size()),
-      rank_group(precision == Precision::kQ16 ? HierarchicalOperator::kRankGroup : 1) {
+      rank_group(has_integer_bases(precision) ? HierarchicalOperator::kRankGroup : 1) {
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
     total += block.value_count(matrix_count);

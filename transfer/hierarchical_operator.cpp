@@ -97,7 +97,7 @@ class Phases {
   }
 
   void multiply(std::span<const CoreBlock> cores) const {
-    cores_.multiply(value_, cores, lanes_, work_.light_count, constant(work_.sent), work_.arrived);
+    cores_.multiply(value_, cores, lanes_, work_.light_count, work_.sent, work_.arrived);
   }
 
   void multiply_dense(std::span<const DenseBlock> blocks) const {

@@ -111,7 +111,9 @@ class Planner {
                          .column = place.column.coefficient,
                          .direction = !to_columns ? Direction::kToRows
                                       : !to_rows  ? Direction::kToColumns
-                                                  : Direction::kBoth};
+                                                  : Direction::kBoth,
+                         .row_remainders = block.row_remainders,
+                         .column_remainders = block.column_remainders};
     if (dense && storage_.matrix_count == 1) {
       plan_.dense.push_back({.values = core.values,
                              .rows = core.rows,
@@ -125,14 +127,11 @@ class Planner {
       plan_.cores.push_back(core);
     }
     plan_.value_count += std::uint64_t{storage_.matrix_count} * core.rows * core.columns;
-    if (to_rows) {
-      add_way(dense, whole_end(block.column_begin, core.columns, core.column),
-              whole_end(block.row_begin, core.rows, core.row));
-    }
-    if (to_columns) {
-      add_way(dense, whole_end(block.row_begin, core.rows, core.row),
-              whole_end(block.column_begin, core.columns, core.column));
-    }
+    const DenseEnd rows = whole_end(block.row_begin, core.rows + core.row_remainders, core.row);
+    const DenseEnd columns =
+        whole_end(block.column_begin, core.columns + core.column_remainders, core.column);
+    if (to_rows) add_way(dense, columns, rows);
+    if (to_columns) add_way(dense, rows, columns);
   }
 
   static DenseEnd whole_end(std::uint32_t position, std::uint32_t count,

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "half_float.h"
+#include "integer_encoding.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -43,12 +44,18 @@ void check_block(const TransferBlock& block, std::size_t position_count) {
   if (misplaced) refuse("a block is neither on the diagonal nor below it");
   switch (block.kind) {
     case TransferBlock::Kind::kDense:
-      if (block.row_rank != 0 || block.column_rank != 0) refuse("a dense block has a rank");
+      if (block.row_vectors() != 0 || block.column_vectors() != 0) {
+        refuse("a dense block has a rank");
+      }
       return;
     case TransferBlock::Kind::kLowRank:
       if (block.row_rank > block.row_count || block.column_rank > block.column_count ||
           (block.on_diagonal() && block.row_rank != block.column_rank)) {
         refuse("the ranks of a block do not fit its size");
+      }
+      if (block.row_remainders > block.row_rank || block.column_remainders > block.column_rank ||
+          (block.on_diagonal() && block.row_remainders != block.column_remainders)) {
+        refuse("the remainders of a block do not fit its ranks");
       }
       return;
   }
@@ -75,6 +82,9 @@ void check_tables(const Storage& storage) {
     const bool one_rank = (block.row_rank == 0) != (block.column_rank == 0);
     if (one_rank && storage.order == HierarchicalOperator::Order::kStreamed) {
       refuse("a block has only one rank");
+    }
+    if (block.row_remainders + block.column_remainders > 0 && storage.precision != Precision::kQ8) {
+      refuse("a block has remainders, which are for bases in 8 bits alone");
     }
   }
 }
@@ -130,9 +140,26 @@ SharedArray<Value> stream_values(const Storage& storage, const std::vector<Trans
 class ValueReader {
  public:
   ValueReader(const Storage& storage, const HierarchicalLayout& layout)
-      : storage_(storage), first_core_(layout.basis_value_count) {}
+      : storage_(storage), layout_(layout), first_core_(layout.basis_value_count) {}
 
-  double basis(std::uint64_t index) const {
+  /// Of one end of a block, `vectors` of which are stored, remainders after `rank` of them.
+  double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vectors,
+               std::uint64_t vector, std::uint64_t position) const {
+    const double value = stored_basis(layout_.basis_index(end, vector, position));
+    if (rank + vector >= vectors) return value;
+    return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
+                       double{HierarchicalOperator::kRemainderScale};
+  }
+  /// Of a core or a dense entry.
+  double core(std::uint64_t index) const {
+    if (storage_.precision == Precision::kF32) return storage_.values_f32[first_core_ + index];
+    const std::uint64_t first = storage_.precision == Precision::kF16 ? first_core_ : 0;
+    return half_to_float(storage_.values_f16[first + index]) /
+           double{HierarchicalOperator::kHalfScale};
+  }
+
+ private:
+  double stored_basis(std::uint64_t index) const {
     switch (storage_.precision) {
       case Precision::kF16:
         return half_to_float(storage_.values_f16[index]);
@@ -145,16 +172,9 @@ class ValueReader {
     }
     return storage_.values_f32[index];
   }
-  /// Of a core or a dense entry.
-  double core(std::uint64_t index) const {
-    if (storage_.precision == Precision::kF32) return storage_.values_f32[first_core_ + index];
-    const std::uint64_t first = storage_.precision == Precision::kF16 ? first_core_ : 0;
-    return half_to_float(storage_.values_f16[first + index]) /
-           double{HierarchicalOperator::kHalfScale};
-  }
 
- private:
   const Storage& storage_;
+  const HierarchicalLayout& layout_;
   std::uint64_t first_core_;
 };
 
@@ -178,129 +198,20 @@ ArraySizes expected_sizes(const Storage& storage) {
   return {.f32 = all};
 }
 
-std::uint16_t encoded(float value) {
-  const std::uint16_t half = float_to_half(value * HierarchicalOperator::kHalfScale);
-  if ((half & 0x7FFFU) >= 0x7C00U) {
-    throw Error("an entry of the operator is too large for f16; use --precision f32");
-  }
-  return half;
-}
-
-/// A kind of integers that bases are rounded to: their largest magnitude, and which of them stands
-/// for 1.
-template <typename Integer>
-struct IntegerRange;
-template <>
-struct IntegerRange<std::int8_t> {
-  static constexpr float kLargest = 127, kScale = HierarchicalOperator::kByteScale;
-};
-template <>
-struct IntegerRange<std::int16_t> {
-  static constexpr float kLargest = HierarchicalOperator::kLargestShort;
-  static constexpr float kScale = HierarchicalOperator::kShortScale;
-};
-
-/// Rounds the bases of operators in f32, and multiplies their cores to make up for the scales.
-template <typename Integer>
-class IntegerEncoder {
- public:
-  using Layout = HierarchicalLayout;
-
-  IntegerEncoder(const Storage& exact, Storage& rounded)
-      : exact_(exact.values_f32.data()),
-        matrix_count_(exact.matrix_count),
-        from_(exact),
-        to_(rounded),
-        bases_(Layout::padded(to_.basis_value_count)),
-        cores_(Layout::padded(to_.core_value_count)) {
-    for (std::size_t b = 0; b < exact.blocks.size(); ++b) encode(exact.blocks[b], b);
-  }
-
-  SharedArray<Integer> take_bases() { return SharedArray(std::move(bases_)); }
-  SharedArray<std::uint16_t> take_cores() { return SharedArray(std::move(cores_)); }
-
- private:
-  void encode(const TransferBlock& block, std::size_t index) {
-    const Layout::Place &from = from_.places[index], &to = to_.places[index];
-    const float* core = exact_ + from_.basis_value_count + from.values;
-    std::uint16_t* encoded_core = cores_.data() + to.values;
-    if (block.kind == TransferBlock::Kind::kDense) {
-      std::transform(core, core + block.value_count(matrix_count_), encoded_core, encoded);
-    } else if (has_values(block)) {
-      const std::vector<float> rows =
-          encode_basis(from.row, to.row, block.row_rank, block.row_count);
-      const std::vector<float> columns =
-          encode_basis(from.column, to.column, block.column_rank, block.column_count);
-      for (const float row : rows) {
-        for (const float column : columns) {
-          for (std::uint32_t matrix = 0; matrix < matrix_count_; ++matrix) {
-            *encoded_core++ = encoded(*core++ * row * column);
-          }
-        }
-      }
-    }
-  }
-
-  /// Returns what each vector must be multiplied by, over kScale.
-  std::vector<float> encode_basis(const Layout::End& from, const Layout::End& to, std::size_t rank,
-                                  std::size_t size) {
-    constexpr float kLargest = IntegerRange<Integer>::kLargest;
-    std::vector<float> scale(rank);
-    for (std::size_t r = 0; r < rank; ++r) {
-      const float* const basis = exact_ + from_.basis_index(from, r, 0);
-      float largest = 0;
-      for (std::size_t k = 0; k < size; ++k) largest = std::max(largest, std::abs(basis[k]));
-      if (largest == 0) continue;
-      for (std::size_t k = 0; k < size; ++k) {
-        bases_[to_.basis_index(to, r, k)] =
-            static_cast<Integer>(std::lround(basis[k] / largest * kLargest));
-      }
-      scale[r] = largest / kLargest * IntegerRange<Integer>::kScale;
-    }
-    return scale;
-  }
-
-  const float* exact_;
-  std::uint32_t matrix_count_;
-  Layout from_, to_;
-  std::vector<Integer> bases_;
-  std::vector<std::uint16_t> cores_;
-};
-
-/// An operator in f32 without its values, for those that `precision` has.
-Storage without_values(const Storage& exact, Precision precision) {
-  Storage storage = exact;
-  storage.precision = precision;
-  storage.values_f32 = {};
-  return storage;
-}
-
-/// An operator in f32 with integers for its bases, kept as `bases`.
-template <typename Integer>
-Storage encode_integers(const Storage& storage, Precision precision,
-                        SharedArray<Integer> Storage::*bases) {
-  const Storage exact = HierarchicalOperator::stream(storage);
-  Storage integers = without_values(exact, precision);
-  IntegerEncoder<Integer> encoder(exact, integers);
-  integers.*bases = encoder.take_bases();
-  integers.values_f16 = encoder.take_cores();
-  return integers;
-}
-
 }  // namespace
 
 std::uint64_t TransferBlock::value_count(std::uint32_t matrix_count) const {
   const std::uint64_t rows = row_count, columns = column_count;
   if (kind == Kind::kDense) return matrix_count * rows * columns;
-  const std::uint64_t column_basis = on_diagonal() ? 0 : columns * column_rank;
-  return rows * row_rank + column_basis +
+  const std::uint64_t column_basis = on_diagonal() ? 0 : columns * column_vectors();
+  return rows * row_vectors() + column_basis +
          std::uint64_t{matrix_count} * row_rank * std::uint64_t{column_rank};
 }
 
 void check_hierarchical_storage(const Storage& storage) {
   check_tables(storage);
-  const bool integers = storage.precision == Precision::kQ16 || storage.precision == Precision::kQ8;
-  if (integers && storage.order != HierarchicalOperator::Order::kStreamed) {
+  if (has_integer_bases(storage.precision) &&
+      storage.order != HierarchicalOperator::Order::kStreamed) {
     refuse("integers are for streamed values alone");
   }
   const ArraySizes sizes{storage.values_f32.size(), storage.values_f16.size(),
@@ -312,6 +223,14 @@ void check_hierarchical_storage(const Storage& storage) {
   if (std::ranges::any_of(storage.bases_q16.span(), too_large)) {
     refuse("a value of the bases is beyond +-" + std::to_string(kLargest));
   }
+}
+
+std::uint16_t encode_core_value(float value) {
+  const std::uint16_t half = float_to_half(value * HierarchicalOperator::kHalfScale);
+  if ((half & 0x7FFFU) >= 0x7C00U) {
+    throw Error("an entry of the operator is too large for f16; use --precision f32");
+  }
+  return half;
 }
 
 Storage HierarchicalOperator::stream(const Storage& storage) {
@@ -332,23 +251,25 @@ Storage HierarchicalOperator::stream(const Storage& storage) {
 
 Storage HierarchicalOperator::encode_half(const Storage& storage) {
   const Storage exact = stream(storage);
-  Storage half = without_values(exact, Precision::kF16);
+  Storage half = exact;
+  half.precision = Precision::kF16;
+  half.values_f32 = {};
   const HierarchicalLayout layout(half);
   std::vector<std::uint16_t> values(exact.values_f32.size());
   for (std::uint64_t k = 0; k < values.size(); ++k) {
     const float value = exact.values_f32[k];
-    values[k] = k < layout.basis_value_count ? float_to_half(value) : encoded(value);
+    values[k] = k < layout.basis_value_count ? float_to_half(value) : encode_core_value(value);
   }
   half.values_f16 = SharedArray(std::move(values));
   return half;
 }
 
 Storage HierarchicalOperator::encode_shorts(const Storage& storage) {
-  return encode_integers(storage, Precision::kQ16, &Storage::bases_q16);
+  return encode_integers(stream(storage), Precision::kQ16);
 }
 
 Storage HierarchicalOperator::encode_bytes(const Storage& storage) {
-  return encode_integers(storage, Precision::kQ8, &Storage::bases_q8);
+  return encode_integers(stream(storage), Precision::kQ8);
 }
 
 Storage HierarchicalOperator::encode(const Storage& storage, Precision precision) {
@@ -373,25 +294,28 @@ Storage decode(const Storage& storage) {
   decoded.values_f16 = {};
   decoded.bases_q16 = {};
   decoded.bases_q8 = {};
+  for (TransferBlock& block : decoded.blocks) block.row_remainders = block.column_remainders = 0;
   const HierarchicalLayout from(streamed), to(decoded);
   const ValueReader read(streamed, from);
   std::vector<float> values(HierarchicalLayout::padded(to.basis_value_count + to.core_value_count));
   const auto copy_basis = [&](const HierarchicalLayout::End& source,
                               const HierarchicalLayout::End& target, std::uint32_t rank,
-                              std::uint32_t size) {
+                              std::uint32_t vectors, std::uint32_t size) {
     for (std::uint32_t r = 0; r < rank; ++r) {
       for (std::uint32_t k = 0; k < size; ++k) {
         values[to.basis_index(target, r, k)] =
-            static_cast<float>(read.basis(from.basis_index(source, r, k)));
+            static_cast<float>(read.basis(source, rank, vectors, r, k));
       }
     }
   };
   for (std::size_t b = 0; b < streamed.blocks.size(); ++b) {
     const TransferBlock& block = streamed.blocks[b];
     if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
-    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_count);
+    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_vectors(),
+               block.row_count);
     if (block.on_diagonal()) continue;
-    copy_basis(from.places[b].column, to.places[b].column, block.column_rank, block.column_count);
+    copy_basis(from.places[b].column, to.places[b].column, block.column_rank,
+               block.column_vectors(), block.column_count);
   }
   for (std::uint64_t k = 0; k < to.core_value_count; ++k) {
     values[to.basis_value_count + k] = static_cast<float>(read.core(k));
@@ -414,20 +338,17 @@ std::vector<double> block_entries(const Storage& storage, const HierarchicalLayo
     return entries;
   }
   const std::size_t row_rank = block.row_rank, column_rank = block.column_rank;
-  const auto value_of = [&](const HierarchicalLayout::End& end, std::size_t rank,
-                            std::size_t position) {
-    return read.basis(layout.basis_index(end, rank, position));
-  };
   std::vector<double> right(columns);  // a row of S V^T
   for (std::size_t r = 0; r < row_rank; ++r) {
     std::ranges::fill(right, 0.0);
     for (std::size_t k = 0; k < column_rank; ++k) {
       const std::uint64_t entry = r * column_rank + k;
       const double core = read.core(place.values + entry * storage.matrix_count + matrix);
-      for (std::size_t j = 0; j < columns; ++j) right[j] += core * value_of(place.column, k, j);
+      for (std::size_t j = 0; j < columns; ++j)
+        right[j] += core * read.basis(place.column, column_rank, block.column_vectors(), k, j);
     }
     for (std::size_t i = 0; i < rows; ++i) {
-      const double left = value_of(place.row, r, i);
+      const double left = read.basis(place.row, row_rank, block.row_vectors(), r, i);
       for (std::size_t j = 0; j < columns; ++j) entries[i * columns + j] += left * right[j];
     }
   }

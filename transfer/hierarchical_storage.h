@@ -10,6 +10,9 @@ namespace rebounce {
 /// Throws Error if the tables or the number of values are not those of an operator.
 void check_hierarchical_storage(const HierarchicalOperator::Storage& storage);
 
+/// A core's or a dense block's entry in half precision. Throws Error if it is beyond its range.
+std::uint16_t encode_core_value(float value);
+
 /// What products of stored values must be multiplied by.
 float product_scale(Precision precision);
 

@@ -54,21 +54,28 @@ struct Magnitudes {
   ChannelFloats largest, sum;
 };
 
+/// The sum of magnitudes, as a power of two, with which no sum of products with values of bases can
+/// overflow 32 bits.
+template <typename Value>
+constexpr std::uint32_t kLargestSum = 19;  // values up to 2^12
+template <>
+constexpr std::uint32_t kLargestSum<std::int8_t> = 24;
+
 /// Powers of two by which light becomes integers, and which bring it back: with the largest of them
-/// below 2^15 and their sum below 2^19, sums of products with values up to 4,095 stay below 2^31.
+/// below 2^15 and their sum below 2^kLargestSum, sums of products stay below 2^31.
 struct IntegerScales {
   ChannelFloats to, back;
 
-  explicit IntegerScales(const Magnitudes& light) {
+  IntegerScales(const Magnitudes& light, std::uint32_t largest_sum) {
     constexpr std::uint32_t kExponent = 0x7F800000, kOne = 127U << 23;
-    constexpr std::uint32_t kLargest = 14U << 23, kSum = 18U << 23;
+    constexpr std::uint32_t kLargest = 14U << 23;
     constexpr std::uint32_t kDark = kOne - (100U << 23);  // anything below 2^-100 is as dark
     const auto power = [=](float magnitude) {
       return std::max(std::bit_cast<std::uint32_t>(magnitude) & kExponent, kDark);
     };
     for (std::size_t c = 0; c < kChannelLanes; ++c) {
-      const std::uint32_t one =
-          std::max(power(light.largest[c]) - kLargest, power(light.sum[c]) - kSum);
+      const std::uint32_t one = std::max(power(light.largest[c]) - kLargest,
+                                         power(light.sum[c]) - ((largest_sum - 1) << 23));
       to[c] = std::bit_cast<float>(2 * kOne - one);
       back[c] = std::bit_cast<float>(one);
     }
@@ -81,10 +88,10 @@ struct IntegerLight {
   ChannelFloats back;
 };
 
-template <typename N>
+template <typename N, typename Value>
 REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std::size_t count,
                                         IntegerLight& light) {
-  const IntegerScales scales(N::magnitudes_of_planes(x, stride, count));
+  const IntegerScales scales(N::magnitudes_of_planes(x, stride, count), kLargestSum<Value>);
   light.back = scales.back;
   for (std::size_t k = 0; k < count; k += 16) {
     for (std::size_t c = 0; c < kChannelCount; ++c) {
@@ -95,14 +102,16 @@ REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std:
 
 /// Part of a basis within a strip: the values of a group of ranks, those of the next one
 /// `group_step` later.
+template <typename Value>
 struct StripBasis {
-  const std::int16_t* values;
+  const Value* values;
   std::size_t group_step;
 };
 
 /// From a position of a cluster on, all groups of ranks from `group` on.
-inline StripBasis strip_at(const std::int16_t* values, const BasisPart& part, std::size_t position,
-                           std::size_t group) {
+template <typename Value>
+inline StripBasis<Value> strip_at(const Value* values, const BasisPart& part, std::size_t position,
+                                  std::size_t group) {
   const std::size_t groups = (part.rank + kRankGroup - 1) / kRankGroup;
   const std::size_t begin = position / kBasisStrip * kBasisStrip;
   const std::size_t width = std::min(kBasisStrip, part.size - begin);
@@ -111,8 +120,8 @@ inline StripBasis strip_at(const std::int16_t* values, const BasisPart& part, st
 }
 
 /// Values of a basis.
-template <typename N>
-REBOUNCE_INLINE inline N load_basis(const std::int16_t* values) {
+template <typename N, typename Value>
+REBOUNCE_INLINE inline N load_basis(const Value* values) {
   ask_ahead<N::kWidth * sizeof(std::int16_t)>(values);
   return N::load(values);
 }
@@ -122,14 +131,16 @@ REBOUNCE_INLINE inline N load_basis(const std::int16_t* values) {
 
 /// kGroups groups of ranks of `count` positions, a chunk at most, whose strips begin with `first`
 /// and `second`.
-template <typename N, std::size_t kGroups>
-[[gnu::noinline]] void project_groups(StripBasis first, StripBasis second, std::size_t count,
-                                      const IntegerLight& light, bool add_to, float* coefficient) {
+template <typename N, std::size_t kGroups, typename Value>
+[[gnu::noinline]] void project_groups(StripBasis<Value> first, StripBasis<Value> second,
+                                      std::size_t count, const IntegerLight& light, bool add_to,
+                                      float* coefficient) {
   N sum[kChannelCount][kGroups];
   unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
     unroll<kGroups>([&](auto g) REBOUNCE_INLINE { sum[c][g] = N::zero(); });
   });
-  const auto add_strip = [&](StripBasis strip, std::size_t begin, std::size_t end) REBOUNCE_INLINE {
+  const auto add_strip = [&](StripBasis<Value> strip, std::size_t begin,
+                             std::size_t end) REBOUNCE_INLINE {
     for (std::size_t k = begin; k < end; k += N::kWidth, strip.values += N::kWidth) {
       N b[kGroups];
       unroll<kGroups>([&](auto g) REBOUNCE_INLINE {
@@ -152,13 +163,13 @@ struct LightChunk {
   std::size_t begin, count;
 };
 
-template <typename N>
-REBOUNCE_INLINE inline void project_chunk(const std::int16_t* values, const BasisPart& part,
+template <typename N, typename Value>
+REBOUNCE_INLINE inline void project_chunk(const Value* values, const BasisPart& part,
                                           const LightChunk& chunk, const IntegerLight& light,
                                           float* coefficient) {
   const std::size_t first_group = part.first_rank / kRankGroup;
   const std::size_t groups = (part.last_rank + kRankGroup - 1) / kRankGroup - first_group;
-  StripBasis first = strip_at(values, part, chunk.begin, first_group), second{};
+  StripBasis<Value> first = strip_at(values, part, chunk.begin, first_group), second{};
   if (chunk.count > kBasisStrip) {
     second = strip_at(values, part, chunk.begin + kBasisStrip, first_group);
   }
@@ -171,8 +182,8 @@ REBOUNCE_INLINE inline void project_chunk(const std::int16_t* values, const Basi
   });
 }
 
-template <typename N>
-void project_integers(const std::int16_t* values, std::span<const BasisPart> parts,
+template <typename N, typename Value>
+void project_integers(const Value* values, std::span<const BasisPart> parts,
                       PlanarVectors<const float> x, Coefficients<float> coefficient) {
   IntegerLight light;
   for (const BasisPart& part : parts) {
@@ -181,7 +192,7 @@ void project_integers(const std::int16_t* values, std::span<const BasisPart> par
       float* const to = coefficient.data + v / kChannelCount * coefficient.stride;
       for (std::size_t k = 0; k < part.size; k += kChunk) {
         const LightChunk chunk{k, std::min(part.size - k, kChunk)};
-        round_light<N>(from + k, x.stride, chunk.count, light);
+        round_light<N, Value>(from + k, x.stride, chunk.count, light);
         project_chunk<N>(values, part, chunk, light, to);
       }
     }
@@ -202,12 +213,13 @@ struct IntegerCoefficients {
 };
 
 /// Of the ranks within a chunk; those of its groups that are not among them are zero.
-template <typename N>
+template <typename N, typename Value>
 REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange ranks,
                                                IntegerCoefficients& to) {
   constexpr std::size_t kGroupSize = IntegerCoefficients::kGroupSize;
   const IntegerScales scales(N::magnitudes_of_lanes(from + ranks.begin * kChannelLanes,
-                                                    (ranks.end - ranks.begin) * kChannelLanes));
+                                                    (ranks.end - ranks.begin) * kChannelLanes),
+                             kLargestSum<Value>);
   to.back = scales.back;
   to.group_count = (ranks.end + kRankGroup - 1) / kRankGroup;
   const typename N::CoefficientRounding round(scales.to);
@@ -227,8 +239,8 @@ REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange rank
 
 /// y of kWide vectors of positions; groups of ranks are dealt out among kSplit sums, so that there
 /// are N::kLeastSums of them or more.
-template <typename N, std::size_t kWide>
-[[gnu::noinline]] void expand_integer_strip(StripBasis strip,
+template <typename N, std::size_t kWide, typename Value>
+[[gnu::noinline]] void expand_integer_strip(StripBasis<Value> strip,
                                             const IntegerCoefficients& coefficient, float* y,
                                             std::size_t y_stride) {
   constexpr std::size_t kSums = kChannelCount * kWide;
@@ -268,8 +280,8 @@ template <typename N, std::size_t kWide>
 }
 
 /// The chunk of ranks from `first_rank` on.
-template <typename N>
-REBOUNCE_INLINE inline void expand_chunk(const std::int16_t* values, const BasisPart& part,
+template <typename N, typename Value>
+REBOUNCE_INLINE inline void expand_chunk(const Value* values, const BasisPart& part,
                                          std::size_t first_rank,
                                          const IntegerCoefficients& coefficient, float* y,
                                          std::size_t y_stride) {
@@ -290,8 +302,8 @@ REBOUNCE_INLINE inline void expand_chunk(const std::int16_t* values, const Basis
   }
 }
 
-template <typename N>
-void expand_integers(const std::int16_t* values, std::span<const BasisPart> parts,
+template <typename N, typename Value>
+void expand_integers(const Value* values, std::span<const BasisPart> parts,
                      Coefficients<const float> coefficient, PlanarVectors<float> y) {
   IntegerCoefficients rounded;
   for (const BasisPart& part : parts) {
@@ -302,7 +314,7 @@ void expand_integers(const std::int16_t* values, std::span<const BasisPart> part
       for (std::size_t r = first_group * kRankGroup; r < part.last_rank; r += kChunk) {
         const RankRange ranks{std::max<std::size_t>(part.first_rank, r) - r,
                               std::min(part.last_rank - r, kChunk)};
-        round_coefficients<N>(from + r * kChannelLanes, ranks, rounded);
+        round_coefficients<N, Value>(from + r * kChannelLanes, ranks, rounded);
         expand_chunk<N>(values, part, r, rounded, y.data + v * y.stride, y.stride);
       }
     }

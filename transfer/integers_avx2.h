@@ -24,6 +24,9 @@ struct Shorts16 {
   static Shorts16 load(const std::int16_t* p) {
     return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p))};
   }
+  static Shorts16 load(const std::int8_t* p) {
+    return {_mm256_cvtepi8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
+  }
   static Shorts16 repeat_four(const std::int16_t* p) {
     return {_mm256_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))};
   }

@@ -26,6 +26,11 @@ struct Shorts32 {
     asm("" : "+v"(loaded));  // else g++ 12 loads it again for each of its products
     return {loaded};
   }
+  static Shorts32 load(const std::int8_t* p) {
+    __m512i loaded = _mm512_cvtepi8_epi16(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)));
+    asm("" : "+v"(loaded));
+    return {loaded};
+  }
   static Shorts32 repeat_four(const std::int16_t* p) {
     return {_mm512_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))};
   }

@@ -34,6 +34,12 @@ struct Shorts8 {
     std::memcpy(&loaded.v, p, sizeof loaded.v);
     return loaded;
   }
+  static Shorts8 load(const std::int8_t* p) {
+    using Bytes = std::int8_t __attribute__((vector_size(8)));
+    Bytes bytes;
+    std::memcpy(&bytes, p, sizeof bytes);
+    return {std::bit_cast<Sums>(__builtin_convertvector(bytes, Shorts))};
+  }
   static Shorts8 repeat_four(const std::int16_t* p) {
     std::int64_t four = 0;
     std::memcpy(&four, p, sizeof four);

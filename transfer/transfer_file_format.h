@@ -63,7 +63,7 @@ inline constexpr HierarchicalTensors kCompressedFormFactors = {
 
 /// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
 /// order.
-using StoredBlock = std::array<std::uint32_t, 7>;
+using StoredBlock = std::array<std::uint32_t, 9>;
 
 inline std::string texture_tensor(std::size_t texture) {
   return "texture." + std::to_string(texture);

@@ -253,7 +253,8 @@ std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* 
   std::vector<TransferBlock> blocks;
   blocks.reserve(stored.size());
   for (const StoredBlock& b : stored) {
-    blocks.push_back({b[0], b[1], b[2], b[3], static_cast<TransferBlock::Kind>(b[4]), b[5], b[6]});
+    blocks.push_back(
+        {b[0], b[1], b[2], b[3], static_cast<TransferBlock::Kind>(b[4]), b[5], b[6], b[7], b[8]});
   }
   return blocks;
 }

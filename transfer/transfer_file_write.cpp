@@ -87,7 +87,8 @@ void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
   std::vector<StoredBlock> blocks;
   for (const TransferBlock& b : storage.blocks) {
     blocks.push_back({b.row_begin, b.row_count, b.column_begin, b.column_count,
-                      static_cast<std::uint32_t>(b.kind), b.row_rank, b.column_rank});
+                      static_cast<std::uint32_t>(b.kind), b.row_rank, b.column_rank,
+                      b.row_remainders, b.column_remainders});
   }
   collector.add_made<StoredBlock>(names.blocks, blocks);
   collector(names.patch, storage.patch);

@@ -24,10 +24,6 @@ struct Vector8 {
   static Vector8 load_half(const std::uint16_t* p) {
     return {_mm256_cvtph_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p)))};
   }
-  static Vector8 load_bytes(const std::int8_t* p) {
-    return {_mm256_cvtepi32_ps(
-        _mm256_cvtepi8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p))))};
-  }
   static Vector8 load_some(const float* p, std::size_t count) {
     return {_mm256_maskload_ps(p, first(count))};
   }

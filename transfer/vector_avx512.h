@@ -25,10 +25,6 @@ struct Vector16 {
   static Vector16 load_half(const std::uint16_t* p) {
     return {_mm512_cvtph_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p)))};
   }
-  static Vector16 load_bytes(const std::int8_t* p) {
-    return {_mm512_cvtepi32_ps(
-        _mm512_cvtepi8_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(p))))};
-  }
   static Vector16 load_some(const float* p, std::size_t count) {
     return {_mm512_maskz_loadu_ps(first(count), p)};
   }

@@ -1,7 +1,7 @@
 #pragma once
 
 // Kernels are written over a vector type `V` of kWidth floats, one per instruction set: load,
-// load_half, load_bytes, store, zero, broadcast, multiply_add, sum; load_some and store_some touch
+// load_half, store, zero, broadcast, multiply_add, sum; load_some and store_some touch
 // the first `count` lanes alone, the others are read as zero; sums gives the sums over the lanes of
 // four vectors. Of vectors whose fours of lanes are the channels of something, repeat_four fills
 // all fours with one, sums_of_fours adds up those of as many vectors as there are, and
@@ -40,11 +40,6 @@ inline V load_values(const float* p) {
 template <typename V>
 inline V load_values(const std::uint16_t* p) {
   return V::load_half(p);
-}
-
-template <typename V>
-inline V load_values(const std::int8_t* p) {
-  return V::load_bytes(p);
 }
 
 /// Calls work(index) for 0 to kCount - 1 as constants, so that arrays indexed by them are

@@ -35,10 +35,6 @@ struct Vector4 {
     const Bits infinite = (magnitude << 13) | 0x7F800000U;
     return {std::bit_cast<Floats>(sign | (magnitude >= 0x7C00U ? infinite : finite))};
   }
-  static Vector4 load_bytes(const std::int8_t* p) {
-    using Bytes = std::int8_t __attribute__((vector_size(4)));
-    return {__builtin_convertvector(read<Bytes>(p), Floats)};
-  }
   static Vector4 load_some(const float* p, std::size_t count) {
     float some[kWidth] = {};
     for (std::size_t k = 0; k < count; ++k) some[k] = p[k];

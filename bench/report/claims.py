@@ -68,7 +68,7 @@ def equally_compressed(result, change, target=0.001):
         "equally compressed",
         change,
         target,
-        result.fastest(change, ("inverse",), 1, form=f"hierarchical {name} q16"),
+        result.fastest(change, ("inverse",), 1, form=f"hierarchical {name} q8"),
         result.fastest(
             change,
             results.GAUSS_SEIDEL,

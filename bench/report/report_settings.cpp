@@ -3,7 +3,7 @@
 namespace rebounce::bench {
 
 void ReportSettings::make_quick() {
-  operators = {{0.005, Precision::kQ16}, {0.001, Precision::kQ16}};
+  operators = {{0.005, Precision::kQ8}, {0.001, Precision::kQ8}};
   form_factor_tolerances = {0.0003, 0.001};
   ranks = {64};
   lamp_count = 2;
@@ -19,11 +19,11 @@ void ReportSettings::make_quick() {
 }
 
 void ReportSettings::make_large() {
-  operators = {{0.005, Precision::kQ16},
-               {0.02, Precision::kQ16},
-               {0.002, Precision::kQ16},
-               {0.001, Precision::kQ16},
-               {0.0003, Precision::kQ16}};
+  operators = {{0.005, Precision::kQ8},
+               {0.02, Precision::kQ8},
+               {0.002, Precision::kQ8},
+               {0.001, Precision::kQ8},
+               {0.0003, Precision::kQ8}};
   form_factor_tolerances = {0.0003, 0.001, 0.003};
   ranks = {256};
   lamp_count = 2;
@@ -33,7 +33,7 @@ void ReportSettings::make_large() {
 }
 
 void ReportSettings::make_huge() {
-  operators = {{0.005, Precision::kQ16}, {0.002, Precision::kQ16}, {0.001, Precision::kQ16}};
+  operators = {{0.005, Precision::kQ8}, {0.002, Precision::kQ8}, {0.001, Precision::kQ8}};
   form_factor_tolerances = {0.0003, 0.0005, 0.001};
   motions = {0.001, 0.01};
   sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16};

@@ -89,7 +89,7 @@ class QuickReport : public testing::Test {
   static std::shared_ptr<const HierarchicalOperator> compressed_operator(double tolerance) {
     const auto lights = draw_fitting_lights(*data_, make_surface_tracer(data_->mesh), 1);
     return build_hierarchical_transfer(static_cast<const DenseOperator&>(*data_->transfer),
-                                       data_->patches, lights.view(), {tolerance, Precision::kQ16});
+                                       data_->patches, lights.view(), {tolerance, Precision::kQ8});
   }
 
   static std::vector<Float3> multiply(const TransferOperator& transfer,
@@ -136,7 +136,7 @@ TEST_F(QuickReport, ErrorsOfTheInverseAreThoseOfTheProduct) {
   const auto transfer = compressed_operator(0.005);
   const auto& reported =
       row("accuracy",
-          {{"transfer", "hierarchical 0.5 % q16"}, {"method", "inverse"}, {"change", "switched"}});
+          {{"transfer", "hierarchical 0.5 % q8"}, {"method", "inverse"}, {"change", "switched"}});
   EXPECT_EQ(reported.at("bytes"), transfer->bytes());
   const std::size_t switched = quick_settings().motions.size() + 1;
   const double direct = mean_error(

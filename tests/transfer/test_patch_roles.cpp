@@ -85,7 +85,7 @@ TEST(PatchRoles, AnApplyIsThatPartOfTheWhole) {
     const std::vector<Float3> m0 = random_light(kPatchCount, 1);
     for (const auto& [precision, allowed] :
          {std::pair(Precision::kF32, 2e-6), std::pair(Precision::kF16, 2e-6),
-          std::pair(Precision::kQ16, 5e-4), std::pair(Precision::kQ8, 2e-6)}) {
+          std::pair(Precision::kQ16, 5e-4), std::pair(Precision::kQ8, 5e-5)}) {
       const HierarchicalOperator whole(HierarchicalOperator::encode(storage, precision));
       const HierarchicalOperator op(HierarchicalOperator::encode(some, precision));
       EXPECT_EQ(op.roles(), some.roles);

@@ -61,7 +61,7 @@ struct BuildSettings {
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
   std::size_t rank = 256;    ///< of kLowRank and kFirstBounce: see LowRankSettings
-  /// By default kF32 for a dense operator, kQ16 for a hierarchical one, kF16 (half the bytes, an
+  /// By default kF32 for a dense operator, kQ8 for a hierarchical one, kF16 (half the bytes, an
   /// error of some 1e-4) for others.
   std::optional<Precision> precision;
   /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are

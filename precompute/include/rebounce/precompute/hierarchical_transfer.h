@@ -16,7 +16,7 @@ struct HierarchicalSettings {
   /// Relative area-weighted L2 error of the indirect irradiance that lights may have in the mean;
   /// twice the tolerance takes about 0.6 of the bytes.
   double tolerance = 0.005;
-  Precision precision = Precision::kQ16;  ///< kF32: twice the bytes, no less error worth mention
+  Precision precision = Precision::kQ8;  ///< kF32: twice the bytes, no less error worth mention
 };
 
 /// Lights that the operator is fitted to, each an initial exitance [n] in lx.

@@ -27,6 +27,12 @@ struct TransferBlock {
   std::uint32_t column_begin = 0, column_count = 0;  ///< likewise
   Kind kind = Kind::kDense;
   std::uint32_t row_rank = 0, column_rank = 0;  ///< of a low-rank block, 0 for a dense one
+  /// Of the first vectors of a basis in 8 bits, so many are sums of two: see kRemainderScale.
+  std::uint32_t row_remainders = 0, column_remainders = 0;
+
+  /// Vectors that are stored at each end.
+  std::uint32_t row_vectors() const { return row_rank + row_remainders; }
+  std::uint32_t column_vectors() const { return column_rank + column_remainders; }
 
   bool on_diagonal() const { return row_begin == column_begin; }
 
@@ -43,6 +49,7 @@ struct TransferBlock {
 ///   dense     [matrix][row_count][column_count]
 ///   low-rank  U^T [row_rank][row_count], V^T [column_rank][column_count] (not on the diagonal),
 ///             S [matrix][row_rank][column_rank]
+/// In 8 bits U^T and V^T have row_remainders and column_remainders rows more.
 ///
 /// An apply streams through the values: all bases of a cluster of patches are kept together,
 /// whichever blocks they belong to, so that one pass over them takes the light of the cluster to
@@ -66,6 +73,10 @@ class HierarchicalOperator final : public TransferOperator {
   /// entries are +-127; cores are divided by them, with this for 1 at each end.
   static constexpr float kByteScale = 128;
 
+  /// Vectors that bytes are too coarse for have a remainder: what rounding left of them, times
+  /// this, as bytes again. Those of a basis follow its vectors, in their order.
+  static constexpr float kRemainderScale = 254;
+
   /// In 16 bits likewise: the largest are +-kLargestShort, and kShortScale stands for 1. So few
   /// that sums of 128 products with such numbers fit 32 bits.
   static constexpr std::int16_t kLargestShort = 4095;
@@ -80,8 +91,8 @@ class HierarchicalOperator final : public TransferOperator {
     /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
     /// the order of their blocks, U^T before V^T; then cores and dense entries by block, the
     /// matrices of an entry side by side; zeros to the next multiple of 64 values, at least
-    /// kPadding of them. Bases in an array of their own are followed by zeros likewise. Those in 16
-    /// bits are [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster:
+    /// kPadding of them. Bases in an array of their own are followed by zeros likewise. Integers
+    /// are [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster:
     /// strips of kStrip positions or what is left of it, the last ranks filled up with zeros.
     kStreamed,
   };
