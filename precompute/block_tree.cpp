@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "basis_remainders.h"
 #include "block_compression.h"
 #include "rebounce/precompute/parallel_progress.h"
 #include "single_threaded_blas.h"
@@ -94,10 +95,11 @@ class PieceCompressor {
   WideBlock weighted_block(const TransferBlock& place, std::uint32_t row,
                            std::uint32_t column) const {
     WideBlock block = wide_block(place);
-    if (wanted_.leads(row, column)) weights_[row].put_left(block.entries);
-    if (!wanted_.leads(column, row)) return block;
+    if (const auto* weight = weight_of(row, column)) weight->put_left(block.entries);
+    const ClusterWeight* const column_weight = weight_of(column, row);
+    if (column_weight == nullptr) return block;
     for (Index m = 0; m < matrix_count(); ++m) {
-      weights_[column].put_right(
+      column_weight->put_right(
           block.entries.middleCols(m * place.column_count, place.column_count));
     }
     return block;
@@ -166,14 +168,19 @@ class PieceCompressor {
     return part;
   }
 
+  /// The weight of the light that goes from one cluster to another; none if it is not wanted.
+  const ClusterWeight* weight_of(std::uint32_t from, std::uint32_t to) const {
+    return wanted_.leads(from, to) ? &weights_[from] : nullptr;
+  }
+
   /// Of the weighted block's factors those of the block itself. Bases are made orthonormal again,
   /// so that neither they nor the cores leave the range of half precision.
   void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
-    if (wanted_.leads(row, column)) weights_[row].take_away(block.row_basis);
+    if (const auto* weight = weight_of(row, column)) weight->take_away(block.row_basis);
     const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);
     Eigen::MatrixXd column_factor = row_factor;
     if (row != column) {
-      if (wanted_.leads(column, row)) weights_[column].take_away(block.column_basis);
+      if (const auto* weight = weight_of(column, row)) weight->take_away(block.column_basis);
       column_factor = make_orthonormal(block.column_basis);
     }
     for (Eigen::MatrixXd& core : block.cores) core = row_factor * core * column_factor.transpose();
@@ -186,6 +193,10 @@ class PieceCompressor {
     place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
     place.column_rank = place.on_diagonal() ? place.row_rank
                                             : static_cast<std::uint32_t>(block.column_basis.cols());
+    const BasisRemainders remainders =
+        find_remainders(block, {weight_of(row, column), weight_of(column, row)}, cost);
+    place.row_remainders = static_cast<std::uint32_t>(remainders.row);
+    place.column_remainders = static_cast<std::uint32_t>(remainders.column);
     BlockPart part{{place}, {}, 0};
     append_columns(block.row_basis, part.values);
     append_columns(block.column_basis, part.values);

@@ -69,6 +69,16 @@ void ClusterWeight::put_right(Eigen::Ref<MatrixXd> matrix) const {
   matrix.noalias() += part * directions_.transpose();
 }
 
+double ClusterWeight::squared_norm() const {
+  // Of B (I + P diag(s) P^T), with orthonormal P.
+  double sum = background_.squaredNorm();
+  for (Index k = 0; k < strength_.size(); ++k) {
+    const double more = (1 + strength_[k]) * (1 + strength_[k]) - 1;
+    sum += more * background_.cwiseProduct(directions_.col(k)).squaredNorm();
+  }
+  return sum;
+}
+
 void ClusterWeight::take_away(MatrixXd& basis) const {
   const VectorXd inverse = (strength_.array() / (1 + strength_.array())).matrix();
   const MatrixXd part = inverse.asDiagonal() * (directions_.transpose() * basis);

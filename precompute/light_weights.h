@@ -30,6 +30,10 @@ class ClusterWeight {
   /// matrix = matrix W.
   void put_right(Eigen::Ref<Eigen::MatrixXd> matrix) const;
 
+  /// Sum of the squares of the entries of W: by it the squared norm of what W^T makes of errors
+  /// that are as large at all positions, and independent, is larger than theirs at one.
+  double squared_norm() const;
+
   /// basis = W^-T basis.
   void take_away(Eigen::MatrixXd& basis) const;
 

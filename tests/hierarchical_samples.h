@@ -69,6 +69,8 @@ class RandomHierarchicalStorage {
       block.column_rank = block.on_diagonal() ? block.row_rank : random_rank(columns);
       if (block.column_rank == 0) block.row_rank = 0;
       if (block.row_rank == 0) block.column_rank = 0;
+      block.row_remainders = block.row_rank / 3;
+      block.column_remainders = block.on_diagonal() ? block.row_remainders : block.column_rank / 4;
     }
     storage.blocks.push_back(block);
     const std::size_t begin = values_.size();

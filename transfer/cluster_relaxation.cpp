@@ -238,7 +238,7 @@ class ClusterRelaxation final : public Relaxation {
     if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
     if (block.row_rank > 0) {
       CoreBlock core = diagonal_core(step, block.row_rank, block.row_rank);
-      core.row_remainders = core.column_remainders = block.row_remainders;
+      core.row_remainders = core.column_remainders = step.remainders;
       project({&step.basis, 1});
       multiply({&core, 1});
       expand({&step.basis, 1}, received_);

@@ -61,9 +61,10 @@ class Planner {
       if (!blocks_[b].on_diagonal()) continue;
       const HierarchicalLayout::Place& place = layout_.places[b];
       plan_.steps.push_back({.diagonal = blocks_[b],
-                             .basis = basis_of(blocks_[b], place.row, blocks_[b].row_vectors()),
+                             .basis = basis_of(blocks_[b], place.row, blocks_[b].row_rank),
                              .values = place.values,
-                             .coefficient = place.row.coefficient});
+                             .coefficient = place.row.coefficient,
+                             .remainders = place.row.remainders});
     }
     add_missing_steps();
     std::ranges::sort(plan_.steps, {}, [](const Step& step) { return step.diagonal.row_begin; });
@@ -103,7 +104,7 @@ class Planner {
             .coefficient = cluster.coefficient,
             .position = cluster.begin,
             .first_rank = first,
-            .last_rank = first + rank,
+            .last_rank = first + rank + end.remainders,
             .first_place = 0,
             .last_place = cluster.size};
   }
@@ -114,8 +115,8 @@ class Planner {
       const TransferBlock& block = blocks_[b];
       if (!is_below_diagonal(block) || block.kind == TransferBlock::Kind::kDense) continue;
       const HierarchicalLayout::Place& place = layout_.places[b];
-      add_basis(rows, rows_of(block), basis_of(block, place.row, block.row_vectors()));
-      add_basis(columns, columns_of(block), basis_of(block, place.column, block.column_vectors()));
+      add_basis(rows, rows_of(block), basis_of(block, place.row, block.row_rank));
+      add_basis(columns, columns_of(block), basis_of(block, place.column, block.column_rank));
     }
     plan_.row_bases = rows.made();
     plan_.column_bases = columns.made();
@@ -180,8 +181,8 @@ class Planner {
                                       .row = place.row.coefficient,
                                       .column = place.column.coefficient,
                                       .direction = products.direction,
-                                      .row_remainders = block.row_remainders,
-                                      .column_remainders = block.column_remainders});
+                                      .row_remainders = place.row.remainders,
+                                      .column_remainders = place.column.remainders});
     }
   }
 

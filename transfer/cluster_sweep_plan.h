@@ -20,6 +20,7 @@ struct ClusterSweepPlan {
     BasisPart basis{};         ///< U^T
     std::uint64_t values = 0;  ///< S or the entries
     std::uint32_t coefficient = 0;
+    std::uint32_t remainders = 0;
   };
 
   /// What is done at each step.

@@ -24,18 +24,20 @@ bool is_low_rank(const TransferBlock& block) {
   return block.kind == TransferBlock::Kind::kLowRank && has_values(block);
 }
 
-/// visit(end, begin, size, rank) for the ends of the low-rank blocks in the order of their bases.
+/// visit(end, begin, size, rank, remainders) for the ends of the low-rank blocks in the order of
+/// their bases.
 template <typename Visit>
 void visit_ends(std::span<const TransferBlock> blocks,
                 std::vector<HierarchicalLayout::Place>& places, const Visit& visit) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
     if (!is_low_rank(block)) continue;
-    visit(places[b].row, block.row_begin, block.row_count, block.row_vectors());
+    visit(places[b].row, block.row_begin, block.row_count, block.row_rank, block.row_remainders);
     if (block.on_diagonal()) {
       places[b].column = places[b].row;
     } else {
-      visit(places[b].column, block.column_begin, block.column_count, block.column_vectors());
+      visit(places[b].column, block.column_begin, block.column_count, block.column_rank,
+            block.column_remainders);
     }
   }
 }
@@ -65,7 +67,7 @@ HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
     }
   }
   find_clusters(blocks);
-  place_bases(blocks);
+  place_bases(blocks, precision);
   place_cores(blocks, matrix_count);
 }
 
@@ -86,9 +88,10 @@ std::uint64_t HierarchicalLayout::basis_index(const End& end, std::uint64_t rank
 }
 
 void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {
-  visit_ends(blocks, places, [&](End&, std::uint32_t begin, std::uint32_t size, std::uint32_t) {
-    clusters.push_back({.begin = begin, .size = size});
-  });
+  visit_ends(blocks, places,
+             [&](End&, std::uint32_t begin, std::uint32_t size, std::uint32_t, std::uint32_t) {
+               clusters.push_back({.begin = begin, .size = size});
+             });
   std::ranges::sort(clusters, comes_before);
   const auto same = [](const Cluster& a, const Cluster& b) {
     return a.begin == b.begin && a.size == b.size;
@@ -103,14 +106,16 @@ std::uint32_t HierarchicalLayout::cluster_at(std::uint32_t begin, std::uint32_t 
   return static_cast<std::uint32_t>(found - clusters.begin());
 }
 
-void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks) {
+void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks, Precision precision) {
   // First each end's place among the bases of its cluster, then that of the clusters.
   visit_ends(blocks, places,
-             [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank) {
+             [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank,
+                 std::uint32_t remainders) {
                end.cluster = cluster_at(begin, size);
+               end.remainders = precision == Precision::kQ8 ? remainders : 0;
                Cluster& cluster = clusters[end.cluster];
                end.coefficient = cluster.rank;
-               cluster.rank = checked_count(std::uint64_t{cluster.rank} + rank);
+               cluster.rank = checked_count(std::uint64_t{cluster.rank} + rank + end.remainders);
              });
   for (Cluster& cluster : clusters) {
     cluster.coefficient = coefficient_count;
@@ -118,9 +123,10 @@ void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks) {
     coefficient_count = checked_count(coefficient_count + filled_rank(cluster));
     basis_value_count += filled_rank(cluster) * cluster.size;
   }
-  visit_ends(blocks, places, [&](End& end, std::uint32_t, std::uint32_t, std::uint32_t) {
-    end.coefficient += clusters[end.cluster].coefficient;
-  });
+  visit_ends(blocks, places,
+             [&](End& end, std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t) {
+               end.coefficient += clusters[end.cluster].coefficient;
+             });
 }
 
 void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,

@@ -25,6 +25,7 @@ struct HierarchicalLayout {
   struct End {
     std::uint32_t cluster = 0;      ///< low-rank blocks only
     std::uint32_t coefficient = 0;  ///< the first
+    std::uint32_t remainders = 0;   ///< that are stored, after the vectors of the basis
   };
   struct Place {
     End row, column;           ///< the same on the diagonal
@@ -57,7 +58,7 @@ struct HierarchicalLayout {
   std::uint64_t filled_rank(const Cluster& cluster) const;
   void find_clusters(std::span<const TransferBlock> blocks);
   std::uint32_t cluster_at(std::uint32_t begin, std::uint32_t size) const;
-  void place_bases(std::span<const TransferBlock> blocks);
+  void place_bases(std::span<const TransferBlock> blocks, Precision precision);
   void place_cores(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
 };
 

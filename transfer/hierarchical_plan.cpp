@@ -112,8 +112,8 @@ class Planner {
                          .direction = !to_columns ? Direction::kToRows
                                       : !to_rows  ? Direction::kToColumns
                                                   : Direction::kBoth,
-                         .row_remainders = block.row_remainders,
-                         .column_remainders = block.column_remainders};
+                         .row_remainders = place.row.remainders,
+                         .column_remainders = place.column.remainders};
     if (dense && storage_.matrix_count == 1) {
       plan_.dense.push_back({.values = core.values,
                              .rows = core.rows,

@@ -44,7 +44,8 @@ void check_block(const TransferBlock& block, std::size_t position_count) {
   if (misplaced) refuse("a block is neither on the diagonal nor below it");
   switch (block.kind) {
     case TransferBlock::Kind::kDense:
-      if (block.row_vectors() != 0 || block.column_vectors() != 0) {
+      if ((block.row_rank | block.column_rank | block.row_remainders | block.column_remainders) !=
+          0) {
         refuse("a dense block has a rank");
       }
       return;
@@ -83,7 +84,9 @@ void check_tables(const Storage& storage) {
     if (one_rank && storage.order == HierarchicalOperator::Order::kStreamed) {
       refuse("a block has only one rank");
     }
-    if (block.row_remainders + block.column_remainders > 0 && storage.precision != Precision::kQ8) {
+    const bool rounded =
+        storage.precision == Precision::kF16 || storage.precision == Precision::kQ16;
+    if (rounded && (block.row_remainders | block.column_remainders) != 0) {
       refuse("a block has remainders, which are for bases in 8 bits alone");
     }
   }
@@ -142,11 +145,11 @@ class ValueReader {
   ValueReader(const Storage& storage, const HierarchicalLayout& layout)
       : storage_(storage), layout_(layout), first_core_(layout.basis_value_count) {}
 
-  /// Of one end of a block, `vectors` of which are stored, remainders after `rank` of them.
-  double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vectors,
-               std::uint64_t vector, std::uint64_t position) const {
+  /// Of one end of a block of that rank.
+  double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vector,
+               std::uint64_t position) const {
     const double value = stored_basis(layout_.basis_index(end, vector, position));
-    if (rank + vector >= vectors) return value;
+    if (vector >= end.remainders) return value;
     return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
                        double{HierarchicalOperator::kRemainderScale};
   }
@@ -203,8 +206,8 @@ ArraySizes expected_sizes(const Storage& storage) {
 std::uint64_t TransferBlock::value_count(std::uint32_t matrix_count) const {
   const std::uint64_t rows = row_count, columns = column_count;
   if (kind == Kind::kDense) return matrix_count * rows * columns;
-  const std::uint64_t column_basis = on_diagonal() ? 0 : columns * column_vectors();
-  return rows * row_vectors() + column_basis +
+  const std::uint64_t column_basis = on_diagonal() ? 0 : columns * column_rank;
+  return rows * row_rank + column_basis +
          std::uint64_t{matrix_count} * row_rank * std::uint64_t{column_rank};
 }
 
@@ -233,6 +236,10 @@ std::uint16_t encode_core_value(float value) {
   return half;
 }
 
+void drop_remainders(Storage& storage) {
+  for (TransferBlock& block : storage.blocks) block.row_remainders = block.column_remainders = 0;
+}
+
 Storage HierarchicalOperator::stream(const Storage& storage) {
   check_hierarchical_storage(storage);
   if (storage.order == Order::kStreamed) return storage;
@@ -254,6 +261,7 @@ Storage HierarchicalOperator::encode_half(const Storage& storage) {
   Storage half = exact;
   half.precision = Precision::kF16;
   half.values_f32 = {};
+  drop_remainders(half);
   const HierarchicalLayout layout(half);
   std::vector<std::uint16_t> values(exact.values_f32.size());
   for (std::uint64_t k = 0; k < values.size(); ++k) {
@@ -294,28 +302,24 @@ Storage decode(const Storage& storage) {
   decoded.values_f16 = {};
   decoded.bases_q16 = {};
   decoded.bases_q8 = {};
-  for (TransferBlock& block : decoded.blocks) block.row_remainders = block.column_remainders = 0;
   const HierarchicalLayout from(streamed), to(decoded);
   const ValueReader read(streamed, from);
   std::vector<float> values(HierarchicalLayout::padded(to.basis_value_count + to.core_value_count));
   const auto copy_basis = [&](const HierarchicalLayout::End& source,
                               const HierarchicalLayout::End& target, std::uint32_t rank,
-                              std::uint32_t vectors, std::uint32_t size) {
+                              std::uint32_t size) {
     for (std::uint32_t r = 0; r < rank; ++r) {
       for (std::uint32_t k = 0; k < size; ++k) {
-        values[to.basis_index(target, r, k)] =
-            static_cast<float>(read.basis(source, rank, vectors, r, k));
+        values[to.basis_index(target, r, k)] = static_cast<float>(read.basis(source, rank, r, k));
       }
     }
   };
   for (std::size_t b = 0; b < streamed.blocks.size(); ++b) {
     const TransferBlock& block = streamed.blocks[b];
     if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
-    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_vectors(),
-               block.row_count);
+    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_count);
     if (block.on_diagonal()) continue;
-    copy_basis(from.places[b].column, to.places[b].column, block.column_rank,
-               block.column_vectors(), block.column_count);
+    copy_basis(from.places[b].column, to.places[b].column, block.column_rank, block.column_count);
   }
   for (std::uint64_t k = 0; k < to.core_value_count; ++k) {
     values[to.basis_value_count + k] = static_cast<float>(read.core(k));
@@ -345,10 +349,10 @@ std::vector<double> block_entries(const Storage& storage, const HierarchicalLayo
       const std::uint64_t entry = r * column_rank + k;
       const double core = read.core(place.values + entry * storage.matrix_count + matrix);
       for (std::size_t j = 0; j < columns; ++j)
-        right[j] += core * read.basis(place.column, column_rank, block.column_vectors(), k, j);
+        right[j] += core * read.basis(place.column, column_rank, k, j);
     }
     for (std::size_t i = 0; i < rows; ++i) {
-      const double left = read.basis(place.row, row_rank, block.row_vectors(), r, i);
+      const double left = read.basis(place.row, row_rank, r, i);
       for (std::size_t j = 0; j < columns; ++j) entries[i * columns + j] += left * right[j];
     }
   }

@@ -13,6 +13,9 @@ void check_hierarchical_storage(const HierarchicalOperator::Storage& storage);
 /// A core's or a dense block's entry in half precision. Throws Error if it is beyond its range.
 std::uint16_t encode_core_value(float value);
 
+/// Blocks as a precision without remainders has them.
+void drop_remainders(HierarchicalOperator::Storage& storage);
+
 /// What products of stored values must be multiplied by.
 float product_scale(Precision precision);
 

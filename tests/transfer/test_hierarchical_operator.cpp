@@ -301,16 +301,22 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
          s.blocks[0].row_remainders = 1;
+         s.blocks[0].column_remainders = 0;
        }},
       {"8 bits alone",
        [](Storage& s) {
+         s.precision = Precision::kF16;
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
          s.blocks[0].row_remainders = s.blocks[0].column_remainders = 1;
        }},
       {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
       {"number of values", [](Storage& s) { s.order = HierarchicalOperator::Order::kStreamed; }},
-      {"number of values", [](Storage& s) { s.precision = Precision::kF16; }},
+      {"number of values",
+       [](Storage& s) {
+         s.precision = Precision::kF16;
+         for (TransferBlock& block : s.blocks) block.row_remainders = block.column_remainders = 0;
+       }},
   };
   for (std::size_t k = 0; k < faults.size(); ++k) {
     SCOPED_TRACE("fault " + std::to_string(k) + ": " + faults[k].message);

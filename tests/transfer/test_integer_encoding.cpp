@@ -12,14 +12,17 @@ namespace {
 constexpr std::uint32_t kSide = 64;
 
 /// One block of low rank between two halves of the patches, with orthonormal bases (cosines) and a
-/// core of one matrix whose diagonal is `core`.
-HierarchicalOperator::Storage block_with(const std::vector<float>& core) {
+/// core of one matrix whose diagonal is `core`; remainders at its ends.
+HierarchicalOperator::Storage block_with(const std::vector<float>& core,
+                                         std::uint32_t row_remainders = 0,
+                                         std::uint32_t column_remainders = 0) {
   const auto rank = static_cast<std::uint32_t>(core.size());
   HierarchicalOperator::Storage storage;
   storage.area.assign(2 * kSide, 1.0F);
   for (std::uint32_t p = 0; p < 2 * kSide; ++p) storage.patch.push_back(p);
   storage.matrix_count = 1;
-  storage.blocks.push_back({kSide, kSide, 0, kSide, TransferBlock::Kind::kLowRank, rank, rank});
+  storage.blocks.push_back({kSide, kSide, 0, kSide, TransferBlock::Kind::kLowRank, rank, rank,
+                            row_remainders, column_remainders});
   std::vector<float> values;
   for (int end = 0; end < 2; ++end) {
     for (std::uint32_t r = 0; r < rank; ++r) {
@@ -49,38 +52,39 @@ double change(const HierarchicalOperator::Storage& exact,
   return std::sqrt(sum);
 }
 
-TEST(IntegerEncoding, RemaindersGoToTheLargestEntries) {
-  const auto exact = block_with({1, 0.03F, 0.002F, 0.001F});
-  const auto bytes = HierarchicalOperator::encode_bytes(exact);
-  ASSERT_EQ(bytes.blocks.size(), 1U);
-  const TransferBlock& block = bytes.blocks.front();
-  EXPECT_EQ(block.row_rank, 4U);
-  EXPECT_EQ(block.row_remainders, 1U);
-  EXPECT_EQ(block.column_remainders, 1U);
-  // Without remainders the first vector alone is some 0.3 % off at each end.
-  EXPECT_LT(change(exact, bytes), 1e-3);
+TEST(IntegerEncoding, RemaindersAreAsGoodAsSixteenBits) {
+  const std::vector<float> core{1, 0.03F, 0.002F, 0.001F};
+  const double bytes =
+      change(block_with(core), HierarchicalOperator::encode_bytes(block_with(core)));
+  // The step of the largest vectors is 0.18 / 127.
+  EXPECT_GT(bytes, 4e-3);
+  EXPECT_LT(bytes, 1e-2);
+  const auto exact = block_with(core, 1, 2);
+  const auto encoded = HierarchicalOperator::encode_bytes(exact);
+  EXPECT_EQ(encoded.blocks.front().row_rank, 4U);
+  EXPECT_EQ(encoded.blocks.front().row_remainders, 1U);
+  EXPECT_EQ(encoded.blocks.front().column_remainders, 2U);
+  EXPECT_LT(change(exact, encoded), 1e-3);
+  // Five and six vectors instead of four at each end are eight: they come in groups of four.
+  const auto plain = HierarchicalOperator::encode_bytes(block_with(core));
+  EXPECT_EQ(HierarchicalOperator(encoded).bytes(), HierarchicalOperator(plain).bytes() + 8 * kSide);
 }
 
-TEST(IntegerEncoding, RemaindersAreThoseOfTheFirstVectors) {
-  // The third vector needs one, so that those before it have one too.
-  const auto bytes = HierarchicalOperator::encode_bytes(block_with({0.002F, 0.001F, 1, 0.001F}));
-  EXPECT_EQ(bytes.blocks.front().row_remainders, 3U);
-  EXPECT_EQ(bytes.blocks.front().column_remainders, 3U);
+TEST(IntegerEncoding, RemaindersAtOneEndLeaveTheOther) {
+  const auto exact = block_with({1, 0.03F}, 1, 0);
+  const double one = change(exact, HierarchicalOperator::encode_bytes(exact));
+  const auto plain = block_with({1, 0.03F});
+  const double none = change(plain, HierarchicalOperator::encode_bytes(plain));
+  EXPECT_NEAR(one / none, std::sqrt(0.5), 0.1);
 }
 
-TEST(IntegerEncoding, EntriesOfOneSizeNeedNoRemainders) {
-  const auto exact = block_with({1, 0.9F, 0.8F, 0.7F});
-  const auto bytes = HierarchicalOperator::encode_bytes(exact);
-  EXPECT_EQ(bytes.blocks.front().row_remainders, 0U);
-  EXPECT_EQ(bytes.blocks.front().column_remainders, 0U);
-  EXPECT_LT(change(exact, bytes), 0.02);
-}
-
-TEST(IntegerEncoding, ShortsHaveNoRemainders) {
-  const auto exact = block_with({1, 0.03F, 0.002F, 0.001F});
-  const auto shorts = HierarchicalOperator::encode_shorts(exact);
-  EXPECT_EQ(shorts.blocks.front().row_remainders, 0U);
-  EXPECT_LT(change(exact, shorts), 5e-4);
+TEST(IntegerEncoding, OthersHaveNoRemainders) {
+  const auto exact = block_with({1, 0.03F, 0.002F, 0.001F}, 2, 2);
+  for (const Precision precision : {Precision::kF16, Precision::kQ16}) {
+    const auto encoded = HierarchicalOperator::encode(exact, precision);
+    EXPECT_EQ(encoded.blocks.front().row_remainders, 0U);
+    EXPECT_LT(change(exact, encoded), 1e-3);
+  }
 }
 
 TEST(IntegerEncoding, NothingStaysNothing) {

@@ -27,16 +27,13 @@ struct TransferBlock {
   std::uint32_t column_begin = 0, column_count = 0;  ///< likewise
   Kind kind = Kind::kDense;
   std::uint32_t row_rank = 0, column_rank = 0;  ///< of a low-rank block, 0 for a dense one
-  /// Of the first vectors of a basis in 8 bits, so many are sums of two: see kRemainderScale.
+  /// So many of the first vectors of a basis are sums of two in 8 bits, which alone are too coarse
+  /// for them: see kRemainderScale. In f32 they are told but not used; in f16 and 16 bits 0.
   std::uint32_t row_remainders = 0, column_remainders = 0;
-
-  /// Vectors that are stored at each end.
-  std::uint32_t row_vectors() const { return row_rank + row_remainders; }
-  std::uint32_t column_vectors() const { return column_rank + column_remainders; }
 
   bool on_diagonal() const { return row_begin == column_begin; }
 
-  /// Values that it takes up, for `matrix_count` distinct channels.
+  /// Values that it takes up, for `matrix_count` distinct channels, without remainders.
   std::uint64_t value_count(std::uint32_t matrix_count) const;
 };
 
