@@ -1,6 +1,6 @@
 #pragma once
 
-// Products with bases of floats, halves and bytes, written once over a vector type `V`
+// Products with bases of floats and halves, written once over a vector type `V`
 // (vector_load.h). Included by one file per instruction set; everything is in an unnamed namespace
 // so that no two sets share an instantiation.
 //

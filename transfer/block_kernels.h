@@ -29,8 +29,8 @@ struct Coefficients {
   std::size_t stride;
 };
 
-/// Ranks and positions of the bases over a cluster, [rank][size]; those of std::int16_t in the
-/// order of integer_kernels_impl.h. Sizes and positions are multiples of
+/// Ranks and positions of the bases over a cluster, [rank][size]; integers in the order of
+/// integer_kernels_impl.h. Sizes and positions are multiples of
 /// HierarchicalOperator::kAlignment.
 struct BasisPart {
   std::uint64_t values;                   ///< where the bases of the cluster begin
@@ -45,7 +45,7 @@ struct BasisPart {
 template <typename Value>
 struct BasisKernels {
   /// coefficient[r] = sum over k of basis[r][k] x[k] for the lights of x and the ranks of each
-  /// part, over all positions of its cluster. Of std::int16_t, ranks begin with a multiple of
+  /// part, over all positions of its cluster. Of integers, ranks begin with a multiple of
   /// HierarchicalOperator::kRankGroup, and coefficients are written up to the next one.
   void (*project)(const Value* values, std::span<const BasisPart> parts,
                   PlanarVectors<const float> x, Coefficients<float> coefficient);

@@ -1,14 +1,15 @@
 #pragma once
 
-// Products with bases of 16-bit integers, written once over a vector type `N` of integers. Included
-// by one file per instruction set; everything is in an unnamed namespace so that no two sets share
-// an instantiation.
+// Products with bases of integers of 16 or 8 bits, written once over a vector type `N` of integers.
+// Included by one file per instruction set; everything is in an unnamed namespace so that no two
+// sets share an instantiation.
 //
 // One instruction multiplies neighbouring pairs of 16-bit integers and adds the two products to a
-// sum of 32 bits: twice the products of a multiply-add of floats, and the values need no widening.
-// The light is rounded to integers for it, with a scale for each channel of a chunk of positions;
-// so are the coefficients on the way back. The scale is the largest with which no sum of products
-// can overflow, 11 bits where the light is even over a chunk of 128 and up to 15 where it is not.
+// sum of 32 bits: twice the products of a multiply-add of floats. Bytes are widened to 16 bits as
+// they are loaded. The light is rounded to integers for it, with a scale for each channel of a
+// chunk of positions; so are the coefficients on the way back. The scale is the largest with which
+// no sum of products can overflow: 15 bits with bytes; with values of 16 bits, 11 where the light
+// is even over a chunk of 128 and up to 15 where it is not.
 //
 // A basis is [strip of 64 positions][rank / 4][position / 2][4 ranks][2 positions]: both ways read
 // it from the first value to the last. Coefficients are sums over positions, and their pairs are

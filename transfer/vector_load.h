@@ -1,10 +1,10 @@
 #pragma once
 
 // Kernels are written over a vector type `V` of kWidth floats, one per instruction set: load,
-// load_half, store, zero, broadcast, multiply_add, sum; load_some and store_some touch
-// the first `count` lanes alone, the others are read as zero; sums gives the sums over the lanes of
-// four vectors. Of vectors whose fours of lanes are the channels of something, repeat_four fills
-// all fours with one, sums_of_fours adds up those of as many vectors as there are, and
+// load_half, store, zero, broadcast, multiply_add, sum; load_some and store_some touch the first
+// `count` lanes alone, the others are read as zero; sums gives the sums over the lanes of four
+// vectors. Of vectors whose fours of lanes are the channels of something, repeat_four fills all
+// fours with one, sums_of_fours adds up those of as many vectors as there are, and
 // EntryLanes<Value>::load loads the entries of a core; entries of kWholeRows load as many vectors
 // of a row as there are with load_row. kStrip positions, the channels of kLights lights and
 // kCoreVectors vectors of a row of a core are what its registers have room for. Everything about it
