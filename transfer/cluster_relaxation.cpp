@@ -90,6 +90,7 @@ class ClusterRelaxation final : public Relaxation {
         upper_(positions()),
         received_(positions()),
         sent_(plan_.coefficient_count),
+        taken_(plan_.coefficient_count),
         arrived_(plan_.coefficient_count) {}
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
@@ -219,7 +220,23 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void multiply(std::span<const CoreBlock> cores) {
-    cores_.multiply(core_values_, cores, lanes_, 1, sent_.to(0), arrived_.to(0));
+    if (exchange_.precision != Precision::kQ8) return multiply(cores, sent_);
+    // Cores are multiplied more than once with what was sent, and parts of that are written anew in
+    // between: remainders are added to copies.
+    for (const CoreBlock& core : cores) {
+      copy_sent(core.row, core.rows + core.row_remainders);
+      copy_sent(core.column, core.columns + core.column_remainders);
+    }
+    multiply(cores, taken_);
+  }
+
+  void multiply(std::span<const CoreBlock> cores, CoefficientArray& in) {
+    cores_.multiply(core_values_, cores, lanes_, 1, in.to(0), arrived_.to(0));
+  }
+
+  void copy_sent(std::size_t first, std::size_t count) {
+    const float* const from = sent_.from(first).data;
+    std::copy_n(from, count * kChannelLanes, taken_.to(first).data);
   }
 
   void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
@@ -285,7 +302,7 @@ class ClusterRelaxation final : public Relaxation {
     for (std::uint32_t k = 0; k < size; ++k) {
       const std::uint32_t row = direction == SweepDirection::kForward ? k : size - 1 - k;
       row_block.values = step.values + std::uint64_t{row} * size;
-      multiply({&row_block, 1});
+      multiply({&row_block, 1}, sent_);
       changed_squared += relax_position(begin + row, step.coefficient);
       send(begin + row, step.coefficient + row);
     }
@@ -322,9 +339,9 @@ class ClusterRelaxation final : public Relaxation {
   float value_scale_;  ///< what a product with stored values is to be multiplied by
   float dense_scale_;  ///< of one with dense entries, which other light meets in both bases
   ClusterSweepPlan plan_;
-  Planes light_, reflectance_, radiosity_;  ///< A^1/2 M0, rho x value_scale, A^1/2 B
-  Planes lower_, upper_, received_;         ///< L x, L^T x, and both and D x
-  CoefficientArray sent_, arrived_;         ///< coefficients of x, of cores
+  Planes light_, reflectance_, radiosity_;   ///< A^1/2 M0, rho x value_scale, A^1/2 B
+  Planes lower_, upper_, received_;          ///< L x, L^T x, and both and D x
+  CoefficientArray sent_, taken_, arrived_;  ///< coefficients of x, as cores take them, of cores
   std::span<const float> area_;
   Known known_ = Known::kNothing;
   bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of x

@@ -135,7 +135,8 @@ class HierarchicalOperator final : public TransferOperator {
   /// The same with bases of 16 bits. Storage has values in f32. Throws Error as encode_half does.
   static Storage encode_shorts(const Storage& storage);
 
-  /// The same with bases of 8 bits. Storage has values in f32. Throws Error as encode_half does.
+  /// The same with bases of 8 bits, and the remainders that its blocks ask for. Storage has values
+  /// in f32. Throws Error as encode_half does.
   static Storage encode_bytes(const Storage& storage);
 
   /// Values in f32 as `precision` has them, in the order kStreamed. Throws Error as the constructor
