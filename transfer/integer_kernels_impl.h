@@ -30,6 +30,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -86,20 +87,51 @@ struct IntegerScales {
 /// The light of a chunk of positions: of each channel (pair of positions)(4 times the pair).
 struct IntegerLight {
   alignas(64) std::int16_t value[kChannelCount][kChunk * kRankGroup];
-  ChannelFloats back;
+  ChannelFloats to, back;
+  bool uneven;  ///< what rounding left may matter
 };
+
+// Light whose largest magnitude is more than this many times the mean is uneven: where the
+// brightest patches of a chunk face nothing but the sky, what arrives comes from others, of which
+// rounding to 2^-15 of the largest leaves little. notes/operator.md.
+constexpr float kUneven = 8;
+
+inline bool is_uneven(const Magnitudes& light, std::size_t count) {
+  bool uneven = false;
+  for (std::size_t c = 0; c < kChannelCount; ++c) {
+    uneven |= light.largest[c] * static_cast<float>(count) > kUneven * light.sum[c];
+  }
+  return uneven;
+}
 
 template <typename N, typename Value>
 REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std::size_t count,
                                         IntegerLight& light) {
-  const IntegerScales scales(N::magnitudes_of_planes(x, stride, count), kLargestSum<Value>);
+  const Magnitudes magnitudes = N::magnitudes_of_planes(x, stride, count);
+  const IntegerScales scales(magnitudes, kLargestSum<Value>);
+  light.to = scales.to;
   light.back = scales.back;
+  light.uneven = is_uneven(magnitudes, count);
   for (std::size_t k = 0; k < count; k += 16) {
     for (std::size_t c = 0; c < kChannelCount; ++c) {
       N::round_positions(x + c * stride + k, scales.to[c], light.value[c] + k * kRankGroup);
     }
   }
 }
+
+/// What rounding left of the light of a chunk: exact, as powers of two scale it.
+struct LightRest {
+  alignas(64) float value[kChannelCount * kChunk];
+
+  LightRest(const float* x, std::size_t stride, std::size_t count, const IntegerLight& light) {
+    for (std::size_t c = 0; c < kChannelCount; ++c) {
+      for (std::size_t k = 0; k < count; ++k) {
+        const float all = x[c * stride + k];
+        value[c * kChunk + k] = all - std::nearbyint(all * light.to[c]) * light.back[c];
+      }
+    }
+  }
+};
 
 /// Part of a basis within a strip: the values of a group of ranks, those of the next one
 /// `group_step` later.
@@ -167,7 +199,7 @@ struct LightChunk {
 template <typename N, typename Value>
 REBOUNCE_INLINE inline void project_chunk(const Value* values, const BasisPart& part,
                                           const LightChunk& chunk, const IntegerLight& light,
-                                          float* coefficient) {
+                                          bool add_to, float* coefficient) {
   const std::size_t first_group = part.first_rank / kRankGroup;
   const std::size_t groups = (part.last_rank + kRankGroup - 1) / kRankGroup - first_group;
   StripBasis<Value> first = strip_at(values, part, chunk.begin, first_group), second{};
@@ -176,7 +208,7 @@ REBOUNCE_INLINE inline void project_chunk(const Value* values, const BasisPart& 
   }
   float* const to = coefficient + (part.coefficient + first_group * kRankGroup) * kChannelLanes;
   for_each_rows<4>(groups, [&]<std::size_t kGroups>(std::size_t g) {
-    project_groups<N, kGroups>(first, second, chunk.count, light, chunk.begin > 0,
+    project_groups<N, kGroups>(first, second, chunk.count, light, add_to,
                                to + g * kRankGroup * kChannelLanes);
     first.values += kGroups * first.group_step;
     second.values += kGroups * second.group_step;
@@ -194,7 +226,12 @@ void project_integers(const Value* values, std::span<const BasisPart> parts,
       for (std::size_t k = 0; k < part.size; k += kChunk) {
         const LightChunk chunk{k, std::min(part.size - k, kChunk)};
         round_light<N, Value>(from + k, x.stride, chunk.count, light);
-        project_chunk<N>(values, part, chunk, light, to);
+        project_chunk<N>(values, part, chunk, light, k > 0, to);
+        if (light.uneven) {
+          const LightRest rest(from + k, x.stride, chunk.count, light);
+          round_light<N, Value>(rest.value, kChunk, chunk.count, light);
+          project_chunk<N>(values, part, chunk, light, true, to);
+        }
       }
     }
   }

@@ -740,10 +740,44 @@ TYPED_TEST_SUITE(IntegerKernels, IntegerTypes);
 TYPED_TEST(IntegerKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
   const PlainBasis plain = integer_basis<TypeParam>(134, 304);
   Random random;
-  const std::vector<float> x = random.floats(3 * kStride);
-  const std::vector<float> expected = there_and_back<TypeParam>(kBlockKernelsPortable, plain, x);
+  std::vector<float> x = random.floats(3 * kStride);
+  for (const float brightest : {x[kFirstPosition + 37], 1e5F}) {  // even light, and uneven
+    x[kFirstPosition + 37] = brightest;
+    const std::vector<float> expected = there_and_back<TypeParam>(kBlockKernelsPortable, plain, x);
+    for (const BlockKernelSet* set : block_kernel_sets()) {
+      EXPECT_EQ(there_and_back<TypeParam>(*set, plain, x), expected) << set->instruction_set;
+    }
+  }
+}
+
+TYPED_TEST(IntegerKernels, BrightPatchesThatDoNotCountLeaveTheOthersTheirLight) {
+  constexpr std::size_t kRank = 7, kSize = 304;
+  constexpr float kBright = 1e5F;
+  PlainBasis plain = integer_basis<TypeParam>(kRank, kSize);
+  Random random;
+  std::vector<float> x = random.floats(3 * kStride);
+  for (const std::size_t bright : {37U, 38U, 140U}) {
+    for (std::size_t r = 0; r < kRank; ++r) plain.value[r * kSize + bright] = 0;
+    for (std::size_t c = 0; c < 3; ++c) x[c * kStride + kFirstPosition + bright] = 0;
+  }
+  std::vector<float> uneven = x;
+  for (const std::size_t bright : {37U, 38U, 140U}) {
+    for (std::size_t c = 0; c < 3; ++c) uneven[c * kStride + kFirstPosition + bright] = kBright;
+  }
   for (const BlockKernelSet* set : block_kernel_sets()) {
-    EXPECT_EQ(there_and_back<TypeParam>(*set, plain, x), expected) << set->instruction_set;
+    SCOPED_TRACE(set->instruction_set);
+    const std::vector<float> expected = there_and_back<TypeParam>(*set, plain, x);
+    const std::vector<float> result = there_and_back<TypeParam>(*set, plain, uneven);
+    float largest = 0;
+    for (std::size_t r = 0; r < kRank * kChannelLanes; ++r) {
+      largest = std::max(largest, std::abs(expected[coefficient_at(0, 0) + r]));
+    }
+    for (std::size_t r = 0; r < kRank; ++r) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        const std::size_t at = coefficient_at(0, 0) + r * kChannelLanes + c;
+        EXPECT_NEAR(result[at], expected[at], 2e-3F * largest);
+      }
+    }
   }
 }
 
