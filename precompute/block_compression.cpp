@@ -1,5 +1,3 @@
-#define EIGEN_USE_BLAS
-#define EIGEN_DONT_PARALLELIZE
 #include "block_compression.h"
 
 #include <Eigen/Eigenvalues>

@@ -1,5 +1,3 @@
-#define EIGEN_USE_BLAS
-#define EIGEN_DONT_PARALLELIZE
 #include "hierarchical_matrix.h"
 
 #include <cblas.h>

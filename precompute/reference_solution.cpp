@@ -191,8 +191,7 @@ class ConjugateGradients {
 
   /// The area-weighted inner products.
   Products product(const Field& a, const Field& b) const {
-    const Eigen::Matrix<double, kRows, 1> sums = (a * b).matrix() * area_;
-    return sums.array();
+    return ((a * b).rowwise() * area_).rowwise().sum();
   }
 
   static Totals per_light(const Products& products) {
@@ -206,7 +205,7 @@ class ConjugateGradients {
 
   const Form& form_;
   const TransferOperator* nearly_inverse_;
-  Eigen::VectorXd area_;
+  Eigen::Array<double, 1, Eigen::Dynamic> area_;
   Field root_, m0_;
 };
 
