@@ -25,12 +25,12 @@ struct OfflineOptions {
 
 /// A symmetric positive definite matrix of n x n; what its entries are makes no difference to how
 /// long the inversion takes.
-TiledMatrix test_matrix(std::size_t n) {
-  TiledMatrix matrix(n);
+TiledMatrix<double> test_matrix(std::size_t n) {
+  TiledMatrix<double> matrix(n);
   const double off_diagonal = -0.5 / static_cast<double>(n);
   for (std::size_t i = 0; i < n; ++i) {
     for (std::size_t j = 0; j < n; ++j) {
-      if (i / TiledMatrix::kTile < j / TiledMatrix::kTile) break;
+      if (i / matrix.kTile < j / matrix.kTile) break;
       matrix.at(i, j) = i == j ? 1.0 : off_diagonal;
     }
   }
@@ -55,7 +55,7 @@ class OfflineStage {
     for (int repeat = 0; repeat < options_.common.repeats; ++repeat) {
       measure_stage();
       speed_->measure_once();
-      TiledMatrix matrix = matrix_;
+      TiledMatrix<double> matrix = matrix_;
       add("inverse", [&] { invert_positive_definite(matrix); });
       add("dgemm", [&] { blas.run(); });
     }
@@ -133,7 +133,7 @@ class OfflineStage {
   const OfflineOptions& options_;
   PatchModel model_;
   RayTracer tracer_;
-  TiledMatrix matrix_;
+  TiledMatrix<double> matrix_;
   BuildReport report_;
   std::optional<StageSpeed> speed_;
   double blas_flops_ = 0;

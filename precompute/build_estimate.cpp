@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "operator_stage.h"
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/large_transfer.h"
 #include "rebounce/precompute/patch_selection.h"
@@ -130,12 +131,15 @@ CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& r
   // left of finding them. Measured, furnished room: 0.30, 1.17 and 4.32 GB with 4,096, 8,192 and
   // 16,384.
   const double factors = n * n / 4;
-  estimate.peak_bytes = static_cast<std::uint64_t>(std::max(
-      40 * factors,
-      32 * factors + static_cast<double>(dense_transfer_peak_bytes(patches.size(), matrices))));
-  // Ten million rays and fifty billion operations a second, about one slow core.
+  const Arithmetic arithmetic = arithmetic_of(settings.operator_kind);
+  const std::size_t inverses = dense_transfer_peak_bytes(patches.size(), matrices, arithmetic);
+  estimate.peak_bytes = static_cast<std::uint64_t>(
+      std::max(40 * factors, 32 * factors + static_cast<double>(inverses)));
+  // Ten million rays and fifty billion operations a second, or a hundred of single precision: about
+  // one slow core.
+  const double speed = arithmetic == Arithmetic::kDouble ? 5e10 : 1e11;
   estimate.whole_seconds = on_all_processors(factors * settings.form_factors.probe_rays / 1e7 +
-                                             2 * n * n * n * matrices / 5e10) +
+                                             2 * n * n * n * matrices / speed) +
                            seconds_of_vertices(model.mesh.position.size());
   estimate.seconds = estimate.whole_seconds;
   if (settings.operator_kind == OperatorKind::kHierarchical) {

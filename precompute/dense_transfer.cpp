@@ -22,29 +22,33 @@ std::vector<double> root_reflectance(const PatchTable& patches, int channel) {
   return root;
 }
 
-/// I - R G R.
-void fill_system(const ExchangeMatrix& exchange, const PatchTable& patches,
-                 const std::vector<double>& root, TiledMatrix& system) {
-  const std::size_t n = patches.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    system.at(i, i) += 1;
+/// visit(i, j, g) for the entries of G that are not zero, i <= j.
+template <typename Visit>
+void visit_exchange(const ExchangeMatrix& exchange, const std::vector<float>& area,
+                    const Visit& visit) {
+  for (std::size_t i = 0; i < area.size(); ++i) {
     for (std::uint64_t k = exchange.row_begin[i]; k < exchange.row_begin[i + 1]; ++k) {
       const std::size_t j = exchange.column[k];
-      const double g = exchange.exchange_area[k] /
-                       std::sqrt(static_cast<double>(patches.area[i]) * patches.area[j]);
-      const double value = -root[i] * g * root[j];
-      if (i == j) {
-        system.at(i, i) += value;
-        continue;
-      }
-      system.at(j, i) = value;
-      if (j / TiledMatrix::kTile == i / TiledMatrix::kTile) system.at(i, j) = value;
+      visit(i, j, exchange.exchange_area[k] / std::sqrt(static_cast<double>(area[i]) * area[j]));
     }
   }
 }
 
-/// Writes Yhat = R^-1 (inverse - I) R^-1 as the operator's tiles.
-void write_tiles(TiledMatrix& inverse, const std::vector<double>& root, float* tiles) {
+/// I - R G R.
+template <typename Scalar>
+void fill_system(const ExchangeMatrix& exchange, const std::vector<float>& area,
+                 const std::vector<double>& root, TiledMatrix<Scalar>& system) {
+  for (std::size_t i = 0; i < area.size(); ++i) system.at(i, i) = 1;
+  visit_exchange(exchange, area, [&](std::size_t i, std::size_t j, double g) {
+    const auto value = static_cast<Scalar>(root[i] * g * root[j]);
+    system.at(j, i) -= value;
+    if (j != i && j / system.kTile == i / system.kTile) system.at(i, j) -= value;
+  });
+}
+
+/// Writes Yhat = R^-1 (inverse - I) R^-1 as the operator's tiles, but for the diagonal.
+template <typename Scalar>
+void write_tiles(TiledMatrix<Scalar>& inverse, const std::vector<double>& root, float* tiles) {
   const std::size_t n = root.size(), side = (n + kTile - 1) / kTile;
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t tile_row = 0; tile_row < side; ++tile_row) {
@@ -54,12 +58,51 @@ void write_tiles(TiledMatrix& inverse, const std::vector<double>& root, float* t
         for (std::size_t c = 0; c < kTile; ++c, ++tile) {
           const std::size_t i = tile_row * kTile + r, j = tile_column * kTile + c;
           if (i >= n || j >= n) continue;
-          const double p = inverse.at(std::max(i, j), std::min(i, j)) - (i == j ? 1.0 : 0.0);
+          if (i == j) continue;
+          const double p = inverse.at(std::max(i, j), std::min(i, j));
           *tile = static_cast<float>(p / (root[i] * root[j]));
         }
       }
     }
   }
+}
+
+/// Entry (row, column), row >= column, of the operator's tiles.
+float& entry(float* tiles, std::size_t row, std::size_t column) {
+  const std::size_t tile_row = row / kTile, tile = tile_row * (tile_row + 1) / 2 + column / kTile;
+  return tiles[(tile * kTile + row % kTile) * kTile + column % kTile];
+}
+
+/// The diagonal of Yhat = G + G R² Yhat from the entries beside it: in that of the inverse little is
+/// left after the 1, and nothing where patches are black.
+void write_diagonal(const ExchangeMatrix& exchange, const std::vector<float>& area,
+                    const std::vector<double>& root, float* tiles) {
+  std::vector<double> sum(area.size(), 0.0), left(area.size(), 1.0);
+  visit_exchange(exchange, area, [&](std::size_t i, std::size_t j, double g) {
+    if (i == j) {
+      sum[i] += g;
+      left[i] -= g * root[i] * root[i];
+    } else {
+      const double gy = g * entry(tiles, j, i);
+      sum[i] += gy * root[j] * root[j];
+      sum[j] += gy * root[i] * root[i];
+    }
+  });
+  for (std::size_t i = 0; i < area.size(); ++i) {
+    entry(tiles, i, i) = static_cast<float>(sum[i] / left[i]);
+  }
+}
+
+/// Yhat of one channel.
+template <typename Scalar>
+void solve_channel(const ExchangeMatrix& exchange, const PatchTable& patches, int channel,
+                   float* tiles, const Progress& progress) {
+  const std::vector<double> root = root_reflectance(patches, channel);
+  TiledMatrix<Scalar> system(patches.size());
+  fill_system(exchange, patches.area, root, system);
+  invert_positive_definite(system, progress);
+  write_tiles(system, root, tiles);
+  write_diagonal(exchange, patches.area, root, tiles);
 }
 
 }  // namespace
@@ -83,16 +126,19 @@ std::uint32_t distinct_channels(std::span<const Float3> reflectance) {
   return distinct_channels(reflectance, channel_matrix);
 }
 
-std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
+std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count,
+                                      Arithmetic arithmetic) {
   const std::size_t tiles =
       DenseOperator::tile_count(patch_count) * kTile * kTile * sizeof(float) * matrix_count;
-  return TiledMatrix::bytes(patch_count) + tiles;
+  return tiles + (arithmetic == Arithmetic::kDouble ? TiledMatrix<double>::bytes(patch_count)
+                                                    : TiledMatrix<float>::bytes(patch_count));
 }
 
 std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& exchange,
                                                           const PatchTable& patches,
                                                           Precision precision,
-                                                          const Progress& progress) {
+                                                          const Progress& progress,
+                                                          Arithmetic arithmetic) {
   DenseOperator::Storage storage;
   storage.area = patches.area;
   storage.precision = precision;
@@ -102,15 +148,13 @@ std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& 
   for (std::uint32_t matrix = 0; matrix < storage.matrix_count; ++matrix) {
     const auto channel = static_cast<int>(std::ranges::find(storage.channel_matrix, matrix) -
                                           storage.channel_matrix.begin());
-    const std::vector<double> root = root_reflectance(patches, channel);
-    TiledMatrix system(patches.size());
-    fill_system(exchange, patches, root, system);
     Progress part;
     if (progress) {
       part = [&](double done) { return progress((matrix + done) / storage.matrix_count); };
     }
-    invert_positive_definite(system, part);
-    write_tiles(system, root, tiles.data() + matrix * matrix_values);
+    const auto solve = arithmetic == Arithmetic::kDouble ? solve_channel<double>
+                                                         : solve_channel<float>;
+    solve(exchange, patches, channel, tiles.data() + matrix * matrix_values, part);
   }
   if (precision == Precision::kF16) {
     storage.tiles_f16 = SharedArray(DenseOperator::encode_half(tiles));

@@ -84,7 +84,8 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
   const bool compressed = decided.operator_kind != OperatorKind::kDense;
   const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
   const auto dense = clock.run("operator", [&](const Progress& part) {
-    return build_dense_transfer(data.exchange, data.patches, dense_precision, part);
+    return build_dense_transfer(data.exchange, data.patches, dense_precision, part,
+                                arithmetic_of(decided.operator_kind));
   });
   check_residual(transfer_residual(*dense, data.exchange, data.patches), dense_precision);
   data.transfer = dense;

@@ -2,6 +2,7 @@
 
 #include "phase_clock.h"
 #include "rebounce/precompute/build.h"
+#include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/patch_roles.h"
 #include "rebounce/transfer/transfer_data.h"
@@ -16,6 +17,11 @@ namespace rebounce {
 /// The operator's tolerance over that of the compressed form factors that it is made from, whose
 /// error it has beside its own.
 inline constexpr double kToleranceOverFormFactors = 5;
+
+/// In what the dense inverse is made that an operator of this kind comes from.
+inline Arithmetic arithmetic_of(OperatorKind kind) {
+  return kind == OperatorKind::kDense ? Arithmetic::kDouble : Arithmetic::kSingle;
+}
 
 /// From data.exchange, by a dense inverse.
 void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,

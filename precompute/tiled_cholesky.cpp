@@ -9,8 +9,6 @@
 namespace rebounce {
 namespace {
 
-using Tile = TiledMatrix::Tile;
-
 /// Reports progress over three stages of equal work, each cubic in the step.
 class StageProgress {
  public:
@@ -28,18 +26,21 @@ class StageProgress {
   std::size_t steps_;
 };
 
-void factor(TiledMatrix& m, const StageProgress& progress) {
+template <typename Scalar>
+void factor(TiledMatrix<Scalar>& m, const StageProgress& progress) {
   for (std::size_t k = 0; k < m.side(); ++k) {
-    Tile diagonal = m.tile(k, k);
-    const Eigen::LLT<Eigen::MatrixXd> llt(diagonal);
+    auto diagonal = m.tile(k, k);
+    const Eigen::LLT<typename TiledMatrix<Scalar>::Matrix> llt(diagonal);
     if (llt.info() != Eigen::Success) {
       throw Error("the radiosity system is not positive definite; a reflectance must be 1 or more");
     }
     diagonal = llt.matrixL();
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t i = k + 1; i < m.side(); ++i) {
-      Tile a = m.tile(i, k);
-      diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(a);
+      auto a = m.tile(i, k);
+      diagonal.template triangularView<Eigen::Lower>()
+          .transpose()
+          .template solveInPlace<Eigen::OnTheRight>(a);
     }
     // All tiles (i, j) with k < j <= i, as one index so that threads share them evenly.
     const std::size_t left = m.side() - k - 1;
@@ -54,15 +55,17 @@ void factor(TiledMatrix& m, const StageProgress& progress) {
   }
 }
 
-void invert_lower(TiledMatrix& m, const StageProgress& progress) {
+template <typename Scalar>
+void invert_lower(TiledMatrix<Scalar>& m, const StageProgress& progress) {
+  using Matrix = typename TiledMatrix<Scalar>::Matrix;
   for (std::size_t k = 0; k < m.side(); ++k) {
-    Tile diagonal = m.tile(k, k);
-    const auto lower = diagonal.triangularView<Eigen::Lower>();
+    auto diagonal = m.tile(k, k);
+    const auto lower = diagonal.template triangularView<Eigen::Lower>();
     const std::size_t below = m.side() - k - 1;
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t i = k + 1; i < m.side(); ++i) {
-      Tile a = m.tile(i, k);
-      lower.solveInPlace<Eigen::OnTheRight>(a);
+      auto a = m.tile(i, k);
+      lower.template solveInPlace<Eigen::OnTheRight>(a);
       a = -a;
     }
 #pragma omp parallel for schedule(dynamic, 1)
@@ -72,10 +75,10 @@ void invert_lower(TiledMatrix& m, const StageProgress& progress) {
     }
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t j = 0; j < k; ++j) {
-      Tile a = m.tile(k, j);
+      auto a = m.tile(k, j);
       lower.solveInPlace(a);
     }
-    Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(TiledMatrix::kTile, TiledMatrix::kTile);
+    Matrix inverse = Matrix::Identity(m.kTile, m.kTile);
     lower.solveInPlace(inverse);
     diagonal = inverse;
     progress.report(1, progress.fraction(k));
@@ -83,7 +86,8 @@ void invert_lower(TiledMatrix& m, const StageProgress& progress) {
 }
 
 /// L^-T L^-1 in place of L^-1.
-void multiply_by_transpose(TiledMatrix& m, const StageProgress& progress) {
+template <typename Scalar>
+void multiply_by_transpose(TiledMatrix<Scalar>& m, const StageProgress& progress) {
   for (std::size_t k = 0; k < m.side(); ++k) {
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t index = 0; index < k * k; ++index) {
@@ -91,13 +95,13 @@ void multiply_by_transpose(TiledMatrix& m, const StageProgress& progress) {
       if (j > i) continue;
       m.tile(i, j).noalias() += m.tile(k, i).transpose() * m.tile(k, j);
     }
-    Tile diagonal = m.tile(k, k);
+    auto diagonal = m.tile(k, k);
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t j = 0; j < k; ++j) {
-      Tile a = m.tile(k, j);
-      a = diagonal.triangularView<Eigen::Lower>().transpose() * a.eval();
+      auto a = m.tile(k, j);
+      a = diagonal.template triangularView<Eigen::Lower>().transpose() * a.eval();
     }
-    const Eigen::MatrixXd product = diagonal.transpose() * diagonal;
+    const typename TiledMatrix<Scalar>::Matrix product = diagonal.transpose() * diagonal;
     diagonal = product;
     const double done = progress.fraction(k);
     progress.report(2, done * done * done);
@@ -106,22 +110,30 @@ void multiply_by_transpose(TiledMatrix& m, const StageProgress& progress) {
 
 }  // namespace
 
-TiledMatrix::TiledMatrix(std::size_t size)
-    : size_(size), side_((size + kTile - 1) / kTile), values_(bytes(size) / sizeof(double), 0.0) {
+template <typename Scalar>
+TiledMatrix<Scalar>::TiledMatrix(std::size_t size)
+    : size_(size), side_((size + kTile - 1) / kTile), values_(bytes(size) / sizeof(Scalar), 0) {
   for (std::size_t i = size; i < side_ * kTile; ++i) at(i, i) = 1;
 }
 
-std::size_t TiledMatrix::bytes(std::size_t size) {
+template <typename Scalar>
+std::size_t TiledMatrix<Scalar>::bytes(std::size_t size) {
   const std::size_t side = (size + kTile - 1) / kTile;
-  return side * (side + 1) / 2 * kTile * kTile * sizeof(double);
+  return side * (side + 1) / 2 * kTile * kTile * sizeof(Scalar);
 }
 
-void invert_positive_definite(TiledMatrix& matrix, const Progress& progress) {
+template <typename Scalar>
+void invert_positive_definite(TiledMatrix<Scalar>& matrix, const Progress& progress) {
   const SingleThreadedBlas single_threaded;
   const StageProgress stages(progress, matrix.side());
   factor(matrix, stages);
   invert_lower(matrix, stages);
   multiply_by_transpose(matrix, stages);
 }
+
+template class TiledMatrix<double>;
+template class TiledMatrix<float>;
+template void invert_positive_definite(TiledMatrix<double>& matrix, const Progress& progress);
+template void invert_positive_definite(TiledMatrix<float>& matrix, const Progress& progress);
 
 }  // namespace rebounce

@@ -8,12 +8,14 @@
 
 namespace rebounce {
 
-/// A symmetric matrix of doubles, of which the lower triangle of square tiles is stored; both
-/// halves of a tile on the diagonal are. The last tiles are padded with the identity.
+/// A symmetric matrix of doubles or floats, of which the lower triangle of square tiles is stored;
+/// both halves of a tile on the diagonal are. The last tiles are padded with the identity.
+template <typename Scalar>
 class TiledMatrix {
  public:
   static constexpr Eigen::Index kTile = 256;
-  using Tile = Eigen::Map<Eigen::MatrixXd>;
+  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  using Tile = Eigen::Map<Matrix>;
 
   explicit TiledMatrix(std::size_t size);
 
@@ -24,18 +26,18 @@ class TiledMatrix {
 
   /// Tile (row, column), row >= column.
   Tile tile(std::size_t row, std::size_t column) {
-    double* begin = values_.data() + (row * (row + 1) / 2 + column) * kTile * kTile;
+    Scalar* begin = values_.data() + (row * (row + 1) / 2 + column) * kTile * kTile;
     return {begin, kTile, kTile};
   }
 
   /// Entry (row, column) of the lower triangle.
-  double& at(std::size_t row, std::size_t column) {
+  Scalar& at(std::size_t row, std::size_t column) {
     return tile(row / kTile, column / kTile)(row % kTile, column % kTile);
   }
 
  private:
   std::size_t size_, side_;
-  std::vector<double> values_;
+  std::vector<Scalar> values_;
 };
 
 /// Replaces a symmetric positive definite matrix by its inverse (lower triangle), through its
@@ -45,7 +47,11 @@ class TiledMatrix {
 /// of parallel tiled linear algebra algorithms for multicore architectures", 2009. Every tile meets
 /// its updates in a fixed order and BLAS runs on one thread, so the bits do not depend on the
 /// number of OpenMP threads. Throws Error if the matrix is not positive definite, Cancelled if
-/// asked to stop.
-void invert_positive_definite(TiledMatrix& matrix, const Progress& progress = {});
+/// asked to stop. For doubles and floats.
+template <typename Scalar>
+void invert_positive_definite(TiledMatrix<Scalar>& matrix, const Progress& progress = {});
+
+extern template class TiledMatrix<double>;
+extern template class TiledMatrix<float>;
 
 }  // namespace rebounce

@@ -164,11 +164,54 @@ TEST(DenseTransfer, IsLinearInTheLight) {
 TEST(DenseTransfer, SameBitsForAnyNumberOfThreads) {
   PatchModel model = make_patch_model(colourful_room(), {.patch_count = 600});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  const auto make = [&] {
-    return build_dense_transfer(f.exchange, model.patches, Precision::kF32);
+  for (const Arithmetic arithmetic : {Arithmetic::kDouble, Arithmetic::kSingle}) {
+    const auto make = [&] {
+      return build_dense_transfer(f.exchange, model.patches, Precision::kF32, {}, arithmetic);
+    };
+    const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
+    EXPECT_TRUE(std::ranges::equal(one->storage().tiles_f32, four->storage().tiles_f32));
+  }
+}
+
+/// The largest relative difference of two operators' entries.
+double largest_difference(const DenseOperator& a, const DenseOperator& b) {
+  double largest = 0;
+  for (std::uint32_t m = 0; m < a.storage().matrix_count; ++m) {
+    for (std::size_t i = 0; i < a.patch_count(); ++i) {
+      for (std::size_t j = 0; j <= i; ++j) {
+        const double exact = b.symmetric_entry(m, i, j);
+        const double error = std::abs(a.symmetric_entry(m, i, j) - exact);
+        largest = std::max(largest, error == 0 ? 0 : error / exact);
+      }
+    }
+  }
+  return largest;
+}
+
+TEST(DenseTransfer, SinglePrecisionKeepsTheRelativeErrorOfEveryEntry) {
+  // Black, nearly black and nearly white patches side by side.
+  PatchModel model = make_patch_model(colourful_room(), {.patch_count = 900});
+  const FormFactors f = compute_form_factors(model, test::make_tracer(model));
+  for (std::size_t i = 0; i < model.patches.size(); i += 3) {
+    model.patches.reflectance[i] = i % 2 == 0 ? Float3{1e-5F, 0.98F, 0} : Float3{0.98F, 1e-3F, 0.9F};
+  }
+  const auto build = [&](Arithmetic arithmetic) {
+    return build_dense_transfer(f.exchange, model.patches, Precision::kF32, {}, arithmetic);
   };
-  const auto one = test::with_threads(1, make), four = test::with_threads(4, make);
-  EXPECT_TRUE(std::ranges::equal(one->storage().tiles_f32, four->storage().tiles_f32));
+  const auto exact = build(Arithmetic::kDouble), single = build(Arithmetic::kSingle);
+  EXPECT_LT(largest_difference(*single, *exact), 1e-5);
+  EXPECT_LT(transfer_residual(*single, f.exchange, model.patches), 1e-5);
+}
+
+TEST(DenseTransfer, SinglePrecisionInAWhiteFurnace) {
+  Scene scene = test::empty_scene({0.99F, 0.99F, 0.99F});
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 700});
+  const FormFactors f = compute_form_factors(model, test::make_tracer(model));
+  const auto single = build_dense_transfer(f.exchange, model.patches, Precision::kF32, {},
+                                           Arithmetic::kSingle);
+  const std::vector<Float3> m0(model.patches.size(), {1, 1, 1});
+  for (const Float3& h : product(*single, m0)) EXPECT_NEAR(h[1] * 0.01F, 1, 1e-3);
 }
 
 TEST(DenseTransfer, GreyScenesStoreOneMatrix) {

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <span>
 
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/dense_operator.h"
@@ -10,19 +13,30 @@
 
 namespace rebounce {
 
+/// In what the system is inverted: double precision, for operators that are compared with, or single
+/// for those that are compressed, in half of the time.
+enum class Arithmetic : std::uint8_t { kDouble, kSingle };
+
 /// Builds Y = F (I - rho F)^-1 for each channel, dense.
 ///
 /// With G = A^1/2 F A^-1/2 and R = rho^1/2, the matrix I - R G R is symmetric positive definite,
 /// and (I - R G R)^-1 = I + R Yhat R gives Yhat = A^1/2 Y A^-1/2. A floor of 1e-7 under the
 /// reflectance makes the division by R harmless for black patches and changes Y by less than 1e-7.
+///
+/// Single precision is enough: the system is an M-matrix, positive on its diagonal only, so that no
+/// sum on the way cancels and every entry keeps its relative error, however small the reflectances
+/// by which it is divided (A. S. Alfa, J. Xue and Q. Ye, "Entrywise perturbation theory for
+/// diagonally dominant M-matrices with applications", 2002). Only the 1 on the diagonal cancels;
+/// entries there follow from the others by Yhat = G + G R² Yhat.
+///
 /// Channels with the same reflectances share one matrix. Throws Cancelled if asked to stop.
-std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& exchange,
-                                                          const PatchTable& patches,
-                                                          Precision precision,
-                                                          const Progress& progress = {});
+std::shared_ptr<const DenseOperator> build_dense_transfer(
+    const ExchangeMatrix& exchange, const PatchTable& patches, Precision precision,
+    const Progress& progress = {}, Arithmetic arithmetic = Arithmetic::kDouble);
 
 /// Bytes that build_dense_transfer holds at its peak: the matrix that is inverted and the operator.
-std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
+std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count,
+                                      Arithmetic arithmetic);
 
 /// Number of different reflectance channels, 1 to 3, and which of them each channel uses.
 std::uint32_t distinct_channels(std::span<const Float3> reflectance,
