@@ -3,7 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <random>
+#include <utility>
 
 namespace rebounce {
 namespace {
@@ -42,19 +45,21 @@ Spectrum gram_spectrum(const MatrixXd& a) {
   return descending(solver.eigenvectors(), solver.eigenvalues(), 0);
 }
 
-MatrixXd random_matrix(Index rows, Index columns, std::uint64_t seed) {
+MatrixXd random_signs(Index rows, Index columns, std::uint64_t seed) {
+  constexpr Index kBits = 64;
   std::mt19937_64 engine(seed);
-  MatrixXd random(rows, columns);
-  for (Index j = 0; j < columns; ++j) {
-    for (Index i = 0; i < rows; ++i) {
-      random(i, j) = static_cast<double>(engine() >> 11) * 0x1p-52 - 1;
-    }
+  MatrixXd signs(rows, columns);
+  double* const value = signs.data();
+  for (Index k = 0; k < signs.size(); k += kBits) {
+    const std::uint64_t bits = engine();
+    const Index count = std::min(kBits, signs.size() - k);
+    for (Index b = 0; b < count; ++b) value[k + b] = (bits >> b & 1) != 0 ? 1 : -1;
   }
-  return random;
+  return signs;
 }
 
 Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t seed) {
-  const MatrixXd sample = a * random_matrix(a.cols(), sketch_size, seed);
+  const MatrixXd sample = a * random_signs(a.cols(), sketch_size, seed);
   const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
                          MatrixXd::Identity(a.rows(), sketch_size);
   const MatrixXd projected = range.transpose() * a;
@@ -99,11 +104,41 @@ Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCo
   return best;
 }
 
+/// Values of the bases for each rank.
+Index basis_values_per_rank(const WideBlock& block) {
+  return block.on_diagonal ? block.rows() : block.rows() + block.columns();
+}
+
+/// Ranks above are not tried.
+Index largest_rank_of(const WideBlock& block) {
+  return block.rows() > kLargeBlock ? block.rows() / 4 : block.rows();
+}
+
 Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cost, double limit) {
-  const Index per_rank = block.on_diagonal ? block.rows() : block.rows() + block.columns();
-  const double affordable = limit / (cost.price * cost.size(per_rank, 0));
-  const Index largest = block.rows() > kLargeBlock ? block.rows() / 4 : block.rows();
+  const double affordable = limit / (cost.price * cost.size(basis_values_per_rank(block), 0));
+  const Index largest = largest_rank_of(block);
   return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
+}
+
+/// The least cost of ranks above `seen`, as far as energies of the rows' directions tell: those of
+/// the columns' and cores are left out. 0 for blocks that do not take long to try.
+double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index seen,
+                         const CompressionCost& cost) {
+  constexpr Index kFewest = 8;
+  if (block.rows() <= kLargeBlock || seen < kFewest) return 0;
+  const auto energy = [&](Index first, Index last) {
+    return (rows.missing[first] - rows.missing[last]) / static_cast<double>(last - first);
+  };
+  const Index some = seen / kFewest;
+  const double last = energy(seen - some, seen), middle = energy((seen - some) / 2, seen / 2);
+  const double power = last > 0 ? std::log2(std::max(1.0, middle / last)) : 0;
+  const double per_rank = cost.size(basis_values_per_rank(block), 0);
+  double missing = rows.missing[seen], least = std::numeric_limits<double>::max();
+  for (Index k = seen + 1; k <= largest_rank_of(block) && missing > 0; ++k) {
+    missing -= last * std::pow(static_cast<double>(seen) / static_cast<double>(k), power);
+    least = std::min(least, cost.total(std::max(0.0, missing), per_rank * static_cast<double>(k)));
+  }
+  return least;
 }
 
 void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index largest,
@@ -151,8 +186,8 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
 
 }  // namespace
 
-std::optional<LowRankBlock> compress_block(const WideBlock& block, const CompressionCost& cost,
-                                           double limit, Index largest_rank, std::uint64_t seed) {
+BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
+                            Index largest_rank, std::uint64_t seed) {
   const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
   const Spectrum rows = left_spectrum(block.entries, largest, seed);
   LowRankBlock result;
@@ -161,9 +196,9 @@ std::optional<LowRankBlock> compress_block(const WideBlock& block, const Compres
   } else {
     truncate(block, rows, largest, cost, result);
   }
-  const double size = cost.size(result.basis_values(), result.core_values());
-  if (cost.total(result.error_squared, size) >= limit) return std::nullopt;
-  return result;
+  BlockAttempt attempt{{}, least_cost_beyond(block, rows, largest, cost)};
+  if (cost.of(result) < limit) attempt.block = std::move(result);
+  return attempt;
 }
 
 }  // namespace rebounce

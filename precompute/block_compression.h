@@ -47,18 +47,28 @@ struct CompressionCost {
   double total(double error_squared, double size) const {
     return multiplicity * error_squared + price * size;
   }
+  double of(const LowRankBlock& block) const {
+    return total(block.error_squared, size(block.basis_values(), block.core_values()));
+  }
 };
 
-/// The approximation of `block` that costs the least, with bases that all matrices share. Nothing
-/// if none costs less than `limit`.
+/// What was found among ranks up to some largest.
+struct BlockAttempt {
+  std::optional<LowRankBlock> block;  ///< nothing if none costs less than the limit
+  double least_beyond = 0;  ///< about the least that more ranks may cost, rather too low; 0: unknown
+};
+
+/// The approximation of `block` that costs the least, with bases that all matrices share.
 ///
 /// The bases are leading singular vectors, from the Gram matrix of a small block and from a random
 /// sketch of a large one: N. Halko, P. G. Martinsson and J. A. Tropp, "Finding structure with
 /// randomness", 2011, algorithm 4.1, whose error is then known exactly, as the bases are
 /// orthonormal. `limit` bounds the rank that is worth having and so the sketch; no rank is above
 /// `largest_rank`.
-std::optional<LowRankBlock> compress_block(const WideBlock& block, const CompressionCost& cost,
-                                           double limit, Eigen::Index largest_rank,
-                                           std::uint64_t seed);
+///
+/// Beyond it, energies of directions are taken to fall with the power of their number with which
+/// they fell over the second half of those that were looked at.
+BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
+                            Eigen::Index largest_rank, std::uint64_t seed);
 
 }  // namespace rebounce

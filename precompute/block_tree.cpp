@@ -125,15 +125,23 @@ class PieceCompressor {
     const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
     const bool leaves = rows.is_leaf() && columns.is_leaf();
     const Index smooth = std::min(block.rows(), block.columns()) / kSmoothPart;
+    BlockAttempt attempt;
     if (!leaves && smooth > 0) {
-      const auto low_rank = compress_block(block, cost, zero_cost - overhead, smooth, seed);
-      if (low_rank && low_rank->row_basis.cols() < smooth && low_rank->column_basis.cols() < smooth)
-        return low_rank_part(place, *low_rank, row, column, cost);
+      attempt = compress_block(block, cost, zero_cost - overhead, smooth, seed);
+      if (attempt.block && attempt.block->row_basis.cols() < smooth &&
+          attempt.block->column_basis.cols() < smooth) {
+        return low_rank_part(place, *attempt.block, row, column, cost);
+      }
     }
     BlockPart best = leaves ? dense_part(place) : compress_children(row, column);
     if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
-    const auto low_rank = compress_block(block, cost, best.cost - overhead, block.rows(), seed);
-    return low_rank ? low_rank_part(place, *low_rank, row, column, cost) : best;
+    const double limit = best.cost - overhead;
+    if (attempt.least_beyond < limit) {
+      attempt = compress_block(block, cost, limit, block.rows(), seed);
+    } else if (attempt.block && cost.of(*attempt.block) >= limit) {
+      return best;
+    }
+    return attempt.block ? low_rank_part(place, *attempt.block, row, column, cost) : best;
   }
 
   BlockPart compress_children(std::uint32_t row, std::uint32_t column) const {
@@ -199,8 +207,7 @@ class PieceCompressor {
     append_columns(block.row_basis, part.values);
     append_columns(block.column_basis, part.values);
     for (const Eigen::MatrixXd& core : block.cores) append_rows(core, part.values);
-    part.cost = cost.total(block.error_squared,
-                           kBlockOverhead + cost.size(block.basis_values(), block.core_values()));
+    part.cost = cost.of(block) + cost.price * kBlockOverhead;
     return part;
   }
 

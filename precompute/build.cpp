@@ -41,6 +41,20 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
   report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
 }
 
+/// The kind of an operator from pairs, if that was left open.
+OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& model) {
+  if (settings.operator_kind != OperatorKind::kAutomatic) return settings.operator_kind;
+  const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
+  return of_some || model.patches.size() > kDensePatchCount ? OperatorKind::kHierarchical
+                                                            : OperatorKind::kDense;
+}
+
+std::uint64_t peak_bytes_from_pairs(BuildSettings settings, const PatchModel& model,
+                                    const PatchRoles& roles) {
+  settings.operator_kind = kind_from_pairs(settings, model);
+  return estimate_cost_of_pairs(model, roles, settings).peak_bytes;
+}
+
 /// What the operator is to be made from, if that was left open.
 FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model,
                                    const PatchRoles& roles) {
@@ -53,7 +67,7 @@ FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchMod
   if (settings.form_factor_kind != FormFactorKind::kAutomatic) return settings.form_factor_kind;
   const bool too_many =
       model.patches.size() > kPairsPatchCount ||
-      estimate_cost_of_pairs(model, roles, settings).peak_bytes > memory_limit_bytes(settings);
+      peak_bytes_from_pairs(settings, model, roles) > memory_limit_bytes(settings);
   return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
 }
 
@@ -64,9 +78,7 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model, const Patc
   const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
   const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
   if (settings.operator_kind == OperatorKind::kAutomatic) {
-    settings.operator_kind = links || of_some || model.patches.size() > kDensePatchCount
-                                 ? OperatorKind::kHierarchical
-                                 : OperatorKind::kDense;
+    settings.operator_kind = links ? OperatorKind::kHierarchical : kind_from_pairs(settings, model);
   }
   const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
   if (of_some && !hierarchical) {

@@ -67,12 +67,6 @@ void write_tiles(TiledMatrix<Scalar>& inverse, const std::vector<double>& root, 
   }
 }
 
-/// Entry (row, column), row >= column, of the operator's tiles.
-float& entry(float* tiles, std::size_t row, std::size_t column) {
-  const std::size_t tile_row = row / kTile, tile = tile_row * (tile_row + 1) / 2 + column / kTile;
-  return tiles[(tile * kTile + row % kTile) * kTile + column % kTile];
-}
-
 /// The diagonal of Yhat = G + G R² Yhat from the entries beside it: in that of the inverse little is
 /// left after the 1, and nothing where patches are black.
 void write_diagonal(const ExchangeMatrix& exchange, const std::vector<float>& area,
@@ -83,13 +77,13 @@ void write_diagonal(const ExchangeMatrix& exchange, const std::vector<float>& ar
       sum[i] += g;
       left[i] -= g * root[i] * root[i];
     } else {
-      const double gy = g * entry(tiles, j, i);
+      const double gy = g * tiles[DenseOperator::entry_index(i, j)];
       sum[i] += gy * root[j] * root[j];
       sum[j] += gy * root[i] * root[i];
     }
   });
   for (std::size_t i = 0; i < area.size(); ++i) {
-    entry(tiles, i, i) = static_cast<float>(sum[i] / left[i]);
+    tiles[DenseOperator::entry_index(i, i)] = static_cast<float>(sum[i] / left[i]);
   }
 }
 

@@ -63,23 +63,34 @@ Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) 
 void DenseMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                           std::span<const std::uint32_t> columns,
                           Eigen::Ref<MatrixXf> entries) const {
-  for (std::size_t j = 0; j < columns.size(); ++j) {
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      entries(static_cast<Index>(i), static_cast<Index>(j)) =
-          dense_.symmetric_entry(matrix, rows[i], columns[j]);
+  const float* const tiles = tiles_of(matrix);
+  const auto m = static_cast<Index>(rows.size()), n = static_cast<Index>(columns.size());
+  // In squares: patches that are close in the order of clusters mostly share cache lines of tiles.
+  for (Index first_column = 0; first_column < n; first_column += kTile) {
+    const Index end_column = std::min(first_column + kTile, n);
+    for (Index first_row = 0; first_row < m; first_row += kTile) {
+      const Index end_row = std::min(first_row + kTile, m);
+      for (Index j = first_column; j < end_column; ++j) {
+        for (Index i = first_row; i < end_row; ++i) {
+          entries(i, j) = tiles[DenseOperator::entry_index(rows[i], columns[j])];
+        }
+      }
     }
   }
 }
 
-MatrixXf DenseMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) const {
+const float* DenseMatrix::tiles_of(std::uint32_t matrix) const {
   const DenseOperator::Storage& storage = dense_.storage();
   assert(storage.precision == Precision::kF32);
+  return storage.tiles_f32.data() +
+         matrix * DenseOperator::tile_count(dense_.patch_count()) * kTile * kTile;
+}
+
+MatrixXf DenseMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) const {
   const SingleThreadedBlas single_threaded;
   const auto n = static_cast<Index>(dense_.patch_count());
   const Index side = (n + kTile - 1) / kTile;
-  const float* const tiles =
-      storage.tiles_f32.data() +
-      matrix * DenseOperator::tile_count(dense_.patch_count()) * kTile * kTile;
+  const float* const tiles = tiles_of(matrix);
   const auto tile = [&](Index row, Index column) {
     return Eigen::Map<const Tile>(tiles + (row * (row + 1) / 2 + column) * kTile * kTile);
   };

@@ -65,6 +65,8 @@ class DenseMatrix final : public SymmetricMatrix {
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
  private:
+  const float* tiles_of(std::uint32_t matrix) const;
+
   const DenseOperator& dense_;
 };
 

@@ -198,11 +198,8 @@ void DenseOperator::apply(std::span<const Float3> initial_exitance,
 
 float DenseOperator::symmetric_entry(std::uint32_t matrix, std::size_t row,
                                      std::size_t column) const {
-  if (row < column) std::swap(row, column);
-  const std::size_t tile_row = row / kTile, tile_column = column / kTile;
-  const std::size_t tile =
-      matrix * tile_count(patch_count()) + tile_row * (tile_row + 1) / 2 + tile_column;
-  const std::size_t k = tile * kTileSize + (row % kTile) * kTile + column % kTile;
+  const std::size_t k =
+      matrix * tile_count(patch_count()) * kTileSize + entry_index(row, column);
   return storage_.precision == Precision::kF16 ? half_to_float(storage_.tiles_f16[k]) / kHalfScale
                                                : storage_.tiles_f32[k];
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rebounce/transfer/shared_array.h"
@@ -48,6 +49,14 @@ class DenseOperator final : public TransferOperator {
 
   /// Tiles of one matrix for n patches: t (t + 1) / 2 with t = ceil(n / kTile).
   static std::size_t tile_count(std::size_t patch_count);
+
+  /// Where in the tiles of a matrix the entry of two patches is, in either order.
+  static std::size_t entry_index(std::size_t row, std::size_t column) {
+    if (row < column) std::swap(row, column);
+    const std::size_t tile_row = row / kTile;
+    const std::size_t tile = tile_row * (tile_row + 1) / 2 + column / kTile;
+    return (tile * kTile + row % kTile) * kTile + column % kTile;
+  }
 
   /// Encodes tiles for Precision::kF16. Throws Error if an entry is beyond half precision's range.
   static std::vector<std::uint16_t> encode_half(std::span<const float> tiles);
