@@ -129,14 +129,21 @@ double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index see
   const auto energy = [&](Index first, Index last) {
     return (rows.missing[first] - rows.missing[last]) / static_cast<double>(last - first);
   };
-  const Index some = seen / kFewest;
-  const double last = energy(seen - some, seen), middle = energy((seen - some) / 2, seen / 2);
-  const double power = last > 0 ? std::log2(std::max(1.0, middle / last)) : 0;
+  // Of the later directions of a sketch the energies are too low, and what is missing from the
+  // first is too much, by no more than this in the mean: Halko et al., theorem 10.5.
+  const Index half = seen / 2, quarter = half / 2;
+  const double excess =
+      1 + static_cast<double>(half) / static_cast<double>(seen + kOversampling - half - 1);
+  const double middle = energy(half - quarter / 2, half + quarter / 2);
+  const double early = energy(quarter - quarter / 2, quarter + quarter / 2);
+  const double power = middle > 0 ? std::log2(std::max(1.0, early / middle)) : 0;
   const double per_rank = cost.size(basis_values_per_rank(block), 0);
-  double missing = rows.missing[seen], least = std::numeric_limits<double>::max();
-  for (Index k = seen + 1; k <= largest_rank_of(block) && missing > 0; ++k) {
-    missing -= last * std::pow(static_cast<double>(seen) / static_cast<double>(k), power);
+  double missing = rows.missing[half] / excess, least = std::numeric_limits<double>::max();
+  for (Index k = half + 1; k <= largest_rank_of(block); ++k) {
+    missing -= middle * std::pow(static_cast<double>(half) / static_cast<double>(k), power);
+    if (k <= seen) continue;
     least = std::min(least, cost.total(std::max(0.0, missing), per_rank * static_cast<double>(k)));
+    if (missing <= 0) break;
   }
   return least;
 }

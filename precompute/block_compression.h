@@ -55,7 +55,8 @@ struct CompressionCost {
 /// What was found among ranks up to some largest.
 struct BlockAttempt {
   std::optional<LowRankBlock> block;  ///< nothing if none costs less than the limit
-  double least_beyond = 0;  ///< about the least that more ranks may cost, rather too low; 0: unknown
+  double least_beyond =
+      0;  ///< about the least that more ranks may cost, rather too low; 0: unknown
 };
 
 /// The approximation of `block` that costs the least, with bases that all matrices share.
@@ -67,7 +68,7 @@ struct BlockAttempt {
 /// `largest_rank`.
 ///
 /// Beyond it, energies of directions are taken to fall with the power of their number with which
-/// they fell over the second half of those that were looked at.
+/// they fell up to half of it.
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
                             Eigen::Index largest_rank, std::uint64_t seed);
 

@@ -67,8 +67,8 @@ void write_tiles(TiledMatrix<Scalar>& inverse, const std::vector<double>& root, 
   }
 }
 
-/// The diagonal of Yhat = G + G R² Yhat from the entries beside it: in that of the inverse little is
-/// left after the 1, and nothing where patches are black.
+/// The diagonal of Yhat = G + G R² Yhat from the entries beside it: in that of the inverse little
+/// is left after the 1, and nothing where patches are black.
 void write_diagonal(const ExchangeMatrix& exchange, const std::vector<float>& area,
                     const std::vector<double>& root, float* tiles) {
   std::vector<double> sum(area.size(), 0.0), left(area.size(), 1.0);
@@ -146,8 +146,8 @@ std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& 
     if (progress) {
       part = [&](double done) { return progress((matrix + done) / storage.matrix_count); };
     }
-    const auto solve = arithmetic == Arithmetic::kDouble ? solve_channel<double>
-                                                         : solve_channel<float>;
+    const auto solve =
+        arithmetic == Arithmetic::kDouble ? solve_channel<double> : solve_channel<float>;
     solve(exchange, patches, channel, tiles.data() + matrix * matrix_values, part);
   }
   if (precision == Precision::kF16) {

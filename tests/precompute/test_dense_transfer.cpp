@@ -193,7 +193,8 @@ TEST(DenseTransfer, SinglePrecisionKeepsTheRelativeErrorOfEveryEntry) {
   PatchModel model = make_patch_model(colourful_room(), {.patch_count = 900});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
   for (std::size_t i = 0; i < model.patches.size(); i += 3) {
-    model.patches.reflectance[i] = i % 2 == 0 ? Float3{1e-5F, 0.98F, 0} : Float3{0.98F, 1e-3F, 0.9F};
+    model.patches.reflectance[i] =
+        i % 2 == 0 ? Float3{1e-5F, 0.98F, 0} : Float3{0.98F, 1e-3F, 0.9F};
   }
   const auto build = [&](Arithmetic arithmetic) {
     return build_dense_transfer(f.exchange, model.patches, Precision::kF32, {}, arithmetic);
@@ -208,8 +209,8 @@ TEST(DenseTransfer, SinglePrecisionInAWhiteFurnace) {
   test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
   const PatchModel model = make_patch_model(scene, {.patch_count = 700});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  const auto single = build_dense_transfer(f.exchange, model.patches, Precision::kF32, {},
-                                           Arithmetic::kSingle);
+  const auto single =
+      build_dense_transfer(f.exchange, model.patches, Precision::kF32, {}, Arithmetic::kSingle);
   const std::vector<Float3> m0(model.patches.size(), {1, 1, 1});
   for (const Float3& h : product(*single, m0)) EXPECT_NEAR(h[1] * 0.01F, 1, 1e-3);
 }
