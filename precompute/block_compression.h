@@ -55,8 +55,7 @@ struct CompressionCost {
 /// What was found among ranks up to some largest.
 struct BlockAttempt {
   std::optional<LowRankBlock> block;  ///< nothing if none costs less than the limit
-  double least_beyond =
-      0;  ///< about the least that more ranks may cost, rather too low; 0: unknown
+  double least_beyond = 0;            ///< about the least that more ranks may cost; 0: unknown
 };
 
 /// The approximation of `block` that costs the least, with bases that all matrices share.
