@@ -93,23 +93,35 @@ REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& 
                                  });
 }
 
+// What there is of remainders is half a vector or less as a rule: masked vectors, as loops that g++
+// makes of such counts are mostly their beginnings and ends.
+
 /// Adds what came in for remainders to the coefficients that they belong to. Not twice, if a core
 /// is multiplied again with what came in.
+template <typename V>
 REBOUNCE_INLINE inline void fold_remainders(float* in, std::size_t rank, std::size_t remainders) {
-  constexpr float kScale = 1 / HierarchicalOperator::kRemainderScale;
+  const V scale = V::broadcast(1 / HierarchicalOperator::kRemainderScale);
   float* const remainder = in + rank * kChannelLanes;
-  for (std::size_t k = 0; k < remainders * kChannelLanes; ++k) {
-    in[k] += kScale * remainder[k];
-    remainder[k] = 0;
+  const std::size_t count = remainders * kChannelLanes;
+  for (std::size_t k = 0; k < count; k += V::kWidth) {
+    const std::size_t lanes = std::min(count - k, V::kWidth);
+    const V folded = multiply_add(V::load_some(remainder + k, lanes), scale, V::load_some(in + k, lanes));
+    folded.store_some(in + k, lanes);
+    V::zero().store_some(remainder + k, lanes);
   }
 }
 
 /// What goes out to remainders.
+template <typename V>
 REBOUNCE_INLINE inline void spread_remainders(float* out, std::size_t rank,
                                               std::size_t remainders) {
-  constexpr float kScale = 1 / HierarchicalOperator::kRemainderScale;
+  const V scale = V::broadcast(1 / HierarchicalOperator::kRemainderScale);
   float* const remainder = out + rank * kChannelLanes;
-  for (std::size_t k = 0; k < remainders * kChannelLanes; ++k) remainder[k] = kScale * out[k];
+  const std::size_t count = remainders * kChannelLanes;
+  for (std::size_t k = 0; k < count; k += V::kWidth) {
+    const std::size_t lanes = std::min(count - k, V::kWidth);
+    multiply(V::load_some(out + k, lanes), scale).store_some(remainder + k, lanes);
+  }
 }
 
 /// A core in its direction, with the remainders at its ends.
@@ -119,17 +131,17 @@ REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CoreBlock& 
   float* const row = in + std::size_t{core.row} * kChannelLanes;
   float* const column = in + std::size_t{core.column} * kChannelLanes;
   if constexpr (kDirection != Direction::kToColumns) {
-    fold_remainders(column, core.columns, core.column_remainders);
+    fold_remainders<V>(column, core.columns, core.column_remainders);
   }
   if constexpr (kDirection != Direction::kToRows) {
-    fold_remainders(row, core.rows, core.row_remainders);
+    fold_remainders<V>(row, core.rows, core.row_remainders);
   }
   multiply_core<V, kDirection, Entries>(values, core, lanes, in, out);
   if constexpr (kDirection != Direction::kToColumns) {
-    spread_remainders(out + std::size_t{core.row} * kChannelLanes, core.rows, core.row_remainders);
+    spread_remainders<V>(out + std::size_t{core.row} * kChannelLanes, core.rows, core.row_remainders);
   }
   if constexpr (kDirection != Direction::kToRows) {
-    spread_remainders(out + std::size_t{core.column} * kChannelLanes, core.columns,
+    spread_remainders<V>(out + std::size_t{core.column} * kChannelLanes, core.columns,
                       core.column_remainders);
   }
 }
