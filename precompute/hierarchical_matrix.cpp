@@ -4,7 +4,8 @@
 
 #include <algorithm>
 
-#include "hierarchical_storage.h"
+#include "hierarchical_values.h"
+#include "rebounce/transfer/error.h"
 #include "single_threaded_blas.h"
 
 namespace rebounce {
@@ -54,6 +55,7 @@ struct HierarchicalMatrix::Places {
 
 HierarchicalMatrix::HierarchicalMatrix(const HierarchicalOperator::Storage& storage)
     : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
+  if (layout_.moment_count > 0) throw Error("hierarchical matrix: its blocks have moments");
   const SharedArray<float> values = std::exchange(storage_.values_f32, {});
   bases_.assign(values.begin(), values.begin() + layout_.basis_value_count);
   const std::uint64_t count = layout_.core_value_count / matrix_count();

@@ -6,24 +6,30 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "rebounce/transfer/hierarchical_operator.h"
 
 namespace rebounce::test {
 
-/// Blocks of all kinds over `patch_count` patches in a random order; f32.
+/// Blocks of all kinds over `patch_count` patches in a random order; f32. Nested, they have moments
+/// where they can: of each 64 positions sixteen, in two cells.
 class RandomHierarchicalStorage {
  public:
-  RandomHierarchicalStorage(std::size_t patch_count, std::uint32_t matrix_count, std::uint64_t seed)
-      : engine_(seed) {
+  RandomHierarchicalStorage(std::size_t patch_count, std::uint32_t matrix_count, std::uint64_t seed,
+                            bool nested)
+      : engine_(seed),
+        positions_(static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count))),
+        nested_(nested) {
     storage.matrix_count = matrix_count;
     storage.channel_matrix = {0, matrix_count > 1 ? 1U : 0U, matrix_count - 1};
     for (std::size_t i = 0; i < patch_count; ++i) storage.area.push_back(0.1F + uniform());
     storage.patch.resize(patch_count);
     std::iota(storage.patch.begin(), storage.patch.end(), 0U);
     std::shuffle(storage.patch.begin(), storage.patch.end(), engine_);
-    add_diagonal(0, static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count)));
+    if (nested_) add_moments();
+    add_diagonal(0, positions_);
     values_.resize(values_.size() + HierarchicalOperator::kPadding, 0.0F);
     storage.values_f32 = SharedArray(std::move(values_));
   }
@@ -37,6 +43,48 @@ class RandomHierarchicalStorage {
 
   static std::uint32_t half(std::uint32_t count) {
     return (count / 2 + kAlignment - 1) / kAlignment * kAlignment;
+  }
+
+  void add_moments() {
+    std::uint32_t moment = positions_;
+    for (std::uint32_t begin = 0; begin + kNested <= positions_; begin += kNested) {
+      for (const std::uint32_t rank : {5U, 11U}) {
+        storage.blocks.push_back({.row_begin = begin + (rank == 5 ? 0 : kNested / 2),
+                                  .row_count = kNested / 2,
+                                  .column_begin = moment,
+                                  .column_count = rank,
+                                  .kind = TransferBlock::Kind::kMoments,
+                                  .row_rank = rank,
+                                  .row_remainders = rank / 3});
+        moment += rank;
+        for (std::uint32_t k = 0; k < rank; ++k) storage.moment_scale.push_back(2 + uniform());
+        for (std::uint32_t k = 0; k < rank * kNested / 2; ++k) values_.push_back(scaled());
+      }
+    }
+  }
+
+  float scaled() { return uniform() / std::sqrt(static_cast<float>(storage.area.size())); }
+
+  /// Positions become their moments, sometimes.
+  void nest(std::uint32_t& begin, std::uint32_t& count) {
+    if (!nested_ || begin % kNested != 0 || count % kNested != 0 || uniform() < 0.3F) return;
+    begin = positions_ + begin / 4;
+    count /= 4;
+  }
+
+  void nest(TransferBlock& block) {
+    const bool diagonal = block.on_diagonal();
+    nest(block.row_begin, block.row_count);
+    if (diagonal) {
+      block.column_begin = block.row_begin;
+      block.column_count = block.row_count;
+      return;
+    }
+    nest(block.column_begin, block.column_count);
+    if (block.column_begin > block.row_begin) {
+      std::swap(block.column_begin, block.row_begin);
+      std::swap(block.column_count, block.row_count);
+    }
   }
 
   void add_diagonal(std::uint32_t begin, std::uint32_t count) {
@@ -65,8 +113,9 @@ class RandomHierarchicalStorage {
         .row_begin = row, .row_count = rows, .column_begin = column, .column_count = columns};
     if (uniform() < 0.6F) {
       block.kind = TransferBlock::Kind::kLowRank;
-      block.row_rank = random_rank(rows);
-      block.column_rank = block.on_diagonal() ? block.row_rank : random_rank(columns);
+      nest(block);
+      block.row_rank = random_rank(block.row_count);
+      block.column_rank = block.on_diagonal() ? block.row_rank : random_rank(block.column_count);
       if (block.column_rank == 0) block.row_rank = 0;
       if (block.row_rank == 0) block.column_rank = 0;
       block.row_remainders = block.row_rank / 3;
@@ -74,9 +123,8 @@ class RandomHierarchicalStorage {
     }
     storage.blocks.push_back(block);
     const std::size_t begin = values_.size();
-    const float scale = 1 / std::sqrt(static_cast<float>(storage.area.size()));
     const std::uint64_t count = block.value_count(storage.matrix_count);
-    for (std::uint64_t k = 0; k < count; ++k) values_.push_back(scale * uniform());
+    for (std::uint64_t k = 0; k < count; ++k) values_.push_back(scaled());
     make_symmetric(block, begin);
   }
 
@@ -98,14 +146,25 @@ class RandomHierarchicalStorage {
     }
   }
 
+  static constexpr std::uint32_t kNested = 64;
+
   std::mt19937_64 engine_;
+  std::uint32_t positions_;
+  bool nested_;
   std::vector<float> values_;
 };
 
 inline HierarchicalOperator::Storage random_hierarchical_storage(std::size_t patch_count,
                                                                  std::uint32_t matrix_count,
                                                                  std::uint64_t seed) {
-  return RandomHierarchicalStorage(patch_count, matrix_count, seed).storage;
+  return RandomHierarchicalStorage(patch_count, matrix_count, seed, false).storage;
+}
+
+/// With moments for the positions of some blocks.
+inline HierarchicalOperator::Storage random_nested_storage(std::size_t patch_count,
+                                                           std::uint32_t matrix_count,
+                                                           std::uint64_t seed) {
+  return RandomHierarchicalStorage(patch_count, matrix_count, seed, true).storage;
 }
 
 }  // namespace rebounce::test

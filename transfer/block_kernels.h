@@ -38,6 +38,9 @@ struct BasisPart {
   std::uint32_t coefficient, position;    ///< its first ones
   std::uint32_t first_rank, last_rank;    ///< [first, last) of them
   std::uint32_t first_place, last_place;  ///< positions in the cluster, likewise
+  /// Whether the positions are moments: none is bright for what faces nothing, as they are what
+  /// arrives of the light.
+  bool moments = false;
 };
 
 /// Products with the bases of the hierarchical operator, for one instruction set. Integers stand

@@ -105,7 +105,8 @@ REBOUNCE_INLINE inline void fold_remainders(float* in, std::size_t rank, std::si
   const std::size_t count = remainders * kChannelLanes;
   for (std::size_t k = 0; k < count; k += V::kWidth) {
     const std::size_t lanes = std::min(count - k, V::kWidth);
-    const V folded = multiply_add(V::load_some(remainder + k, lanes), scale, V::load_some(in + k, lanes));
+    const V folded =
+        multiply_add(V::load_some(remainder + k, lanes), scale, V::load_some(in + k, lanes));
     folded.store_some(in + k, lanes);
     V::zero().store_some(remainder + k, lanes);
   }
@@ -138,11 +139,12 @@ REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CoreBlock& 
   }
   multiply_core<V, kDirection, Entries>(values, core, lanes, in, out);
   if constexpr (kDirection != Direction::kToColumns) {
-    spread_remainders<V>(out + std::size_t{core.row} * kChannelLanes, core.rows, core.row_remainders);
+    spread_remainders<V>(out + std::size_t{core.row} * kChannelLanes, core.rows,
+                         core.row_remainders);
   }
   if constexpr (kDirection != Direction::kToRows) {
     spread_remainders<V>(out + std::size_t{core.column} * kChannelLanes, core.columns,
-                      core.column_remainders);
+                         core.column_remainders);
   }
 }
 

@@ -20,19 +20,20 @@ bool comes_before(const Cluster& a, const Cluster& b) {
   return a.begin != b.begin ? a.begin < b.begin : a.size > b.size;
 }
 
-bool is_low_rank(const TransferBlock& block) {
-  return block.kind == TransferBlock::Kind::kLowRank && has_values(block);
+bool has_bases(const TransferBlock& block) {
+  return block.kind != TransferBlock::Kind::kDense && has_values(block);
 }
 
-/// visit(end, begin, size, rank, remainders) for the ends of the low-rank blocks in the order of
-/// their bases.
+/// visit(end, begin, size, rank, remainders) for the ends of the blocks with bases in the order of
+/// these.
 template <typename Visit>
 void visit_ends(std::span<const TransferBlock> blocks,
                 std::vector<HierarchicalLayout::Place>& places, const Visit& visit) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
-    if (!is_low_rank(block)) continue;
+    if (!has_bases(block)) continue;
     visit(places[b].row, block.row_begin, block.row_count, block.row_rank, block.row_remainders);
+    if (is_moments(block)) continue;
     if (block.on_diagonal()) {
       places[b].column = places[b].row;
     } else {
@@ -62,6 +63,8 @@ HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
     total += block.value_count(matrix_count);
+    if (is_moments(block))
+      moment_count = checked_count(std::uint64_t{moment_count} + block.column_count);
     if (total > kMostValues) {
       throw Error("hierarchical operator: its blocks are larger than any memory");
     }

@@ -49,7 +49,8 @@ struct HierarchicalLayout {
   std::uint64_t basis_value_count = 0;
   std::uint64_t core_value_count = 0;  ///< cores and dense entries
   std::uint32_t coefficient_count = 0;
-  std::uint32_t rank_group;  ///< ranks that are kept together: 1, or in 16 bits kRankGroup
+  std::uint32_t rank_group;  ///< ranks that are kept together: 1, or of integers kRankGroup
+  std::uint32_t moment_count = 0;
 
   /// `value_count` values with the zeros that follow them.
   static std::uint64_t padded(std::uint64_t value_count);
@@ -64,5 +65,9 @@ struct HierarchicalLayout {
 
 /// Whether a block has values.
 bool has_values(const TransferBlock& block);
+
+inline bool is_moments(const TransferBlock& block) {
+  return block.kind == TransferBlock::Kind::kMoments;
+}
 
 }  // namespace rebounce

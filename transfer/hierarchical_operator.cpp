@@ -8,6 +8,7 @@
 #include "block_kernels.h"
 #include "hierarchical_plan.h"
 #include "hierarchical_storage.h"
+#include "hierarchical_values.h"
 #include "kernels_of_storage.h"
 #include "rebounce/transfer/error.h"
 
@@ -24,7 +25,7 @@ std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
 
-/// The vectors of an apply to some lights.
+/// The vectors of an apply to some lights. Positions of patches are followed by moments.
 struct WorkVectors {
   std::size_t light_count;
   PlanarVectors<float> x;       ///< by position, times the root of the area
@@ -35,7 +36,8 @@ struct WorkVectors {
   WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
               float* buffer)
       : light_count(lights) {
-    const std::size_t vector = vector_size(positions), coefficients = coefficients_size(layout);
+    const std::size_t vector = vector_size(positions, layout);
+    const std::size_t coefficients = coefficients_size(layout);
     const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
     x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
     sent = {take(light_count * coefficients), coefficients};
@@ -45,11 +47,14 @@ struct WorkVectors {
 
   static std::size_t size(std::size_t positions, const HierarchicalLayout& layout,
                           std::size_t light_count) {
-    return 2 * (kChannelCount * vector_size(positions) + coefficients_size(layout)) * light_count;
+    return 2 * (kChannelCount * vector_size(positions, layout) + coefficients_size(layout)) *
+           light_count;
   }
 
  private:
-  static std::size_t vector_size(std::size_t positions) { return round_up(positions, kLine); }
+  static std::size_t vector_size(std::size_t positions, const HierarchicalLayout& layout) {
+    return round_up(positions + layout.moment_count, kLine);
+  }
   static std::size_t coefficients_size(const HierarchicalLayout& layout) {
     return round_up(layout.coefficient_count * kChannelLanes, kLine);
   }
@@ -74,14 +79,15 @@ template <typename Basis, typename Value>
 class Phases {
  public:
   Phases(const BasisKernels<Basis>& bases, const CoreKernels<Value>& cores, const Basis* basis,
-         const Value* value, const ChannelLanes& lanes, float product_scale,
-         const WorkVectors& work)
+         const Value* value, const ChannelLanes& lanes, float basis_scale,
+         std::span<const float> moment_scale, const WorkVectors& work)
       : bases_(bases),
         cores_(cores),
         basis_(basis),
         value_(value),
         lanes_(lanes),
-        product_scale_(product_scale),
+        basis_scale_(basis_scale),
+        moment_scale_(moment_scale),
         work_(work) {}
 
   void project(std::span<const BasisPart> parts) const {
@@ -93,6 +99,43 @@ class Phases {
       const float* const x = work_.x.data + v * work_.x.stride + end.position;
       float* const lane = lane_of(work_.sent, v, end.coefficient);
       for (std::size_t k = 0; k < end.count; ++k) lane[k * kChannelLanes] = x[k];
+    }
+  }
+
+  /// The moments of the light, from its coefficients.
+  void take_moments(const HierarchicalPlan::Moments& moments) const {
+    const std::size_t stride = work_.x.stride;
+    for (std::size_t light = 0; light < work_.light_count; ++light) {
+      float* const lane = lane_of(work_.sent, light * kChannelCount, moments.coefficient);
+      const float* const remainder = lane + moments.rank * kChannelLanes;
+      for (std::size_t k = 0; k < moments.remainders * kChannelLanes; ++k) {
+        lane[k] += kRemainder * remainder[k];
+      }
+      float* const x = work_.x.data + light * kChannelCount * stride + moments.position;
+      for (std::size_t k = 0; k < moments.rank; ++k) {
+        const float scale = moment_scale_[moments.scale + k] / basis_scale_;
+        for (int c = 0; c < kChannelCount; ++c)
+          x[c * stride + k] = scale * lane[k * kChannelLanes + c];
+      }
+    }
+  }
+
+  /// The coefficients of the light that arrives, from its moments.
+  void put_moments(const HierarchicalPlan::Moments& moments) const {
+    const std::size_t stride = work_.y.stride;
+    for (std::size_t light = 0; light < work_.light_count; ++light) {
+      const float* const y = work_.y.data + light * kChannelCount * stride + moments.position;
+      float* const lane = lane_of(work_.arrived, light * kChannelCount, moments.coefficient);
+      for (std::size_t k = 0; k < moments.rank; ++k) {
+        const float scale = moment_scale_[moments.scale + k] / basis_scale_;
+        for (int c = 0; c < kChannelCount; ++c)
+          lane[k * kChannelLanes + c] = scale * y[c * stride + k];
+        lane[k * kChannelLanes + kChannelCount] = 0;
+      }
+      float* const remainder = lane + moments.rank * kChannelLanes;
+      for (std::size_t k = 0; k < moments.remainders * kChannelLanes; ++k) {
+        remainder[k] = kRemainder * lane[k];
+      }
     }
   }
 
@@ -110,13 +153,18 @@ class Phases {
 
   void add_light(std::span<const DenseEnd> ends) const {
     if (lanes_.matrix_count == 1) {
-      cores_.add_products(ends, constant(work_.arrived), product_scale_, work_.y);
+      cores_.add_products(ends, constant(work_.arrived), product_scale(), work_.y);
     } else {
       for (const DenseEnd& end : ends) add_coefficients(end);
     }
   }
 
  private:
+  static constexpr float kRemainder = 1 / HierarchicalOperator::kRemainderScale;
+
+  /// Of light that goes through no bases, which other light does twice.
+  float product_scale() const { return basis_scale_ * basis_scale_; }
+
   /// The coefficients of a channel of a light, kChannelLanes floats from one to the next.
   static float* lane_of(const Coefficients<float>& coefficients, std::size_t v, std::size_t first) {
     return coefficients.data + v / kChannelCount * coefficients.stride + first * kChannelLanes +
@@ -127,7 +175,7 @@ class Phases {
     for (std::size_t v = 0; v < work_.y.count; ++v) {
       const float* const lane = lane_of(work_.arrived, v, end.coefficient + end.first);
       float* const y = work_.y.data + v * work_.y.stride + end.position;
-      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale_ * lane[k * kChannelLanes];
+      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale() * lane[k * kChannelLanes];
     }
   }
 
@@ -136,7 +184,8 @@ class Phases {
   const Basis* basis_;
   const Value* value_;
   const ChannelLanes& lanes_;
-  float product_scale_;  ///< of light that goes through no bases, which other light does twice
+  float basis_scale_;
+  std::span<const float> moment_scale_;
   const WorkVectors& work_;
 };
 
@@ -182,22 +231,56 @@ struct Exchange {
   }
 };
 
+// The steps of an apply that phases have several of, shared out among the threads.
+
+template <typename Phases>
+void project_parts(const std::vector<BasisPart>& projections,
+                   const std::vector<std::uint32_t>& parts, const Phases& phases) {
+#pragma omp for schedule(dynamic, 1)
+  for (std::size_t part = 0; part < parts.size() - 1; ++part) {
+    phases.project(between(projections, parts[part], parts[part + 1]));
+  }
+}
+
+template <typename Work>
+void for_all_moments(const std::vector<HierarchicalPlan::Moments>& moments, const Work& work) {
+#pragma omp for schedule(static)
+  for (std::size_t k = 0; k < moments.size(); ++k) work(moments[k]);
+}
+
+/// All that arrives at some positions or moments, then `finish(arrival)`; the last of them first.
+template <typename Phases, typename Finish>
+void arrive(const HierarchicalPlan& plan, const std::vector<HierarchicalPlan::Arrival>& arrivals,
+            const Phases& phases, const WorkVectors& work, const Finish& finish) {
+#pragma omp for schedule(dynamic, 1)
+  for (std::size_t k = arrivals.size(); k > 0; --k) {
+    const HierarchicalPlan::Arrival& arrival = arrivals[k - 1];
+    clear(work.y, arrival.begin, arrival.end);
+    phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
+    phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
+    finish(arrival);
+  }
+}
+
 template <typename Basis, typename Value>
 void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
               const Exchange& exchange, const WorkVectors& work,
               std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance) {
+  using Moments = HierarchicalPlan::Moments;
+  using Arrival = HierarchicalPlan::Arrival;
+  const std::size_t positions = HierarchicalOperator::position_count(exchange.patch.size());
 #pragma omp parallel
   {
 #pragma omp for schedule(static)
-    for (std::size_t k = 0; k < work.x.stride; k += kGathered) {
-      exchange.gather(initial_exitance, k, std::min(k + kGathered, work.x.stride));
+    for (std::size_t k = 0; k < positions; k += kGathered) {
+      exchange.gather(initial_exitance, k, std::min(k + kGathered, positions));
     }
 #pragma omp for schedule(dynamic, 1) nowait
     for (std::size_t k = 0; k < plan.dense_in.size(); ++k) phases.take_light(plan.dense_in[k]);
-#pragma omp for schedule(dynamic, 1)
-    for (std::size_t part = 0; part < plan.projection_parts.size() - 1; ++part) {
-      phases.project(
-          between(plan.projections, plan.projection_parts[part], plan.projection_parts[part + 1]));
+    project_parts(plan.projections, plan.projection_parts, phases);
+    if (!plan.moments_in.empty()) {
+      for_all_moments(plan.moments_in, [&](const Moments& m) { phases.take_moments(m); });
+      project_parts(plan.moment_projections, plan.moment_projection_parts, phases);
     }
 #pragma omp for schedule(dynamic, 1) nowait
     for (std::size_t part = 0; part < plan.dense_parts.size() - 1; ++part) {
@@ -208,16 +291,15 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
     for (std::size_t part = 0; part < plan.core_parts.size() - 1; ++part) {
       phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]));
     }
-#pragma omp for schedule(dynamic, 1)
-    for (std::size_t k = plan.arrivals.size(); k > 0; --k) {
-      const HierarchicalPlan::Arrival& arrival = plan.arrivals[k - 1];
-      clear(work.y, arrival.begin, arrival.end);
-      phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
-      phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
+    if (!plan.moments_out.empty()) {
+      arrive(plan, plan.moment_arrivals, phases, work, [](const Arrival&) {});
+      for_all_moments(plan.moments_out, [&](const Moments& m) { phases.put_moments(m); });
+    }
+    arrive(plan, plan.arrivals, phases, work, [&](const Arrival& arrival) {
       const std::span targets(plan.targets);
       exchange.scatter(targets.subspan(arrival.first_target, arrival.target_count()),
                        indirect_irradiance);
-    }
+    });
   }
 }
 
@@ -264,6 +346,7 @@ std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
          storage_.bases_q16.size_bytes() + storage_.bases_q8.size_bytes() +
          storage_.blocks.size() * sizeof(TransferBlock) +
+         storage_.moment_scale.size() * sizeof(float) +
          storage_.patch.size() * sizeof(std::uint32_t) + storage_.roles.role.size();
 }
 
@@ -297,7 +380,7 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   }
   const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
                                 const auto* core, float basis_scale) {
-    const Phases phases(bases, cores, basis, core, lanes, basis_scale * basis_scale, work);
+    const Phases phases(bases, cores, basis, core, lanes, basis_scale, storage_.moment_scale, work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
   with_kernels_of(storage_, *layout_, apply_phases);
@@ -347,15 +430,16 @@ void HierarchicalOperator::expand(int channel, std::span<float> transfer) const 
                                                     std::sqrt(storage_.area[row]));
   };
   for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
-    const TransferBlock& block = storage_.blocks[b];
-    const std::vector<double> entries =
-        block_entries(storage_, *layout_, b, storage_.channel_matrix[channel]);
-    for (std::size_t r = 0; r < block.row_count; ++r) {
-      for (std::size_t c = 0; c < block.column_count; ++c) {
-        const std::size_t i = block.row_begin + r, j = block.column_begin + c;
+    if (is_moments(storage_.blocks[b])) continue;
+    const BlockOfPositions block =
+        block_of_positions(storage_, *layout_, b, storage_.channel_matrix[channel]);
+    for (std::size_t r = 0; r < block.rows.size(); ++r) {
+      for (std::size_t c = 0; c < block.columns.size(); ++c) {
+        const std::size_t i = block.rows[r], j = block.columns[c];
         if (i >= n || j >= n) continue;
-        put(i, j, entries[r * block.column_count + c]);
-        if (!block.on_diagonal()) put(j, i, entries[r * block.column_count + c]);
+        const double entry = block.entries[r * block.columns.size() + c];
+        put(i, j, entry);
+        if (!storage_.blocks[b].on_diagonal()) put(j, i, entry);
       }
     }
   }

@@ -1,6 +1,7 @@
 #include "hierarchical_plan.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace rebounce {
 namespace {
@@ -64,6 +65,20 @@ class WantedRuns {
   std::vector<std::uint32_t> before_;
 };
 
+/// The moments that light at any of these positions has come after them.
+WantedRuns with_moments(const HierarchicalOperator::Storage& storage,
+                        std::vector<std::uint32_t> positions, std::size_t position_count,
+                        std::size_t moment_count) {
+  const WantedRuns wanted(positions, position_count);
+  for (const TransferBlock& block : storage.blocks) {
+    if (!is_moments(block) || !wanted.any(block.row_begin, block.row_count)) continue;
+    for (std::uint32_t m = 0; m < block.column_count; m += kAlignment) {
+      positions.push_back(block.column_begin + m);
+    }
+  }
+  return {positions, position_count + moment_count};
+}
+
 class Planner {
  public:
   using Layout = HierarchicalLayout;
@@ -74,22 +89,33 @@ class Planner {
         layout_(layout),
         plan_(plan),
         positions_(HierarchicalOperator::position_count(storage.area.size())),
-        wanted_(plan.targets, positions_),
-        lit_(source_positions(storage), positions_),
+        wanted_(with_moments(storage, plan.targets, positions_, layout.moment_count)),
+        lit_(with_moments(storage, source_positions(storage), positions_, layout.moment_count)),
         in_(layout.coefficient_count),
-        out_(layout.coefficient_count) {}
+        out_(layout.coefficient_count),
+        moments_in_(layout.moment_count),
+        moments_out_(layout.moment_count) {}
 
   void make() {
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
-      if (has_values(storage_.blocks[b])) add_core(storage_.blocks[b], layout_.places[b]);
+      const TransferBlock& block = storage_.blocks[b];
+      if (!is_moments(block) && has_values(block)) add_core(block, layout_.places[b]);
+    }
+    for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
+      if (is_moments(storage_.blocks[b])) add_moments(storage_.blocks[b], layout_.places[b].row);
     }
     mark_groups_in();
     for (const Layout::Cluster& cluster : layout_.clusters) add_projections(cluster);
-    add_arrivals();
+    const auto first_moment = static_cast<std::uint32_t>(positions_ / kAlignment);
+    add_arrivals(0, first_moment, plan_.arrivals);
+    add_arrivals(first_moment, static_cast<std::uint32_t>(wanted_.run_count()),
+                 plan_.moment_arrivals);
     count_bases();
-    plan_.projection_parts = share_out(plan_.projections, [](const BasisPart& part) {
+    const auto values = [](const BasisPart& part) {
       return std::uint64_t{part.last_rank - part.first_rank} * part.size;
-    });
+    };
+    plan_.projection_parts = share_out(plan_.projections, values);
+    plan_.moment_projection_parts = share_out(plan_.moment_projections, values);
     const auto entries = [](const auto& core) { return std::uint64_t{core.rows} * core.columns; };
     plan_.core_parts = share_out(plan_.cores, entries);
     plan_.dense_parts = share_out(plan_.dense, entries);
@@ -130,8 +156,35 @@ class Planner {
     const DenseEnd rows = whole_end(block.row_begin, core.rows + core.row_remainders, core.row);
     const DenseEnd columns =
         whole_end(block.column_begin, core.columns + core.column_remainders, core.column);
-    if (to_rows) add_way(dense, columns, rows);
-    if (to_columns) add_way(dense, rows, columns);
+    const Positions at_rows{block.row_begin, block.row_count};
+    const Positions at_columns{block.column_begin, block.column_count};
+    if (to_rows) {
+      add_way(dense, columns, rows);
+      mark_moments(at_columns, at_rows);
+    }
+    if (to_columns) {
+      add_way(dense, rows, columns);
+      mark_moments(at_rows, at_columns);
+    }
+  }
+
+  void add_moments(const TransferBlock& block, const Layout::End& end) {
+    const auto scale = static_cast<std::uint32_t>(block.column_begin - positions_);
+    const Plan::Moments moments{end.coefficient, block.row_rank, end.remainders, block.column_begin,
+                                scale};
+    const std::uint32_t count = block.row_rank + end.remainders;
+    const auto any = [&](const std::vector<bool>& marks) {
+      const auto first = marks.begin() + scale;
+      return std::find(first, first + block.column_count, true) != first + block.column_count;
+    };
+    if (any(moments_in_)) {
+      mark(in_, end.coefficient, count);
+      plan_.moments_in.push_back(moments);
+    }
+    if (any(moments_out_) && wanted_.any(block.row_begin, block.row_count)) {
+      mark(out_, end.coefficient, count);
+      plan_.moments_out.push_back(moments);
+    }
   }
 
   static DenseEnd whole_end(std::uint32_t position, std::uint32_t count,
@@ -142,6 +195,16 @@ class Planner {
   struct Positions {
     std::uint32_t begin, count;
   };
+
+  /// The moments that a block reads and those that it adds to.
+  void mark_moments(const Positions& from, const Positions& to) {
+    const auto mark_range = [this](std::vector<bool>& marks, const Positions& range) {
+      if (range.begin < positions_) return;
+      mark(marks, static_cast<std::uint32_t>(range.begin - positions_), range.count);
+    };
+    mark_range(moments_in_, from);
+    mark_range(moments_out_, to);
+  }
 
   /// Whether a source is here and a target there.
   bool leads(const Positions& from, const Positions& to) const {
@@ -188,9 +251,9 @@ class Planner {
     }
   }
 
-  static BasisPart part_of(const Layout::Cluster& cluster, std::uint32_t first_rank,
-                           std::uint32_t last_rank, std::uint32_t first_place,
-                           std::uint32_t last_place) {
+  BasisPart part_of(const Layout::Cluster& cluster, std::uint32_t first_rank,
+                    std::uint32_t last_rank, std::uint32_t first_place,
+                    std::uint32_t last_place) const {
     return {.values = cluster.values,
             .rank = cluster.rank,
             .size = cluster.size,
@@ -199,12 +262,15 @@ class Planner {
             .first_rank = first_rank,
             .last_rank = last_rank,
             .first_place = first_place,
-            .last_place = last_place};
+            .last_place = last_place,
+            .moments = cluster.begin >= positions_};
   }
 
   void add_projections(const Layout::Cluster& cluster) {
+    std::vector<BasisPart>& parts =
+        cluster.begin < positions_ ? plan_.projections : plan_.moment_projections;
     visit_marked(in_, cluster, [&](std::uint32_t first, std::uint32_t last) {
-      plan_.projections.push_back(part_of(cluster, first, last, 0, cluster.size));
+      parts.push_back(part_of(cluster, first, last, 0, cluster.size));
     });
   }
 
@@ -234,10 +300,16 @@ class Planner {
     return ranks;
   }
 
-  /// Runs at which the arrivals begin and end: shares of about equal work, moved to where the least
-  /// is cut, as coefficients are prepared anew in each part of a cluster.
-  std::vector<std::uint32_t> arrival_bounds() const {
-    const std::vector<std::uint64_t> weight = arrival_weights(), cut = cut_ranks();
+  /// Runs in [first, last) at which the arrivals begin and end: shares of about equal work, moved
+  /// to where the least is cut, as coefficients are prepared anew in each part of a cluster.
+  std::vector<std::uint32_t> arrival_bounds(std::uint32_t first_run, std::uint32_t last_run) const {
+    std::vector<std::uint64_t> weight = arrival_weights(), cut = cut_ranks();
+    const auto keep_runs = [&](std::vector<std::uint64_t>& runs) {
+      runs.erase(runs.begin() + last_run, runs.end());
+      runs.erase(runs.begin(), runs.begin() + first_run);
+    };
+    keep_runs(weight);
+    keep_runs(cut);
     std::vector<std::uint32_t> bounds =
         share_out(weight, [](std::uint64_t run_weight) { return run_weight; });
     for (std::size_t k = 1; k + 1 < bounds.size(); ++k) {
@@ -246,6 +318,7 @@ class Planner {
       const auto least = std::min_element(cut.begin() + first, cut.begin() + last + 1);
       bounds[k] = static_cast<std::uint32_t>(least - cut.begin());
     }
+    for (std::uint32_t& bound : bounds) bound += first_run;
     return bounds;
   }
 
@@ -255,8 +328,11 @@ class Planner {
     return (bounds[end] - bounds[begin]) / 2;
   }
 
-  void add_arrivals() {
-    const std::vector<std::uint32_t> bounds = arrival_bounds();
+  /// Of the runs [first, last) of positions or of moments.
+  void add_arrivals(std::uint32_t first_run, std::uint32_t last_run,
+                    std::vector<Plan::Arrival>& arrivals) {
+    if (first_run == last_run) return;
+    const std::vector<std::uint32_t> bounds = arrival_bounds(first_run, last_run);
     std::uint32_t target = 0;
     for (std::size_t k = 0; k + 1 < bounds.size(); ++k) {
       Plan::Arrival arrival{};
@@ -271,7 +347,7 @@ class Planner {
       arrival.first_target = target;
       while (target < plan_.targets.size() && plan_.targets[target] < arrival.end) ++target;
       arrival.last_target = target;
-      if (arrival.first_target < arrival.last_target) plan_.arrivals.push_back(arrival);
+      if (wanted_.any(arrival.begin, arrival.end - arrival.begin)) arrivals.push_back(arrival);
     }
   }
 
@@ -312,9 +388,10 @@ class Planner {
   const HierarchicalOperator::Storage& storage_;
   const Layout& layout_;
   Plan& plan_;
-  std::size_t positions_;
-  WantedRuns wanted_, lit_;
-  std::vector<bool> in_, out_;       ///< which coefficients are needed, before and after cores
+  std::size_t positions_;       ///< of patches, before those of moments
+  WantedRuns wanted_, lit_;     ///< of both
+  std::vector<bool> in_, out_;  ///< which coefficients are needed, before and after cores
+  std::vector<bool> moments_in_, moments_out_;
   std::vector<DenseEnd> dense_out_;  ///< whole
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "half_float.h"
+#include "hierarchical_layout.h"
 #include "integer_encoding.h"
 #include "rebounce/transfer/error.h"
 
@@ -27,15 +28,43 @@ void check_permutation(std::span<const std::uint32_t> patch, std::size_t patch_c
   }
 }
 
-/// Whether [begin, begin + count) is a cluster's range of positions.
-bool is_range(std::uint64_t begin, std::uint64_t count, std::size_t position_count) {
-  return count > 0 && begin % kAlignment == 0 && count % kAlignment == 0 &&
-         begin + count <= position_count;
+/// Positions of patches, with their padding, and the moments that are numbered after them.
+struct Places {
+  std::size_t position_count, moment_count;
+
+  /// Whether [begin, begin + count) is a cluster's range of positions.
+  bool are_positions(std::uint64_t begin, std::uint64_t count) const {
+    return are_aligned(begin, count) && begin + count <= position_count;
+  }
+  bool are_moments(std::uint64_t begin, std::uint64_t count) const {
+    return are_aligned(begin, count) && begin >= position_count &&
+           begin + count <= position_count + moment_count;
+  }
+
+ private:
+  static bool are_aligned(std::uint64_t begin, std::uint64_t count) {
+    return count > 0 && begin % kAlignment == 0 && count % kAlignment == 0;
+  }
+};
+
+void check_moments(const TransferBlock& block, const Places& places) {
+  if (!places.are_positions(block.row_begin, block.row_count))
+    refuse("moments are of no positions");
+  if (block.row_rank != block.column_count || block.row_rank > block.row_count ||
+      block.column_rank != 0 || block.row_remainders > block.row_rank ||
+      block.column_remainders != 0) {
+    refuse("the rank of moments does not fit their number");
+  }
 }
 
-void check_block(const TransferBlock& block, std::size_t position_count) {
-  if (!is_range(block.row_begin, block.row_count, position_count) ||
-      !is_range(block.column_begin, block.column_count, position_count)) {
+void check_block(const TransferBlock& block, const Places& places) {
+  if (is_moments(block)) return check_moments(block, places);
+  const auto is_range = [&](std::uint32_t begin, std::uint32_t count) {
+    return places.are_positions(begin, count) ||
+           (block.kind == TransferBlock::Kind::kLowRank && places.are_moments(begin, count));
+  };
+  if (!is_range(block.row_begin, block.row_count) ||
+      !is_range(block.column_begin, block.column_count)) {
     refuse("a block is empty, not aligned or reaches outside the matrix");
   }
   const bool misplaced = block.on_diagonal()
@@ -59,8 +88,25 @@ void check_block(const TransferBlock& block, std::size_t position_count) {
         refuse("the remainders of a block do not fit its ranks");
       }
       return;
+    case TransferBlock::Kind::kMoments:
+      return;
   }
   refuse("a block is of an unknown kind");
+}
+
+/// Of the blocks of moments, which must be numbered in their order; their scales must be there.
+std::size_t checked_moment_count(const Storage& storage, std::size_t position_count) {
+  std::uint64_t end = position_count;
+  for (const TransferBlock& block : storage.blocks) {
+    if (!is_moments(block)) continue;
+    if (block.column_begin != end) refuse("moments are not numbered in the order of their blocks");
+    end += block.column_count;
+  }
+  if (storage.moment_scale.size() != end - position_count) refuse("not one scale for each moment");
+  if (!std::ranges::all_of(storage.moment_scale, [](float s) { return std::isfinite(s); })) {
+    refuse("a scale of a moment is not finite");
+  }
+  return end - position_count;
 }
 
 void check_tables(const Storage& storage) {
@@ -78,9 +124,11 @@ void check_tables(const Storage& storage) {
   } catch (const Error& error) {
     refuse(error.what());
   }
+  const std::size_t positions = HierarchicalOperator::position_count(n);
+  const Places places{positions, checked_moment_count(storage, positions)};
   for (const TransferBlock& block : storage.blocks) {
-    check_block(block, HierarchicalOperator::position_count(n));
-    const bool one_rank = (block.row_rank == 0) != (block.column_rank == 0);
+    check_block(block, places);
+    const bool one_rank = !is_moments(block) && (block.row_rank == 0) != (block.column_rank == 0);
     if (one_rank && storage.order == HierarchicalOperator::Order::kStreamed) {
       refuse("a block has only one rank");
     }
@@ -111,7 +159,7 @@ void place_block(const HierarchicalLayout& layout, const TransferBlock& block,
   };
   if (!dense) {
     copy_basis(place.row, std::uint64_t{block.row_rank} * block.row_count);
-    if (!block.on_diagonal()) {
+    if (!block.on_diagonal() && !is_moments(block)) {
       copy_basis(place.column, std::uint64_t{block.column_rank} * block.column_count);
     }
   }
@@ -138,48 +186,6 @@ SharedArray<Value> stream_values(const Storage& storage, const std::vector<Trans
   }
   return SharedArray(std::move(streamed));
 }
-
-/// Reads values of any precision as what they stand for.
-class ValueReader {
- public:
-  ValueReader(const Storage& storage, const HierarchicalLayout& layout)
-      : storage_(storage), layout_(layout), first_core_(layout.basis_value_count) {}
-
-  /// Of one end of a block of that rank.
-  double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vector,
-               std::uint64_t position) const {
-    const double value = stored_basis(layout_.basis_index(end, vector, position));
-    if (vector >= end.remainders) return value;
-    return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
-                       double{HierarchicalOperator::kRemainderScale};
-  }
-  /// Of a core or a dense entry.
-  double core(std::uint64_t index) const {
-    if (storage_.precision == Precision::kF32) return storage_.values_f32[first_core_ + index];
-    const std::uint64_t first = storage_.precision == Precision::kF16 ? first_core_ : 0;
-    return half_to_float(storage_.values_f16[first + index]) /
-           double{HierarchicalOperator::kHalfScale};
-  }
-
- private:
-  double stored_basis(std::uint64_t index) const {
-    switch (storage_.precision) {
-      case Precision::kF16:
-        return half_to_float(storage_.values_f16[index]);
-      case Precision::kQ16:
-        return storage_.bases_q16[index] / double{HierarchicalOperator::kShortScale};
-      case Precision::kQ8:
-        return storage_.bases_q8[index] / double{HierarchicalOperator::kByteScale};
-      case Precision::kF32:
-        break;
-    }
-    return storage_.values_f32[index];
-  }
-
-  const Storage& storage_;
-  const HierarchicalLayout& layout_;
-  std::uint64_t first_core_;
-};
 
 /// Numbers of values that the arrays must have.
 struct ArraySizes {
@@ -246,6 +252,7 @@ Storage HierarchicalOperator::stream(const Storage& storage) {
   Storage streamed = storage;
   streamed.order = Order::kStreamed;
   for (TransferBlock& block : streamed.blocks) {
+    if (is_moments(block)) continue;
     if (block.row_rank == 0 || block.column_rank == 0) block.row_rank = block.column_rank = 0;
   }
   if (storage.precision == Precision::kF16) {
@@ -292,71 +299,6 @@ Storage HierarchicalOperator::encode(const Storage& storage, Precision precision
       break;
   }
   return stream(storage);
-}
-
-Storage decode(const Storage& storage) {
-  const Storage streamed = HierarchicalOperator::stream(storage);
-  if (streamed.precision == Precision::kF32) return streamed;
-  Storage decoded = streamed;
-  decoded.precision = Precision::kF32;
-  decoded.values_f16 = {};
-  decoded.bases_q16 = {};
-  decoded.bases_q8 = {};
-  const HierarchicalLayout from(streamed), to(decoded);
-  const ValueReader read(streamed, from);
-  std::vector<float> values(HierarchicalLayout::padded(to.basis_value_count + to.core_value_count));
-  const auto copy_basis = [&](const HierarchicalLayout::End& source,
-                              const HierarchicalLayout::End& target, std::uint32_t rank,
-                              std::uint32_t size) {
-    for (std::uint32_t r = 0; r < rank; ++r) {
-      for (std::uint32_t k = 0; k < size; ++k) {
-        values[to.basis_index(target, r, k)] = static_cast<float>(read.basis(source, rank, r, k));
-      }
-    }
-  };
-  for (std::size_t b = 0; b < streamed.blocks.size(); ++b) {
-    const TransferBlock& block = streamed.blocks[b];
-    if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
-    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_count);
-    if (block.on_diagonal()) continue;
-    copy_basis(from.places[b].column, to.places[b].column, block.column_rank, block.column_count);
-  }
-  for (std::uint64_t k = 0; k < to.core_value_count; ++k) {
-    values[to.basis_value_count + k] = static_cast<float>(read.core(k));
-  }
-  decoded.values_f32 = SharedArray(std::move(values));
-  return decoded;
-}
-
-std::vector<double> block_entries(const Storage& storage, const HierarchicalLayout& layout,
-                                  std::size_t index, std::uint32_t matrix) {
-  const ValueReader read(storage, layout);
-  const TransferBlock& block = storage.blocks[index];
-  const HierarchicalLayout::Place& place = layout.places[index];
-  const std::size_t rows = block.row_count, columns = block.column_count;
-  std::vector<double> entries(rows * columns, 0.0);
-  if (block.kind == TransferBlock::Kind::kDense) {
-    for (std::size_t k = 0; k < entries.size(); ++k) {
-      entries[k] = read.core(place.values + k * storage.matrix_count + matrix);
-    }
-    return entries;
-  }
-  const std::size_t row_rank = block.row_rank, column_rank = block.column_rank;
-  std::vector<double> right(columns);  // a row of S V^T
-  for (std::size_t r = 0; r < row_rank; ++r) {
-    std::ranges::fill(right, 0.0);
-    for (std::size_t k = 0; k < column_rank; ++k) {
-      const std::uint64_t entry = r * column_rank + k;
-      const double core = read.core(place.values + entry * storage.matrix_count + matrix);
-      for (std::size_t j = 0; j < columns; ++j)
-        right[j] += core * read.basis(place.column, column_rank, k, j);
-    }
-    for (std::size_t i = 0; i < rows; ++i) {
-      const double left = read.basis(place.row, row_rank, r, i);
-      for (std::size_t j = 0; j < columns; ++j) entries[i * columns + j] += left * right[j];
-    }
-  }
-  return entries;
 }
 
 float product_scale(Precision precision) {

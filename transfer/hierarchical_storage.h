@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
-#include "hierarchical_layout.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 
 namespace rebounce {
 
@@ -18,14 +17,5 @@ void drop_remainders(HierarchicalOperator::Storage& storage);
 
 /// What products of stored values must be multiplied by.
 float product_scale(Precision precision);
-
-/// What the values of an operator stand for, in f32 and in the order kStreamed.
-HierarchicalOperator::Storage decode(const HierarchicalOperator::Storage& storage);
-
-/// The entries of one block, [row_count][column_count], of one matrix; values in the order
-/// kStreamed.
-std::vector<double> block_entries(const HierarchicalOperator::Storage& storage,
-                                  const HierarchicalLayout& layout, std::size_t block,
-                                  std::uint32_t matrix);
 
 }  // namespace rebounce

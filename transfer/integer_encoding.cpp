@@ -38,11 +38,13 @@ class IntegerEncoder {
         matrix_count_(exact.matrix_count),
         from_(exact),
         to_(rounded),
+        moment_scale_(exact.moment_scale),
         bases_(Layout::padded(to_.basis_value_count)),
         cores_(Layout::padded(to_.core_value_count)) {
     for (std::size_t b = 0; b < exact.blocks.size(); ++b) encode(exact.blocks[b], b);
   }
 
+  std::vector<float> take_moment_scale() { return std::move(moment_scale_); }
   SharedArray<Integer> take_bases() { return SharedArray(std::move(bases_)); }
   SharedArray<std::uint16_t> take_cores() { return SharedArray(std::move(cores_)); }
 
@@ -59,6 +61,10 @@ class IntegerEncoder {
     } else if (has_values(block)) {
       const std::vector<float> rows =
           encode_basis(from.row, to.row, block.row_rank, block.row_count);
+      if (is_moments(block)) {
+        for (const float row : rows) moment_scale_[moment_++] *= row;
+        return;
+      }
       const std::vector<float> columns =
           encode_basis(from.column, to.column, block.column_rank, block.column_count);
       for (const float row : rows) {
@@ -103,6 +109,8 @@ class IntegerEncoder {
   const float* exact_;
   std::uint32_t matrix_count_;
   Layout from_, to_;
+  std::vector<float> moment_scale_;
+  std::size_t moment_ = 0;  ///< the next one
   std::vector<Integer> bases_;
   std::vector<std::uint16_t> cores_;
 };
@@ -111,6 +119,7 @@ class IntegerEncoder {
 template <typename Integer>
 void encode(const Storage& exact, Storage& rounded, SharedArray<Integer> Storage::*bases) {
   IntegerEncoder<Integer> encoder(exact, rounded);
+  rounded.moment_scale = encoder.take_moment_scale();
   rounded.*bases = encoder.take_bases();
   rounded.values_f16 = encoder.take_cores();
 }

@@ -289,6 +289,9 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   storage.channel_matrix = read_channel_matrix(file, names.channel_matrix, kChannelCount);
   storage.matrix_count = 1 + std::ranges::max(storage.channel_matrix);
   storage.roles = read_roles(file, names.role, area.size());
+  if (names.moment_scale != nullptr && file.tensors().contains(names.moment_scale)) {
+    TensorReader{file}(names.moment_scale, storage.moment_scale);
+  }
   if (file.info(names.values).type == TensorType::kF16) {
     storage.precision = Precision::kF16;
     storage.values_f16 = file.tensor<std::uint16_t>(names.values, {kAnySize}, TensorType::kF16);

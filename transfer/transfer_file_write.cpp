@@ -93,6 +93,7 @@ void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
   collector.add_made<StoredBlock>(names.blocks, blocks);
   collector(names.patch, storage.patch);
   if (!storage.roles.all_are_both()) collector(names.role, storage.roles.role);
+  if (!storage.moment_scale.empty()) collector(names.moment_scale, storage.moment_scale);
   collector.add<std::uint32_t>(names.channel_matrix, {storage.channel_matrix.size()},
                                storage.channel_matrix);
   if (storage.precision == Precision::kQ16) {

@@ -36,7 +36,7 @@ Eigen::MatrixXf expanded(const HierarchicalOperator& transfer, int channel) {
 class HierarchicalMatrixOf : public testing::TestWithParam<Precision> {
  protected:
   HierarchicalOperator transfer{HierarchicalOperator::encode(
-      test::RandomHierarchicalStorage(kPatchCount, 2, 5).storage, GetParam())};
+      test::random_hierarchical_storage(kPatchCount, 2, 5), GetParam())};
   HierarchicalMatrix matrix{transfer.storage()};
   SingleThreadedBlas single_threaded;
 };

@@ -11,6 +11,7 @@
 #include "expect_error.h"
 #include "hierarchical_samples.h"
 #include "plain_data.h"
+#include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/safetensors.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
@@ -29,6 +30,14 @@ TransferData sample_data(Precision precision, const PatchRoles& roles = {}) {
   if (precision != Precision::kF32) storage = HierarchicalOperator::encode(storage, precision);
   TransferData data = test::plain_data(storage.area);
   data.transfer = std::make_shared<const HierarchicalOperator>(std::move(storage));
+  return data;
+}
+
+/// With moments.
+TransferData nested_data(Precision precision) {
+  TransferData data = sample_data(precision);
+  data.transfer = std::make_shared<const HierarchicalOperator>(
+      HierarchicalOperator::encode(test::random_nested_storage(kPatchCount, 2, 5), precision));
   return data;
 }
 
@@ -60,6 +69,32 @@ TEST(HierarchicalFile, RoundTrips) {
     save_transfer_file(folder / "again", loaded);
     EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
   }
+}
+
+TEST(HierarchicalFile, HoldsMoments) {
+  for (const Precision precision :
+       {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
+    const test::TemporaryFolder folder;
+    const TransferData data = nested_data(precision);
+    save_transfer_file(folder / "file", data);
+    const TransferData loaded = load_transfer_file(folder / "file");
+    const auto &a = storage_of(data), &b = storage_of(loaded);
+    EXPECT_EQ(a.moment_scale.size(), 16U);
+    EXPECT_EQ(a.moment_scale, b.moment_scale);
+    std::vector<float> expanded_a(kPatchCount * kPatchCount), expanded_b(expanded_a);
+    data.transfer->expand(1, expanded_a);
+    loaded.transfer->expand(1, expanded_b);
+    EXPECT_EQ(expanded_a, expanded_b);
+    save_transfer_file(folder / "again", loaded);
+    EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
+  }
+}
+
+TEST(HierarchicalFile, SaysNothingOfMomentsWhereThereAreNone) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kQ8));
+  EXPECT_FALSE(
+      SafetensorsFile(folder / "file").tensors().contains("transfer.hierarchical.moment_scale"));
 }
 
 /// Each of the four roles in turn.
@@ -221,7 +256,8 @@ TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
       {"blocks", 1, 0, "empty"},
       {"blocks", 1, 8, "not aligned"},
       {"blocks", 3, 0xFFFFFFF0, "reaches outside"},
-      {"blocks", 4, 2, "unknown kind"},
+      {"blocks", 4, 2, "not numbered in the order"},
+      {"blocks", 4, 3, "unknown kind"},
       {"blocks", 4, 0xFFFFFFFF, "unknown kind"},
       {"blocks", 5, 1000, "rank"},
       {"blocks", 5, 0, "rank"},
@@ -249,13 +285,37 @@ TEST(HierarchicalFile, RefusesRolesThatAreNotOneForEachPatch) {
   expect_error([&] { load_transfer_file(folder / "file"); }, "transfer.hierarchical.role");
 }
 
-TEST(HierarchicalFile, SurvivesRandomMutationsUnderAGoodChecksum) {
+TEST(HierarchicalFile, RefusesMomentsThatDoNotFit) {
+  const auto refuses = [](const char* tensor, std::size_t entry, std::uint32_t value,
+                          const char* message) {
+    SCOPED_TRACE(std::string(tensor) + ": " + message);
+    const test::TemporaryFolder folder;
+    save_transfer_file(folder / "file", nested_data(Precision::kQ8));
+    Tampering(folder / "file").set(tensor, entry, value);
+    expect_error([&] { load_transfer_file(folder / "file"); }, message);
+  };
+  refuses("blocks", 0, 112, "moments are of no positions");
+  refuses("blocks", 2, 0, "not numbered in the order");
+  refuses("blocks", 3, 0xFFFFFFF0, "not numbered in the order");
+  refuses("blocks", 4, 1, "not numbered in the order");
+  refuses("blocks", 5, 6, "rank of moments");
+  refuses("moment_scale", 3, 0x7FC00000, "not finite");
+  refuses("moment_scale", 3, 0x7F800000, "not finite");
+}
+
+TEST(HierarchicalFile, RefusesFormFactorsWithMoments) {
+  const auto moments = std::make_shared<const HierarchicalOperator>(
+      HierarchicalOperator::encode_half(test::random_nested_storage(kPatchCount, 1, 5)));
+  expect_error([&] { CompressedFormFactors{moments}; }, "have moments");
+}
+
+void survive_mutations(const TransferData& data) {
   constexpr std::uint64_t kSeed = 20240609;
   constexpr int kCount = 1'000;
   std::printf("seed %llu\n", static_cast<unsigned long long>(kSeed));
   std::mt19937_64 random(kSeed);
   const test::TemporaryFolder folder;
-  save_transfer_file(folder / "file", sample_data(Precision::kF16));
+  save_transfer_file(folder / "file", data);
   const std::string whole = test::read_bytes(folder / "file");
   const SafetensorsFile file(folder / "file");
   const TensorInfo& blocks = file.info("transfer.hierarchical.blocks");
@@ -275,6 +335,13 @@ TEST(HierarchicalFile, SurvivesRandomMutationsUnderAGoodChecksum) {
   }
   EXPECT_GT(loaded, 0);
   EXPECT_LT(loaded, kCount * 9 / 10);
+}
+
+TEST(HierarchicalFile, SurvivesRandomMutationsUnderAGoodChecksum) {
+  for (const bool nested : {false, true}) {
+    SCOPED_TRACE(nested ? "nested" : "plain");
+    survive_mutations(nested ? nested_data(Precision::kQ8) : sample_data(Precision::kF16));
+  }
 }
 
 }  // namespace

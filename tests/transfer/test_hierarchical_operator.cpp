@@ -23,6 +23,7 @@ namespace {
 
 using test::expect_error;
 using test::random_hierarchical_storage;
+using test::random_nested_storage;
 
 std::vector<Float3> product(const TransferOperator& op, const std::vector<Float3>& m0) {
   std::vector<Float3> h(m0.size());
@@ -213,7 +214,9 @@ void check_receivers(const HierarchicalOperator& op, float allowed) {
     previous = receivers.value_count();
   }
   EXPECT_EQ(op.receivers(std::vector<std::uint32_t>{}).value_count(), 0U);
-  expect_error([&] { (void)op.receivers(std::vector<std::uint32_t>{777}); }, "does not exist");
+  expect_error(
+      [&] { (void)op.receivers(std::vector<std::uint32_t>{static_cast<std::uint32_t>(n)}); },
+      "does not exist");
 }
 
 TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
@@ -268,7 +271,7 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
       {"not aligned", [](Storage& s) { s.blocks[0].row_count = 8; }},
       {"nor below", [](Storage& s) { s.blocks[0].column_begin = 16; }},
       {"nor below", [](Storage& s) { s.blocks[0].column_count += 16; }},
-      {"unknown kind", [](Storage& s) { s.blocks[0].kind = static_cast<Kind>(2); }},
+      {"unknown kind", [](Storage& s) { s.blocks[0].kind = static_cast<Kind>(3); }},
       {"dense block has a rank",
        [](Storage& s) {
          s.blocks[0].kind = Kind::kDense;
@@ -322,6 +325,184 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
     SCOPED_TRACE("fault " + std::to_string(k) + ": " + faults[k].message);
     Storage storage = random_hierarchical_storage(100, 3, 1);
     ASSERT_TRUE(storage.blocks[0].on_diagonal());
+    faults[k].make(storage);
+    expect_error([&] { HierarchicalOperator{storage}; }, faults[k].message);
+  }
+}
+
+constexpr Precision kPrecisions[] = {Precision::kF32, Precision::kF16, Precision::kQ16,
+                                     Precision::kQ8};
+
+/// What an apply may differ from plain sums over the same stored values.
+double rounding_of(Precision precision) {
+  return precision == Precision::kQ16 ? 5e-4 : precision == Precision::kQ8 ? 1e-4 : 5e-6;
+}
+
+TEST(NestedOperator, TheTestOperatorHasMomentsOnAllSides) {
+  int rows = 0, both = 0, diagonal = 0, neither = 0;
+  const std::size_t positions = HierarchicalOperator::position_count(1000);
+  for (const std::uint64_t seed : {1U, 6U, 11U, 12U, 1003U}) {
+    for (const TransferBlock& block : random_nested_storage(1000, 3, seed).blocks) {
+      if (block.kind != TransferBlock::Kind::kLowRank) continue;
+      const bool row = block.row_begin >= positions, column = block.column_begin >= positions;
+      (block.on_diagonal() ? (row ? diagonal : neither) : column ? both : row ? rows : neither)++;
+    }
+  }
+  for (const int count : {rows, both, diagonal, neither}) EXPECT_GE(count, 3);
+}
+
+TEST(NestedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
+  for (const std::size_t n : {64U, 500U, 1000U}) {
+    for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+      const HierarchicalOperator::Storage storage =
+          random_nested_storage(n, matrices, n + matrices);
+      ASSERT_FALSE(storage.moment_scale.empty());
+      const std::vector<Float3> m0 = test::random_light(n, n, 100);
+      const HierarchicalOperator exact(storage);
+      for (const Precision precision : kPrecisions) {
+        SCOPED_TRACE(std::to_string(n) + " patches, " + std::to_string(matrices) + " matrices");
+        const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+        EXPECT_LT(relative_difference(product(op, m0), multiply_expansion(op, m0), storage.area),
+                  rounding_of(precision));
+        EXPECT_LT(relative_difference(product(op, m0), product(exact, m0), storage.area), 5e-3);
+      }
+    }
+  }
+}
+
+TEST(NestedOperator, MomentsAreTheProductsThatTheyStandFor) {
+  // One block of rank one over the moments of all positions but its own mirror image's:
+  // Yhat = u v^T + v u^T with u = W D t and v = W D s, written out.
+  HierarchicalOperator::Storage storage;
+  storage.area.assign(64, 1.0F);
+  storage.patch.resize(64);
+  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+  storage.matrix_count = 1;
+  std::vector<float> values;
+  const auto take = [&](std::size_t count, auto value) {
+    for (std::size_t k = 0; k < count; ++k) values.push_back(value(static_cast<float>(k)));
+  };
+  for (const std::uint32_t begin : {0U, 32U}) {
+    storage.blocks.push_back({.row_begin = begin,
+                              .row_count = 32,
+                              .column_begin = 64 + begin / 2,
+                              .column_count = 16,
+                              .kind = TransferBlock::Kind::kMoments,
+                              .row_rank = 16});
+    take(16 * 32, [&](float k) { return std::sin(k + static_cast<float>(begin)); });
+  }
+  for (int k = 0; k < 32; ++k) storage.moment_scale.push_back(1 + 0.1F * static_cast<float>(k));
+  storage.blocks.push_back({.row_begin = 80,
+                            .row_count = 16,
+                            .column_begin = 64,
+                            .column_count = 16,
+                            .kind = TransferBlock::Kind::kLowRank,
+                            .row_rank = 1,
+                            .column_rank = 1});
+  take(16, [](float k) { return std::cos(k); });
+  take(16, [](float k) { return std::cos(2 * k); });
+  take(1, [](float) { return 0.25F; });
+  values.resize(values.size() + HierarchicalOperator::kPadding);
+  const auto vector_of = [&](std::size_t cell) {
+    std::vector<double> u(32);
+    for (std::size_t m = 0; m < 16; ++m) {
+      const double t = values[2 * 512 + (1 - cell) * 16 + m] * storage.moment_scale[16 * cell + m];
+      for (std::size_t k = 0; k < 32; ++k) u[k] += t * values[cell * 512 + m * 32 + k];
+    }
+    return u;
+  };
+  const std::vector<double> rows = vector_of(1), columns = vector_of(0);
+  storage.values_f32 = SharedArray(std::vector<float>(values));
+  const HierarchicalOperator op(storage);
+  std::vector<float> y(64 * 64);
+  op.expand(0, y);
+  for (std::size_t i = 0; i < 32; ++i) {
+    for (std::size_t j = 0; j < 32; ++j) {
+      const double entry = 0.25 * rows[i] * columns[j];
+      EXPECT_NEAR(y[(32 + i) * 64 + j], entry, 1e-4);
+      EXPECT_NEAR(y[j * 64 + 32 + i], entry, 1e-4);
+      EXPECT_EQ(y[i * 64 + j], 0);
+    }
+  }
+}
+
+TEST(NestedOperator, SameBitsForAnyNumberOfThreads) {
+  const HierarchicalOperator::Storage storage = random_nested_storage(1000, 3, 6);
+  const std::vector<Float3> m0 = test::random_light(1000, 2, 100);
+  for (const Precision precision : kPrecisions) {
+    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    const auto multiply = [&] { return product(op, m0); };
+    EXPECT_EQ(test::with_threads(1, multiply), test::with_threads(5, multiply));
+  }
+}
+
+TEST(NestedOperator, ABatchIsAsManyAppliesAndReceiversGetTheirLight) {
+  constexpr std::size_t kCount = 1000, kLights = 3;
+  const HierarchicalOperator::Storage storage = random_nested_storage(kCount, 3, 11);
+  for (const Precision precision : kPrecisions) {
+    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    const std::vector<Float3> m0 = test::random_light(kLights * kCount, 3, 100);
+    const std::vector<Float3> batch = batch_product(op, kLights, m0);
+    for (std::size_t light = 0; light < kLights; ++light) {
+      const auto at = static_cast<std::ptrdiff_t>(light * kCount);
+      const auto end = at + static_cast<std::ptrdiff_t>(kCount);
+      const std::vector<Float3> one(m0.begin() + at, m0.begin() + end);
+      const std::vector<Float3> part(batch.begin() + at, batch.begin() + end);
+      EXPECT_LT(relative_difference(part, product(op, one), storage.area), 1e-6);
+    }
+  }
+  check_receivers(HierarchicalOperator(random_nested_storage(777, 3, 12)), 1e-6F);
+  check_receivers(HierarchicalOperator(random_nested_storage(1000, 3, 12)), 1e-6F);
+  check_receivers(HierarchicalOperator(HierarchicalOperator::encode_bytes(storage)), 5e-4F);
+}
+
+TEST(NestedOperator, AllocatesNothing) {
+  const HierarchicalOperator op(random_nested_storage(500, 3, 8));
+  const std::vector<Float3> m0 = test::random_light(500, 3, 100);
+  std::vector<Float3> h(m0.size());
+  std::vector<float> workspace(op.workspace_size());
+  op.apply(m0, h, workspace);
+  EXPECT_EQ(test::count_allocations([&] { op.apply(m0, h, workspace); }), 0);
+}
+
+TEST(NestedOperator, RefusesMomentsThatDoNotFit) {
+  using Storage = HierarchicalOperator::Storage;
+  struct Fault {
+    const char* message;
+    std::function<void(Storage&)> make;
+  };
+  const std::vector<Fault> faults = {
+      {"not numbered in the order", [](Storage& s) { s.blocks[1].column_begin += 16; }},
+      {"not numbered in the order", [](Storage& s) { std::swap(s.blocks[0], s.blocks[1]); }},
+      {"not numbered in the order", [](Storage& s) { s.blocks[0].column_count = 4294967295U; }},
+      {"moments are of no positions", [](Storage& s) { s.blocks[0].row_begin = 1008; }},
+      {"moments are of no positions", [](Storage& s) { s.blocks[0].row_count = 24; }},
+      {"rank of moments", [](Storage& s) { s.blocks[0].row_rank = 4; }},
+      {"rank of moments", [](Storage& s) { s.blocks[0].column_rank = 1; }},
+      {"rank of moments", [](Storage& s) { s.blocks[0].row_remainders = 6; }},
+      {"rank of moments", [](Storage& s) { s.blocks[0].column_remainders = 1; }},
+      {"one scale for each moment", [](Storage& s) { s.moment_scale.pop_back(); }},
+      {"one scale for each moment", [](Storage& s) { s.moment_scale.push_back(1); }},
+      {"not finite", [](Storage& s) { s.moment_scale[3] = std::nanf(""); }},
+      {"reaches outside",
+       [](Storage& s) {
+         for (TransferBlock& block : s.blocks) {
+           if (block.kind != TransferBlock::Kind::kDense) continue;
+           block.row_begin = block.column_begin = 1008;
+           break;
+         }
+       }},
+      {"reaches outside",
+       [](Storage& s) {
+         for (TransferBlock& block : s.blocks) {
+           if (block.kind == TransferBlock::Kind::kLowRank) block.row_begin = 1008 - 16;
+         }
+       }},
+      {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
+  };
+  for (std::size_t k = 0; k < faults.size(); ++k) {
+    SCOPED_TRACE("fault " + std::to_string(k) + ": " + faults[k].message);
+    Storage storage = random_nested_storage(1000, 3, 1);
     faults[k].make(storage);
     expect_error([&] { HierarchicalOperator{storage}; }, faults[k].message);
   }

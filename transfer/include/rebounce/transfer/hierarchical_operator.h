@@ -20,13 +20,21 @@ struct HierarchicalLayout;
 /// A rectangle of the symmetric matrix Yhat in cluster order. Either it lies on the diagonal, its
 /// rows and columns the same, or all of its columns come before its rows; then it stands for its
 /// transpose too.
+///
+/// Large blocks are of low rank over *moments* instead of positions: the light of some positions in
+/// a basis that all blocks over them share. A block of kMoments is such a basis. Moments are
+/// numbered after the positions, and the rows and the columns of a low-rank block each are of one
+/// kind.
 struct TransferBlock {
-  enum class Kind : std::uint32_t { kDense = 0, kLowRank = 1 };
+  /// Of kMoments the rows are positions and the columns the moments that they have, in the order of
+  /// the blocks.
+  enum class Kind : std::uint32_t { kDense = 0, kLowRank = 1, kMoments = 2 };
 
   std::uint32_t row_begin = 0, row_count = 0;        ///< positions, multiples of kAlignment
   std::uint32_t column_begin = 0, column_count = 0;  ///< likewise
   Kind kind = Kind::kDense;
-  std::uint32_t row_rank = 0, column_rank = 0;  ///< of a low-rank block, 0 for a dense one
+  /// Of a low-rank block; 0 for a dense one; of moments as many as columns, and 0.
+  std::uint32_t row_rank = 0, column_rank = 0;
   /// So many of the first vectors of a basis are sums of two in 8 bits, which alone are too coarse
   /// for them: see kRemainderScale. In f32 they are told but not used; in f16 and 16 bits 0.
   std::uint32_t row_remainders = 0, column_remainders = 0;
@@ -46,7 +54,12 @@ struct TransferBlock {
 ///   dense     [matrix][row_count][column_count]
 ///   low-rank  U^T [row_rank][row_count], V^T [column_rank][column_count] (not on the diagonal),
 ///             S [matrix][row_rank][column_rank]
-/// In 8 bits U^T and V^T have row_remainders and column_remainders rows more.
+///   moments   W^T [row_rank][row_count]
+/// In 8 bits U^T, V^T and W^T have row_remainders and column_remainders rows more.
+///
+/// The bases of large blocks are nested (W. Hackbusch and S. Börm, "Data-sparse approximation by
+/// adaptive H2-matrices", 2002), in one level: U = W D T, in which W has the bases of moments along
+/// its diagonal, D their scales, and T, much shorter than U, is what the block holds.
 ///
 /// An apply streams through the values: all bases of a cluster of patches are kept together,
 /// whichever blocks they belong to, so that one pass over them takes the light of the cluster to
@@ -100,6 +113,7 @@ class HierarchicalOperator final : public TransferOperator {
     std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
     std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
     std::vector<TransferBlock> blocks;                          ///< where there is none, Yhat is 0
+    std::vector<float> moment_scale;  ///< [moments] times W^T x is a moment of light x
     PatchRoles roles;  ///< by patch; entries that no source and receiver share are of no meaning
     Order order = Order::kByBlock;  ///< of the values
     Precision precision = Precision::kF32;
