@@ -10,12 +10,21 @@
 #include "rebounce/transfer/reflection.h"
 
 namespace rebounce {
+namespace {
+
+/// Sweeps work on the light at positions.
+HierarchicalSettings without_moments(HierarchicalSettings settings) {
+  settings.moments = false;
+  return settings;
+}
+
+}  // namespace
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, radiosities,
-                               settings, progress);
+                               without_moments(settings), progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
@@ -31,7 +40,7 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(LinkedMatrix(links, std::move(product), patches), patches,
-                               radiosities, settings, progress);
+                               radiosities, without_moments(settings), progress);
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,

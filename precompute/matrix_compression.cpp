@@ -9,6 +9,7 @@
 #include "block_tree.h"
 #include "judged_error.h"
 #include "lit_truth.h"
+#include "nested_bases.h"
 #include "price_search.h"
 #include "progress_part.h"
 #include "wanted_blocks.h"
@@ -97,9 +98,10 @@ double basis_value(Precision precision) {
 class Compression {
  public:
   Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping,
-              double basis_value)
+              double basis_value, bool moments)
       : matrix_(matrix),
         basis_value_(basis_value),
+        moments_(moments),
         truth_(matrix, with_uniform(patches.size(), shaping)),
         frame_(frame_of(matrix, patches, truth_)) {}
 
@@ -120,7 +122,11 @@ class Compression {
                                        [&] { return compressor.compress(some, price, part); }));
       report_progress(part, 1);
     }
-    return compressor.assemble(std::move(whole));
+    HierarchicalOperator::Storage storage = compressor.assemble(std::move(whole));
+    if (!moments_) return storage;
+    const CompressionCost cost{.price = price, .basis_value = basis_value_};
+    const WantedBlocks wanted(frame_.roles, frame_.tree);
+    return nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
   }
 
   double price_of(double usual) const { return frame_.price_of(usual); }
@@ -139,6 +145,7 @@ class Compression {
  private:
   const SymmetricMatrix& matrix_;
   double basis_value_;
+  bool moments_;
   LitTruth truth_;
   CompressionFrame frame_;
 };
@@ -178,7 +185,8 @@ double first_price(double tolerance, std::size_t patch_count) {
 HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
                                               const PatchTable& patches, Exitances shaping,
                                               double price, const Progress& progress) {
-  return Compression(matrix, patches, shaping, 1).at(price, {BlockCheckpoint(), {}}, progress);
+  return Compression(matrix, patches, shaping, 1, false)
+      .at(price, {BlockCheckpoint(), {}}, progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
@@ -186,7 +194,8 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
   const LitTruth judging = judging_truth(matrix, lights.judging);
-  Compression compression(matrix, patches, lights.shaping, basis_value(settings.precision));
+  Compression compression(matrix, patches, lights.shaping, basis_value(settings.precision),
+                          settings.moments);
   const double tolerance = settings.tolerance;
   PriceSearch search(compression.price_of(first_price(tolerance, patches.size())),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});

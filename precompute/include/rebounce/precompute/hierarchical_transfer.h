@@ -17,6 +17,9 @@ struct HierarchicalSettings {
   /// twice the tolerance takes about 0.6 of the bytes.
   double tolerance = 0.005;
   Precision precision = Precision::kQ8;  ///< kF32: twice the bytes, no less error worth mention
+  /// Whether large blocks may be of moments (TransferBlock), as is smaller from some thousand
+  /// patches on; sweeps over compressed form factors do not know them.
+  bool moments = true;
 };
 
 /// Lights that the operator is fitted to, each an initial exitance [n] in lx.
