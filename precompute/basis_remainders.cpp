@@ -31,20 +31,28 @@ Index remainder_count(const BasisEnd& end, const BasisEnd& other,
   const MatrixXd gram = weighted_gram(other);
   const double to_other = end.weight != nullptr ? end.weight->squared_norm() : 0;
   const double from_other = other.weight != nullptr ? size : 0;
-  Index count = 0;
-  for (Index r = 0; r < end.basis.cols(); ++r) {
-    const double step = end.basis.col(r).cwiseAbs().maxCoeff() / kLargestByte;
-    double worth = 0;
+  return worthwhile_remainders(end.basis, cost.price, [&](Index r) {
+    double effect = 0;
     for (const MatrixXd& core : cores) {
-      worth += to_other * core.row(r).squaredNorm() +
-               from_other * core.row(r).dot(gram * core.row(r).transpose());
+      effect += to_other * core.row(r).squaredNorm() +
+                from_other * core.row(r).dot(gram * core.row(r).transpose());
     }
-    if (step * step / 12 * worth > kRemainderWorth * cost.price * size) count = r + 1;
-  }
-  return count;
+    return effect;
+  });
 }
 
 }  // namespace
+
+Index worthwhile_remainders(const MatrixXd& vectors, double price,
+                            const std::function<double(Index)>& effect) {
+  const double worth = kRemainderWorth * price * static_cast<double>(vectors.rows());
+  Index count = 0;
+  for (Index k = 0; k < vectors.cols(); ++k) {
+    const double step = vectors.col(k).cwiseAbs().maxCoeff() / kLargestByte;
+    if (step * step / 12 * effect(k) > worth) count = k + 1;
+  }
+  return count;
+}
 
 BasisRemainders find_remainders(const LowRankBlock& block, const BlockWeights& weights,
                                 const CompressionCost& cost) {

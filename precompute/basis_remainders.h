@@ -1,5 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <functional>
+
 #include "block_compression.h"
 #include "light_weights.h"
 
@@ -15,6 +18,12 @@ struct BlockWeights {
 struct BasisRemainders {
   Eigen::Index row = 0, column = 0;
 };
+
+/// The number of columns up to the last whose remainder is worth its values: where what bytes leave
+/// of them is an error above price x rows. `effect(column)` is the squared error that an error of
+/// one in each of its entries would be if these were independent.
+Eigen::Index worthwhile_remainders(const Eigen::MatrixXd& vectors, double price,
+                                   const std::function<double(Eigen::Index)>& effect);
 
 /// What bytes leave of a vector of a basis is an error of the block in proportion to the entries
 /// that go with the vector. A vector gets a remainder where that error is worth more than the

@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "basis_remainders.h"
 #include "single_threaded_blas.h"
 
 namespace rebounce {
@@ -23,9 +24,6 @@ constexpr std::uint32_t kCell = 128, kGroup = 256;
 
 // A cell's description, in values.
 constexpr double kCellOverhead = 32;
-
-// Bytes are within +-127.
-constexpr double kLargestByte = 127;
 
 constexpr auto kAlignment = static_cast<Index>(HierarchicalOperator::kAlignment);
 
@@ -302,18 +300,6 @@ class Nesting {
     for (CellBasis& own : bases_) own.length *= largest;
   }
 
-  /// As basis_remainders.h has them: where what bytes leave of a vector is worth more.
-  template <typename Worth>
-  Index remainder_count(const auto& vectors, const Worth& worth) const {
-    Index count = 0;
-    for (Index k = 0; k < vectors.cols(); ++k) {
-      const double step = vectors.col(k).cwiseAbs().maxCoeff() / kLargestByte;
-      const double values = static_cast<double>(vectors.rows());
-      if (step * step / 12 * worth(k) > price() * values) count = k + 1;
-    }
-    return count;
-  }
-
   void find_remainders(std::size_t c) {
     CellBasis& own = bases_[c];
     VectorXd arriving = VectorXd::Zero(own.rank), leaving = arriving;
@@ -326,7 +312,7 @@ class Nesting {
       if (end.sends) leaving += (t * end.plain).cwiseProduct(t).rowwise().sum();
     }
     const double size = cell(c).count, weight = weight_of_cell(c).squared_norm();
-    own.remainders = remainder_count(own.vectors, [&](Index k) {
+    own.remainders = worthwhile_remainders(own.vectors, price(), [&](Index k) {
       return own.norm[k] * own.norm[k] * (size * arriving[k] + weight * leaving[k]);
     });
   }
@@ -339,7 +325,7 @@ class Nesting {
       if (end.receives) arriving += own.norm.cwiseProduct(own.length).squaredNorm();
       if (end.sends) leaving += own.length.squaredNorm();
     }
-    return remainder_count(end.moments.transpose(), [&](Index r) {
+    return worthwhile_remainders(end.moments.transpose().cast<double>(), price(), [&](Index r) {
       return arriving * end.weighted(r, r) + leaving * end.plain(r, r);
     });
   }

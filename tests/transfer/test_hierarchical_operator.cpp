@@ -160,26 +160,28 @@ std::vector<Float3> batch_product(const TransferOperator& op, std::size_t lights
   return h;
 }
 
+void check_batch(const HierarchicalOperator& op, std::size_t lights) {
+  const std::size_t n = op.patch_count();
+  const std::vector<Float3> m0 = test::random_light(lights * n, lights, 100);
+  const std::vector<Float3> batch = batch_product(op, lights, m0);
+  for (std::size_t light = 0; light < lights; ++light) {
+    const auto at = static_cast<std::ptrdiff_t>(light * n);
+    const auto end = at + static_cast<std::ptrdiff_t>(n);
+    const std::vector<Float3> one(m0.begin() + at, m0.begin() + end);
+    const std::vector<Float3> part(batch.begin() + at, batch.begin() + end);
+    EXPECT_LT(relative_difference(part, product(op, one), op.storage().area), 1e-6);
+  }
+}
+
 TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
   for (const std::uint32_t matrices : {1U, 2U, 3U}) {
-    const std::size_t n = 333;
     const HierarchicalOperator::Storage storage =
-        random_hierarchical_storage(n, matrices, 40 + matrices);
+        random_hierarchical_storage(333, matrices, 40 + matrices);
     for (const HierarchicalOperator& op :
          {HierarchicalOperator(storage),
           HierarchicalOperator(HierarchicalOperator::encode_half(storage)),
           HierarchicalOperator(HierarchicalOperator::encode_shorts(storage))}) {
-      for (const std::size_t lights : {1U, 2U, 3U, 5U}) {
-        const std::vector<Float3> m0 = test::random_light(lights * n, lights, 100);
-        const std::vector<Float3> batch = batch_product(op, lights, m0);
-        for (std::size_t light = 0; light < lights; ++light) {
-          const auto at = static_cast<std::ptrdiff_t>(light * n);
-          const auto end = at + static_cast<std::ptrdiff_t>(n);
-          const std::vector<Float3> one(m0.begin() + at, m0.begin() + end);
-          const std::vector<Float3> part(batch.begin() + at, batch.begin() + end);
-          EXPECT_LT(relative_difference(part, product(op, one), storage.area), 1e-6);
-        }
-      }
+      for (const std::size_t lights : {1U, 2U, 3U, 5U}) check_batch(op, lights);
     }
   }
 }
@@ -437,19 +439,9 @@ TEST(NestedOperator, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(NestedOperator, ABatchIsAsManyAppliesAndReceiversGetTheirLight) {
-  constexpr std::size_t kCount = 1000, kLights = 3;
-  const HierarchicalOperator::Storage storage = random_nested_storage(kCount, 3, 11);
+  const HierarchicalOperator::Storage storage = random_nested_storage(1000, 3, 11);
   for (const Precision precision : kPrecisions) {
-    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
-    const std::vector<Float3> m0 = test::random_light(kLights * kCount, 3, 100);
-    const std::vector<Float3> batch = batch_product(op, kLights, m0);
-    for (std::size_t light = 0; light < kLights; ++light) {
-      const auto at = static_cast<std::ptrdiff_t>(light * kCount);
-      const auto end = at + static_cast<std::ptrdiff_t>(kCount);
-      const std::vector<Float3> one(m0.begin() + at, m0.begin() + end);
-      const std::vector<Float3> part(batch.begin() + at, batch.begin() + end);
-      EXPECT_LT(relative_difference(part, product(op, one), storage.area), 1e-6);
-    }
+    check_batch(HierarchicalOperator(HierarchicalOperator::encode(storage, precision)), 3);
   }
   check_receivers(HierarchicalOperator(random_nested_storage(777, 3, 12)), 1e-6F);
   check_receivers(HierarchicalOperator(random_nested_storage(1000, 3, 12)), 1e-6F);
