@@ -104,9 +104,10 @@ Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCo
   return best;
 }
 
-/// Values of the bases for each rank.
-Index basis_values_per_rank(const WideBlock& block) {
-  return block.on_diagonal ? block.rows() : block.rows() + block.columns();
+/// Of the bases, for each rank.
+double size_per_rank(const WideBlock& block, const CompressionCost& cost) {
+  return block.on_diagonal ? cost.size(block.rows(), 1, 0)
+                           : cost.size(block.rows() + block.columns(), 2, 0);
 }
 
 /// Ranks above are not tried.
@@ -115,7 +116,7 @@ Index largest_rank_of(const WideBlock& block) {
 }
 
 Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cost, double limit) {
-  const double affordable = limit / (cost.price * cost.size(basis_values_per_rank(block), 0));
+  const double affordable = limit / (cost.price * size_per_rank(block, cost));
   const Index largest = largest_rank_of(block);
   return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
 }
@@ -137,7 +138,7 @@ double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index see
   const double middle = energy(half - quarter / 2, half + quarter / 2);
   const double early = energy(quarter - quarter / 2, quarter + quarter / 2);
   const double power = middle > 0 ? std::log2(std::max(1.0, early / middle)) : 0;
-  const double per_rank = cost.size(basis_values_per_rank(block), 0);
+  const double per_rank = size_per_rank(block, cost);
   double missing = rows.missing[half] / excess, least = std::numeric_limits<double>::max();
   for (Index k = half + 1; k <= largest_rank_of(block); ++k) {
     missing -= middle * std::pow(static_cast<double>(half) / static_cast<double>(k), power);
@@ -153,7 +154,7 @@ void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index large
   const Index m = block.rows(), matrices = block.matrix_count;
   // What is missing from the rows is missing from the columns too.
   const Index rank = cheapest_rank(rows, largest, cost, 2,
-                                   [&](Index k) { return cost.size(m * k, matrices * k * k); });
+                                   [&](Index k) { return cost.size(m * k, k, matrices * k * k); });
   result.row_basis = rows.directions.leftCols(rank);
   double kept = 0;
   for (Index c = 0; c < matrices; ++c) {
@@ -168,7 +169,7 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
   const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
   // Half of a core for the rows and half for the columns.
   const Index row_rank = cheapest_rank(
-      rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, matrices * k * k / 2); });
+      rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, k, matrices * k * k / 2); });
   result.row_basis = rows.directions.leftCols(row_rank);
   result.error_squared = rows.missing[row_rank];
   MatrixXd projected(matrices * row_rank, n);
@@ -179,7 +180,7 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
   if (row_rank > 0) {
     const Spectrum columns = right_spectrum(projected);
     column_rank = cheapest_rank(columns, largest, cost, 1, [&](Index k) {
-      return cost.size(n * k, matrices * row_rank * k / 2);
+      return cost.size(n * k, k, matrices * row_rank * k / 2);
     });
     result.column_basis = columns.directions.leftCols(column_rank);
     result.error_squared += columns.missing[column_rank];

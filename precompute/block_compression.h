@@ -27,6 +27,7 @@ struct LowRankBlock {
   double error_squared = 0;            ///< Frobenius, of all matrices together
 
   Eigen::Index basis_values() const { return row_basis.size() + column_basis.size(); }
+  Eigen::Index vectors() const { return row_basis.cols() + column_basis.cols(); }
   Eigen::Index core_values() const {
     return cores.empty() ? 0 : static_cast<Eigen::Index>(cores.size()) * cores.front().size();
   }
@@ -34,21 +35,24 @@ struct LowRankBlock {
 
 /// What the construction minimises: error² + price x size, summed over the blocks. For every
 /// price this is the smallest operator of its error (and the most exact one of its size) that the
-/// cluster tree admits.
+/// cluster tree admits. Sizes are in values of cores, and may count the time of a product too.
 struct CompressionCost {
   double price = 0;  ///< squared error that one stored value of a core or dense block is worth
   double multiplicity = 1;  ///< 2 for a block that stands for its mirror image as well
-  double basis_value = 1;   ///< size of a value of a basis, in values of cores
+  double basis_value = 1;   ///< size of a value of a basis
+  double vector = 0;        ///< size of a vector of a basis beside its values: its coefficients
 
-  /// Of bases and cores with so many values.
-  double size(Eigen::Index bases, Eigen::Index cores) const {
-    return basis_value * static_cast<double>(bases) + static_cast<double>(cores);
+  /// Of bases with so many values in so many vectors, and cores with so many values.
+  double size(Eigen::Index basis_values, Eigen::Index vectors, Eigen::Index core_values) const {
+    return basis_value * static_cast<double>(basis_values) + vector * static_cast<double>(vectors) +
+           static_cast<double>(core_values);
   }
   double total(double error_squared, double size) const {
     return multiplicity * error_squared + price * size;
   }
   double of(const LowRankBlock& block) const {
-    return total(block.error_squared, size(block.basis_values(), block.core_values()));
+    return total(block.error_squared,
+                 size(block.basis_values(), block.vectors(), block.core_values()));
   }
 };
 

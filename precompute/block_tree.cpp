@@ -14,9 +14,6 @@ namespace {
 
 using Eigen::Index;
 
-// What a block costs beside its values, in values: its description, and the start of its loops.
-constexpr double kBlockOverhead = 32;
-
 // Rows of the squares that the matrix is gathered and compressed in.
 constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
 
@@ -47,11 +44,12 @@ class PieceCompressor {
  public:
   PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
                   const std::vector<ClusterWeight>& weights, const WantedBlocks& wanted,
-                  const CompressionCost& cost, const BlockPiece& piece)
+                  const PartSizes& sizes, double price, const BlockPiece& piece)
       : tree_(tree),
         weights_(weights),
         wanted_(wanted),
-        cost_(cost),
+        sizes_(sizes),
+        price_(price),
         row_(piece.row),
         column_(piece.column),
         row_begin_(tree.clusters[piece.row].begin),
@@ -117,10 +115,12 @@ class PieceCompressor {
                               .column_begin = columns.begin,
                               .column_count = columns.count};
     const WideBlock block = weighted_block(place, row, column);
-    CompressionCost cost = cost_;
-    cost.multiplicity = multiplicity(row, column);
-    const double zero_cost = cost.total(block.entries.squaredNorm(), kBlockOverhead);
-    const double overhead = cost.price * kBlockOverhead;
+    const CompressionCost cost{.price = price_,
+                               .multiplicity = multiplicity(row, column),
+                               .basis_value = sizes_.basis_value_of(place),
+                               .vector = sizes_.vector};
+    const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
+    const double overhead = price_ * sizes_.block;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
     const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
     const bool leaves = rows.is_leaf() && columns.is_leaf();
@@ -170,7 +170,7 @@ class PieceCompressor {
     const WideBlock block = wide_block(place);
     BlockPart part{{place}, {}, 0};
     for (Index m = 0; m < block.matrix_count; ++m) append_rows(block.matrix(m), part.values);
-    part.cost = cost_.price * (kBlockOverhead + static_cast<double>(part.values.size()));
+    part.cost = price_ * (sizes_.block + static_cast<double>(part.values.size()));
     return part;
   }
 
@@ -207,14 +207,15 @@ class PieceCompressor {
     append_columns(block.row_basis, part.values);
     append_columns(block.column_basis, part.values);
     for (const Eigen::MatrixXd& core : block.cores) append_rows(core, part.values);
-    part.cost = cost.of(block) + cost.price * kBlockOverhead;
+    part.cost = cost.of(block) + price_ * sizes_.block;
     return part;
   }
 
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
   const WantedBlocks& wanted_;
-  CompressionCost cost_;
+  const PartSizes& sizes_;
+  double price_;
   std::uint32_t row_, column_, row_begin_, column_begin_;
   std::vector<Eigen::MatrixXf> matrices_;
 };
@@ -264,14 +265,14 @@ std::vector<BlockPiece> BlockTreeCompressor::pieces() const {
 BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double price,
                                         const Progress& progress) const {
   const SingleThreadedBlas single_threaded;
-  const CompressionCost cost{.price = price, .basis_value = basis_value_};
   std::vector<BlockPart> parts(pieces.size());
   ParallelProgress loop(progress, pieces.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (loop.stopped()) continue;
     if (wants(pieces[k])) {
-      parts[k] = PieceCompressor(matrix_, tree_, weights_, wanted_, cost, pieces[k]).compress();
+      parts[k] =
+          PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, price, pieces[k]).compress();
     }
     loop.advance();
   }

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -35,6 +37,21 @@ std::uint32_t largest_piece(std::uint32_t position_count);
 /// traversal.
 std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t largest);
 
+/// What the parts of an operator take, in values of cores.
+struct PartSizes {
+  double basis_value = 1;
+  /// Of bases of blocks whose sides have `large_count` positions or more: they will be nested.
+  double large_basis_value = 1;
+  std::uint32_t large_count = std::numeric_limits<std::uint32_t>::max();
+  double vector = 0;  ///< a vector of a basis beside its values
+  double block = 32;  ///< a block beside its values: its description, and the start of its loops
+
+  double basis_value_of(const TransferBlock& place) const {
+    return std::min(place.row_count, place.column_count) < large_count ? basis_value
+                                                                       : large_basis_value;
+  }
+};
+
 /// Compresses one matrix at any number of prices.
 ///
 /// What is minimised is error² + price x size, in which the error is that of the symmetric form in
@@ -43,15 +60,14 @@ std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t larg
 /// no block.
 class BlockTreeCompressor {
  public:
-  /// All that is given must outlive the object; `weights` has one entry for each cluster, and
-  /// `basis_value` is the size of a value of a basis, where one of a core is 1.
+  /// All that is given must outlive the object; `weights` has one entry for each cluster.
   BlockTreeCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
-                      const std::vector<ClusterWeight>& weights, double basis_value = 1)
+                      const std::vector<ClusterWeight>& weights, const PartSizes& sizes = {})
       : matrix_(matrix),
         tree_(tree),
         weights_(weights),
         wanted_(matrix.roles(), tree),
-        basis_value_(basis_value) {}
+        sizes_(sizes) {}
 
   /// All pieces, with sides of largest_piece at most.
   std::vector<BlockPiece> pieces() const;
@@ -71,7 +87,7 @@ class BlockTreeCompressor {
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
   WantedBlocks wanted_;
-  double basis_value_;
+  PartSizes sizes_;
 };
 
 }  // namespace rebounce

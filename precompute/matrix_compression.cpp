@@ -43,6 +43,11 @@ constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 // reflect no light, good enough as lamps.
 constexpr double kUniformShare = 0.1;
 
+// What is left of a value of the basis of a large block when it has moments, in parts of it; and
+// what a vector and a block of an apply take beside their values, in values: coefficients are
+// written and read twice, and loops begin. Measured: notes/operator.md.
+constexpr double kNestedPart = 0.5, kVector = 16, kBlock = 128;
+
 using Exitances = std::span<const std::vector<Float3>>;
 
 /// The lights after one with which every patch gives off the same, black ones too.
@@ -88,19 +93,27 @@ struct KeptParts {
   std::string prefix;
 };
 
-/// What a value of a basis takes, in values of cores: bytes, with the remainders of some, beside
-/// halves.
-double basis_value(Precision precision) {
-  return precision == Precision::kQ8 ? 0.55 : 1;
+/// What parts of an operator take; in bytes, with the remainders of some, a value of a basis is
+/// beside halves. One with moments is for applies, whose time counts too.
+PartSizes part_sizes(Precision precision, bool moments) {
+  PartSizes sizes;
+  sizes.basis_value = precision == Precision::kQ8 ? 0.55 : 1;
+  sizes.large_basis_value = sizes.basis_value;
+  if (!moments) return sizes;
+  sizes.large_basis_value *= kNestedPart;
+  sizes.large_count = kMomentGroup;
+  sizes.vector = kVector;
+  sizes.block = kBlock;
+  return sizes;
 }
 
 /// A compressor with all that it looks at.
 class Compression {
  public:
   Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping,
-              double basis_value, bool moments)
+              const PartSizes& sizes, bool moments)
       : matrix_(matrix),
-        basis_value_(basis_value),
+        sizes_(sizes),
         moments_(moments),
         truth_(matrix, with_uniform(patches.size(), shaping)),
         frame_(frame_of(matrix, patches, truth_)) {}
@@ -108,7 +121,7 @@ class Compression {
   HierarchicalOperator::Storage at(double price, const KeptParts& kept,
                                    const Progress& progress) const {
     const std::vector<ClusterWeight> weights = frame_.weights();
-    const BlockTreeCompressor compressor(matrix_, frame_.tree, weights, basis_value_);
+    const BlockTreeCompressor compressor(matrix_, frame_.tree, weights, sizes_);
     const std::vector<BlockPiece> pieces = compressor.pieces();
     const std::size_t together = kept.checkpoint.keeps() ? kKeptPieces : pieces.size();
     const auto all = static_cast<double>(pieces.size());
@@ -124,7 +137,8 @@ class Compression {
     }
     HierarchicalOperator::Storage storage = compressor.assemble(std::move(whole));
     if (!moments_) return storage;
-    const CompressionCost cost{.price = price, .basis_value = basis_value_};
+    const CompressionCost cost{
+        .price = price, .basis_value = sizes_.basis_value, .vector = sizes_.vector};
     const WantedBlocks wanted(frame_.roles, frame_.tree);
     return nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
   }
@@ -144,7 +158,7 @@ class Compression {
 
  private:
   const SymmetricMatrix& matrix_;
-  double basis_value_;
+  PartSizes sizes_;
   bool moments_;
   LitTruth truth_;
   CompressionFrame frame_;
@@ -185,7 +199,7 @@ double first_price(double tolerance, std::size_t patch_count) {
 HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
                                               const PatchTable& patches, Exitances shaping,
                                               double price, const Progress& progress) {
-  return Compression(matrix, patches, shaping, 1, false)
+  return Compression(matrix, patches, shaping, PartSizes(), false)
       .at(price, {BlockCheckpoint(), {}}, progress);
 }
 
@@ -194,8 +208,8 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
   const LitTruth judging = judging_truth(matrix, lights.judging);
-  Compression compression(matrix, patches, lights.shaping, basis_value(settings.precision),
-                          settings.moments);
+  Compression compression(matrix, patches, lights.shaping,
+                          part_sizes(settings.precision, settings.moments), settings.moments);
   const double tolerance = settings.tolerance;
   PriceSearch search(compression.price_of(first_price(tolerance, patches.size())),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});

@@ -18,9 +18,8 @@ using Eigen::VectorXd;
 using Storage = HierarchicalOperator::Storage;
 using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Cells have so many positions at most; a side of a block has moments if it is made of whole
-// groups, clusters of so many positions at most. Measured: notes/operator.md.
-constexpr std::uint32_t kCell = 128, kGroup = 256;
+// Cells have so many positions at most. Measured: notes/operator.md.
+constexpr std::uint32_t kCell = 128;
 
 // A cell's description, in values.
 constexpr double kCellOverhead = 32;
@@ -42,7 +41,7 @@ struct Cells {
  private:
   void add(const ClusterTree& tree, std::uint32_t index, bool in_group) {
     const Cluster& c = tree.clusters[index];
-    if (!in_group && (c.count <= kGroup || c.is_leaf())) {
+    if (!in_group && (c.count <= kMomentGroup || c.is_leaf())) {
       group_first.push_back(cluster.size());
       group_position.push_back(c.begin);
       in_group = true;
@@ -226,7 +225,7 @@ class Nesting {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
     own.directions = solver.eigenvectors().rowwise().reverse();
     own.energies = solver.eigenvalues().reverse().cwiseMax(0);
-    const double worth = price() * frame_.cost.size(size + own.stacked, 0);
+    const double worth = price() * frame_.cost.size(size + own.stacked, 1, 0);
     own.rank = (own.energies.array() > worth).count();
   }
 
@@ -257,8 +256,9 @@ class Nesting {
   double gain_of(std::size_t c) const {
     const CellBasis& own = bases_[c];
     const auto size = static_cast<Index>(cell(c).count);
-    const double before = frame_.cost.size(size * own.stacked, 0);
-    const double after = frame_.cost.size((size + own.stacked) * own.rank, 0) + kCellOverhead;
+    const double before = frame_.cost.size(size * own.stacked, 0, 0);
+    const double after =
+        frame_.cost.size((size + own.stacked) * own.rank, own.rank, 0) + kCellOverhead;
     return price() * (before - after) - own.energies.tail(size - own.rank).sum();
   }
 

@@ -54,8 +54,26 @@ TEST(BlockCompression, SaysItsErrorAndTakesTheRankThatPays) {
     EXPECT_NEAR(attempt.block->error_squared / error, 1, 1e-6) << size;
     EXPECT_NEAR(
         cost.of(*attempt.block),
-        error + cost.price * cost.size(attempt.block->basis_values(), attempt.block->core_values()),
+        error + cost.price * cost.size(attempt.block->basis_values(), attempt.block->vectors(),
+                                       attempt.block->core_values()),
         1e-9);
+  }
+}
+
+TEST(BlockCompression, VectorsThatCostMoreAreFewer) {
+  for (const Index size : {96, 400}) {
+    const WideBlock block = block_with(size, powers(size / 2, 1));
+    const auto rank = [&](double vector) {
+      const auto attempt =
+          compress_block(block, {.price = 1e-4, .vector = vector}, kNoLimit, size, 3);
+      return attempt.block ? attempt.block->row_basis.cols() : 0;
+    };
+    // A direction more is worth it while its energy is above what it takes: at twice the size,
+    // with squares of energies, at 0.7 of the ranks.
+    const double few = static_cast<double>(rank(static_cast<double>(size)));
+    const double many = static_cast<double>(rank(0));
+    EXPECT_GE(few, 0.6 * many) << size;
+    EXPECT_LE(few, 0.9 * many) << size;
   }
 }
 

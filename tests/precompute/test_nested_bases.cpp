@@ -118,7 +118,8 @@ struct CompressedBox {
         frame(compression_frame(matrix, patches, spots(patches, 24, 1))),
         weights(frame.weights()),
         cost{.price = price, .basis_value = 0.55} {
-    const BlockTreeCompressor compressor(matrix, frame.tree, weights, cost.basis_value);
+    const BlockTreeCompressor compressor(matrix, frame.tree, weights,
+                                         {.basis_value = cost.basis_value});
     plain = compressor.assemble(compressor.compress(compressor.pieces(), price));
   }
 
@@ -166,6 +167,29 @@ std::size_t bytes_of(const Storage& storage) {
 const CompressedBox& large_box() {
   static const CompressedBox box(24, 3e-9);
   return box;
+}
+
+TEST(PartSizes, BlocksAreFewerIfEachTakesMore) {
+  const CompressedBox& box = large_box();
+  const auto compressed = [&](const PartSizes& sizes) {
+    const BlockTreeCompressor compressor(box.matrix, box.frame.tree, box.weights, sizes);
+    return compressor.assemble(compressor.compress(compressor.pieces(), box.cost.price));
+  };
+  const Storage usual = compressed({.basis_value = 0.55, .large_basis_value = 0.55});
+  const Storage fewer = compressed({.basis_value = 0.55, .block = 512});
+  EXPECT_LE(fewer.blocks.size(), 0.8 * static_cast<double>(usual.blocks.size()));
+  // What large bases take leaves the others as they are.
+  const Storage cheap =
+      compressed({.basis_value = 0.55, .large_basis_value = 0.1, .large_count = 256});
+  const auto ranks = [](const Storage& storage, bool large) {
+    std::uint64_t sum = 0;
+    for (const TransferBlock& block : storage.blocks) {
+      if ((std::min(block.row_count, block.column_count) >= 256) == large) sum += block.row_rank;
+    }
+    return sum;
+  };
+  EXPECT_GT(ranks(cheap, true), ranks(usual, true));
+  EXPECT_LE(ranks(cheap, false), ranks(usual, false));
 }
 
 TEST(NestedBases, TakeFewerBytesForLittleMoreError) {
