@@ -117,7 +117,7 @@ class PieceCompressor {
     const WideBlock block = weighted_block(place, row, column);
     const CompressionCost cost{.price = price_,
                                .multiplicity = multiplicity(row, column),
-                               .basis_value = sizes_.basis_value_of(place),
+                               .basis_value = sizes_.basis_value,
                                .vector = sizes_.vector};
     const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
     const double overhead = price_ * sizes_.block;

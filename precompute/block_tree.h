@@ -1,8 +1,6 @@
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -40,16 +38,8 @@ std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t larg
 /// What the parts of an operator take, in values of cores.
 struct PartSizes {
   double basis_value = 1;
-  /// Of bases of blocks whose sides have `large_count` positions or more: they will be nested.
-  double large_basis_value = 1;
-  std::uint32_t large_count = std::numeric_limits<std::uint32_t>::max();
   double vector = 0;  ///< a vector of a basis beside its values
   double block = 32;  ///< a block beside its values: its description, and the start of its loops
-
-  double basis_value_of(const TransferBlock& place) const {
-    return std::min(place.row_count, place.column_count) < large_count ? basis_value
-                                                                       : large_basis_value;
-  }
 };
 
 /// Compresses one matrix at any number of prices.

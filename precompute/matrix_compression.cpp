@@ -43,10 +43,10 @@ constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 // reflect no light, good enough as lamps.
 constexpr double kUniformShare = 0.1;
 
-// What is left of a value of the basis of a large block when it has moments, in parts of it; and
-// what a vector and a block of an apply take beside their values, in values: coefficients are
-// written and read twice, and loops begin. Measured: notes/operator.md.
-constexpr double kNestedPart = 0.5, kVector = 16, kBlock = 128;
+// What a vector and a block take of an apply beside their values, in values, in operators of so
+// many patches, and in part in smaller ones: coefficients that the nearest caches do not hold, and
+// loops that begin. Measured: notes/operator.md.
+constexpr double kVectorSize = 9, kBlockSize = 96, kSizedPatches = 16384;
 
 using Exitances = std::span<const std::vector<Float3>>;
 
@@ -93,17 +93,16 @@ struct KeptParts {
   std::string prefix;
 };
 
-/// What parts of an operator take; in bytes, with the remainders of some, a value of a basis is
+/// What parts of an operator take. In bytes, with the remainders of some, a value of a basis is
 /// beside halves. One with moments is for applies, whose time counts too.
-PartSizes part_sizes(Precision precision, bool moments) {
+PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_count) {
   PartSizes sizes;
-  sizes.basis_value = precision == Precision::kQ8 ? 0.55 : 1;
-  sizes.large_basis_value = sizes.basis_value;
-  if (!moments) return sizes;
-  sizes.large_basis_value *= kNestedPart;
-  sizes.large_count = kMomentGroup;
-  sizes.vector = kVector;
-  sizes.block = kBlock;
+  sizes.basis_value = settings.precision == Precision::kQ8 ? 0.55 : 1;
+  if (settings.moments) {
+    const double part = std::min(1.0, static_cast<double>(patch_count) / kSizedPatches);
+    sizes.vector += kVectorSize * part;
+    sizes.block += kBlockSize * part;
+  }
   return sizes;
 }
 
@@ -208,8 +207,8 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
   const LitTruth judging = judging_truth(matrix, lights.judging);
-  Compression compression(matrix, patches, lights.shaping,
-                          part_sizes(settings.precision, settings.moments), settings.moments);
+  Compression compression(matrix, patches, lights.shaping, part_sizes(settings, patches.size()),
+                          settings.moments);
   const double tolerance = settings.tolerance;
   PriceSearch search(compression.price_of(first_price(tolerance, patches.size())),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});

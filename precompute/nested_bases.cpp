@@ -1,6 +1,7 @@
 #include "nested_bases.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -18,8 +19,9 @@ using Eigen::VectorXd;
 using Storage = HierarchicalOperator::Storage;
 using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Cells have so many positions at most. Measured: notes/operator.md.
-constexpr std::uint32_t kCell = 128;
+// Cells have so many positions at most; a side of a block has moments if it is made of whole
+// groups, clusters of so many positions at most. Measured: notes/operator.md.
+constexpr std::uint32_t kCell = 128, kGroup = 256;
 
 // A cell's description, in values.
 constexpr double kCellOverhead = 32;
@@ -41,7 +43,7 @@ struct Cells {
  private:
   void add(const ClusterTree& tree, std::uint32_t index, bool in_group) {
     const Cluster& c = tree.clusters[index];
-    if (!in_group && (c.count <= kMomentGroup || c.is_leaf())) {
+    if (!in_group && (c.count <= kGroup || c.is_leaf())) {
       group_first.push_back(cluster.size());
       group_position.push_back(c.begin);
       in_group = true;
@@ -66,6 +68,8 @@ struct NestedEnd {
   /// E weighted E^T, and of E plain E^T where light at the other side is not weighed.
   MatrixXd weighted = {}, plain = {};
   RowMajor moments = {};  ///< [rank][moments] in place of the basis
+  /// [rank][vectors before]: what the vectors were combined of, where there are fewer now.
+  MatrixXd folded = {};
 
   Index rank() const { return plain.rows(); }
 };
@@ -120,6 +124,7 @@ class Nesting {
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t e = 0; e < ends_.size(); ++e) take_moments(ends_[e]);
     normalise();
+    for (NestedEnd& end : ends_) fold(end);
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t c = 0; c < bases_.size(); ++c) find_remainders(c);
     return assemble();
@@ -300,6 +305,17 @@ class Nesting {
     for (CellBasis& own : bases_) own.length *= largest;
   }
 
+  /// Of a side with more vectors than moments: as many do, the rest goes into the core.
+  static void fold(NestedEnd& end) {
+    if (end.rank() <= end.moments.cols()) return;
+    const MatrixXd vectors = end.moments.transpose().cast<double>();
+    const Eigen::HouseholderQR<MatrixXd> qr(vectors);
+    end.folded = qr.matrixQR().triangularView<Eigen::Upper>();
+    end.moments = MatrixXd(qr.householderQ()).transpose().cast<float>();
+    end.weighted = end.folded * end.weighted * end.folded.transpose();
+    end.plain = end.folded * end.plain * end.folded.transpose();
+  }
+
   void find_remainders(std::size_t c) {
     CellBasis& own = bases_[c];
     VectorXd arriving = VectorXd::Zero(own.rank), leaving = arriving;
@@ -381,6 +397,10 @@ class Nesting {
   struct Side {
     std::uint32_t begin, count, rank, remainders;
     RowMajor vectors;
+    MatrixXd folded = {};  ///< as of its end
+
+    /// Of a core, to whose rows the side belongs.
+    MatrixXd of(MatrixXd core) const { return folded.size() > 0 ? MatrixXd(folded * core) : core; }
   };
 
   Side side_of(std::size_t b, bool is_row, const NestedEnd* end, std::uint32_t positions) const {
@@ -389,8 +409,11 @@ class Nesting {
     if (end != nullptr) {
       const Index first = bases_[end->first_cell].first_moment;
       return {positions + static_cast<std::uint32_t>(first),
-              static_cast<std::uint32_t>(end->moments.cols()), rank,
-              static_cast<std::uint32_t>(remainder_count(*end)), end->moments};
+              static_cast<std::uint32_t>(end->moments.cols()),
+              static_cast<std::uint32_t>(end->rank()),
+              static_cast<std::uint32_t>(remainder_count(*end)),
+              end->moments,
+              end->folded};
     }
     if (is_row) {
       return {block.row_begin, block.row_count, rank, block.row_remainders, basis(b, true)};
@@ -420,7 +443,10 @@ class Nesting {
     add(row.vectors);
     if (!diagonal) add(column.vectors);
     for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
-      add(swapped ? RowMajor(core(b, m).transpose()) : RowMajor(core(b, m)));
+      MatrixXd s = core(b, m).cast<double>();
+      if (swapped) s.transposeInPlace();
+      s = row.of(std::move(s));
+      add(column.of(s.transpose()).transpose().cast<float>());
     }
   }
 

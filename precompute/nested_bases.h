@@ -8,10 +8,6 @@
 
 namespace rebounce {
 
-/// Sides of blocks have moments if they are made of whole groups, clusters of so many positions at
-/// most. Measured: notes/operator.md.
-inline constexpr std::uint32_t kMomentGroup = 256;
-
 /// What a compression knows of its blocks.
 struct NestingFrame {
   const ClusterTree& tree;

@@ -68,8 +68,8 @@ TEST(BlockCompression, VectorsThatCostMoreAreFewer) {
           compress_block(block, {.price = 1e-4, .vector = vector}, kNoLimit, size, 3);
       return attempt.block ? attempt.block->row_basis.cols() : 0;
     };
-    // A direction more is worth it while its energy is above what it takes: at twice the size,
-    // with squares of energies, at 0.7 of the ranks.
+    // Energies fall with the square of their number: of directions that take twice as much, some
+    // 0.7 are worth it.
     const double few = static_cast<double>(rank(static_cast<double>(size)));
     const double many = static_cast<double>(rank(0));
     EXPECT_GE(few, 0.6 * many) << size;

@@ -17,8 +17,9 @@ struct HierarchicalSettings {
   /// twice the tolerance takes about 0.6 of the bytes.
   double tolerance = 0.005;
   Precision precision = Precision::kQ8;  ///< kF32: twice the bytes, no less error worth mention
-  /// Whether large blocks may be of moments (TransferBlock), as is smaller from some thousand
-  /// patches on; sweeps over compressed form factors do not know them.
+  /// Whether it is for applies: large blocks may then be of moments (TransferBlock), which is
+  /// smaller from some thousand patches on, and blocks are priced by the time that they take, too.
+  /// Sweeps over compressed form factors do not know moments.
   bool moments = true;
 };
 
