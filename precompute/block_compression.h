@@ -33,19 +33,25 @@ struct LowRankBlock {
   }
 };
 
+/// What the parts of an operator take, in values of cores; may count the time of a product too.
+struct PartSizes {
+  double basis_value = 1;
+  double vector = 0;  ///< a vector of a basis beside its values: its coefficients
+  double block = 32;  ///< a block beside its values: its description, and the start of its loops
+};
+
 /// What the construction minimises: error² + price x size, summed over the blocks. For every
 /// price this is the smallest operator of its error (and the most exact one of its size) that the
-/// cluster tree admits. Sizes are in values of cores, and may count the time of a product too.
+/// cluster tree admits.
 struct CompressionCost {
   double price = 0;  ///< squared error that one stored value of a core or dense block is worth
   double multiplicity = 1;  ///< 2 for a block that stands for its mirror image as well
-  double basis_value = 1;   ///< size of a value of a basis
-  double vector = 0;        ///< size of a vector of a basis beside its values: its coefficients
+  PartSizes sizes = {};
 
   /// Of bases with so many values in so many vectors, and cores with so many values.
   double size(Eigen::Index basis_values, Eigen::Index vectors, Eigen::Index core_values) const {
-    return basis_value * static_cast<double>(basis_values) + vector * static_cast<double>(vectors) +
-           static_cast<double>(core_values);
+    return sizes.basis_value * static_cast<double>(basis_values) +
+           sizes.vector * static_cast<double>(vectors) + static_cast<double>(core_values);
   }
   double total(double error_squared, double size) const {
     return multiplicity * error_squared + price * size;

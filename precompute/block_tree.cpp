@@ -115,10 +115,8 @@ class PieceCompressor {
                               .column_begin = columns.begin,
                               .column_count = columns.count};
     const WideBlock block = weighted_block(place, row, column);
-    const CompressionCost cost{.price = price_,
-                               .multiplicity = multiplicity(row, column),
-                               .basis_value = sizes_.basis_value,
-                               .vector = sizes_.vector};
+    const CompressionCost cost{
+        .price = price_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
     const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
     const double overhead = price_ * sizes_.block;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);

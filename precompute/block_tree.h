@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "block_compression.h"
 #include "cluster_tree.h"
 #include "light_weights.h"
 #include "rebounce/precompute/progress.h"
@@ -34,13 +35,6 @@ std::uint32_t largest_piece(std::uint32_t position_count);
 /// The lower triangle cut into pieces with sides of `largest` positions at most, in the order of
 /// traversal.
 std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t largest);
-
-/// What the parts of an operator take, in values of cores.
-struct PartSizes {
-  double basis_value = 1;
-  double vector = 0;  ///< a vector of a basis beside its values
-  double block = 32;  ///< a block beside its values: its description, and the start of its loops
-};
 
 /// Compresses one matrix at any number of prices.
 ///

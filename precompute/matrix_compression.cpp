@@ -136,8 +136,7 @@ class Compression {
     }
     HierarchicalOperator::Storage storage = compressor.assemble(std::move(whole));
     if (!moments_) return storage;
-    const CompressionCost cost{
-        .price = price, .basis_value = sizes_.basis_value, .vector = sizes_.vector};
+    const CompressionCost cost{.price = price, .sizes = sizes_};
     const WantedBlocks wanted(frame_.roles, frame_.tree);
     return nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
   }

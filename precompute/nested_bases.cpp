@@ -399,8 +399,13 @@ class Nesting {
     RowMajor vectors;
     MatrixXd folded = {};  ///< as of its end
 
-    /// Of a core, to whose rows the side belongs.
-    MatrixXd of(MatrixXd core) const { return folded.size() > 0 ? MatrixXd(folded * core) : core; }
+    /// Of a core to whose rows or columns the side belongs.
+    void fold_rows(RowMajor& core) const {
+      if (folded.size() > 0) core = (folded * core.cast<double>()).cast<float>().eval();
+    }
+    void fold_columns(RowMajor& core) const {
+      if (folded.size() > 0) core = (core.cast<double>() * folded.transpose()).cast<float>().eval();
+    }
   };
 
   Side side_of(std::size_t b, bool is_row, const NestedEnd* end, std::uint32_t positions) const {
@@ -443,10 +448,11 @@ class Nesting {
     add(row.vectors);
     if (!diagonal) add(column.vectors);
     for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
-      MatrixXd s = core(b, m).cast<double>();
+      RowMajor s = core(b, m);
       if (swapped) s.transposeInPlace();
-      s = row.of(std::move(s));
-      add(column.of(s.transpose()).transpose().cast<float>());
+      row.fold_rows(s);
+      column.fold_columns(s);
+      add(s);
     }
   }
 

@@ -65,7 +65,7 @@ TEST(BlockCompression, VectorsThatCostMoreAreFewer) {
     const WideBlock block = block_with(size, powers(size / 2, 1));
     const auto rank = [&](double vector) {
       const auto attempt =
-          compress_block(block, {.price = 1e-4, .vector = vector}, kNoLimit, size, 3);
+          compress_block(block, {.price = 1e-4, .sizes = {.vector = vector}}, kNoLimit, size, 3);
       return attempt.block ? attempt.block->row_basis.cols() : 0;
     };
     // Energies fall with the square of their number: of directions that take twice as much, some

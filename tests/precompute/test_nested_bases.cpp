@@ -117,9 +117,8 @@ struct CompressedBox {
         matrix(patches, roles),
         frame(compression_frame(matrix, patches, spots(patches, 24, 1))),
         weights(frame.weights()),
-        cost{.price = price, .basis_value = 0.55} {
-    const BlockTreeCompressor compressor(matrix, frame.tree, weights,
-                                         {.basis_value = cost.basis_value});
+        cost{.price = price, .sizes = {.basis_value = 0.55}} {
+    const BlockTreeCompressor compressor(matrix, frame.tree, weights, cost.sizes);
     plain = compressor.assemble(compressor.compress(compressor.pieces(), price));
   }
 
