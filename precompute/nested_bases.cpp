@@ -23,6 +23,9 @@ using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Row
 // groups, clusters of so many positions at most. Measured: notes/operator.md.
 constexpr std::uint32_t kCell = 128, kGroup = 256;
 
+// The largest entry of a core between moments: half of what half precision has room for.
+constexpr double kLargestCore = 32768 / HierarchicalOperator::kHalfScale;
+
 // A cell's description, in values.
 constexpr double kCellOverhead = 32;
 
@@ -68,10 +71,14 @@ struct NestedEnd {
   /// E weighted E^T, and of E plain E^T where light at the other side is not weighed.
   MatrixXd weighted = {}, plain = {};
   RowMajor moments = {};  ///< [rank][moments] in place of the basis
-  /// [rank][vectors before]: what the vectors were combined of, where there are fewer now.
-  MatrixXd folded = {};
+  MatrixXd folded = {};   ///< [rank][vectors before]: what the vectors were combined of
 
   Index rank() const { return plain.rows(); }
+};
+
+/// Those of a block; null where it has its own basis.
+struct NestedSides {
+  const NestedEnd *row = nullptr, *column = nullptr;
 };
 
 /// What all large blocks over a cell share.
@@ -123,8 +130,8 @@ class Nesting {
     for (std::size_t c = 0; c < bases_.size(); ++c) make_basis(c);
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t e = 0; e < ends_.size(); ++e) take_moments(ends_[e]);
-    normalise();
     for (NestedEnd& end : ends_) fold(end);
+    fit_cores();
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t c = 0; c < bases_.size(); ++c) find_remainders(c);
     return assemble();
@@ -279,7 +286,7 @@ class Nesting {
     constexpr double kLeast = 1e-3;
     const double most = own.rank > 0 ? own.energies[0] : 1;
     own.length =
-        (own.energies.head(own.rank) / std::max(most, 1e-300)).array().pow(0.25).max(kLeast);
+        (own.energies.head(own.rank) / std::max(most, 1e-300)).array().pow(0.125).max(kLeast);
   }
 
   void take_moments(NestedEnd& end) {
@@ -293,27 +300,64 @@ class Nesting {
     }
   }
 
-  /// No vector of moments has a norm above 1, as those of orthonormal bases: cores stay within the
-  /// range of half precision when the lengths of integer vectors are taken into them.
-  void normalise() {
-    float largest = 0;
-    for (const NestedEnd& end : ends_) {
-      largest = std::max(largest, end.moments.rowwise().norm().maxCoeff());
+  /// Vectors of moments get norm 1, as those of bases, and cores what they were longer by. Of a
+  /// side with more vectors than moments as many do, and the rest goes into the core.
+  static void fold(NestedEnd& end) {
+    if (end.rank() > end.moments.cols()) {
+      const MatrixXd vectors = end.moments.transpose().cast<double>();
+      const Eigen::HouseholderQR<MatrixXd> qr(vectors);
+      end.folded = qr.matrixQR().triangularView<Eigen::Upper>();
+      end.moments = MatrixXd(qr.householderQ()).transpose().cast<float>();
+    } else {
+      const VectorXd norm = end.moments.rowwise().norm().cast<double>();
+      end.folded = (norm.array() > 0).select(norm, 1).asDiagonal();
+      end.moments.rowwise().normalize();
     }
-    if (largest == 0) return;
-    for (NestedEnd& end : ends_) end.moments /= largest;
-    for (CellBasis& own : bases_) own.length *= largest;
+    scale_errors(end, end.folded);
   }
 
-  /// Of a side with more vectors than moments: as many do, the rest goes into the core.
-  static void fold(NestedEnd& end) {
-    if (end.rank() <= end.moments.cols()) return;
-    const MatrixXd vectors = end.moments.transpose().cast<double>();
-    const Eigen::HouseholderQR<MatrixXd> qr(vectors);
-    end.folded = qr.matrixQR().triangularView<Eigen::Upper>();
-    end.moments = MatrixXd(qr.householderQ()).transpose().cast<float>();
-    end.weighted = end.folded * end.weighted * end.folded.transpose();
-    end.plain = end.folded * end.plain * end.folded.transpose();
+  static void scale_errors(NestedEnd& end, const MatrixXd& by) {
+    end.weighted = by * end.weighted * by.transpose();
+    end.plain = by * end.plain * by.transpose();
+  }
+
+  /// Moments get longer, and cores smaller, until the largest entry of all cores fits half
+  /// precision well. By as much for all: small cores are not to fall below its normal numbers.
+  void fit_cores() {
+    double one_side = 0, both_sides = 0;
+    for (const auto& [b, sides] : sides_of_blocks()) {
+      double& largest = sides.row != nullptr && sides.column != nullptr ? both_sides : one_side;
+      for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
+        largest = std::max<double>(largest, folded_core(b, m, sides).cwiseAbs().maxCoeff());
+      }
+    }
+    const double length = std::max(one_side / kLargestCore, std::sqrt(both_sides / kLargestCore));
+    if (length == 0) return;
+    for (NestedEnd& end : ends_) {
+      end.folded /= length;
+      end.weighted /= length * length;
+      end.plain /= length * length;
+    }
+    for (CellBasis& own : bases_) own.length *= length;
+  }
+
+  /// Of all blocks that have any; those on the diagonal have the same twice.
+  std::map<std::size_t, NestedSides> sides_of_blocks() const {
+    std::map<std::size_t, NestedSides> sides;
+    for (const NestedEnd& end : ends_) {
+      NestedSides& of_block = sides[end.block];
+      if (end.is_row) of_block.row = &end;
+      if (!end.is_row || storage_.blocks[end.block].on_diagonal()) of_block.column = &end;
+    }
+    return sides;
+  }
+
+  /// A core with what its sides have folded into it.
+  MatrixXd folded_core(std::size_t b, std::uint32_t matrix, const NestedSides& sides) const {
+    MatrixXd s = core(b, matrix).cast<double>();
+    if (sides.row != nullptr) s = sides.row->folded * s;
+    if (sides.column != nullptr) s *= sides.column->folded.transpose();
+    return s;
   }
 
   void find_remainders(std::size_t c) {
@@ -353,17 +397,16 @@ class Nesting {
     const auto positions =
         static_cast<std::uint32_t>(HierarchicalOperator::position_count(tree_.patch.size()));
     add_moments(positions, result, values);
-    std::vector<const NestedEnd*> row(storage_.blocks.size()), column(storage_.blocks.size());
-    for (const NestedEnd& end : ends_) (end.is_row ? row : column)[end.block] = &end;
+    const std::map<std::size_t, NestedSides> sides = sides_of_blocks();
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
-      if (row[b] == nullptr && column[b] == nullptr) {
+      const auto found = sides.find(b);
+      if (found == sides.end()) {
         const float* const from = storage_.values_f32.data() + values_of_[b];
         result.blocks.push_back(storage_.blocks[b]);
         values.insert(values.end(), from,
                       from + storage_.blocks[b].value_count(storage_.matrix_count));
       } else {
-        add_block(b, side_of(b, true, row[b], positions), side_of(b, false, column[b], positions),
-                  result, values);
+        add_block(b, found->second, positions, result, values);
       }
     }
     values.resize(values.size() + HierarchicalOperator::kPadding, 0.0F);
@@ -397,15 +440,6 @@ class Nesting {
   struct Side {
     std::uint32_t begin, count, rank, remainders;
     RowMajor vectors;
-    MatrixXd folded = {};  ///< as of its end
-
-    /// Of a core to whose rows or columns the side belongs.
-    void fold_rows(RowMajor& core) const {
-      if (folded.size() > 0) core = (folded * core.cast<double>()).cast<float>().eval();
-    }
-    void fold_columns(RowMajor& core) const {
-      if (folded.size() > 0) core = (core.cast<double>() * folded.transpose()).cast<float>().eval();
-    }
   };
 
   Side side_of(std::size_t b, bool is_row, const NestedEnd* end, std::uint32_t positions) const {
@@ -416,9 +450,7 @@ class Nesting {
       return {positions + static_cast<std::uint32_t>(first),
               static_cast<std::uint32_t>(end->moments.cols()),
               static_cast<std::uint32_t>(end->rank()),
-              static_cast<std::uint32_t>(remainder_count(*end)),
-              end->moments,
-              end->folded};
+              static_cast<std::uint32_t>(remainder_count(*end)), end->moments};
     }
     if (is_row) {
       return {block.row_begin, block.row_count, rank, block.row_remainders, basis(b, true)};
@@ -427,10 +459,11 @@ class Nesting {
   }
 
   /// Rows come after columns: the sides change places if only the columns have moments.
-  void add_block(std::size_t b, Side row, Side column, Storage& result,
+  void add_block(std::size_t b, const NestedSides& sides, std::uint32_t positions, Storage& result,
                  std::vector<float>& values) const {
     const bool diagonal = storage_.blocks[b].on_diagonal();
-    if (diagonal) column = row;
+    Side row = side_of(b, true, sides.row, positions);
+    Side column = diagonal ? row : side_of(b, false, sides.column, positions);
     const bool swapped = row.begin < column.begin;
     if (swapped) std::swap(row, column);
     result.blocks.push_back({.row_begin = row.begin,
@@ -448,10 +481,8 @@ class Nesting {
     add(row.vectors);
     if (!diagonal) add(column.vectors);
     for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
-      RowMajor s = core(b, m);
+      RowMajor s = folded_core(b, m, sides).cast<float>();
       if (swapped) s.transposeInPlace();
-      row.fold_rows(s);
-      column.fold_columns(s);
       add(s);
     }
   }

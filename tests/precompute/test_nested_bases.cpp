@@ -229,6 +229,36 @@ TEST(NestedBases, ALowerPriceBuysMoreMomentsAndLessError) {
   EXPECT_LT(previous_error, 1.01 * before) << "all that the blocks have is kept";
 }
 
+TEST(NestedBases, VectorsHaveNormOneAndCoresFitHalfPrecision) {
+  // At a low price lengths of moments differ most. Vectors that are all scaled alike, by the
+  // longest of them, leave cores that half precision has as good as nothing for.
+  const CompressedBox box(16, 1e-13);
+  for (const double factor : {1.0, 1e8}) {  // the second has sides with more vectors than moments
+    const Storage nested = box.nested(factor * box.cost.price);
+    const auto positions =
+        static_cast<std::uint32_t>(HierarchicalOperator::position_count(box.patches.size()));
+    const float* values = nested.values_f32.data();
+    float largest = 0;
+    for (const TransferBlock& block : nested.blocks) {
+      const float* const end = values + block.value_count(nested.matrix_count);
+      const bool low_rank = block.kind == TransferBlock::Kind::kLowRank;
+      if (low_rank && block.row_begin >= positions) {  // rows come after columns
+        const Eigen::Map<const Eigen::MatrixXf> rows(values, block.row_count, block.row_rank);
+        EXPECT_NEAR(rows.colwise().norm().minCoeff(), 1, 1e-5);
+        EXPECT_NEAR(rows.colwise().norm().maxCoeff(), 1, 1e-5);
+        largest = std::max(largest, Eigen::Map<const Eigen::ArrayXf>(
+                                        end - Eigen::Index{block.row_rank} * block.column_rank,
+                                        Eigen::Index{block.row_rank} * block.column_rank)
+                                        .abs()
+                                        .maxCoeff());
+      }
+      values = end;
+    }
+    EXPECT_LE(largest * HierarchicalOperator::kHalfScale, 33000);
+    EXPECT_GE(largest * HierarchicalOperator::kHalfScale, 30000);
+  }
+}
+
 TEST(NestedBases, SameBitsForAnyNumberOfThreads) {
   const CompressedBox& box = large_box();
   const auto make = [&] { return box.nested(box.cost.price); };
