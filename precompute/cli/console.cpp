@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <csignal>
-#include <cstdio>
 
 namespace rebounce::cli {
 namespace {
@@ -24,6 +23,12 @@ std::string readable_time(double seconds) {
   return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
+/// Nothing as long as it is a guess.
+std::string time_left(double fraction, double seconds) {
+  if (fraction <= 0.02 || seconds <= 0.5) return "";
+  return ", " + readable_time(seconds * (1 - fraction) / fraction) + " left";
+}
+
 }  // namespace
 
 void install_interrupt_handler() {
@@ -35,7 +40,12 @@ bool interrupted() {
   return interrupt_seen != 0;
 }
 
-ProgressBar::ProgressBar(bool enabled) : enabled_(enabled && isatty(STDERR_FILENO) != 0) {}
+ProgressBar::ProgressBar(bool enabled, std::FILE* to, std::chrono::duration<double> line_interval)
+    : enabled_(enabled),
+      on_terminal_(isatty(fileno(to)) != 0),
+      to_(to),
+      line_interval_(line_interval),
+      last_shown_(Clock::now()) {}
 
 ProgressBar::~ProgressBar() {
   clear();
@@ -48,12 +58,13 @@ bool ProgressBar::update(std::string_view phase, double fraction) {
     phase_ = phase;
     phase_begin_ = now;
   }
-  const std::chrono::duration<double> since_drawn = now - last_drawn_;
+  const std::chrono::duration<double> drawn_at_least(0.1);
   if (fraction >= 1) {
     clear();
-  } else if (since_drawn.count() > 0.1) {
-    draw(fraction, std::chrono::duration<double>(now - phase_begin_).count());
-    last_drawn_ = now;
+  } else if (now - last_shown_ >= (on_terminal_ ? drawn_at_least : line_interval_)) {
+    const std::chrono::duration<double> since_begin = now - phase_begin_;
+    on_terminal_ ? draw(fraction, since_begin.count()) : print_line(fraction, since_begin.count());
+    last_shown_ = now;
   }
   return !interrupted();
 }
@@ -61,19 +72,20 @@ bool ProgressBar::update(std::string_view phase, double fraction) {
 void ProgressBar::draw(double fraction, double seconds) {
   constexpr int kWidth = 30;
   const int filled = static_cast<int>(fraction * kWidth);
-  std::string left;
-  if (fraction > 0.02 && seconds > 0.5) {
-    left = ", " + readable_time(seconds * (1 - fraction) / fraction) + " left";
-  }
-  fmt::print(stderr, "\r\033[K{:<13} [{}{}] {:3.0f} %{}", phase_, std::string(filled, '#'),
-             std::string(kWidth - filled, '.'), 100 * fraction, left);
-  std::fflush(stderr);
+  fmt::print(to_, "\r\033[K{:<13} [{}{}] {:3.0f} %{}", phase_, std::string(filled, '#'),
+             std::string(kWidth - filled, '.'), 100 * fraction, time_left(fraction, seconds));
+  std::fflush(to_);
   drawn_ = true;
 }
 
+void ProgressBar::print_line(double fraction, double seconds) {
+  fmt::print(to_, "{}: {:.0f} %{}\n", phase_, 100 * fraction, time_left(fraction, seconds));
+  std::fflush(to_);
+}
+
 void ProgressBar::clear() {
-  if (drawn_) fmt::print(stderr, "\r\033[K");
-  std::fflush(stderr);
+  if (drawn_) fmt::print(to_, "\r\033[K");
+  std::fflush(to_);
   drawn_ = false;
 }
 

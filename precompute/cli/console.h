@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdio>
 #include <string>
 #include <string_view>
 
@@ -18,11 +19,13 @@ struct CommonOptions {
 void install_interrupt_handler();
 bool interrupted();
 
-/// A progress bar with time left on standard error: drawn only on a terminal, at most ten times a
-/// second. Always reports whether to go on, so that it can serve as a progress function.
+/// How far long work is, with time left, on `to`: on a terminal a bar, drawn ten times a second at
+/// most; elsewhere, as in a log, a line whenever `line_interval` has gone by. Always reports
+/// whether to go on, so that it can serve as a progress function.
 class ProgressBar {
  public:
-  explicit ProgressBar(bool enabled);
+  explicit ProgressBar(bool enabled, std::FILE* to = stderr,
+                       std::chrono::duration<double> line_interval = std::chrono::minutes(1));
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
@@ -34,12 +37,15 @@ class ProgressBar {
   using Clock = std::chrono::steady_clock;
 
   void draw(double fraction, double seconds);
+  void print_line(double fraction, double seconds);
   void clear();
 
-  bool enabled_;
+  bool enabled_, on_terminal_;
+  std::FILE* to_;
+  std::chrono::duration<double> line_interval_;
   bool drawn_ = false;
   std::string phase_;
-  Clock::time_point phase_begin_{}, last_drawn_{};
+  Clock::time_point phase_begin_{}, last_shown_;
 };
 
 /// Prints `line` on standard error unless `quiet`.
