@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "blas_speed.h"
 #include "build_estimate.h"
 #include "operator_stage.h"
 #include "phase_clock.h"
@@ -148,12 +149,14 @@ class TransferBuild {
     }
     decided_ = decide(settings_, model_, roles_);
     report_.estimate = estimate_cost(model_, roles_, decided_);
+    const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
+    if (fits && decided_.form_factor_kind == FormFactorKind::kPairs) measure_speed();
     announce(report_.estimate);
   }
 
   /// Finds what patches exchange; afterwards the patches and the mesh are the data's.
   void find_exchange() {
-    tracer_.emplace(make_surface_tracer(model_.mesh));
+    if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
     EscapedLight escaped =
         decided_.form_factor_kind == FormFactorKind::kLinks ? find_links_alone() : find_pairs();
     data_.patches = std::move(model_.patches);
@@ -202,6 +205,18 @@ class TransferBuild {
   TransferData take() { return std::move(data_); }
 
  private:
+  /// Estimates a build from pairs by how fast this machine is.
+  void measure_speed() {
+    tracer_.emplace(make_surface_tracer(model_.mesh));
+    clock_.run("estimate", [&](const Progress& part) {
+      const double seconds =
+          forecast_form_factors(model_, *tracer_, decided_.form_factors, part).seconds;
+      report_.estimate = estimate_cost_of_pairs(model_, roles_, decided_,
+                                                PairSpeed{seconds, measure_blas_speed()});
+      return true;
+    });
+  }
+
   /// Throws Error if what is left needs more memory than it may take.
   void announce(const CostEstimate& estimate) {
     if (on_estimate_) on_estimate_(estimate);

@@ -34,9 +34,15 @@ double seconds_of_vertices(std::size_t vertex_count) {
   return static_cast<double>(vertex_count) / 8e4;
 }
 
-// Processor seconds to compress the dense inverse of so many patches, and how they grow; measured:
+// Operations of the BLAS that would take as long as to compress the dense inverse of so many
+// patches, and how they grow; the part of its speed that a dense inverse has. Measured:
 // notes/operator.md.
-constexpr double kCompressPairs = 3.4e-4, kCompressPairsGrowth = 1.3;
+constexpr double kCompressPairs = 6.8e7, kCompressPairsGrowth = 1.3;
+constexpr double kInverseShare = 0.7;
+
+// Where neither has been measured: rays of a pair, rays a second, operations a second, of a slow
+// core.
+constexpr double kGuessedRays = 100, kGuessedRaySpeed = 1e7, kGuessedOperations = 7e10;
 
 // Links of a patch where there are kLinkPatches of them, and how their number grows: in a bare room
 // and in a furnished one. Measured: notes/links.md, notes/operator.md. Rooms full of small things
@@ -121,7 +127,8 @@ std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
 }
 
 CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& roles,
-                                    const BuildSettings& settings) {
+                                    const BuildSettings& settings,
+                                    const std::optional<PairSpeed>& speed) {
   const PatchTable& patches = model.patches;
   const std::uint32_t matrices = distinct_channels(patches.reflectance);
   const auto n = static_cast<double>(patches.size());
@@ -135,16 +142,17 @@ CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& r
   const std::size_t inverses = dense_transfer_peak_bytes(patches.size(), matrices, arithmetic);
   estimate.peak_bytes = static_cast<std::uint64_t>(
       std::max(40 * factors, 32 * factors + static_cast<double>(inverses)));
-  // Ten million rays and fifty billion operations a second, or a hundred of single precision: about
-  // one slow core.
-  const double speed = arithmetic == Arithmetic::kDouble ? 5e10 : 1e11;
-  estimate.whole_seconds = on_all_processors(factors * settings.form_factors.probe_rays / 1e7 +
-                                             2 * n * n * n * matrices / speed) +
+  const PairSpeed known =
+      speed.value_or(PairSpeed{on_all_processors(factors * kGuessedRays / kGuessedRaySpeed),
+                               kGuessedOperations / on_all_processors(1)});
+  const double operations =
+      kInverseShare * known.operations_per_second * (arithmetic == Arithmetic::kDouble ? 0.5 : 1);
+  estimate.whole_seconds = known.form_factor_seconds + 2 * n * n * n * matrices / operations +
                            seconds_of_vertices(model.mesh.position.size());
   estimate.seconds = estimate.whole_seconds;
   if (settings.operator_kind == OperatorKind::kHierarchical) {
-    estimate.seconds += on_all_processors(kCompressPairs * std::pow(n, kCompressPairsGrowth) *
-                                          wanted_part(roles, patches.size()));
+    estimate.seconds += kCompressPairs * std::pow(n, kCompressPairsGrowth) *
+                        wanted_part(roles, patches.size()) / known.operations_per_second;
   }
   estimate.least_seconds = estimate.seconds;
   return estimate;

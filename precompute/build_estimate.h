@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "rebounce/precompute/build.h"
@@ -14,9 +15,17 @@ namespace rebounce {
 /// What the build may take: as it was set, or half of the machine's memory.
 std::uint64_t memory_limit_bytes(const BuildSettings& settings);
 
+/// How fast this machine is in a build from pairs.
+struct PairSpeed {
+  double form_factor_seconds = 0;    ///< for all of them
+  double operations_per_second = 0;  ///< measure_blas_speed
+};
+
 /// What form factors and operator of these patches will take, by pairs whatever the settings say.
+/// Without a speed that of a slow machine is taken, and rays are guessed.
 CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& roles,
-                                    const BuildSettings& settings);
+                                    const BuildSettings& settings,
+                                    const std::optional<PairSpeed>& speed = {});
 
 /// The same of what settings.form_factor_kind, which is no longer open, says. Links are taken to be
 /// as many as in a furnished room.

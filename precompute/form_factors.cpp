@@ -27,6 +27,10 @@ class FormFactorAssembly {
     return close(compute_raw_exchange(model_, shadow_rays_, tracer_, settings_, progress_));
   }
 
+  FormFactorForecast forecast() const {
+    return forecast_raw_exchange(model_, shadow_rays_, tracer_, settings_, progress_);
+  }
+
  private:
   RawExchange exchange_of_links() const {
     const RefinedLinks refined =
@@ -103,6 +107,13 @@ FormFactors compute_form_factors(const PatchModel& model, const RayTracer& trace
                                  const FormFactorSettings& settings, const Progress& progress) {
   check_form_factor_settings(settings);
   return FormFactorAssembly(model, tracer, settings, progress).run();
+}
+
+FormFactorForecast forecast_form_factors(const PatchModel& model, const RayTracer& tracer,
+                                         const FormFactorSettings& settings,
+                                         const Progress& progress) {
+  check_form_factor_settings(settings);
+  return FormFactorAssembly(model, tracer, settings, progress).forecast();
 }
 
 }  // namespace rebounce

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "hemisphere_exchange.h"
@@ -30,6 +32,25 @@ constexpr double kSpreadGain = 0.2;
 constexpr double kRowSumTolerance = 6e-4;
 constexpr int kDefaultRays = 64, kRefinedProbes = 4;
 
+// A forecast looks at one of so many patches, but at so many at least and at most; in runs of
+// neighbours, whose rays go alike.
+constexpr std::size_t kForecastShare = 32, kForecastLeast = 64, kForecastMost = 512;
+constexpr std::size_t kForecastRun = 16;
+
+std::vector<std::uint32_t> sample_of_patches(std::size_t patch_count) {
+  const std::size_t wanted =
+      std::clamp(patch_count / kForecastShare, kForecastLeast, kForecastMost);
+  const std::size_t runs = std::min(wanted / kForecastRun, patch_count);
+  const std::size_t length = std::min(patch_count / runs, kForecastRun);
+  std::vector<std::uint32_t> sample;
+  for (std::size_t run = 0; run < runs; ++run) {
+    const std::size_t begin = (2 * run + 1) * patch_count / (2 * runs) - length / 2;
+    for (std::size_t k = 0; k < length; ++k)
+      sample.push_back(static_cast<std::uint32_t>(begin + k));
+  }
+  return sample;
+}
+
 class RawExchangeBuilder {
  public:
   RawExchangeBuilder(const PatchModel& model, const ShadowRays& shadow_rays,
@@ -45,24 +66,59 @@ class RawExchangeBuilder {
 
   RawExchange run() {
     const std::size_t n = geometry_.patch_count();
-    const std::vector<Escape> escape = trace_hemispheres();
+    std::vector<std::uint32_t> all(n);
+    std::iota(all.begin(), all.end(), 0U);
+    const std::vector<Escape> escape =
+        trace_hemispheres(all, [](double done) { return 0.2 * done; });
     ExchangeRows rows(n);
     // Row i has n - i pairs: what is left is a triangle.
     const auto triangle = [](double done) { return 1 - (1 - done) * (1 - done); };
-    for_each_patch([&](std::uint32_t i, Scratch& scratch) { compute_row(i, scratch, rows[i]); },
-                   [&](double done) { return 0.2 + 0.6 * triangle(done); });
+    const auto every = [](std::uint32_t) { return true; };
+    for_each_patch(
+        all, [&](std::uint32_t i, Scratch& scratch) { compute_row(i, every, scratch, rows[i]); },
+        [&](double done) { return 0.2 + 0.6 * triangle(done); });
     const std::vector<RowTarget> target = row_targets(escape, settings_.hemisphere_rays);
     const SecondLook look(row_sums(rows, geometry_.areas()), target, row_sum_tolerance());
-    refine_rows(look.trial(), rows, [&](double done) { return 0.8 + 0.1 * triangle(done); });
+    const auto refine = [&](const std::vector<bool>& doubtful, double begin) {
+      for_each_patch(
+          all,
+          [&](std::uint32_t i, Scratch& scratch) { refine_row(i, doubtful, scratch, rows[i]); },
+          [&](double done) { return begin + 0.1 * triangle(done); });
+    };
+    refine(look.trial(), 0.8);
     const std::vector<bool> rest = look.rest(row_sums(rows, geometry_.areas()));
-    if (!rest.empty()) {
-      refine_rows(rest, rows, [&](double done) { return 0.9 + 0.1 * triangle(done); });
-    }
-    const std::uint64_t hemisphere_rays = n * static_cast<std::uint64_t>(settings_.hemisphere_rays);
-    return {std::move(rows), escape, target, ray_count_ + hemisphere_rays, pair_count_};
+    if (!rest.empty()) refine(rest, 0.9);
+    return {std::move(rows), escape, target, ray_count_ + hemisphere_ray_count(n), pair_count_};
+  }
+
+  /// The pairs of some patches with each other.
+  FormFactorForecast forecast() {
+    const std::size_t n = geometry_.patch_count();
+    const std::vector<std::uint32_t> sample = sample_of_patches(n);
+    std::vector<bool> sampled(n);
+    for (const std::uint32_t i : sample) sampled[i] = true;
+    const auto wanted = [&](std::uint32_t j) { return sampled[j]; };
+    const auto begin = Clock::now();
+    trace_hemispheres(sample, [](double done) { return 0.5 * done; });
+    const auto between = Clock::now();
+    for_each_patch(
+        sample,
+        [&](std::uint32_t i, Scratch& scratch) {
+          std::vector<ExchangeEntry> row;
+          compute_row(i, wanted, scratch, row);
+        },
+        [](double done) { return 0.5 + 0.5 * done; });
+    const std::chrono::duration<double> hemispheres = between - begin,
+                                        pairs = Clock::now() - between;
+    const double share = static_cast<double>(n) / static_cast<double>(sample.size());
+    return {hemispheres.count() * share + pairs.count() * share * share,
+            static_cast<double>(hemisphere_ray_count(n)) +
+                static_cast<double>(ray_count_) * share * share};
   }
 
  private:
+  using Clock = std::chrono::steady_clock;
+
   struct Scratch {
     std::vector<FacingPatch> facing, mixed, large_mixed;
     std::vector<Ray> rays;
@@ -71,44 +127,52 @@ class RawExchangeBuilder {
     MetPatchCounter counter;
   };
 
-  /// Runs `work` for every patch on all threads; throws Cancelled if asked to. `part` says which
-  /// part of the whole is done when a part of the patches is.
+  std::uint64_t hemisphere_ray_count(std::size_t patch_count) const {
+    return patch_count * static_cast<std::uint64_t>(settings_.hemisphere_rays);
+  }
+
+  /// Runs `work` for every one of `patches` on all threads; throws Cancelled if asked to. `part`
+  /// says which part of the whole is done when a part of the patches is.
   template <typename Work, typename Part>
-  void for_each_patch(const Work& work, const Part& part) {
-    const std::size_t n = geometry_.patch_count();
+  void for_each_patch(std::span<const std::uint32_t> patches, const Work& work, const Part& part) {
     const Progress whole = [&](double done) { return !progress_ || progress_(part(done)); };
-    ParallelProgress loop(whole, n);
+    ParallelProgress loop(whole, patches.size());
 #pragma omp parallel
     {
       Scratch scratch;
 #pragma omp for schedule(dynamic, 4)
-      for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < patches.size(); ++k) {
         if (loop.stopped()) continue;
-        work(static_cast<std::uint32_t>(i), scratch);
+        work(patches[k], scratch);
         loop.advance();
       }
     }
     loop.finish();
   }
 
-  std::vector<Escape> trace_hemispheres() {
+  /// Those of `patches`; of others nothing is known afterwards.
+  template <typename Part>
+  std::vector<Escape> trace_hemispheres(std::span<const std::uint32_t> patches, const Part& part) {
     const std::size_t n = geometry_.patch_count();
     std::vector<Escape> escape(n);
     std::vector<std::vector<MetPatch>> met(n);
     for_each_patch(
+        patches,
         [&](std::uint32_t i, Scratch& scratch) {
           escape[i] = measure_escape(model_, patch_triangles_[i], i, tracer_,
                                      settings_.hemisphere_rays, settings_.seed, scratch.escape);
           met[i] = scratch.counter.count(n, scratch.escape.met);
         },
-        [](double done) { return 0.2 * done; });
+        part);
     hemisphere_.emplace(met, geometry_.areas(), settings_.hemisphere_rays);
     return escape;
   }
 
-  void compute_row(std::uint32_t i, Scratch& scratch, std::vector<ExchangeEntry>& row) {
-    append_fine(
-        i, settings_.probe_rays, [](std::uint32_t) { return true; }, scratch, row);
+  /// The pairs (i, j) that are not coarse and `wanted`(j), and all coarse ones.
+  template <typename Wanted>
+  void compute_row(std::uint32_t i, const Wanted& wanted, Scratch& scratch,
+                   std::vector<ExchangeEntry>& row) {
+    append_fine(i, settings_.probe_rays, wanted, scratch, row);
     append_coarse(i, row);
     std::ranges::sort(row, {}, &ExchangeEntry::column);
   }
@@ -159,13 +223,6 @@ class RawExchangeBuilder {
     // As random rays would deviate: more than they do, but of many thousand pairs none may be lost
     // to chance whose kernel is exact.
     return std::abs(count - expected) > deviations * std::sqrt(expected + 1);
-  }
-
-  template <typename Part>
-  void refine_rows(const std::vector<bool>& doubtful, ExchangeRows& rows, const Part& part) {
-    for_each_patch(
-        [&](std::uint32_t i, Scratch& scratch) { refine_row(i, doubtful, scratch, rows[i]); },
-        part);
   }
 
   /// Looks at the fine pairs of row i that have a doubtful patch with more probe rays, and replaces
@@ -278,6 +335,13 @@ RawExchange compute_raw_exchange(const PatchModel& model, const ShadowRays& shad
                                  const RayTracer& tracer, const FormFactorSettings& settings,
                                  const Progress& progress) {
   return RawExchangeBuilder(model, shadow_rays, tracer, settings, progress).run();
+}
+
+FormFactorForecast forecast_raw_exchange(const PatchModel& model, const ShadowRays& shadow_rays,
+                                         const RayTracer& tracer,
+                                         const FormFactorSettings& settings,
+                                         const Progress& progress) {
+  return RawExchangeBuilder(model, shadow_rays, tracer, settings, progress).forecast();
 }
 
 }  // namespace rebounce

@@ -202,6 +202,19 @@ TEST(FormFactors, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.absorbed, three.absorbed);
 }
 
+TEST(FormFactors, AreForecastByASample) {
+  for (const std::size_t patch_count : {400, 1600}) {
+    const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = patch_count});
+    const auto make = [&] { return forecast_form_factors(model, test::make_tracer(model)); };
+    const FormFactorForecast one = test::with_threads(1, make), three = test::with_threads(3, make);
+    EXPECT_EQ(one.ray_count, three.ray_count);
+    EXPECT_GT(one.seconds, 0);
+    const auto rays = static_cast<double>(form_factors_of(model).ray_count);
+    EXPECT_GT(one.ray_count, 0.6 * rays);
+    EXPECT_LT(one.ray_count, 1.6 * rays);
+  }
+}
+
 TEST(FormFactors, AnotherSeedGivesNearlyTheSame) {
   const PatchModel model = make_patch_model(test::furnished_room(), {.patch_count = 400});
   const FormFactors a = form_factors_of(model, {.seed = 1}),
