@@ -34,10 +34,10 @@ double seconds_of_vertices(std::size_t vertex_count) {
   return static_cast<double>(vertex_count) / 8e4;
 }
 
-// Operations of the BLAS that would take as long as to compress the dense inverse of so many
-// patches, and how they grow; the part of its speed that a dense inverse has. Measured:
+// Processor seconds to compress the dense inverse of so many patches, and how they grow, where a
+// core does so many operations a second; the part of its speed that a dense inverse has. Measured:
 // notes/operator.md.
-constexpr double kCompressPairs = 6.8e7, kCompressPairsGrowth = 1.3;
+constexpr double kCompressPairs = 3.4e-4, kCompressPairsGrowth = 1.3, kUsualOperations = 2e11;
 constexpr double kInverseShare = 0.7;
 
 // Where neither has been measured: rays of a pair, rays a second, operations a second, of a slow
@@ -151,8 +151,12 @@ CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& r
                            seconds_of_vertices(model.mesh.position.size());
   estimate.seconds = estimate.whole_seconds;
   if (settings.operator_kind == OperatorKind::kHierarchical) {
-    estimate.seconds += kCompressPairs * std::pow(n, kCompressPairsGrowth) *
-                        wanted_part(roles, patches.size()) / known.operations_per_second;
+    // Half of it is no product of matrices.
+    const double slowness =
+        std::sqrt(kUsualOperations / on_all_processors(1) / known.operations_per_second);
+    estimate.seconds +=
+        slowness * on_all_processors(kCompressPairs * std::pow(n, kCompressPairsGrowth) *
+                                     wanted_part(roles, patches.size()));
   }
   estimate.least_seconds = estimate.seconds;
   return estimate;
