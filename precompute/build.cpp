@@ -150,7 +150,9 @@ class TransferBuild {
     decided_ = decide(settings_, model_, roles_);
     report_.estimate = estimate_cost(model_, roles_, decided_);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
-    if (fits && decided_.form_factor_kind == FormFactorKind::kPairs) measure_speed();
+    const bool all_pairs = decided_.form_factor_kind == FormFactorKind::kPairs &&
+                           decided_.form_factors.link_epsilon == 0;
+    if (fits && all_pairs) measure_speed();
     announce(report_.estimate);
   }
 

@@ -40,8 +40,8 @@ double seconds_of_vertices(std::size_t vertex_count) {
 constexpr double kCompressPairs = 3.4e-4, kCompressPairsGrowth = 1.3, kUsualOperations = 2e11;
 constexpr double kInverseShare = 0.7;
 
-// Where neither has been measured: rays of a pair, rays a second, operations a second, of a slow
-// core.
+// Where neither has been measured: rays of a pair (as many as it begins with, if links tell what is
+// seen), rays a second, operations a second, of a slow core.
 constexpr double kGuessedRays = 100, kGuessedRaySpeed = 1e7, kGuessedOperations = 7e10;
 
 // Links of a patch where there are kLinkPatches of them, and how their number grows: in a bare room
@@ -142,8 +142,10 @@ CostEstimate estimate_cost_of_pairs(const PatchModel& model, const PatchRoles& r
   const std::size_t inverses = dense_transfer_peak_bytes(patches.size(), matrices, arithmetic);
   estimate.peak_bytes = static_cast<std::uint64_t>(
       std::max(40 * factors, 32 * factors + static_cast<double>(inverses)));
+  const FormFactorSettings& form_factors = settings.form_factors;
+  const double rays = form_factors.link_epsilon > 0 ? form_factors.probe_rays : kGuessedRays;
   const PairSpeed known =
-      speed.value_or(PairSpeed{on_all_processors(factors * kGuessedRays / kGuessedRaySpeed),
+      speed.value_or(PairSpeed{on_all_processors(factors * rays / kGuessedRaySpeed),
                                kGuessedOperations / on_all_processors(1)});
   const double operations =
       kInverseShare * known.operations_per_second * (arithmetic == Arithmetic::kDouble ? 0.5 : 1);
