@@ -275,7 +275,7 @@ class Nesting {
   }
 
   /// Vectors of norm 1, and lengths of the moments between those of coefficients (all alike as
-  /// they are rounded) and of energies: with the root between both rounding does the least.
+  /// they are rounded) and of energies: rounding does the least there. notes/operator.md.
   void make_basis(std::size_t c) {
     CellBasis& own = bases_[c];
     own.directions.conservativeResize(Eigen::NoChange, own.rank);
