@@ -33,7 +33,7 @@ struct CompressionFrame {
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
                                    std::span<const std::vector<Float3>> shaping);
 
-/// The price that the search for a tolerance begins with.
+/// What a value per patch is worth at the tolerance: that with which searches begin, or near it.
 double first_price(double tolerance, std::size_t patch_count);
 
 /// Compresses `matrix` as compress_transfer does. `patches` are those of the matrix.
