@@ -263,8 +263,21 @@ Storage HierarchicalOperator::stream(const Storage& storage) {
   return streamed;
 }
 
+namespace {
+
+/// Values in f32, which can be rounded, in the order kStreamed.
+Storage stream_exact(const Storage& storage) {
+  if (storage.precision != Precision::kF32) {
+    refuse(std::string("values in ") + precision_name(storage.precision) +
+           " cannot be rounded again; give them in f32");
+  }
+  return HierarchicalOperator::stream(storage);
+}
+
+}  // namespace
+
 Storage HierarchicalOperator::encode_half(const Storage& storage) {
-  const Storage exact = stream(storage);
+  const Storage exact = stream_exact(storage);
   Storage half = exact;
   half.precision = Precision::kF16;
   half.values_f32 = {};
@@ -280,11 +293,11 @@ Storage HierarchicalOperator::encode_half(const Storage& storage) {
 }
 
 Storage HierarchicalOperator::encode_shorts(const Storage& storage) {
-  return encode_integers(stream(storage), Precision::kQ16);
+  return encode_integers(stream_exact(storage), Precision::kQ16);
 }
 
 Storage HierarchicalOperator::encode_bytes(const Storage& storage) {
-  return encode_integers(stream(storage), Precision::kQ8);
+  return encode_integers(stream_exact(storage), Precision::kQ8);
 }
 
 Storage HierarchicalOperator::encode(const Storage& storage, Precision precision) {
@@ -298,7 +311,7 @@ Storage HierarchicalOperator::encode(const Storage& storage, Precision precision
     case Precision::kF32:
       break;
   }
-  return stream(storage);
+  return stream_exact(storage);
 }
 
 float product_scale(Precision precision) {

@@ -131,6 +131,18 @@ TEST(HierarchicalOperator, ShortsAreAsGoodAsTheirBits) {
   }
 }
 
+TEST(HierarchicalOperator, RefusesToRoundTwice) {
+  const HierarchicalOperator::Storage exact = random_hierarchical_storage(100, 1, 1);
+  for (const Precision first : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+    const HierarchicalOperator::Storage rounded = HierarchicalOperator::encode(exact, first);
+    for (const Precision second :
+         {Precision::kF32, Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+      EXPECT_THROW(HierarchicalOperator::encode(rounded, second), Error)
+          << precision_name(first) << " to " << precision_name(second);
+    }
+  }
+}
+
 TEST(HierarchicalOperator, RefusesShortsWhoseSumsCouldOverflow) {
   HierarchicalOperator::Storage storage =
       HierarchicalOperator::encode_shorts(random_hierarchical_storage(100, 1, 1));

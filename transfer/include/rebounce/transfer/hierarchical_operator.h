@@ -142,19 +142,19 @@ class HierarchicalOperator final : public TransferOperator {
   /// rank loses it. Throws Error as the constructor does.
   static Storage stream(const Storage& storage);
 
-  /// The same with half-precision numbers, in the order kStreamed. Throws Error if a value is
-  /// beyond their range, and as the constructor does.
+  /// The same with half-precision numbers, in the order kStreamed. Throws Error if the values are
+  /// not in f32 or one is beyond the range of halves, and as the constructor does.
   static Storage encode_half(const Storage& storage);
 
-  /// The same with bases of 16 bits. Storage has values in f32. Throws Error as encode_half does.
+  /// The same with bases of 16 bits. Throws Error as encode_half does.
   static Storage encode_shorts(const Storage& storage);
 
-  /// The same with bases of 8 bits, and the remainders that its blocks ask for. Storage has values
-  /// in f32. Throws Error as encode_half does.
+  /// The same with bases of 8 bits, and the remainders that its blocks ask for. Throws Error as
+  /// encode_half does.
   static Storage encode_bytes(const Storage& storage);
 
-  /// Values in f32 as `precision` has them, in the order kStreamed. Throws Error as the constructor
-  /// and the encodings do.
+  /// Values in f32 as `precision` has them, in the order kStreamed. Throws Error if they are not in
+  /// f32, and as the constructor and the encodings do.
   static Storage encode(const Storage& storage, Precision precision);
 
   /// Takes over `storage`; values in the order kByBlock are copied into the order kStreamed. Throws
