@@ -36,9 +36,8 @@ constexpr std::size_t kKeptPieces = 64;
 // scenes and sizes, notes/operator.md.
 constexpr double kFirstPrice = 2.5;
 
-// Operators with moments end 6 to 20 times above it from some thousand patches on, nearer with
-// fewer. Their search begins higher by this power of how many times so many patches they have, and
-// by so much at most. Measured: notes/operator.md.
+// Operators with moments mostly end far above it. Their search begins higher by this power of how
+// many times so many patches they have, and by so much at most. Measured: notes/operator.md.
 constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
 
 // From one round to the next, the strength of a shaping light changes by a factor between these.
