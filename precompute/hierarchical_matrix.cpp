@@ -56,6 +56,7 @@ struct HierarchicalMatrix::Places {
 HierarchicalMatrix::HierarchicalMatrix(const HierarchicalOperator::Storage& storage)
     : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
   if (layout_.moment_count > 0) throw Error("hierarchical matrix: its blocks have moments");
+  if (!storage_.scale_exponent.empty()) throw Error("hierarchical matrix: it is equilibrated");
   const SharedArray<float> values = std::exchange(storage_.values_f32, {});
   bases_.assign(values.begin(), values.begin() + layout_.basis_value_count);
   const std::uint64_t count = layout_.core_value_count / matrix_count();

@@ -1,6 +1,7 @@
 #include "judged_error.h"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <numeric>
 #include <vector>
@@ -8,24 +9,35 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kGroup = 64;
+constexpr double kGroup = 64, kConfidence = 0.95;
 
-// Times the mean that an error may be: the largest of a group, and what it usually is.
-constexpr double kLargestOverMean = 3, kUsualOverMean = 2.75;
+// Times the mean that the largest error of a group may be.
+constexpr double kLargestOverMean = 3;
+
+// The tail is this part of the sample, and no fewer than kLeastTail; fewer errors than kLeastSample
+// say nothing of one.
+constexpr std::size_t kTailPart = 16, kLeastTail = 8, kLeastSample = 32;
+
+/// What the largest of kGroup errors stays below with kConfidence; `falling`, largest first.
+double largest_of_group(std::span<const double> falling) {
+  if (falling.size() < kLeastSample) return falling.front();
+  const std::size_t tail = std::max(kLeastTail, falling.size() / kTailPart);
+  const double threshold = falling[tail];
+  const auto count = static_cast<double>(tail), size = static_cast<double>(falling.size());
+  const double all = std::accumulate(falling.begin(), falling.begin() + tail, 0.0);
+  const double excess = all / count - threshold;
+  const double beyond = 1 - std::pow(kConfidence, 1 / kGroup);
+  return threshold + excess * std::log(count / (size * beyond));
+}
 
 }  // namespace
 
 double judged_error(std::span<const double> errors) {
-  const auto count = static_cast<double>(errors.size());
-  const double mean = std::accumulate(errors.begin(), errors.end(), 0.0) / count;
-  const double largest = std::ranges::max(errors.first(std::min(errors.size(), kGroup)));
-  const double judged = std::max(mean, largest / kLargestOverMean);
-  const std::size_t groups = errors.size() / kGroup;
-  if (groups < 2) return judged;
-  std::vector<double> sorted(errors.begin(), errors.end());
-  const auto usual = sorted.begin() + static_cast<std::ptrdiff_t>(groups - 1);
-  std::ranges::nth_element(sorted, usual, std::greater<>());
-  return std::max(judged, *usual / kUsualOverMean);
+  std::vector<double> falling(errors.begin(), errors.end());
+  std::ranges::sort(falling, std::greater<>());
+  const double mean =
+      std::accumulate(falling.begin(), falling.end(), 0.0) / static_cast<double>(falling.size());
+  return std::max(mean, largest_of_group(falling) / kLargestOverMean);
 }
 
 }  // namespace rebounce

@@ -21,11 +21,10 @@ constexpr Index kDirectionCount = 8;
 // lights in any direction. Measured: notes/operator.md.
 constexpr double kBackground = 1;
 
-// The background grows with this power of what the light of a patch lacks to the usual energy, and
-// no further below kLeastEnergy of that. With 1/2 the errors of all single patches would count
-// alike; rows and columns are both weighed, which is too much of it where both are dark. Measured:
-// notes/operator.md.
-constexpr double kDarkPower = 0.4, kLeastEnergy = 1e-6;
+// The background grows with the root of what the light of a patch lacks to the usual energy, so
+// that the errors of all single patches count alike, and no further below this part of it.
+// Measured: notes/operator.md.
+constexpr double kLeastEnergy = 1e-6;
 
 struct Principal {
   MatrixXd directions;
@@ -103,7 +102,7 @@ VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree
     energy[k] = matrix.roles().is_source(p) ? of_patch[p] : usual;
   }
   background.head(energy.size()) =
-      (usual / energy.array().max(kLeastEnergy * usual).min(usual)).pow(kDarkPower);
+      (usual / energy.array().max(kLeastEnergy * usual).min(usual)).sqrt();
   return background;
 }
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
+#include "balanced_matrix.h"
 #include "block_tree.h"
 #include "judged_error.h"
 #include "lit_truth.h"
@@ -110,21 +112,34 @@ PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_cou
   return sizes;
 }
 
+/// What is at each position, by patch.
+std::vector<std::int8_t> by_patch(const std::vector<std::int8_t>& at_position,
+                                  const ClusterTree& tree) {
+  std::vector<std::int8_t> of_patch(at_position.size());
+  for (std::size_t k = 0; k < at_position.size(); ++k) of_patch[tree.patch[k]] = at_position[k];
+  return of_patch;
+}
+
 /// A compressor with all that it looks at.
 class Compression {
  public:
+  /// For applies, the matrix is balanced and bases are nested.
   Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping,
-              const PartSizes& sizes, bool moments)
+              const PartSizes& sizes, bool for_applies)
       : matrix_(matrix),
         sizes_(sizes),
-        moments_(moments),
         truth_(matrix, with_uniform(patches.size(), shaping)),
-        frame_(frame_of(matrix, patches, truth_)) {}
+        frame_(frame_of(matrix, patches, truth_)) {
+    if (!for_applies) return;
+    exponent_ = frame_.balance();
+    balanced_.emplace(matrix, by_patch(exponent_, frame_.tree));
+  }
 
   HierarchicalOperator::Storage at(double price, const KeptParts& kept,
                                    const Progress& progress) const {
     const std::vector<ClusterWeight> weights = frame_.weights();
-    const BlockTreeCompressor compressor(matrix_, frame_.tree, weights, sizes_);
+    const BlockTreeCompressor compressor(balanced_ ? *balanced_ : matrix_, frame_.tree, weights,
+                                         sizes_);
     const std::vector<BlockPiece> pieces = compressor.pieces();
     const std::size_t together = kept.checkpoint.keeps() ? kKeptPieces : pieces.size();
     const auto all = static_cast<double>(pieces.size());
@@ -139,10 +154,12 @@ class Compression {
       report_progress(part, 1);
     }
     HierarchicalOperator::Storage storage = compressor.assemble(std::move(whole));
-    if (!moments_) return storage;
+    if (!balanced_) return storage;
     const CompressionCost cost{.price = price, .sizes = sizes_};
     const WantedBlocks wanted(frame_.roles, frame_.tree);
-    return nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
+    storage = nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
+    storage.scale_exponent = exponent_;
+    return storage;
   }
 
   double price_of(double usual) const { return frame_.price_of(usual); }
@@ -161,9 +178,10 @@ class Compression {
  private:
   const SymmetricMatrix& matrix_;
   PartSizes sizes_;
-  bool moments_;
   LitTruth truth_;
   CompressionFrame frame_;
+  std::vector<std::int8_t> exponent_;  ///< by position, as BalancedMatrix has them
+  std::optional<BalancedMatrix> balanced_;
 };
 
 /// The best operator that the search has met: the smallest within the limit, or the most exact.
@@ -196,6 +214,18 @@ double search_start(const HierarchicalSettings& settings, std::size_t patch_coun
 }
 
 }  // namespace
+
+std::vector<std::int8_t> CompressionFrame::balance() {
+  std::vector<std::int8_t> exponent(tree.patch.size());
+  for (std::size_t k = 0; k < exponent.size(); ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    const double power = -std::round(std::log2(background[row]));
+    exponent[k] = static_cast<std::int8_t>(power);
+    sample.row(row) *= std::exp2(power);
+    background[row] *= std::exp2(power);
+  }
+  return exponent;
+}
 
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
                                    Exitances shaping) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -23,6 +24,10 @@ struct CompressionFrame {
   /// What a value is worth where that is `usual` with all patches receivers: squares of errors are
   /// relative to those of what arrives.
   double price_of(double usual) const { return usual * received_part * received_part; }
+
+  /// Goes over to the coordinates of a matrix K that leaves the background of all lights about 1,
+  /// BalancedMatrix: x becomes R x. Returns R as powers of two, by position.
+  std::vector<std::int8_t> balance();
 
   std::vector<ClusterWeight> weights() const {
     return make_cluster_weights(tree, sample, background, roles);

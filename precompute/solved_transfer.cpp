@@ -35,8 +35,8 @@ constexpr Index kSummedRows = 128;
 // few that lights are.
 constexpr Index kSmallGroup = 16;
 
-// Random vectors for the energies: their errors are sqrt(2 / 128), 13 %, and to the power 0.4 that
-// are taken to (light_weights.cpp) are 5 %.
+// Random vectors for the energies: their errors are sqrt(2 / 128), 13 %, and of their roots, which
+// count (light_weights.cpp), 6 %.
 constexpr Index kProbeCount = 128;
 
 /// Sums over the rows of `term(first, count)`, an expression [count][k].

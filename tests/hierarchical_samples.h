@@ -167,4 +167,15 @@ inline HierarchicalOperator::Storage random_nested_storage(std::size_t patch_cou
   return RandomHierarchicalStorage(patch_count, matrix_count, seed, true).storage;
 }
 
+/// The same with scales of positions from 1/64 to 4.
+inline HierarchicalOperator::Storage equilibrated(HierarchicalOperator::Storage storage,
+                                                  std::uint64_t seed) {
+  std::mt19937_64 engine(seed);
+  std::uniform_int_distribution<int> exponent(-6, 2);
+  for (std::size_t k = 0; k < storage.area.size(); ++k) {
+    storage.scale_exponent.push_back(static_cast<std::int8_t>(exponent(engine)));
+  }
+  return storage;
+}
+
 }  // namespace rebounce::test

@@ -198,8 +198,8 @@ void clear(const PlanarVectors<float>& vectors, std::size_t begin, std::size_t e
 
 /// Takes the light of the patches into x and what arrives out of y.
 struct Exchange {
-  std::span<const std::uint32_t> patch;       ///< [n] at each position
-  std::span<const float> sqrt_area, inverse;  ///< [n] by position; `inverse` holds the scale
+  std::span<const std::uint32_t> patch;                ///< [n] at each position
+  std::span<const float> gather_scale, scatter_scale;  ///< [n] by position
   const WorkVectors& work;
 
   void gather(std::span<const Float3> light, std::size_t begin, std::size_t end) const {
@@ -209,7 +209,7 @@ struct Exchange {
       float* const x = work.x.data + v * stride;
       for (std::size_t k = begin; k < last; ++k) {
         const Float3& m = from_light[patch[k]];
-        const float weight = sqrt_area[k];
+        const float weight = gather_scale[k];
         for (int c = 0; c < kChannelCount; ++c) x[c * stride + k] = weight * m[c];
       }
     }
@@ -224,7 +224,7 @@ struct Exchange {
       const float* const y = work.y.data + v * stride;
       for (const std::uint32_t k : targets) {
         Float3& h = to_light[patch[k]];
-        const float weight = inverse[k];
+        const float weight = scatter_scale[k];
         for (int c = 0; c < kChannelCount; ++c) h[c] = weight * y[c * stride + k];
       }
     }
@@ -315,13 +315,14 @@ std::size_t HierarchicalOperator::position_count(std::size_t patch_count) {
 
 HierarchicalOperator::HierarchicalOperator(Storage storage)
     : storage_(stream(storage)), layout_(std::make_shared<HierarchicalLayout>(storage_)) {
-  sqrt_area_.reserve(patch_count());
-  inverse_.reserve(patch_count());
+  gather_scale_.reserve(patch_count());
+  scatter_scale_.reserve(patch_count());
   const float scale = product_scale(storage_.precision);
-  for (const std::uint32_t p : storage_.patch) {
-    const float root = std::sqrt(storage_.area[p]);
-    sqrt_area_.push_back(roles().is_source(p) ? root : 0);
-    inverse_.push_back(scale / root);
+  for (std::size_t k = 0; k < patch_count(); ++k) {
+    const std::uint32_t p = storage_.patch[k];
+    const float root = std::sqrt(storage_.area[p]), of_position = position_scale(storage_, k);
+    gather_scale_.push_back(roles().is_source(p) ? of_position * root : 0);
+    scatter_scale_.push_back(of_position * scale / root);
   }
   plan_ = plan_to(std::vector<bool>(patch_count(), true));
 }
@@ -346,7 +347,7 @@ std::size_t HierarchicalOperator::bytes() const {
   return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
          storage_.bases_q16.size_bytes() + storage_.bases_q8.size_bytes() +
          storage_.blocks.size() * sizeof(TransferBlock) +
-         storage_.moment_scale.size() * sizeof(float) +
+         storage_.moment_scale.size() * sizeof(float) + storage_.scale_exponent.size() +
          storage_.patch.size() * sizeof(std::uint32_t) + storage_.roles.role.size();
 }
 
@@ -371,7 +372,7 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const std::size_t misplaced = reinterpret_cast<std::uintptr_t>(workspace.data()) / sizeof(float);
   float* const aligned = workspace.data() + (kLine - misplaced % kLine) % kLine;
   const WorkVectors work(position_count(patch_count()), *layout_, light_count, aligned);
-  const Exchange exchange{storage_.patch, sqrt_area_, inverse_, work};
+  const Exchange exchange{storage_.patch, gather_scale_, scatter_scale_, work};
   const ChannelLanes lanes(storage_.channel_matrix, storage_.matrix_count);
   for (std::size_t light = 0; light < light_count; ++light) {
     for (const std::uint32_t p : plan.dark) {
@@ -437,7 +438,8 @@ void HierarchicalOperator::expand(int channel, std::span<float> transfer) const 
       for (std::size_t c = 0; c < block.columns.size(); ++c) {
         const std::size_t i = block.rows[r], j = block.columns[c];
         if (i >= n || j >= n) continue;
-        const double entry = block.entries[r * block.columns.size() + c];
+        const double scale = position_scale(storage_, i) * position_scale(storage_, j);
+        const double entry = scale * block.entries[r * block.columns.size() + c];
         put(i, j, entry);
         if (!storage_.blocks[b].on_diagonal()) put(j, i, entry);
       }

@@ -28,6 +28,16 @@ void check_permutation(std::span<const std::uint32_t> patch, std::size_t patch_c
   }
 }
 
+void check_exponents(std::span<const std::int8_t> exponents, std::size_t patch_count) {
+  if (!exponents.empty() && exponents.size() != patch_count) {
+    refuse("not one scale for each position");
+  }
+  constexpr int kLargest = HierarchicalOperator::kLargestExponent;
+  if (std::ranges::any_of(exponents, [](int e) { return e < -kLargest || e > kLargest; })) {
+    refuse("a scale of a position is beyond 2^+-" + std::to_string(kLargest));
+  }
+}
+
 /// Positions of patches, with their padding, and the moments that are numbered after them.
 struct Places {
   std::size_t position_count, moment_count;
@@ -119,6 +129,7 @@ void check_tables(const Storage& storage) {
     if (matrix >= storage.matrix_count) refuse("a channel has no matrix");
   }
   check_permutation(storage.patch, n);
+  check_exponents(storage.scale_exponent, n);
   try {
     check_roles(storage.roles, n);
   } catch (const Error& error) {
@@ -207,6 +218,42 @@ ArraySizes expected_sizes(const Storage& storage) {
   return {.f32 = all};
 }
 
+/// Makes all entries so much smaller by powers of four that halves hold them, and scales of
+/// positions, if there are any, as much larger.
+void fit_halves(Storage& exact) {
+  if (exact.scale_exponent.empty()) return;
+  // Half of what they hold: entries of cores grow a little with the rounding of their bases.
+  constexpr float kMost = 65504 / HierarchicalOperator::kHalfScale / 2;
+  const HierarchicalLayout layout(exact);
+  std::vector<float> values(exact.values_f32.begin(), exact.values_f32.end());
+  const auto entries = std::span(values).subspan(layout.basis_value_count);
+  float largest = 0;
+  for (const float entry : entries) largest = std::max(largest, std::abs(entry));
+  if (!(largest > kMost) || !std::isfinite(largest)) return;
+  const int power = static_cast<int>(std::ceil(std::log2(largest / kMost) / 2));
+  for (float& entry : entries) entry = std::ldexp(entry, -2 * power);
+  for (std::int8_t& exponent : exact.scale_exponent) {
+    exponent = static_cast<std::int8_t>(exponent + power);
+  }
+  exact.values_f32 = SharedArray(std::move(values));
+}
+
+/// Values in f32, which can be rounded, in the order kStreamed.
+Storage stream_exact(const Storage& storage) {
+  if (storage.precision != Precision::kF32) {
+    refuse(std::string("values in ") + precision_name(storage.precision) +
+           " cannot be rounded again; give them in f32");
+  }
+  return HierarchicalOperator::stream(storage);
+}
+
+/// The same within the range of halves, as far as scales of positions allow.
+Storage stream_for_halves(const Storage& storage) {
+  Storage exact = stream_exact(storage);
+  fit_halves(exact);
+  return exact;
+}
+
 }  // namespace
 
 std::uint64_t TransferBlock::value_count(std::uint32_t matrix_count) const {
@@ -242,6 +289,10 @@ std::uint16_t encode_core_value(float value) {
   return half;
 }
 
+float position_scale(const Storage& storage, std::size_t position) {
+  return storage.scale_exponent.empty() ? 1 : std::ldexp(1.0F, storage.scale_exponent[position]);
+}
+
 void drop_remainders(Storage& storage) {
   for (TransferBlock& block : storage.blocks) block.row_remainders = block.column_remainders = 0;
 }
@@ -263,21 +314,8 @@ Storage HierarchicalOperator::stream(const Storage& storage) {
   return streamed;
 }
 
-namespace {
-
-/// Values in f32, which can be rounded, in the order kStreamed.
-Storage stream_exact(const Storage& storage) {
-  if (storage.precision != Precision::kF32) {
-    refuse(std::string("values in ") + precision_name(storage.precision) +
-           " cannot be rounded again; give them in f32");
-  }
-  return HierarchicalOperator::stream(storage);
-}
-
-}  // namespace
-
 Storage HierarchicalOperator::encode_half(const Storage& storage) {
-  const Storage exact = stream_exact(storage);
+  const Storage exact = stream_for_halves(storage);
   Storage half = exact;
   half.precision = Precision::kF16;
   half.values_f32 = {};
@@ -293,11 +331,11 @@ Storage HierarchicalOperator::encode_half(const Storage& storage) {
 }
 
 Storage HierarchicalOperator::encode_shorts(const Storage& storage) {
-  return encode_integers(stream_exact(storage), Precision::kQ16);
+  return encode_integers(stream_for_halves(storage), Precision::kQ16);
 }
 
 Storage HierarchicalOperator::encode_bytes(const Storage& storage) {
-  return encode_integers(stream_exact(storage), Precision::kQ8);
+  return encode_integers(stream_for_halves(storage), Precision::kQ8);
 }
 
 Storage HierarchicalOperator::encode(const Storage& storage, Precision precision) {

@@ -15,6 +15,9 @@ std::uint16_t encode_core_value(float value);
 /// Blocks as a precision without remainders has them.
 void drop_remainders(HierarchicalOperator::Storage& storage);
 
+/// R at a position that holds a patch.
+float position_scale(const HierarchicalOperator::Storage& storage, std::size_t position);
+
 /// What products of stored values must be multiplied by.
 float product_scale(Precision precision);
 

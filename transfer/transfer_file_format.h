@@ -49,20 +49,22 @@ inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matri
 
 /// The tensors of a hierarchical operator; `role` is null where every patch has both roles.
 struct HierarchicalTensors {
-  const char *patch, *blocks, *bases, *values, *channel_matrix, *role, *moment_scale;
+  const char *patch, *blocks, *bases, *values, *channel_matrix, *role, *moment_scale,
+      *scale_exponent;
 };
 
 inline constexpr HierarchicalTensors kHierarchicalTransfer = {
     "transfer.hierarchical.patch",          "transfer.hierarchical.blocks",
     "transfer.hierarchical.bases",          "transfer.hierarchical.values",
     "transfer.hierarchical.channel_matrix", "transfer.hierarchical.role",
-    "transfer.hierarchical.moment_scale"};
+    "transfer.hierarchical.moment_scale",   "transfer.hierarchical.scale_exponent"};
 inline constexpr HierarchicalTensors kCompressedFormFactors = {
     "form_factor.hierarchical.patch",
     "form_factor.hierarchical.blocks",
     "form_factor.hierarchical.bases",
     "form_factor.hierarchical.values",
     "form_factor.hierarchical.channel_matrix",
+    nullptr,
     nullptr,
     nullptr};
 

@@ -292,6 +292,11 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   if (names.moment_scale != nullptr && file.tensors().contains(names.moment_scale)) {
     TensorReader{file}(names.moment_scale, storage.moment_scale);
   }
+  if (names.scale_exponent != nullptr && file.tensors().contains(names.scale_exponent)) {
+    const auto stored =
+        file.tensor<std::int8_t>(names.scale_exponent, {area.size()}, TensorType::kI8);
+    storage.scale_exponent.assign(stored.begin(), stored.end());
+  }
   if (file.info(names.values).type == TensorType::kF16) {
     storage.precision = Precision::kF16;
     storage.values_f16 = file.tensor<std::uint16_t>(names.values, {kAnySize}, TensorType::kF16);

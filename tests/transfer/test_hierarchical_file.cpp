@@ -41,6 +41,14 @@ TransferData nested_data(Precision precision) {
   return data;
 }
 
+/// With scales of positions.
+TransferData equilibrated_data(Precision precision) {
+  TransferData data = sample_data(precision);
+  data.transfer = std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode(
+      test::equilibrated(test::random_nested_storage(kPatchCount, 2, 5), 6), precision));
+  return data;
+}
+
 const HierarchicalOperator::Storage& storage_of(const TransferData& data) {
   return dynamic_cast<const HierarchicalOperator&>(*data.transfer).storage();
 }
@@ -56,6 +64,7 @@ void check_round_trip(const TransferData& data) {
   EXPECT_EQ(a.matrix_count, b.matrix_count);
   EXPECT_EQ(a.precision, b.precision);
   EXPECT_EQ(a.moment_scale, b.moment_scale);
+  EXPECT_EQ(a.scale_exponent, b.scale_exponent);
   EXPECT_TRUE(std::ranges::equal(a.values_f32, b.values_f32));
   EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
   EXPECT_TRUE(std::ranges::equal(a.bases_q16, b.bases_q16));
@@ -68,21 +77,25 @@ void check_round_trip(const TransferData& data) {
   EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
 }
 
-TEST(HierarchicalFile, RoundTripsWithAndWithoutMoments) {
+TEST(HierarchicalFile, RoundTripsWithAndWithoutMomentsAndScales) {
   for (const Precision precision :
        {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
     check_round_trip(sample_data(precision));
     const TransferData nested = nested_data(precision);
     EXPECT_EQ(storage_of(nested).moment_scale.size(), 16U);
     check_round_trip(nested);
+    const TransferData equilibrated = equilibrated_data(precision);
+    EXPECT_EQ(storage_of(equilibrated).scale_exponent.size(), kPatchCount);
+    check_round_trip(equilibrated);
   }
 }
 
-TEST(HierarchicalFile, SaysNothingOfMomentsWhereThereAreNone) {
+TEST(HierarchicalFile, SaysNothingOfMomentsAndScalesWhereThereAreNone) {
   const test::TemporaryFolder folder;
   save_transfer_file(folder / "file", sample_data(Precision::kQ8));
-  EXPECT_FALSE(
-      SafetensorsFile(folder / "file").tensors().contains("transfer.hierarchical.moment_scale"));
+  const SafetensorsFile file(folder / "file");
+  EXPECT_FALSE(file.tensors().contains("transfer.hierarchical.moment_scale"));
+  EXPECT_FALSE(file.tensors().contains("transfer.hierarchical.scale_exponent"));
 }
 
 /// Each of the four roles in turn.
@@ -289,6 +302,20 @@ TEST(HierarchicalFile, RefusesMomentsThatDoNotFit) {
   refuses("blocks", 5, 6, "rank of moments");
   refuses("moment_scale", 3, 0x7FC00000, "not finite");
   refuses("moment_scale", 3, 0x7F800000, "not finite");
+}
+
+TEST(HierarchicalFile, RefusesScalesThatDoNotFit) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", equilibrated_data(Precision::kQ8));
+  Tampering(folder / "file").set("scale_exponent", 3, 0x00001900);
+  expect_error([&] { load_transfer_file(folder / "file"); }, "beyond 2^+-24");
+}
+
+TEST(HierarchicalFile, RefusesEquilibratedFormFactors) {
+  const auto equilibrated =
+      std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode_half(
+          test::equilibrated(test::random_hierarchical_storage(kPatchCount, 1, 5), 6)));
+  expect_error([&] { CompressedFormFactors{equilibrated}; }, "are equilibrated");
 }
 
 TEST(HierarchicalFile, RefusesFormFactorsWithMoments) {

@@ -512,6 +512,83 @@ TEST(NestedOperator, RefusesMomentsThatDoNotFit) {
   }
 }
 
+std::vector<float> expansion(const HierarchicalOperator& op) {
+  std::vector<float> y(op.patch_count() * op.patch_count());
+  op.expand(0, y);
+  return y;
+}
+
+TEST(EquilibratedOperator, IsWhatItHoldsTimesTheScalesOfBothPatches) {
+  const HierarchicalOperator::Storage plain = random_nested_storage(500, 3, 21);
+  const HierarchicalOperator::Storage scaled = test::equilibrated(plain, 22);
+  std::vector<float> scale(500);
+  for (std::size_t k = 0; k < scale.size(); ++k) {
+    scale[plain.patch[k]] = std::exp2(static_cast<float>(scaled.scale_exponent[k]));
+  }
+  const std::vector<float> before = expansion(HierarchicalOperator(plain));
+  std::vector<float> expected = before;
+  for (std::size_t i = 0; i < 500; ++i) {
+    for (std::size_t j = 0; j < 500; ++j) expected[i * 500 + j] *= scale[i] * scale[j];
+  }
+  EXPECT_EQ(expansion(HierarchicalOperator(scaled)), expected);
+  EXPECT_NE(before, expected);
+}
+
+TEST(EquilibratedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
+  for (const std::size_t n : {777U, 1000U}) {
+    const HierarchicalOperator::Storage storage =
+        test::equilibrated(random_nested_storage(n, 3, n), n + 1);
+    const std::vector<Float3> m0 = test::random_light(n, n, 100);
+    for (const Precision precision : kPrecisions) {
+      SCOPED_TRACE(std::to_string(n) + " patches, " + precision_name(precision));
+      const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+      EXPECT_LT(relative_difference(product(op, m0), multiply_expansion(op, m0), storage.area),
+                rounding_of(precision));
+      check_batch(op, 3);
+    }
+    check_receivers(HierarchicalOperator(storage), 1e-6F);
+  }
+}
+
+TEST(EquilibratedOperator, FitsHalvesByItsScales) {
+  constexpr std::uint32_t kSize = 32;
+  HierarchicalOperator::Storage storage;
+  storage.area.assign(kSize, 1.0F);
+  storage.patch.resize(kSize);
+  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+  storage.matrix_count = 1;
+  storage.blocks.push_back({.row_count = kSize, .column_count = kSize});
+  std::vector<float> values(kSize * kSize + HierarchicalOperator::kPadding);
+  for (std::uint32_t i = 0; i < kSize; ++i) {
+    for (std::uint32_t j = 0; j < kSize; ++j) {
+      values[i * kSize + j] = static_cast<float>(1000 + i * j);  // x 512 is too much
+    }
+  }
+  storage.values_f32 = SharedArray(std::move(values));
+  for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+    expect_error([&] { HierarchicalOperator::encode(storage, precision); }, "too large for f16");
+  }
+  storage.scale_exponent.assign(kSize, -3);
+  const HierarchicalOperator exact(storage);
+  const std::vector<Float3> m0 = test::random_light(kSize, 24, 100);
+  for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    EXPECT_GT(op.storage().scale_exponent.front(), -3);
+    EXPECT_LT(relative_difference(product(op, m0), product(exact, m0), storage.area), 1e-3);
+  }
+}
+
+TEST(EquilibratedOperator, RefusesScalesThatDoNotFit) {
+  HierarchicalOperator::Storage storage = random_hierarchical_storage(100, 1, 1);
+  storage.scale_exponent.assign(99, 0);
+  expect_error([&] { HierarchicalOperator{storage}; }, "one scale for each position");
+  storage.scale_exponent.assign(100, 0);
+  for (const std::int8_t exponent : {25, -25, 127, -128}) {
+    storage.scale_exponent[7] = exponent;
+    expect_error([&] { HierarchicalOperator{storage}; }, "beyond 2^+-24");
+  }
+}
+
 TEST(HierarchicalOperator, RefusesHalfPrecisionBeyondItsRange) {
   HierarchicalOperator::Storage storage = random_hierarchical_storage(100, 1, 1);
   storage.values_f32 =

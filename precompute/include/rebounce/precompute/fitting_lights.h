@@ -19,7 +19,7 @@ struct DrawnLights {
 
 /// Points that judge; where products with the matrix are dear, as without a dense inverse, and each
 /// light takes memory.
-inline constexpr int kJudgingCount = 256, kFewJudgingCount = 64;
+inline constexpr int kJudgingCount = 512, kFewJudgingCount = 64;
 
 /// Draws the lights that the operator of a scene is fitted to: points, spots and, where it is open,
 /// suns to shape it, other points to judge it, and for both the light of the scene's own lamps; all

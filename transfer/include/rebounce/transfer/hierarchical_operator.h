@@ -65,6 +65,10 @@ struct TransferBlock {
 /// whichever blocks they belong to, so that one pass over them takes the light of the cluster to
 /// its coefficients, and another the coefficients back to the light that arrives.
 ///
+/// Patches may be equilibrated: the values are then those of K, Yhat = R K R, in which R is
+/// diagonal with powers of two, small for patches of whose light little arrives. Integers of a
+/// basis have one step for all of its positions, and where it is dark they would be lost in it.
+///
 /// An operator for some receivers and sources has the blocks that these share, whichever way the
 /// light goes; an apply reads them in the ways that are wanted.
 class HierarchicalOperator final : public TransferOperator {
@@ -92,6 +96,9 @@ class HierarchicalOperator final : public TransferOperator {
   static constexpr std::int16_t kLargestShort = 4095;
   static constexpr float kShortScale = 4096;
 
+  /// Of the scales of positions.
+  static constexpr int kLargestExponent = 24;
+
   /// Of bases in 16 bits, so many ranks are kept together, and so many positions.
   static constexpr std::uint32_t kRankGroup = 4, kStrip = 64;
 
@@ -114,6 +121,8 @@ class HierarchicalOperator final : public TransferOperator {
     std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
     std::vector<TransferBlock> blocks;                          ///< where there is none, Yhat is 0
     std::vector<float> moment_scale;  ///< [moments] times W^T x is a moment of light x
+    /// [n] by position, R = 2^this, within +-kLargestExponent; none: R = 1.
+    std::vector<std::int8_t> scale_exponent;
     PatchRoles roles;  ///< by patch; entries that no source and receiver share are of no meaning
     Order order = Order::kByBlock;  ///< of the values
     Precision precision = Precision::kF32;
@@ -142,8 +151,9 @@ class HierarchicalOperator final : public TransferOperator {
   /// rank loses it. Throws Error as the constructor does.
   static Storage stream(const Storage& storage);
 
-  /// The same with half-precision numbers, in the order kStreamed. Throws Error if the values are
-  /// not in f32 or one is beyond the range of halves, and as the constructor does.
+  /// The same with half-precision numbers, in the order kStreamed. Where there are scales of
+  /// positions, all of them grow as far as entries would be beyond the range of halves. Throws
+  /// Error if the values are not in f32 or one is still beyond it, and as the constructor does.
   static Storage encode_half(const Storage& storage);
 
   /// The same with bases of 16 bits. Throws Error as encode_half does.
@@ -197,8 +207,9 @@ class HierarchicalOperator final : public TransferOperator {
            std::span<float> workspace) const;
 
   Storage storage_;
-  std::vector<float> sqrt_area_;  ///< [n] by position, 0 of patches that are no sources
-  std::vector<float> inverse_;    ///< of it, times the scale of the products
+  /// [n] by position: R A^1/2, 0 of patches that are no sources, and R A^-1/2 times the scale of
+  /// the products.
+  std::vector<float> gather_scale_, scatter_scale_;
   std::shared_ptr<const HierarchicalLayout> layout_;
   std::shared_ptr<const HierarchicalPlan> plan_;  ///< to all receivers
 };
