@@ -14,6 +14,7 @@
 #include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/content_hash.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/transfer_file.h"
 #include "rebounce/transfer/version.h"
 #include "solved_matrix.h"
 #include "solved_transfer.h"
@@ -72,6 +73,7 @@ std::string first_key(const HierarchicalOperator& form_factors, const PatchTable
                       const FittingLights& lights, const PatchRoles& roles, double price) {
   ContentHash hash;
   update(hash, std::span(std::string_view(version())));
+  update<int>(hash, {{kFileFormatVersion}});
   update<double>(hash, {{price, kResidualPart}});
   const HierarchicalOperator::Storage& f = form_factors.storage();
   update(hash, std::span(f.blocks));

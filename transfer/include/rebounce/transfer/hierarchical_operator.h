@@ -80,7 +80,7 @@ class HierarchicalOperator final : public TransferOperator {
   /// In half precision, dense entries and cores are stored times this, so that small ones stay
   /// normal numbers; bases are stored as they are. With orthonormal bases no core has an entry
   /// above the norm of Yhat, 1 / (1 - reflectance): up to 0.99, the most that patches have, all of
-  /// them fit.
+  /// them fit. Those of an equilibrated K are made to: encode_half.
   static constexpr float kHalfScale = 512;
 
   /// In 8 bits, a basis holds its vectors times numbers of their own such that their largest
