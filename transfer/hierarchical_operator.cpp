@@ -435,11 +435,14 @@ void HierarchicalOperator::expand(int channel, std::span<float> transfer) const 
     const BlockOfPositions block =
         block_of_positions(storage_, *layout_, b, storage_.channel_matrix[channel]);
     for (std::size_t r = 0; r < block.rows.size(); ++r) {
+      const std::size_t i = block.rows[r];
+      if (i >= n) continue;
+      const double scale = position_scale(storage_, i);
       for (std::size_t c = 0; c < block.columns.size(); ++c) {
-        const std::size_t i = block.rows[r], j = block.columns[c];
-        if (i >= n || j >= n) continue;
-        const double scale = position_scale(storage_, i) * position_scale(storage_, j);
-        const double entry = scale * block.entries[r * block.columns.size() + c];
+        const std::size_t j = block.columns[c];
+        if (j >= n) continue;
+        const double entry =
+            scale * position_scale(storage_, j) * block.entries[r * block.columns.size() + c];
         put(i, j, entry);
         if (!storage_.blocks[b].on_diagonal()) put(j, i, entry);
       }

@@ -224,14 +224,15 @@ void fit_halves(Storage& exact) {
   if (exact.scale_exponent.empty()) return;
   // Half of what they hold: entries of cores grow a little with the rounding of their bases.
   constexpr float kMost = 65504 / HierarchicalOperator::kHalfScale / 2;
-  const HierarchicalLayout layout(exact);
-  std::vector<float> values(exact.values_f32.begin(), exact.values_f32.end());
-  const auto entries = std::span(values).subspan(layout.basis_value_count);
+  const std::uint64_t begin = HierarchicalLayout(exact).basis_value_count;
   float largest = 0;
-  for (const float entry : entries) largest = std::max(largest, std::abs(entry));
+  for (const float entry : exact.values_f32.span().subspan(begin)) {
+    largest = std::max(largest, std::abs(entry));
+  }
   if (!(largest > kMost) || !std::isfinite(largest)) return;
   const int power = static_cast<int>(std::ceil(std::log2(largest / kMost) / 2));
-  for (float& entry : entries) entry = std::ldexp(entry, -2 * power);
+  std::vector<float> values(exact.values_f32.begin(), exact.values_f32.end());
+  for (float& entry : std::span(values).subspan(begin)) entry = std::ldexp(entry, -2 * power);
   for (std::int8_t& exponent : exact.scale_exponent) {
     exponent = static_cast<std::int8_t>(exponent + power);
   }
