@@ -60,7 +60,7 @@ class SceneBench {
     data_.patches.absorbed.assign(model.patches.size(), 0);
     link_seconds_ = processor_seconds_of(
         [&] { links_ = build_links(model, tracer, {.link_epsilon = kLinkEpsilon}).links; });
-    lights_ = draw_fitting_lights(data_, tracer, 1, {}, kFewJudgingCount);
+    lights_ = draw_fitting_lights(data_, tracer, 1);
     test_lights_ = random_initial_exitances(data_, tracer, LightKind::kPoint, 64, 77);
   }
 

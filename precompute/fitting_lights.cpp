@@ -12,11 +12,12 @@ namespace {
 
 // Measured: notes/operator.md.
 constexpr int kShapingPointCount = 128, kShapingSpotCount = 32, kShapingSunCount = 32;
+constexpr int kJudgingPointCount = 512;
 
 }  // namespace
 
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed, const PatchRoles& roles, int judging_count) {
+                                std::uint64_t seed, const PatchRoles& roles) {
   const auto draw = [&](LightKind kind, int count) {
     seed = mix_bits(seed);
     return random_initial_exitances(data, tracer, kind, count, seed, roles);
@@ -32,7 +33,8 @@ DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& trace
   roles.keep(PatchRoles::kSource, own);
   lights.shaping.push_back(own);
   lights.judging.push_back(std::move(own));
-  std::ranges::move(draw(LightKind::kPoint, judging_count), std::back_inserter(lights.judging));
+  std::ranges::move(draw(LightKind::kPoint, kJudgingPointCount),
+                    std::back_inserter(lights.judging));
   return lights;
 }
 

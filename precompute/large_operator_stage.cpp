@@ -19,8 +19,10 @@
 namespace rebounce {
 namespace {
 
-// Lights that compressed form factors are measured under.
+// Lights that compressed form factors are measured under, and judging points of the operator's that
+// judge them too.
 constexpr int kTestLightCount = 16;
+constexpr std::size_t kFormFactorJudgingCount = 64;
 
 // Residual of the radiosities that form factors are fitted to and measured with: what light patches
 // give off matters there, not its third digit.
@@ -30,16 +32,17 @@ constexpr double kFittingResidual = 1e-2;
 constexpr double kLeastTolerance = 1e-4;
 
 using Lights = std::vector<std::vector<Float3>>;
+using Exitances = std::span<const std::vector<Float3>>;
 
 /// The radiosities that initial exitances give rise to. Throws Cancelled if asked to stop.
-Lights radiosities_of(const ReferenceSolver& solver, const Lights& exitances,
+Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
                       const Progress& progress) {
   Lights radiosities;
   while (radiosities.size() < exitances.size()) {
     if (progress && !progress(static_cast<double>(radiosities.size()) / exitances.size())) {
       throw Cancelled();
     }
-    const auto left = std::span(exitances).subspan(radiosities.size());
+    const Exitances left = exitances.subspan(radiosities.size());
     const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kTogether));
     for (const auto& solution : solver.radiosities(some, kFittingResidual)) {
       std::vector<Float3>& radiosity = radiosities.emplace_back();
@@ -61,21 +64,21 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
                          std::uint64_t seed, const ReferenceSolver& solver,
                          const Progress& progress) {
   FittedLights lights;
-  lights.exitances = draw_fitting_lights(data, tracer, seed, roles, kFewJudgingCount);
+  lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
   const Lights tests =
       random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
-  const std::size_t shaping = lights.exitances.shaping.size(),
-                    judging = lights.exitances.judging.size();
-  const auto all = static_cast<double>(shaping + judging + tests.size());
+  const Exitances shaping = lights.exitances.shaping, judging = lights.exitances.judging;
+  const Exitances few = judging.first(std::min(judging.size(), 1 + kFormFactorJudgingCount));
+  const auto all = static_cast<double>(shaping.size() + few.size() + tests.size());
   std::size_t before = 0;
-  const auto solve = [&](const Lights& some) {
+  const auto solve = [&](Exitances some) {
     const double begin = before / all, part = some.size() / all;
     before += some.size();
     return radiosities_of(solver, some,
                           [&](double done) { return !progress || progress(begin + part * done); });
   };
-  lights.radiosities.shaping = solve(lights.exitances.shaping);
-  lights.radiosities.judging = solve(lights.exitances.judging);
+  lights.radiosities.shaping = solve(shaping);
+  lights.radiosities.judging = solve(few);
   lights.test_radiosities = solve(tests);
   return lights;
 }

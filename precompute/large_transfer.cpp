@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "first_stage.h"
+#include "hierarchical_matrix.h"
 #include "matrix_compression.h"
 #include "progress_part.h"
 #include "rebounce/precompute/dense_transfer.h"
@@ -25,6 +26,10 @@ namespace {
 
 // Of the tolerance, the residual that columns are solved to. Measured: notes/operator.md.
 constexpr double kResidualPart = 0.35;
+
+// What form factors for the steps of columns are compressed to, in tolerances of the operator.
+// Measured: notes/operator.md.
+constexpr double kCoarsePart = 4;
 
 // The price of a value in the first stage, in first prices of the search for the tolerance. Errors
 // go about like the root of the price: a quarter of what the second stage may do.
@@ -68,13 +73,21 @@ void update(ContentHash& hash, std::span<const T> values) {
   hash.update(std::as_bytes(values));
 }
 
+/// Form factors as the steps of columns take them.
+HierarchicalOperator::Storage coarser(const HierarchicalOperator& form_factors,
+                                      const PatchTable& patches, const FittingLights& lights,
+                                      double tolerance) {
+  return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, lights.shaping,
+                         first_price(kCoarsePart * tolerance, patches.size()));
+}
+
 /// A hash of all that the first stage depends on.
 std::string first_key(const HierarchicalOperator& form_factors, const PatchTable& patches,
                       const FittingLights& lights, const PatchRoles& roles, double price) {
   ContentHash hash;
   update(hash, std::span(std::string_view(version())));
   update<int>(hash, {{kFileFormatVersion}});
-  update<double>(hash, {{price, kResidualPart}});
+  update<double>(hash, {{price, kResidualPart, kCoarsePart}});
   const HierarchicalOperator::Storage& f = form_factors.storage();
   update(hash, std::span(f.blocks));
   update(hash, f.values_f32.span());
@@ -154,7 +167,8 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
   const BlockCheckpoint panels(settings.checkpoint, key);
 
   const ThreadLimit limited(plan.thread_count);
-  const SolvedTransfer solved(form_factors, patches, kResidualPart * tolerance);
+  const SolvedTransfer solved(form_factors, coarser(form_factors, patches, lights, tolerance),
+                              patches, kResidualPart * tolerance);
   const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
   const double work_after = kColumnsBefore + work_of_rounds(patches.size(), settings.roles);
   double searching = 0;  // when the search of the second stage begins

@@ -82,6 +82,13 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors, const P
   }
 }
 
+SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
+                               const HierarchicalOperator::Storage& coarse,
+                               const PatchTable& patches, double residual)
+    : SolvedTransfer(form_factors, patches, residual) {
+  coarse_.emplace(coarse);
+}
+
 Vectors SolvedTransfer::gather(const Vectors& x) const {
   const SingleThreadedBlas single_threaded;
   Vectors result(x.rows(), x.cols());
@@ -130,7 +137,8 @@ void SolvedTransfer::solve_leading(std::uint32_t matrix, Workspace& workspace) c
   r.noalias() -= leading.vectors * part;
 }
 
-void SolvedTransfer::solve(std::uint32_t matrix, Workspace& workspace) const {
+void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_factors,
+                           Workspace& workspace) const {
   const Eigen::VectorXf& root = root_[matrix];
   Vectors &y = workspace.solution, &r = workspace.residual, &p = workspace.direction;
   Vectors &sent = workspace.sent, &arrived = workspace.arrived;
@@ -146,7 +154,7 @@ void SolvedTransfer::solve(std::uint32_t matrix, Workspace& workspace) const {
   Sums rr = squares(r);
   for (int step = 0; (rr > allowed).any(); ++step) {
     if (step == kMostSteps) refuse();
-    form_factors_.multiply(0, sent, arrived, workspace.products);
+    form_factors.multiply(0, sent, arrived, workspace.products);
     const Sums pq = column_sums(rows, width, [&](Index i) {
       return p.row(i).array().square() - sent.row(i).array() * arrived.row(i).array();
     });
@@ -173,7 +181,7 @@ const Vectors& SolvedTransfer::columns(std::uint32_t matrix, std::span<const std
   form_factors_.entries(0, patch(), patches, seen);
   workspace.solution.setZero(position_count(), seen.cols());
   workspace.solution.topRows(seen.rows()) = seen;
-  solve(matrix, workspace);
+  solve(matrix, coarse_ ? *coarse_ : form_factors_, workspace);
   return workspace.solution;
 }
 
@@ -191,7 +199,7 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
     }
     form_factors_.multiply(0, in, workspace.solution, workspace.products);
     try {
-      solve(matrix, workspace);
+      solve(matrix, form_factors_, workspace);
     } catch (...) {
 #pragma omp critical
       failure = std::current_exception();

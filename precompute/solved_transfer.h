@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,6 +28,14 @@ class SolvedTransfer {
 
   /// `form_factors` are G. A solution is accepted when the residual of z is `residual` of R G b.
   SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
+                 double residual);
+
+  /// The same, but that the steps of `columns` multiply with `coarse`, which is G up to an error. G
+  /// itself gives what they begin with, R G b less what leading eigenvectors have of it, and of the
+  /// small rest that they are taken for an error in proportion is allowed (V. Simoncini, D. B.
+  /// Szyld, "Theory of inexact Krylov subspace methods", 2003).
+  SolvedTransfer(const HierarchicalOperator& form_factors,
+                 const HierarchicalOperator::Storage& coarse, const PatchTable& patches,
                  double residual);
 
   std::span<const float> area() const { return form_factors_.area(); }
@@ -75,10 +84,12 @@ class SolvedTransfer {
   /// Moves the solution by its part in the leading eigenvectors, and the residual of z.
   void solve_leading(std::uint32_t matrix, Workspace& workspace) const;
 
-  /// From G b to Yhat b, as the solution in `workspace`.
-  void solve(std::uint32_t matrix, Workspace& workspace) const;
+  /// From G b to Yhat b, as the solution in `workspace`; the steps multiply with `form_factors`.
+  void solve(std::uint32_t matrix, const HierarchicalMatrix& form_factors,
+             Workspace& workspace) const;
 
   HierarchicalMatrix form_factors_;
+  std::optional<HierarchicalMatrix> coarse_;
   std::array<std::uint32_t, kChannelCount> channel_matrix_{};
   std::vector<Eigen::VectorXf> root_;  ///< of each matrix: R by position, 0 where no patch is
   std::vector<Leading> leading_;       ///< of each matrix

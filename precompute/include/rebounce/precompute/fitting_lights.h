@@ -17,16 +17,10 @@ struct DrawnLights {
   FittingLights view() const { return {shaping, judging}; }
 };
 
-/// Points that judge; where products with the matrix are dear, as without a dense inverse, and each
-/// light takes memory.
-inline constexpr int kJudgingCount = 512, kFewJudgingCount = 64;
-
 /// Draws the lights that the operator of a scene is fitted to: points, spots and, where it is open,
-/// suns to shape it, other points to judge it, and for both the light of the scene's own lamps; all
-/// as far as sources give them off. The same `seed`, the same lights; of fewer judging points, the
-/// first.
+/// suns to shape it, other points to judge it, and for both the light of the scene's own lamps,
+/// which judge first; all as far as sources give them off. The same `seed`, the same lights.
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed, const PatchRoles& roles = {},
-                                int judging_count = kJudgingCount);
+                                std::uint64_t seed, const PatchRoles& roles = {});
 
 }  // namespace rebounce
