@@ -10,9 +10,9 @@
 namespace rebounce {
 namespace {
 
-// What it takes to compress the longest panel, of what it takes to solve for its columns. Both are
-// in proportion to the rows, but columns are solved for in all rows. Measured: notes/operator.md.
-constexpr double kCompression = 0.5;
+// What it takes to compress all panels, in columns that are solved for. Measured:
+// notes/operator.md.
+constexpr double kCompression = 5500;
 
 }  // namespace
 
@@ -32,7 +32,9 @@ FirstStage::FirstStage(PanelMatrix& matrix, const PatchTable& patches,
 }
 
 void FirstStage::make_panels() {
-  for (const BlockPiece& piece : block_pieces(frame_.tree, kPanelWidth)) {
+  const std::vector<BlockPiece> pieces = block_pieces(frame_.tree, kPanelWidth);
+  all_pieces_ = pieces.size();
+  for (const BlockPiece& piece : pieces) {
     if (!compressor_.wants(piece)) continue;
     const auto found = std::ranges::find(panels_, piece.column, &Panel::column);
     Panel& panel =
@@ -49,14 +51,11 @@ void FirstStage::make_panels() {
 double FirstStage::usual_work(std::size_t patch_count, const PatchRoles& roles) {
   const std::size_t columns = std::min(roles.count(PatchRoles::kReceiver, patch_count),
                                        roles.count(PatchRoles::kSource, patch_count));
-  return static_cast<double>(columns) +
-         kCompression / 2 * wanted_part(roles, patch_count) * static_cast<double>(patch_count);
+  return static_cast<double>(columns) + kCompression * wanted_part(roles, patch_count);
 }
 
 double FirstStage::compression_work(const Panel& panel) const {
-  return kCompression * frame_.tree.clusters[panel.column].count *
-         static_cast<double>(panel.pieces.size()) /
-         static_cast<double>(panels_.front().pieces.size());
+  return kCompression * static_cast<double>(panel.pieces.size()) / static_cast<double>(all_pieces_);
 }
 
 double FirstStage::work_of(std::span<const Panel> panels) const {

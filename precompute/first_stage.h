@@ -60,7 +60,8 @@ class FirstStage {
   CompressionFrame frame_;
   std::vector<ClusterWeight> weights_;
   BlockTreeCompressor compressor_;
-  std::vector<Panel> panels_;  ///< by their first columns
+  std::vector<Panel> panels_;   ///< by their first columns
+  std::size_t all_pieces_ = 0;  ///< of panels, with those that nobody wants
 };
 
 }  // namespace rebounce

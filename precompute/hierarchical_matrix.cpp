@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "hierarchical_storage.h"
 #include "hierarchical_values.h"
 #include "rebounce/transfer/error.h"
 #include "single_threaded_blas.h"
@@ -56,7 +57,6 @@ struct HierarchicalMatrix::Places {
 HierarchicalMatrix::HierarchicalMatrix(const HierarchicalOperator::Storage& storage)
     : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
   if (layout_.moment_count > 0) throw Error("hierarchical matrix: its blocks have moments");
-  if (!storage_.scale_exponent.empty()) throw Error("hierarchical matrix: it is equilibrated");
   const SharedArray<float> values = std::exchange(storage_.values_f32, {});
   bases_.assign(values.begin(), values.begin() + layout_.basis_value_count);
   const std::uint64_t count = layout_.core_value_count / matrix_count();
@@ -69,7 +69,33 @@ HierarchicalMatrix::HierarchicalMatrix(const HierarchicalOperator::Storage& stor
   for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
     low_rank_count_ = std::max<Index>(low_rank_count_, Index{cluster.coefficient} + cluster.rank);
   }
+  if (!storage_.scale_exponent.empty()) take_scales();
   sort_blocks();
+}
+
+/// R K R instead of K; in powers of two, so that nothing is rounded.
+void HierarchicalMatrix::take_scales() {
+  std::vector<float> scale(static_cast<std::size_t>(position_count()), 1.0F);
+  for (std::size_t k = 0; k < position_.size(); ++k) scale[k] = position_scale(storage_, k);
+  storage_.scale_exponent.clear();
+  const auto at = [&](std::uint32_t begin, std::uint32_t count) {
+    return Eigen::Map<const Eigen::VectorXf>(scale.data() + begin, count).asDiagonal();
+  };
+  for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
+    Eigen::Map<Vectors> bases(bases_.data() + cluster.values, cluster.rank, cluster.size);
+    bases = (bases * at(cluster.begin, cluster.size)).eval();
+  }
+  for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
+    const TransferBlock& block = storage_.blocks[b];
+    if (block.kind != TransferBlock::Kind::kDense) continue;
+    const std::uint64_t begin = layout_.places[b].values / matrix_count();
+    for (std::vector<float>& own : cores_) {
+      Eigen::Map<Vectors> entries(own.data() + begin, block.row_count, block.column_count);
+      entries = (at(block.row_begin, block.row_count) * entries *
+                 at(block.column_begin, block.column_count))
+                    .eval();
+    }
+  }
 }
 
 Index HierarchicalMatrix::position_count() const {

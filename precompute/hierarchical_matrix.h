@@ -47,6 +47,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   /// Such a list by position.
   struct Places;
 
+  void take_scales();
   void sort_blocks();
   /// The entries of a block in some of its rows and columns.
   Eigen::MatrixXf block_entries(std::uint32_t matrix, std::size_t block,

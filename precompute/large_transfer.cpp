@@ -38,17 +38,18 @@ constexpr double kFinePart = 1.0 / 16;
 // What is done before the first panel, and before the first round of the second stage, takes as
 // long as so many columns; all rounds together as many, where there are kRoundsPatches, and growing
 // with this power of their number. Measured: notes/operator.md.
-constexpr double kColumnsBefore = 1500;
-constexpr double kRounds = 3400, kRoundsPatches = 4000, kRoundsGrowth = 0.7;
+constexpr double kColumnsBefore = 5500;
+constexpr double kRounds = 6000, kRoundsPatches = 4000, kRoundsGrowth = 0.33;
 
-// Products with the form factors that a column takes, and operations a second of a slow core.
-constexpr double kProducts = 5.5, kOperationsPerSecond = 6e10;
+// Products with all of the form factors that take as long as a column, of which most are with
+// coarser ones, and operations a second of a slow core.
+constexpr double kProducts = 1.5, kOperationsPerSecond = 6e10;
 
 // Bytes a patch: lights, what they lead to and how they fall on clusters; and, for each matrix, an
 // operator of the first stage and the rounds of the second, at a tolerance, with the power by which
 // less of that takes more. Measured, and about a fifth more than all that was used:
 // notes/operator.md.
-constexpr double kLightBytes = 14e3, kOperatorBytes = 10.5e3;
+constexpr double kLightBytes = 30e3, kOperatorBytes = 10.5e3;
 constexpr double kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
 
 /// The rounds of the second stage, in columns that are solved for.

@@ -120,17 +120,29 @@ std::vector<std::int8_t> by_patch(const std::vector<std::int8_t>& at_position,
   return of_patch;
 }
 
+/// Beyond blocks of low rank.
+struct Form {
+  bool balanced = false, nested = false;
+};
+
+/// Bases in integers have one step for all patches of a cluster; sweeps work on the light at
+/// positions, and do not know moments.
+Form form_of(const HierarchicalSettings& settings) {
+  return {.balanced = has_integer_bases(settings.precision) || settings.moments,
+          .nested = settings.moments};
+}
+
 /// A compressor with all that it looks at.
 class Compression {
  public:
-  /// For applies, the matrix is balanced and bases are nested.
   Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping,
-              const PartSizes& sizes, bool for_applies)
+              const PartSizes& sizes, const Form& form)
       : matrix_(matrix),
         sizes_(sizes),
+        nested_(form.nested),
         truth_(matrix, with_uniform(patches.size(), shaping)),
         frame_(frame_of(matrix, patches, truth_)) {
-    if (!for_applies) return;
+    if (!form.balanced) return;
     exponent_ = frame_.balance();
     balanced_.emplace(matrix, by_patch(exponent_, frame_.tree));
   }
@@ -154,10 +166,11 @@ class Compression {
       report_progress(part, 1);
     }
     HierarchicalOperator::Storage storage = compressor.assemble(std::move(whole));
-    if (!balanced_) return storage;
-    const CompressionCost cost{.price = price, .sizes = sizes_};
-    const WantedBlocks wanted(frame_.roles, frame_.tree);
-    storage = nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
+    if (nested_) {
+      const CompressionCost cost{.price = price, .sizes = sizes_};
+      const WantedBlocks wanted(frame_.roles, frame_.tree);
+      storage = nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
+    }
     storage.scale_exponent = exponent_;
     return storage;
   }
@@ -178,6 +191,7 @@ class Compression {
  private:
   const SymmetricMatrix& matrix_;
   PartSizes sizes_;
+  bool nested_;
   LitTruth truth_;
   CompressionFrame frame_;
   std::vector<std::int8_t> exponent_;  ///< by position, as BalancedMatrix has them
@@ -239,7 +253,7 @@ double first_price(double tolerance, std::size_t patch_count) {
 HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
                                               const PatchTable& patches, Exitances shaping,
                                               double price, const Progress& progress) {
-  return Compression(matrix, patches, shaping, PartSizes(), false)
+  return Compression(matrix, patches, shaping, PartSizes(), Form())
       .at(price, {BlockCheckpoint(), {}}, progress);
 }
 
@@ -249,7 +263,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const BlockCheckpoint& checkpoint) {
   const LitTruth judging = judging_truth(matrix, lights.judging);
   Compression compression(matrix, patches, lights.shaping, part_sizes(settings, patches.size()),
-                          settings.moments);
+                          form_of(settings));
   const double tolerance = settings.tolerance;
   PriceSearch search(compression.price_of(search_start(settings, patches.size())),
                      {kLeast * tolerance, kAim * tolerance, kMost * tolerance});

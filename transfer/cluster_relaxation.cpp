@@ -6,6 +6,8 @@
 // A forward sweep after a forward one finds L^T x as it goes: a column of blocks is multiplied with
 // the values before of its rows right before its own positions are relaxed, and with what became of
 // them right after, so that it is read from the nearer caches the second time.
+//
+// Of equilibrated patches, G = R K R, the unknown is R x, with rho R^2 for rho and K for G.
 
 #include "cluster_relaxation.h"
 
@@ -86,6 +88,7 @@ class ClusterRelaxation final : public Relaxation {
         light_(positions()),
         reflectance_(positions()),
         radiosity_(positions()),
+        change_weight_(positions(), 1.0F),
         lower_(positions()),
         upper_(positions()),
         received_(positions()),
@@ -97,12 +100,13 @@ class ClusterRelaxation final : public Relaxation {
     area_ = problem.area;
     for (std::size_t k = 0; k < exchange_.patch.size(); ++k) {
       const std::uint32_t p = exchange_.patch[k];
-      const float root = std::sqrt(area_[p]);
+      const float scale = position_scale(exchange_, k), root = scaled_root(k);
       for (int c = 0; c < kChannelCount; ++c) {
         light_.at(c, k) = root * problem.initial_exitance[p][c];
-        reflectance_.at(c, k) = value_scale_ * problem.reflectance[p][c];
+        reflectance_.at(c, k) = scale * scale * value_scale_ * problem.reflectance[p][c];
         radiosity_.at(c, k) = root * radiosity[p][c];
       }
+      change_weight_[k] = 1 / (scale * scale);
     }
     known_ = Known::kNothing;
     rows_are_sent_ = false;
@@ -114,9 +118,9 @@ class ClusterRelaxation final : public Relaxation {
 
   void end(std::span<Float3> radiosity) const override {
     for (std::size_t k = 0; k < exchange_.patch.size(); ++k) {
-      const std::uint32_t p = exchange_.patch[k];
-      const float root = std::sqrt(area_[p]);
-      for (int c = 0; c < kChannelCount; ++c) radiosity[p][c] = radiosity_.at(c, k) / root;
+      const float root = scaled_root(k);
+      Float3& of_patch = radiosity[exchange_.patch[k]];
+      for (int c = 0; c < kChannelCount; ++c) of_patch[c] = radiosity_.at(c, k) / root;
     }
   }
 
@@ -132,6 +136,11 @@ class ClusterRelaxation final : public Relaxation {
 
   std::size_t positions() const {
     return HierarchicalOperator::position_count(exchange_.area.size());
+  }
+
+  /// What x at a position is of the radiosity there.
+  float scaled_root(std::size_t position) const {
+    return position_scale(exchange_, position) * std::sqrt(area_[exchange_.patch[position]]);
   }
 
   double sweep_forward() {
@@ -280,12 +289,12 @@ class ClusterRelaxation final : public Relaxation {
       std::array<float, kAlignment> squares{};  // sums of their own, so that they are vectors
       for (std::size_t k = begin; k < end; k += kAlignment) {
         const float *light = &light_.at(c, k), *reflectance = &reflectance_.at(c, k);
-        const float* received = &received_.at(c, k);
+        const float *received = &received_.at(c, k), *weight = &change_weight_[k];
         float* x = &radiosity_.at(c, k);
         for (std::size_t j = 0; j < kAlignment; ++j) {
           const float next = light[j] + reflectance[j] * received[j];
           const float change = next - x[j];
-          squares[j] += change * change;
+          squares[j] += weight[j] * change * change;
           x[j] = next;
         }
       }
@@ -324,7 +333,7 @@ class ClusterRelaxation final : public Relaxation {
       const float received = received_.at(c, position) + dense_scale_ * arrived_.at(c, inside);
       const float next = light_.at(c, position) + reflectance_.at(c, position) * received;
       const double change = static_cast<double>(next) - x;
-      changed_squared += change * change;
+      changed_squared += change_weight_[position] * change * change;
       x = next;
     }
     return changed_squared;
@@ -339,7 +348,9 @@ class ClusterRelaxation final : public Relaxation {
   float value_scale_;  ///< what a product with stored values is to be multiplied by
   float dense_scale_;  ///< of one with dense entries, which other light meets in both bases
   ClusterSweepPlan plan_;
-  Planes light_, reflectance_, radiosity_;   ///< A^1/2 M0, rho x value_scale, A^1/2 B
+  /// R A^1/2 M0, R^2 rho x value_scale, R A^1/2 B.
+  Planes light_, reflectance_, radiosity_;
+  std::vector<float> change_weight_;         ///< [positions] R^-2: changes are those of A^1/2 B
   Planes lower_, upper_, received_;          ///< L x, L^T x, and both and D x
   CoefficientArray sent_, taken_, arrived_;  ///< coefficients of x, as cores take them, of cores
   std::span<const float> area_;

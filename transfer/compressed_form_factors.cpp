@@ -14,9 +14,6 @@ CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalO
   if (!exchange_->storage().moment_scale.empty()) {
     throw Error("compressed form factors: their blocks have moments, which sweeps do not know");
   }
-  if (!exchange_->storage().scale_exponent.empty()) {
-    throw Error("compressed form factors: they are equilibrated, which sweeps do not know");
-  }
 }
 
 void CompressedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,

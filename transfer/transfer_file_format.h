@@ -66,7 +66,7 @@ inline constexpr HierarchicalTensors kCompressedFormFactors = {
     "form_factor.hierarchical.channel_matrix",
     nullptr,
     nullptr,
-    nullptr};
+    "form_factor.hierarchical.scale_exponent"};
 
 /// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
 /// order.

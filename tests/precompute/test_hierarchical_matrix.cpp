@@ -33,10 +33,20 @@ Eigen::MatrixXf expanded(const HierarchicalOperator& transfer, int channel) {
   return result;
 }
 
-class HierarchicalMatrixOf : public testing::TestWithParam<Precision> {
+struct Kind {
+  Precision precision;
+  bool equilibrated = false;
+};
+
+HierarchicalOperator sample(const Kind& kind) {
+  HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
+  if (kind.equilibrated) storage = test::equilibrated(std::move(storage), 6);
+  return HierarchicalOperator(HierarchicalOperator::encode(storage, kind.precision));
+}
+
+class HierarchicalMatrixOf : public testing::TestWithParam<Kind> {
  protected:
-  HierarchicalOperator transfer{HierarchicalOperator::encode(
-      test::random_hierarchical_storage(kPatchCount, 2, 5), GetParam())};
+  HierarchicalOperator transfer = sample(GetParam());
   HierarchicalMatrix matrix{transfer.storage()};
   SingleThreadedBlas single_threaded;
 };
@@ -78,11 +88,13 @@ TEST_P(HierarchicalMatrixOf, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
-INSTANTIATE_TEST_SUITE_P(Precisions, HierarchicalMatrixOf,
-                         testing::Values(Precision::kF32, Precision::kF16, Precision::kQ16,
-                                         Precision::kQ8),
-                         [](const auto& parameter) {
-                           return std::string(precision_name(parameter.param));
+INSTANTIATE_TEST_SUITE_P(Kinds, HierarchicalMatrixOf,
+                         testing::Values(Kind{Precision::kF32}, Kind{Precision::kF16},
+                                         Kind{Precision::kQ16}, Kind{Precision::kQ8},
+                                         Kind{Precision::kF32, true}, Kind{Precision::kQ8, true}),
+                         [](const auto& kind) {
+                           return std::string(precision_name(kind.param.precision)) +
+                                  (kind.param.equilibrated ? "_equilibrated" : "");
                          });
 
 }  // namespace

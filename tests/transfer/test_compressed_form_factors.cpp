@@ -22,8 +22,9 @@ struct System {
   std::vector<float> matrix;  ///< F, [n][n]
   std::vector<Float3> reflectance, light;
 
-  System(std::size_t n, std::uint64_t seed, Precision precision) {
+  System(std::size_t n, std::uint64_t seed, Precision precision, bool equilibrated = false) {
     HierarchicalOperator::Storage storage = test::random_hierarchical_storage(n, 1, seed);
+    if (equilibrated) storage = test::equilibrated(std::move(storage), seed);
     storage = HierarchicalOperator::encode(storage, precision);
     exchange = std::make_shared<const HierarchicalOperator>(std::move(storage));
     matrix.resize(n * n);
@@ -103,8 +104,27 @@ TEST(CompressedFormFactors, GatherIsTheMatrix) {
   EXPECT_LE(difference(gathered, expected), 1e-6);
 }
 
-TEST(CompressedFormFactors, SweepsAreGaussSeidelInEveryOrderOfDirections) {
+/// Sweeps in every order of directions against those in double precision.
+void check_sweeps(const System& system, std::uint64_t seed, double tolerance) {
   constexpr auto kForward = SweepDirection::kForward, kBackward = SweepDirection::kBackward;
+  const std::size_t n = system.light.size();
+  const CompressedFormFactors form_factors(system.exchange);
+  const auto relaxation = form_factors.make_relaxation();
+  const std::vector<Float3> start = test::random_light(n, seed + 7);
+  std::vector<std::array<double, 3>> expected;
+  for (const Float3& x : start) expected.push_back({x[0], x[1], x[2]});
+  relaxation->begin(system.problem(), start);
+  std::vector<Float3> radiosity(n);
+  for (const SweepDirection direction :
+       {kForward, kForward, kBackward, kForward, kForward, kBackward, kBackward}) {
+    relaxation->sweep(direction);
+    relaxation->end(radiosity);
+    system.sweep(expected, direction);
+    EXPECT_LE(difference(radiosity, expected), tolerance);
+  }
+}
+
+TEST(CompressedFormFactors, SweepsAreGaussSeidelInEveryOrderOfDirections) {
   int low_rank_on_diagonal = 0;
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
     for (const Precision precision :
@@ -113,46 +133,45 @@ TEST(CompressedFormFactors, SweepsAreGaussSeidelInEveryOrderOfDirections) {
       const double tolerance = precision == Precision::kQ16  ? 1e-3
                                : precision == Precision::kQ8 ? 1e-4
                                                              : 1e-6;
-      const System system(421, seed, precision);
-      for (const TransferBlock& block : system.exchange->storage().blocks) {
-        low_rank_on_diagonal += block.on_diagonal() && block.row_rank > 0 ? 1 : 0;
-      }
-      const CompressedFormFactors form_factors(system.exchange);
-      const auto relaxation = form_factors.make_relaxation();
-      const std::vector<Float3> start = test::random_light(421, seed + 7);
-      std::vector<std::array<double, 3>> expected;
-      for (const Float3& x : start) expected.push_back({x[0], x[1], x[2]});
-      relaxation->begin(system.problem(), start);
-      std::vector<Float3> radiosity(421);
-      for (const SweepDirection direction :
-           {kForward, kForward, kBackward, kForward, kForward, kBackward, kBackward}) {
-        relaxation->sweep(direction);
-        relaxation->end(radiosity);
-        system.sweep(expected, direction);
-        EXPECT_LE(difference(radiosity, expected), tolerance)
-            << seed << " " << precision_name(precision);
+      for (const bool equilibrated : {false, true}) {
+        SCOPED_TRACE("seed " + std::to_string(seed) + ", " + precision_name(precision) +
+                     (equilibrated ? ", equilibrated" : ""));
+        const System system(421, seed, precision, equilibrated);
+        for (const TransferBlock& block : system.exchange->storage().blocks) {
+          low_rank_on_diagonal += block.on_diagonal() && block.row_rank > 0 ? 1 : 0;
+        }
+        check_sweeps(system, seed, tolerance);
       }
     }
   }
   EXPECT_GT(low_rank_on_diagonal, 0);
 }
 
-TEST(CompressedFormFactors, ASweepReportsWhatItChanged) {
-  const System system(200, 5, Precision::kF32);
-  const auto relaxation = CompressedFormFactors(system.exchange).make_relaxation();
-  std::vector<Float3> before = test::random_light(200, 6), after(200);
-  relaxation->begin(system.problem(), before);
-  for (const auto direction : {SweepDirection::kForward, SweepDirection::kBackward}) {
-    const double reported = relaxation->sweep(direction);
-    relaxation->end(after);
-    double changed = 0;
-    for (std::size_t i = 0; i < 200; ++i) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        changed += system.area()[i] * std::pow(static_cast<double>(after[i][c]) - before[i][c], 2);
-      }
+/// Of radiosities [n], the sum of squares of A^1/2 B.
+double squared_change(const System& system, std::span<const Float3> before,
+                      std::span<const Float3> after) {
+  double changed = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      changed += system.area()[i] * std::pow(static_cast<double>(after[i][c]) - before[i][c], 2);
     }
-    EXPECT_NEAR(reported, changed, 1e-3 * changed);
-    before = after;
+  }
+  return changed;
+}
+
+TEST(CompressedFormFactors, ASweepReportsWhatItChanged) {
+  for (const bool equilibrated : {false, true}) {
+    const System system(200, 5, Precision::kF32, equilibrated);
+    const auto relaxation = CompressedFormFactors(system.exchange).make_relaxation();
+    std::vector<Float3> before = test::random_light(200, 6), after(200);
+    relaxation->begin(system.problem(), before);
+    for (const auto direction : {SweepDirection::kForward, SweepDirection::kBackward}) {
+      const double reported = relaxation->sweep(direction);
+      relaxation->end(after);
+      const double changed = squared_change(system, before, after);
+      EXPECT_NEAR(reported, changed, 1e-3 * changed);
+      before = after;
+    }
   }
 }
 

@@ -12,8 +12,8 @@ namespace rebounce {
 /// stored; gathering applies both while it is in cache.
 class CompressedFormFactors final : public SweepableFormFactors {
  public:
-  /// Refers to nothing but `exchange`, which it shares. Throws Error if that is null or its
-  /// channels have different matrices.
+  /// Refers to nothing but `exchange`, which it shares. Throws Error if that is null, its channels
+  /// have different matrices or its blocks moments.
   explicit CompressedFormFactors(std::shared_ptr<const HierarchicalOperator> exchange);
 
   std::size_t patch_count() const override { return exchange_->patch_count(); }
