@@ -61,16 +61,16 @@ constexpr double kFindPatch = 6e-4, kFindLink = 1.7e-5;
 // To gather eight lights along them once, and to compress F, likewise; both where there are
 // kLargePatches, and growing with this power beside, as vectors leave the caches.
 constexpr double kGatherPatch = 4e-6, kGatherLink = 1.25e-7;
-constexpr double kCompressPatch = 2.2e-3, kCompressLink = 5e-6;
+constexpr double kCompressPatch = 5.5e-3, kCompressLink = 5e-6;
 constexpr double kLargePatches = 64000, kGrowth = 1.0 / 3;
 
 // To choose fewer links, by those that there are; links of a patch that are left.
 constexpr double kChooseLink = 3.5e-6, kFewerLinks = 30;
 
 // Groups of eight lights that are fitted to and measured with, and of each kind of the check, and
-// gathers that each takes; to draw a light, by patches.
+// gathers that each takes; groups that are only drawn; to draw a light, by patches.
 constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 8, kCheckGathers = 7;
-constexpr double kDrawPatch = 4e-7;
+constexpr double kOtherGroups = 56, kDrawPatch = 4e-7;
 
 // Bytes of a patch of compressed form factors, with no links and for each link of it.
 constexpr double kFormFactorBytes = 570, kFormFactorLinkBytes = 4;
@@ -203,7 +203,7 @@ CostEstimate estimate_operator_from_links(const LinkedBuild& build, std::uint64_
   const LargeTransferPlan plan =
       plan_large_transfer(build.patch_count, build.matrix_count, settings);
   const double kinds = build.open ? 4 : 3;
-  const double groups = kFitGroups + kinds * kCheckGroups;
+  const double groups = kFitGroups + kOtherGroups + kinds * kCheckGroups;
   const double fewer = std::min(links, kFewerLinks * n);
   const double fitting = kFitGroups * kFitGathers * (kGatherPatch * n + kGatherLink * fewer);
   const double checking =

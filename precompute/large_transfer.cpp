@@ -43,13 +43,13 @@ constexpr double kRounds = 6000, kRoundsPatches = 4000, kRoundsGrowth = 0.33;
 
 // Products with all of the form factors that take as long as a column, of which most are with
 // coarser ones, and operations a second of a slow core.
-constexpr double kProducts = 1.5, kOperationsPerSecond = 6e10;
+constexpr double kProducts = 2.4, kOperationsPerSecond = 6e10;
 
 // Bytes a patch: lights, what they lead to and how they fall on clusters; and, for each matrix, an
 // operator of the first stage and the rounds of the second, at a tolerance, with the power by which
 // less of that takes more. Measured, and about a fifth more than all that was used:
 // notes/operator.md.
-constexpr double kLightBytes = 30e3, kOperatorBytes = 10.5e3;
+constexpr double kLightBytes = 26.4e3, kOperatorBytes = 10.5e3;
 constexpr double kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
 
 /// The rounds of the second stage, in columns that are solved for.
