@@ -21,6 +21,11 @@ constexpr std::size_t kLine = 16;
 // Positions whose light a thread takes in at a time.
 constexpr std::size_t kGathered = 512;
 
+// Positions ahead at which the light of a patch is asked for. A second-level cache has more loads
+// under way at a time than the nearest one.
+constexpr std::size_t kPatchesAhead = 64;
+constexpr int kToRead = 0, kToWrite = 1, kSecondLevel = 2;
+
 std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
@@ -208,6 +213,9 @@ struct Exchange {
       const Float3* const from_light = light.data() + v / kChannelCount * n;
       float* const x = work.x.data + v * stride;
       for (std::size_t k = begin; k < last; ++k) {
+        if (k + kPatchesAhead < n) {
+          __builtin_prefetch(&from_light[patch[k + kPatchesAhead]], kToRead, kSecondLevel);
+        }
         const Float3& m = from_light[patch[k]];
         const float weight = gather_scale[k];
         for (int c = 0; c < kChannelCount; ++c) x[c * stride + k] = weight * m[c];
@@ -223,6 +231,9 @@ struct Exchange {
       Float3* const to_light = light.data() + v / kChannelCount * n;
       const float* const y = work.y.data + v * stride;
       for (const std::uint32_t k : targets) {
+        if (k + kPatchesAhead < n) {
+          __builtin_prefetch(&to_light[patch[k + kPatchesAhead]], kToWrite, kSecondLevel);
+        }
         Float3& h = to_light[patch[k]];
         const float weight = scatter_scale[k];
         for (int c = 0; c < kChannelCount; ++c) h[c] = weight * y[c * stride + k];

@@ -24,12 +24,16 @@ namespace rebounce {
 namespace {
 
 /// Asks for values that are read in order before their turn. Only registers of kRegister bytes that
-/// are whole cache lines do: others would ask too often.
+/// are whole cache lines do: others would ask too often. They are brought to the second-level cache
+/// alone: the nearest one has too few loads under way at a time for all that memory can give.
 template <std::size_t kRegister, typename Value>
 REBOUNCE_INLINE inline void ask_ahead(const Value* values) {
   // The processor itself looks no farther than the end of a page. Measured: notes/operator.md.
-  constexpr std::size_t kLine = 64, kAhead = 4096;
-  if constexpr (kRegister == kLine) __builtin_prefetch(values + kAhead / sizeof(Value));
+  constexpr std::size_t kLine = 64, kAhead = 16384;
+  constexpr int kToRead = 0, kSecondLevel = 2;
+  if constexpr (kRegister == kLine) {
+    __builtin_prefetch(values + kAhead / sizeof(Value), kToRead, kSecondLevel);
+  }
 }
 
 template <typename V>
