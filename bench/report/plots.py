@@ -31,11 +31,11 @@ def save(figure, path):
     return path
 
 
-def put_legend(figure, handles, labels):
+def put_legend(figure, handles, labels, columns=5):
     """Below everything, in room of its own."""
-    inches = 0.6
+    inches = 0.2 + 0.2 * -(-len(labels) // columns)
     figure.tight_layout(rect=(0, inches / figure.get_figheight(), 1, 1))
-    figure.legend(handles, labels, loc="lower center", ncols=5, fontsize=8)
+    figure.legend(handles, labels, loc="lower center", ncols=columns, fontsize=8)
 
 
 def draw_accuracy(axes, result, change):

@@ -67,7 +67,7 @@ def main():
     named = {}  # a scene need not have all kinds
     for panel in axes.flat:
         named.update(zip(*reversed(panel.get_legend_handles_labels())))
-    plots.put_legend(figure, named.values(), named.keys())
+    plots.put_legend(figure, named.values(), named.keys(), columns=min(5, columns + 1))
     plots.save(figure, options.picture)
 
 
