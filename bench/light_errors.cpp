@@ -1,6 +1,6 @@
 // What a file promises, tried: an operator under many fresh lights of every kind. The truth comes
-// from the form factors beside it: conjugate gradients or, of pairs, a dense inverse of their own,
-// which is many times faster and is itself held against conjugate gradients.
+// from the form factors that it was made from: conjugate gradients or, of pairs, a dense inverse of
+// their own, which is many times faster and is itself held against conjugate gradients.
 
 #include <algorithm>
 #include <functional>
@@ -41,21 +41,27 @@ constexpr double kResidual = 1e-9;
 /// What arrives of lights, as the form factors of a file say.
 class Truth {
  public:
-  Truth(const TransferData& data, bool iterate) : data_(data), reference_(data) {
+  Truth(const TransferData& data, bool iterate)
+      : data_(data),
+        reference_(iterate || !data.exchange.empty()
+                       ? ReferenceSolver(data)
+                       : ReferenceSolver(data).preconditioned(data.transfer)) {
     if (!iterate && !data.exchange.empty()) {
       dense_ = build_dense_transfer(data.exchange, data.patches, Precision::kF32);
     }
   }
 
   std::vector<std::vector<Float3>> operator()(std::span<const std::vector<Float3>> lights) const {
-    return dense_ ? products(DenseMatrix(*dense_), lights) : iterated(lights);
+    return dense_ ? products(DenseMatrix(*dense_), lights)
+                  : reference_.indirect_irradiances(lights, kResidual);
   }
 
-  /// The largest relative difference from conjugate gradients over the first lights.
+  /// The largest relative difference from plain conjugate gradients over the first lights.
   double error(std::span<const std::vector<Float3>> lights) const {
     const auto some =
         lights.first(std::min<std::size_t>(lights.size(), ReferenceSolver::kTogether));
-    const auto truths = (*this)(some), others = iterated(some);
+    const auto truths = (*this)(some);
+    const auto others = ReferenceSolver(data_).indirect_irradiances(some, kResidual);
     double largest = 0;
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(others[k], some[k], data_.patches.area)) continue;
@@ -65,14 +71,21 @@ class Truth {
   }
 
  private:
-  std::vector<std::vector<Float3>> iterated(std::span<const std::vector<Float3>> lights) const {
-    return reference_.indirect_irradiances(lights, kResidual);
-  }
-
   const TransferData& data_;
   ReferenceSolver reference_;
   std::shared_ptr<const DenseOperator> dense_;  ///< null: it iterates
 };
+
+/// Throws Error if the form factors that the operator was made from are not there.
+void check_has_truth(const TransferData& data) {
+  const auto settings = nlohmann::json::parse(data.record.settings_json, nullptr, false);
+  const bool fewer = data.exchange.empty() && !data.links.empty() && settings.is_object() &&
+                     !settings.value("store_all_links", false);
+  if (!data.exchange.empty() || (!data.links.empty() && !fewer)) return;
+  throw Error(data.record.scene_name + ": the file holds " +
+              (fewer ? "fewer links than the operator was made from" : "neither pairs nor links") +
+              ", which the truth is found with; give the scene, with --form-factors links");
+}
 
 /// What the file says of lights of one kind; nothing where it was not measured.
 std::optional<double> recorded_bound(const BuildRecord& record, LightKind kind) {
@@ -100,11 +113,7 @@ Table::Cell groups_above(std::span<const LightError> errors, double limit) {
 }
 
 void measure(const TransferData& data, const LightErrorOptions& options, Table& table) {
-  if (data.exchange.empty() && data.links.empty()) {
-    throw Error(data.record.scene_name +
-                ": the file holds neither pairs nor links, which the "
-                "truth is found with; build it from pairs, or with --store-links");
-  }
+  check_has_truth(data);
   const RayTracer tracer = make_surface_tracer(data.mesh);
   const Truth truth(data, options.iterate);
   const BuildRecord& record = data.record;
@@ -152,10 +161,19 @@ int main(int argc, char** argv) {
   using namespace rebounce::bench;
   LightErrorOptions options;
   options.settings.operator_kind = rebounce::OperatorKind::kHierarchical;
+  options.settings.store_all_links = true;
   CLI::App app("Tries operators under fresh lights of every kind, against the bound in their files",
                "bench_light_errors");
   add_input_option(app, options.inputs);
   add_patches_option(app, options.patch_counts);
+  app.add_option_function<std::string>(
+         "--form-factors",
+         [&](const std::string& kind) {
+           options.settings.form_factor_kind = kind == "links" ? rebounce::FormFactorKind::kLinks
+                                                               : rebounce::FormFactorKind::kPairs;
+         },
+         "What operators are built from")
+      ->check(CLI::IsMember({"pairs", "links"}));
   app.add_option("--tolerance", options.settings.tolerance, "Of operators that are built")
       ->check(CLI::Range(1e-5, 0.5))
       ->capture_default_str();
@@ -165,7 +183,8 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Seed of the lights, other than that of the build")
       ->capture_default_str();
   app.add_flag("--iterate", options.iterate,
-               "Find the truth by conjugate gradients alone, with no dense inverse");
+               "Find the truth by conjugate gradients alone, with neither a dense inverse nor the "
+               "operator to begin with");
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] { run(options); });
 }

@@ -103,6 +103,9 @@ std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float>
 
 void scale_rows(std::span<const float> target, std::span<const float> area,
                 std::span<const Float3> centroid, FormFactorLinks& links) {
+  for (std::size_t i = 0; i < target.size(); ++i) {
+    if (target[i] == 0) links.scale[i] = 0;
+  }
   std::vector<float> scaled(target.size(), 1);  // by this function
   for (int round = 0; round < kScalingRounds; ++round) {
     const std::vector<float> sum = row_sums(links, area, centroid);

@@ -43,7 +43,8 @@ std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float>
                             std::span<const Float3> centroid);
 
 /// Multiplies the scales of `links` until rows add up to `target` [n], nearly; no more than twice
-/// or half.
+/// or half. Where the target is 0 they become 0: what such a patch exchanges has leaked from others
+/// of its nodes, of either sign.
 void scale_rows(std::span<const float> target, std::span<const float> area,
                 std::span<const Float3> centroid, FormFactorLinks& links);
 

@@ -23,7 +23,8 @@ struct ExchangeEntry {
 
 using ExchangeRows = std::vector<std::vector<ExchangeEntry>>;
 
-/// What a row of F should add up to, and how sure that is (0: certain).
+/// What a row of F should add up to, and how sure that is (0: certain). A sum of 0: no ray saw
+/// anything.
 struct RowTarget {
   double sum;
   double deviation;

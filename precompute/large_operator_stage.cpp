@@ -154,8 +154,10 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     return measure_error(data, tracer, reference.preconditioned(data.transfer), seed, part);
   });
   // The check is the last that needs them all.
-  data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
-  if (decided.store_links) report.link_count = data.links.pair.size();
+  if (!decided.store_all_links) {
+    data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
+    if (decided.store_links) report.link_count = data.links.pair.size();
+  }
   record_build(decided, report, errors, data.record);
 }
 

@@ -12,8 +12,8 @@ constexpr int kScalingSteps = 30;  // each about halves what is left
 constexpr double kScaled = 1e-6;   // row sums nearer to their targets than this are there
 constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
 
-// What patches exchange that see nothing by all of their hemisphere rays has leaked through nodes
-// on both sides of a wall: it may go.
+// What patches exchange that see next to nothing has leaked through nodes on both sides of a wall:
+// it may go.
 constexpr double kLeastFactorUnseeing = 1e-6;
 
 // Relative deviation of a row sum that links amount to, from penumbrae that they average; measured.
@@ -97,6 +97,14 @@ std::vector<double> wanted_sums(std::span<const double> sum, std::span<const Row
   return wanted;
 }
 
+/// What patches that see nothing exchange has leaked alone, and of either sign, which scaling by
+/// sums could not take away: it goes.
+std::vector<double> first_factors(std::span<const RowTarget> target) {
+  std::vector<double> factor;
+  for (const RowTarget& t : target) factor.push_back(t.sum > 0 ? 1 : 0);
+  return factor;
+}
+
 std::vector<double> scaled_row_sums(const LinkTree& tree, std::span<const Link> links,
                                     const std::vector<double>& factor) {
   std::vector<double> sum = gather_links(tree, links, factor);
@@ -142,13 +150,15 @@ LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
                         std::span<const RowTarget> target) {
   LinkScaling result;
   std::vector<double>&factor = result.factor, &row = result.row_sum;
-  factor.assign(target.size(), 1.0);
-  row = gather_links(tree, links, factor);
+  row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));
   result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
+  factor = first_factors(target);
+  row = scaled_row_sums(tree, links, factor);
   const std::vector<double> wanted = wanted_sums(row, target);
   for (int step = 0; step < kScalingSteps; ++step) {
     double worst = 0;
     for (std::size_t i = 0; i < factor.size(); ++i) {
+      if (factor[i] == 0) continue;
       worst = std::max(worst, std::abs(row[i] - wanted[i]));
       if (row[i] <= 0 || wanted[i] <= 0) continue;
       factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row[i]), least_factor(target[i]),

@@ -25,7 +25,8 @@ struct LinkScaling {
 ///
 /// Symmetric scaling (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix
 /// scaling", 2014). A target that was measured counts for as much as it is more certain than the
-/// row sum. Factors stay in [0.5, 2], but for patches that see nothing, which may lose it all.
+/// row sum. Factors stay in [0.5, 2], but for patches that see next to nothing, which may lose
+/// nearly all, and those whose target is 0, whose factor is.
 LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
                         std::span<const RowTarget> target);
 

@@ -13,8 +13,10 @@ std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count
     // sure as the rule of succession says; low-discrepancy rays err about half as much as random
     // ones.
     const bool closed = lost * count < 1.5;
+    const bool unseeing = lost * count > count - 0.5;
     const double p = (lost * count + 1) / (count + 2);
-    target.push_back({closed ? 1 : 1 - lost, closed ? 0 : 0.5 * std::sqrt(p * (1 - p) / count)});
+    const double seen = unseeing ? 0 : 1 - lost;
+    target.push_back({closed ? 1 : seen, closed ? 0 : 0.5 * std::sqrt(p * (1 - p) / count)});
   }
   return target;
 }

@@ -75,7 +75,7 @@ void check_values(const FormFactorLinks& links) {
     if (!std::ranges::all_of(g, is_finite)) refuse("a gradient is not finite");
   }
   for (const float s : links.scale) {
-    if (!(s > 0) || !is_finite(s)) refuse("a scale is not finite and > 0");
+    if (!(s >= 0) || !is_finite(s)) refuse("a scale is not finite and >= 0");
   }
 }
 

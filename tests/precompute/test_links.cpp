@@ -12,6 +12,7 @@
 #include <random>
 
 #include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/link_fitting.h"
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/runtime/hierarchical_solver.h"
 #include "rebounce/transfer/area_norm.h"
@@ -210,6 +211,33 @@ TEST(Links, NothingGoesThroughAWall) {
     if (light[i][0] > 0) continue;
     // What links may be wrong by; not a leak that would be seen.
     EXPECT_NEAR(arrived[i][0], 0, kLinkEpsilon) << i;
+  }
+}
+
+TEST(Links, PatchesThatSeeNothingExchangeNothing) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  test::add_box(scene, {1, 0, 1}, {2.5, 1, 2.5}, false);  // its bottom does not show
+  test::remove_face(scene, test::Face::kLowY, 1);
+  const PatchModel model = model_of(scene);
+  const FormFactorLinks links = links_of(model).links;
+  const auto is_under_the_block = [&](std::size_t i) {
+    const Float3& p = model.patches.centroid[i];
+    return p[1] == 0 && p[0] > 1 && p[0] < 2.5F && p[2] > 1 && p[2] < 2.5F;
+  };
+  std::vector<Float3> light;
+  for (std::size_t i = 0; i < model.patches.size(); ++i) {
+    light.push_back(is_under_the_block(i) ? Float3{1, 1, 1} : Float3{0, 0, 0});
+  }
+  ASSERT_GT(area_norm(light, model.patches.area), 0);
+  for (const FormFactorLinks& some : {links, fit_links(links, model.patches)}) {
+    const LinkedFormFactors f(some, model.patches.area, model.patches.centroid);
+    EXPECT_EQ(area_norm(gather(f, light), model.patches.area), 0);
+    const auto arrived = gather(f, smooth_light(model.patches));
+    for (std::size_t i = 0; i < arrived.size(); ++i) {
+      if (!is_under_the_block(i)) continue;
+      EXPECT_EQ(arrived[i], (Float3{0, 0, 0})) << i;
+    }
   }
 }
 

@@ -122,7 +122,7 @@ TEST(LinkedFormFactors, RefuseWhatIsNotATreeWithLinks) {
       [](auto& l) { l.pair[0][1] = 7; },        [](auto& l) { l.pair.pop_back(); },
       [](auto& l) { l.exchange_area[1] = -1; }, [](auto& l) { l.exchange_area[1] = kNan; },
       [](auto& l) { l.gradient[0][4] = kNan; }, [](auto& l) { l.gradient.pop_back(); },
-      [](auto& l) { l.scale[2] = 0; },          [](auto& l) { l.scale[2] = kNan; },
+      [](auto& l) { l.scale[2] = -1; },         [](auto& l) { l.scale[2] = kNan; },
       [](auto& l) { l.scale.pop_back(); },
   };
   EXPECT_NO_THROW(check_links(sample_links(), kPatchCount));

@@ -27,7 +27,7 @@ struct FormFactorLinks {
   std::vector<float> exchange_area;                ///< [l] m²
   std::vector<std::array<float, 6>> gradient;      ///< [l] m: gradient_a, gradient_b
   /// [n] F(i,j) is that of the links times scale(i) scale(j), so that rows add up to what they
-  /// should.
+  /// should; 0 for a patch that exchanges nothing.
   std::vector<float> scale;
 
   bool empty() const { return patch.empty(); }
