@@ -43,9 +43,8 @@ class Truth {
  public:
   Truth(const TransferData& data, bool iterate)
       : data_(data),
-        reference_(iterate || !data.exchange.empty()
-                       ? ReferenceSolver(data)
-                       : ReferenceSolver(data).preconditioned(data.transfer)) {
+        plain_(data),
+        solver_(iterate ? plain_ : plain_.preconditioned(data.transfer)) {
     if (!iterate && !data.exchange.empty()) {
       dense_ = build_dense_transfer(data.exchange, data.patches, Precision::kF32);
     }
@@ -53,7 +52,7 @@ class Truth {
 
   std::vector<std::vector<Float3>> operator()(std::span<const std::vector<Float3>> lights) const {
     return dense_ ? products(DenseMatrix(*dense_), lights)
-                  : reference_.indirect_irradiances(lights, kResidual);
+                  : solver_.indirect_irradiances(lights, kResidual);
   }
 
   /// The largest relative difference from plain conjugate gradients over the first lights.
@@ -61,7 +60,7 @@ class Truth {
     const auto some =
         lights.first(std::min<std::size_t>(lights.size(), ReferenceSolver::kTogether));
     const auto truths = (*this)(some);
-    const auto others = ReferenceSolver(data_).indirect_irradiances(some, kResidual);
+    const auto others = plain_.indirect_irradiances(some, kResidual);
     double largest = 0;
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(others[k], some[k], data_.patches.area)) continue;
@@ -72,19 +71,20 @@ class Truth {
 
  private:
   const TransferData& data_;
-  ReferenceSolver reference_;
-  std::shared_ptr<const DenseOperator> dense_;  ///< null: it iterates
+  ReferenceSolver plain_, solver_;
+  std::shared_ptr<const DenseOperator> dense_;  ///< null: solver_ iterates
 };
 
 /// Throws Error if the form factors that the operator was made from are not there.
 void check_has_truth(const TransferData& data) {
+  if (!data.exchange.empty()) return;
   const auto settings = nlohmann::json::parse(data.record.settings_json, nullptr, false);
-  const bool fewer = data.exchange.empty() && !data.links.empty() && settings.is_object() &&
-                     !settings.value("store_all_links", false);
-  if (!data.exchange.empty() || (!data.links.empty() && !fewer)) return;
-  throw Error(data.record.scene_name + ": the file holds " +
-              (fewer ? "fewer links than the operator was made from" : "neither pairs nor links") +
-              ", which the truth is found with; give the scene, with --form-factors links");
+  const bool are_all =
+      settings.is_object() && settings.value("store_all_links", nlohmann::json()) == true;
+  if (!data.links.empty() && are_all) return;
+  throw Error(data.record.scene_name +
+              ": the file does not hold the pairs or all of the links that the operator was made "
+              "from, which the truth is found with; give the scene, with --form-factors links");
 }
 
 /// What the file says of lights of one kind; nothing where it was not measured.

@@ -11,7 +11,7 @@ std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count
     // Where no ray at all is lost, the row is taken as closed; nor does a single one open it, as it
     // may have begun beyond the wall of an edge, a ray's offset away. Else the measurement is as
     // sure as the rule of succession says; low-discrepancy rays err about half as much as random
-    // ones.
+    // ones. Where all are lost, nothing is seen, exactly.
     const bool closed = lost * count < 1.5;
     const bool unseeing = lost * count > count - 0.5;
     const double p = (lost * count + 1) / (count + 2);
