@@ -68,8 +68,9 @@ constexpr double kLargePatches = 64000, kGrowth = 1.0 / 3;
 constexpr double kChooseLink = 3.5e-6, kFewerLinks = 30;
 
 // Groups of eight lights that are fitted to and measured with, and of each kind of the check, and
-// gathers that each takes; groups that are only drawn; to draw a light, by patches.
-constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 8, kCheckGathers = 7;
+// gathers that each takes, those of the check three in single precision; groups that are only
+// drawn; to draw a light, by patches.
+constexpr double kFitGroups = 30, kFitGathers = 7, kCheckGroups = 32, kCheckGathers = 1.7;
 constexpr double kOtherGroups = 56, kDrawPatch = 4e-7;
 
 // Bytes of a patch of compressed form factors, with no links and for each link of it.

@@ -151,7 +151,8 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     if (roles.all_are_both()) {
       data.record.solve_residual = transfer_residual(*data.transfer, *links, patches);
     }
-    return measure_error(data, tracer, reference.preconditioned(data.transfer), seed, part);
+    return measure_error(data, tracer, reference.preconditioned(data.transfer), decided.tolerance,
+                         seed, part);
   });
   // The check is the last that needs them all.
   if (!decided.store_all_links) {

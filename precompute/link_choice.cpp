@@ -107,7 +107,8 @@ class BlockFitting {
 
   Choice choose(std::uint32_t i, std::uint32_t j) {
     const PairSums pairs = sums(i, j);
-    if (pairs.count == 0) return {0, Kind::kNothing};
+    // Next to nothing beside others in the tables is rounded to 0, or to less.
+    if (pairs.count == 0 || pairs.exchange <= 0) return {0, Kind::kNothing};
     Choice best{kForbidden, Kind::kLink};
     if (is_of_one_room(i, j)) {
       const double error = squared_error(i, j, pairs);

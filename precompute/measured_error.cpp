@@ -16,10 +16,12 @@ namespace {
 
 using Exitances = std::vector<std::vector<Float3>>;
 
-// Against the dense inverse, against pairs, of an operator that has rounding errors alone, and
-// against links.
-constexpr int kLightCount = 256, kReferenceLightCount = 16, kLinkedLightCount = 64;
-constexpr double kReferenceResidual = 1e-9;
+// Of a compressed operator, and of one that has rounding errors alone.
+constexpr int kLightCount = 256, kRoundedLightCount = 16;
+
+// Of the initial exitance: rounding errors are above it. Of the reflected light, in parts of the
+// tolerance: a thousandth of an error hangs on it at most (notes/operator.md).
+constexpr double kReferenceResidual = 1e-10, kResidualOfTolerance = 0.02;
 
 KindError summary(LightKind kind, std::size_t light_count, const std::vector<double>& errors) {
   const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
@@ -91,7 +93,9 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
   if (exact == nullptr && data.exchange.empty() && data.links.empty()) {
     throw Error("measured error: there is no truth without pairs or links; store links too");
   }
-  if (exact == nullptr) return measure_error(data, tracer, ReferenceSolver(data), seed, progress);
+  if (exact == nullptr) {
+    return measure_error(data, tracer, ReferenceSolver(data), 0, seed, progress);
+  }
   const auto errors_of = [&](const Exitances& lights, const Progress&) {
     return LitTruth(DenseMatrix(*exact, data.transfer->roles()), lights).errors(*data.transfer);
   };
@@ -99,11 +103,12 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
 }
 
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
-                                     const ReferenceSolver& reference, std::uint64_t seed,
-                                     const Progress& progress) {
+                                     const ReferenceSolver& reference, double tolerance,
+                                     std::uint64_t seed, const Progress& progress) {
   const auto errors_of = [&](const Exitances& lights, const Progress& part) {
     const auto truth_of = [&](std::span<const std::vector<Float3>> some) {
-      return reference.indirect_irradiances(some, kReferenceResidual);
+      return reference.indirect_irradiances(some, kReferenceResidual,
+                                            kResidualOfTolerance * tolerance);
     };
     std::vector<double> errors;
     for (const LightError& light : light_errors(data, lights, truth_of, part)) {
@@ -111,8 +116,8 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
     }
     return errors;
   };
-  return measure(data, tracer, data.exchange.empty() ? kLinkedLightCount : kReferenceLightCount,
-                 seed, errors_of, progress);
+  return measure(data, tracer, tolerance > 0 ? kLightCount : kRoundedLightCount, seed, errors_of,
+                 progress);
 }
 
 }  // namespace rebounce

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -14,6 +15,12 @@ using Double3 = ReferenceSolver::Double3;
 using Form = ReferenceSolver::Form;
 
 constexpr int kMaxSteps = 10000;
+
+// Down to this residual, in parts of the reflected light, links gather in single precision, twice
+// as fast: what that rounds off is a hundredth of it. Lights for which it is more, as what links
+// carry too much and too little of cancels, are solved in double precision after kSingleRounds.
+constexpr double kSinglePrecisionSuffices = 1e-5;
+constexpr int kSingleRounds = 2;
 
 /// A column is a patch and holds all channels of the first light, then of the next.
 template <int kRows>
@@ -36,14 +43,19 @@ Field<kRows> times(const FormFactorRows& rows, const Field<kRows>& in) {
   return out;
 }
 
+template <typename Scalar, int kRows>
+Field<kRows> gather_along(const LinkedFormFactors& links, const Field<kRows>& in) {
+  using Columns = std::array<Scalar, kRows>;
+  using ScalarField = Eigen::Array<Scalar, kRows, Eigen::Dynamic>;
+  std::vector<Columns> from(in.cols()), to(in.cols());
+  Eigen::Map<ScalarField>(from.front().data(), kRows, in.cols()) = in.template cast<Scalar>();
+  links.gather(std::span<const Columns>(from), std::span(to));
+  return Eigen::Map<const ScalarField>(to.front().data(), kRows, in.cols()).template cast<double>();
+}
+
 template <int kRows>
 Field<kRows> times(const std::shared_ptr<const LinkedFormFactors>& links, const Field<kRows>& in) {
-  using Columns = std::array<double, kRows>;
-  std::vector<Columns> from(in.cols()), to(in.cols());
-  const auto size = static_cast<std::size_t>(in.size());
-  std::copy_n(in.data(), size, from.front().data());
-  links->gather(std::span<const Columns>(from), std::span(to));
-  return Eigen::Map<const Field<kRows>>(to.front().data(), kRows, in.cols());
+  return gather_along<double>(*links, in);
 }
 
 /// Light after light, in single precision.
@@ -71,6 +83,12 @@ struct System {
   const TransferOperator* nearly_inverse;  ///< may be null
 };
 
+/// That of (I - rho F) B = M0; solved is what has either.
+struct Residual {
+  double of_initial_exitance;  ///< in parts of M0
+  double of_reflected_light;   ///< in parts of rho H
+};
+
 /// kLights lights on one scene, solved together.
 template <int kLights>
 class ConjugateGradients {
@@ -78,6 +96,10 @@ class ConjugateGradients {
   using Lights = std::span<const std::vector<Float3>>;
   static constexpr int kRows = kLights * kChannelCount;
   using Field = rebounce::Field<kRows>;
+
+  struct Solution {
+    Field radiosity, indirect_irradiance;
+  };
 
   /// `lights`: kLights of them at most.
   ConjugateGradients(const System& system, Lights lights)
@@ -98,29 +120,30 @@ class ConjugateGradients {
     }
   }
 
-  /// Returns B.
-  Field solve(double residual) const {
-    const Totals allowed = residual * residual * per_light(product(m0_, m0_));
+  Solution solve(const Residual& residual) const {
+    const Totals of_initial =
+        residual.of_initial_exitance * residual.of_initial_exitance * per_light(product(m0_, m0_));
     Field z = Field::Zero(kRows, m0_.cols());
     bool conditioned = nearly_inverse_ != nullptr;
     if (conditioned) z = root_ * transfer(m0_);
-    for (int steps = 0; steps < kMaxSteps;) {
-      const Field b = m0_ + root_ * z;
-      const Field r = root_ * gather(b) - z;  // R r is the residual of B
-      if ((left_over(r) <= allowed).all()) return b;
+    const bool coarse = residual.of_reflected_light >= kSinglePrecisionSuffices;
+    for (int steps = 0, round = 0; steps < kMaxSteps; ++round) {
+      const Arithmetic arithmetic =
+          coarse && round < kSingleRounds ? Arithmetic::kSingle : Arithmetic::kDouble;
+      Field b = m0_ + root_ * z, h = gather(b, arithmetic);
+      const Field reflected = root_ * h;
+      const Field r = reflected - z;  // R r is the residual of B
+      const Totals allowed = of_initial.max(
+          residual.of_reflected_light * residual.of_reflected_light * exitance_squares(reflected));
+      if ((exitance_squares(r) <= allowed).all()) return {std::move(b), std::move(h)};
       if (conditioned) {
-        conditioned = descend_conditioned(r, allowed, z, steps);
+        conditioned = descend_conditioned(r, allowed, arithmetic, z, steps);
       } else {
-        descend(r, allowed, z, steps);
+        descend(r, allowed, arithmetic, z, steps);
       }
     }
     throw Error("the reference solution did not converge in " + std::to_string(kMaxSteps) +
                 " steps; a reflectance must be too close to 1");
-  }
-
-  /// F times `in`.
-  Field gather(const Field& in) const {
-    return std::visit([&](const auto& form) { return times<kRows>(form, in); }, form_);
   }
 
  private:
@@ -129,37 +152,48 @@ class ConjugateGradients {
 
   /// Moves `z`, the residual of which is `r`, until that is small enough by its own recursion
   /// (M. R. Hestenes, E. Stiefel, 1952).
-  void descend(Field r, const Totals& allowed, Field& z, int& steps) const {
+  void descend(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z, int& steps) const {
     Field p = r;
     Products rr = product(r, r);
     do {
-      const Field q = p - root_ * gather(root_ * p);
+      const Field q = p - root_ * gather(root_ * p, arithmetic);
       const Products alpha = quotient(rr, product(p, q));
       z += p.colwise() * alpha;
       r -= q.colwise() * alpha;
       const Products before = std::exchange(rr, product(r, r));
       p = r + p.colwise() * quotient(rr, before);
-    } while (++steps < kMaxSteps && !(left_over(r) <= allowed).all());
+    } while (++steps < kMaxSteps && !(exitance_squares(r) <= allowed).all());
   }
 
   /// The same, preconditioned by I + R Y R, which is nearly the inverse of I - R F R. Directions
   /// are kept conjugate though it is rounded (G. H. Golub, Q. Ye, 1999). Returns false, with `z` as
   /// near as it came, if Y is so wrong that it is not positive.
-  bool descend_conditioned(Field r, const Totals& allowed, Field& z, int& steps) const {
+  bool descend_conditioned(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z,
+                           int& steps) const {
     Field y = condition(r), p = y;
     Products ry = product(r, y);
-    do {
+    for (;;) {
       if ((ry <= 0 && product(r, r) > 0).any()) return false;
-      const Field q = p - root_ * gather(root_ * p);
+      const Field q = p - root_ * gather(root_ * p, arithmetic);
       const Products alpha = quotient(ry, product(p, q));
       z += p.colwise() * alpha;
       const Field change = q.colwise() * alpha;
       r -= change;
+      if (++steps >= kMaxSteps || (exitance_squares(r) <= allowed).all()) return true;
       y = condition(r);
       const Products before = std::exchange(ry, product(r, y));
       p = y - p.colwise() * quotient(product(change, y), before);
-    } while (++steps < kMaxSteps && !(left_over(r) <= allowed).all());
-    return true;
+    }
+  }
+
+  /// F times `in`; links alone gather in single precision where that is enough.
+  Field gather(const Field& in, Arithmetic arithmetic) const {
+    using Links = std::shared_ptr<const LinkedFormFactors>;
+    if (const Links* links = std::get_if<Links>(&form_);
+        links != nullptr && arithmetic == Arithmetic::kSingle) {
+      return gather_along<float>(**links, in);
+    }
+    return std::visit([&](const auto& form) { return times<kRows>(form, in); }, form_);
   }
 
   Field condition(const Field& r) const { return r + root_ * transfer(root_ * r); }
@@ -184,8 +218,9 @@ class ConjugateGradients {
     return out;
   }
 
-  Totals left_over(const Field& r) const {
-    const Field scaled = root_ * r;
+  /// The squared area norms of R v.
+  Totals exitance_squares(const Field& v) const {
+    const Field scaled = root_ * v;
     return per_light(product(scaled, scaled));
   }
 
@@ -223,11 +258,12 @@ enum class Quantity { kRadiosity, kIndirectIrradiance };
 /// Appends the solutions [n] of kLights lights at most.
 template <int kLights>
 void solve_together(const System& system, std::span<const std::vector<Float3>> lights,
-                    double residual, Quantity quantity,
+                    const Residual& residual, Quantity quantity,
                     std::vector<std::vector<Double3>>& solutions) {
   const ConjugateGradients<kLights> solver(system, lights);
-  auto field = solver.solve(residual);
-  if (quantity == Quantity::kIndirectIrradiance) field = solver.gather(field);
+  const auto solved = solver.solve(residual);
+  const auto& field =
+      quantity == Quantity::kRadiosity ? solved.radiosity : solved.indirect_irradiance;
   for (std::size_t light = 0; light < lights.size(); ++light) {
     std::vector<Double3>& solution = solutions.emplace_back(system.patches.size());
     for (std::size_t i = 0; i < solution.size(); ++i) {
@@ -238,9 +274,10 @@ void solve_together(const System& system, std::span<const std::vector<Float3>> l
 
 std::vector<std::vector<Double3>> solve(const System& system,
                                         std::span<const std::vector<Float3>> lights,
-                                        double residual, Quantity quantity) {
+                                        Residual residual, Quantity quantity) {
   if (std::holds_alternative<CompressedFormFactors>(system.form)) {
-    residual = std::max(residual, ReferenceSolver::kSinglePrecisionResidual);
+    residual.of_initial_exitance =
+        std::max(residual.of_initial_exitance, ReferenceSolver::kSinglePrecisionResidual);
   }
   std::vector<std::vector<Double3>> solutions;
   while (solutions.size() < lights.size()) {
@@ -291,8 +328,8 @@ std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_
 
 std::vector<std::vector<Double3>> ReferenceSolver::radiosities(
     std::span<const std::vector<Float3>> initial_exitances, double residual) const {
-  return solve({form_, patches_, nearly_inverse_.get()}, initial_exitances, residual,
-               Quantity::kRadiosity);
+  return solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
+               {.of_initial_exitance = residual, .of_reflected_light = 0}, Quantity::kRadiosity);
 }
 
 std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3> initial_exitance,
@@ -302,9 +339,12 @@ std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3>
 }
 
 std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
-    std::span<const std::vector<Float3>> initial_exitances, double residual) const {
-  const auto solutions = solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
-                               residual, Quantity::kIndirectIrradiance);
+    std::span<const std::vector<Float3>> initial_exitances, double residual,
+    double of_reflected_light) const {
+  const auto solutions =
+      solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
+            {.of_initial_exitance = residual, .of_reflected_light = of_reflected_light},
+            Quantity::kIndirectIrradiance);
   std::vector<std::vector<Float3>> result;
   for (const std::vector<Double3>& h : solutions) result.push_back(rounded(h));
   return result;

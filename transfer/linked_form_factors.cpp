@@ -268,6 +268,10 @@ void LinkedFormFactors::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out
   }
 }
 
+template void LinkedFormFactors::gather(std::span<const std::array<float, 3>>,
+                                        std::span<std::array<float, 3>>) const;
+template void LinkedFormFactors::gather(std::span<const std::array<float, 24>>,
+                                        std::span<std::array<float, 24>>) const;
 template void LinkedFormFactors::gather(std::span<const std::array<double, 3>>,
                                         std::span<std::array<double, 3>>) const;
 template void LinkedFormFactors::gather(std::span<const std::array<double, 24>>,

@@ -198,6 +198,21 @@ TEST(LinkFitting, PatchesThatSeeThemselves) {
   EXPECT_LE(error_of(pairs, links), 1e-6);
 }
 
+TEST(LinkFitting, PairsThatExchangeNextToNothing) {
+  // Beside others in a sum their light is rounded away, or to less than none.
+  Pairs faint{furnished().model, furnished().exchange};
+  std::vector<float> exchange(faint.exchange.exchange_area.begin(),
+                              faint.exchange.exchange_area.end());
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> magnitude(-30, 0);
+  for (float& s : exchange) s *= std::pow(10.0F, magnitude(random));
+  faint.exchange.exchange_area = SharedArray(std::move(exchange));
+  const FormFactorLinks links = fitted(faint);
+  check_links(links, faint.patches().size());
+  for (const float s : links.exchange_area) ASSERT_GT(s, 0);
+  EXPECT_LT(error_of(faint, links), 0.2);
+}
+
 TEST(LinkFitting, SameBitsForAnyNumberOfThreads) {
   const Pairs& pairs = furnished();
   const auto make = [&] { return fitted(pairs); };

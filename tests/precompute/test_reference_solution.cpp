@@ -151,6 +151,13 @@ TEST(ReferenceSolution, SolvesOnLinksInDoublePrecision) {
     }
   }
   EXPECT_LE(std::sqrt(left / all), 1e-11);
+  // In single precision where that is enough.
+  const auto truth = ReferenceSolver(links, patches).indirect_irradiance(light, 1e-12);
+  for (const double residual : {1e-2, 1e-5, 1e-7}) {
+    const auto found =
+        ReferenceSolver(links, patches).indirect_irradiances({&light, 1}, 0, residual);
+    EXPECT_LE(relative_difference(found.front(), truth, patches.area), 10 * residual);
+  }
 }
 
 TEST(ReferenceSolution, SolvesOnCompressedFormFactorsToSinglePrecision) {
@@ -214,6 +221,42 @@ TEST(ReferenceSolution, IsTheSameWithAnyPreconditioner) {
     }
   }
   EXPECT_THROW(plain.preconditioned(std::make_shared<Multiple>(n + 1, 0.0F)), Error);
+}
+
+TEST(ReferenceSolution, WhatArrivesIsAsExactOfALightOfWhichLittleDoes) {
+  const Room room({0.7F, 0.5F, 0.9F});
+  const ReferenceSolver plain(room.exchange, room.patches);
+  const ReferenceSolver preconditioned =
+      plain.preconditioned(build_dense_transfer(room.exchange, room.patches, Precision::kF16));
+  // The second shines on a patch of which hardly any light gets away.
+  auto lights = room.lights(3);
+  const FormFactorRows rows(room.exchange, room.patches.area);
+  std::size_t closed = 0;
+  double least = 1;
+  for (std::size_t i = 0; i < room.patches.size(); ++i) {
+    double sum = 0;
+    for (const float f : rows.form_factors(i)) sum += f;
+    if (sum > 0 && sum < least) {
+      least = sum;
+      closed = i;
+    }
+  }
+  lights[1].assign(room.patches.size(), {0, 0, 0});
+  lights[1][closed] = {1, 1, 1};
+  const auto truths = plain.indirect_irradiances(lights, 1e-13);
+  for (const ReferenceSolver* solver : {&plain, &preconditioned}) {
+    for (const double residual : {1e-2, 1e-5}) {
+      const auto found = solver->indirect_irradiances(lights, 0, residual);
+      for (std::size_t k = 0; k < lights.size(); ++k) {
+        // (I - rho F)^-1 amplifies what is left by 1 / (1 - 0.9) at most.
+        EXPECT_LE(relative_difference(found[k], truths[k], room.patches.area), 10 * residual)
+            << "light " << k;
+      }
+    }
+  }
+  const auto dark = plain.indirect_irradiances(
+      std::vector(1, std::vector<Float3>(room.patches.size(), Float3{0, 0, 0})), 0, 1e-3);
+  for (const Float3& h : dark.front()) EXPECT_EQ(h, (Float3{0, 0, 0}));
 }
 
 TEST(ReferenceSolution, SameBitsForAnyNumberOfThreads) {

@@ -45,16 +45,19 @@ std::vector<LightError> light_errors(const TransferData& data,
 /// give off, at its receivers.
 ///
 /// With `exact`, the operator in f32 that data.transfer was made from, the truth is what that one
-/// gives, and there are 256 lights of a kind. Without it, the truth is that of ReferenceSolver on
-/// the pairs of `data` under 16 lights of a kind, or else on its links under 64, to 1e-9; from
-/// compressed form factors alone, which are a part of what is measured, it would be none.
+/// gives, and there are 256 lights of a kind. Without it, data.transfer has rounding errors alone:
+/// the truth is that of ReferenceSolver on the pairs or the links of `data` to 1e-10, under 16
+/// lights of a kind. From compressed form factors alone, which are a part of what is measured, it
+/// would be none.
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress = {});
 
-/// The same without `exact`, with a solver that is there, on the pairs or the links of `data`.
+/// Of an operator of `tolerance` that was made from links: the truth is that of `reference`, which
+/// solves with them, so much closer than the tolerance that no error changes by a thousandth; 256
+/// lights of a kind. With a tolerance of 0, rounding errors are measured, as above.
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
-                                     const ReferenceSolver& reference, std::uint64_t seed,
-                                     const Progress& progress = {});
+                                     const ReferenceSolver& reference, double tolerance,
+                                     std::uint64_t seed, const Progress& progress = {});
 
 }  // namespace rebounce

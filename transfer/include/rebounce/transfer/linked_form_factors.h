@@ -68,8 +68,8 @@ class LinkedFormFactors final : public FormFactorOperator {
   void gather(std::span<const Float3> in, std::span<Float3> out,
               std::span<float> workspace) const override;
 
-  /// The same in double precision for several lights at once: `Columns` is an array of 3 or 24
-  /// doubles, the channels of one or of eight lights. Allocates its workspace.
+  /// The same for several lights at once: `Columns` is an array of 3 or 24 floats or doubles, the
+  /// channels of one or of eight lights, and so is what is added up. Allocates its workspace.
   template <typename Columns>
   void gather(std::span<const Columns> in, std::span<Columns> out) const;
 
