@@ -5,16 +5,18 @@
 
 namespace rebounce {
 
+// Static: each file has its own, for the instructions that it is compiled with.
+
 /// Adds `factor` times `from` to `to`, arrays of as many numbers.
 template <typename Lanes>
-void add_scaled(Lanes& to, float factor, const Lanes& from) {
+static inline void add_scaled(Lanes& to, float factor, const Lanes& from) {
   for (std::size_t lane = 0; lane < to.size(); ++lane) to[lane] += factor * from[lane];
 }
 
-/// LinkKernels::gather in plain C++, for light of any precision and number of channels.
+/// GatherAlongLinks in plain C++, for light of any precision and number of channels.
 template <typename Lanes>
-LinkLightOf<Lanes> gather_along_links(const IncomingLink* link, std::size_t count,
-                                      const LinkLightOf<Lanes>* light) {
+static inline LinkLightOf<Lanes> gather_along_links(const IncomingLink* link, std::size_t count,
+                                                    const LinkLightOf<Lanes>* light) {
   LinkLightOf<Lanes> sum{};
   for (std::size_t l = 0; l < count; ++l) {
     const LinkLightOf<Lanes>& from = light[link[l].from];

@@ -5,7 +5,9 @@
 
 namespace rebounce {
 
-const LinkKernels kLinkKernelsPortable = {"portable", gather_along_links<ColorLanes>};
+const LinkKernels kLinkKernelsPortable = {"portable", gather_along_links<ColorLanes>,
+                                          gather_along_links<ManyFloats>,
+                                          gather_along_links<ManyDoubles>};
 
 std::span<const LinkKernels* const> link_kernel_sets() {
 #if defined(__x86_64__)

@@ -22,12 +22,21 @@ struct LinkLightOf {
 using LinkLight = LinkLightOf<ColorLanes>;
 static_assert(sizeof(LinkLight) == 64);
 
-/// Gathering along links, for one instruction set.
+/// What arrives at one node along its `count` links.
+template <typename Lanes>
+using GatherAlongLinks = LinkLightOf<Lanes> (*)(const IncomingLink* link, std::size_t count,
+                                                const LinkLightOf<Lanes>* light);
+
+// The channels of eight lights.
+using ManyFloats = std::array<float, 24>;
+using ManyDoubles = std::array<double, 24>;
+
+/// Gathering along links, for one instruction set; many lights with the same bits for any of them.
 struct LinkKernels {
   const char* instruction_set;
-
-  /// What arrives at one node along its `count` links.
-  LinkLight (*gather)(const IncomingLink* link, std::size_t count, const LinkLight* light);
+  GatherAlongLinks<ColorLanes> gather;
+  GatherAlongLinks<ManyFloats> gather_floats;
+  GatherAlongLinks<ManyDoubles> gather_doubles;
 };
 
 extern const LinkKernels kLinkKernelsPortable;

@@ -3,6 +3,7 @@
 
 #include <immintrin.h>
 
+#include "link_gather.h"
 #include "link_kernels.h"
 
 namespace rebounce {
@@ -44,6 +45,7 @@ LinkLight gather(const IncomingLink* link, std::size_t count, const LinkLight* l
 
 }  // namespace
 
-const LinkKernels kLinkKernelsAvx2 = {"avx2", gather};
+const LinkKernels kLinkKernelsAvx2 = {"avx2", gather, gather_along_links<ManyFloats>,
+                                      gather_along_links<ManyDoubles>};
 
 }  // namespace rebounce

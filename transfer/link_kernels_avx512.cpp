@@ -3,6 +3,7 @@
 
 #include <immintrin.h>
 
+#include "link_gather.h"
 #include "link_kernels.h"
 
 namespace rebounce {
@@ -38,6 +39,7 @@ LinkLight gather(const IncomingLink* link, std::size_t count, const LinkLight* l
 
 }  // namespace
 
-const LinkKernels kLinkKernelsAvx512 = {"avx512", gather};
+const LinkKernels kLinkKernelsAvx512 = {"avx512", gather, gather_along_links<ManyFloats>,
+                                        gather_along_links<ManyDoubles>};
 
 }  // namespace rebounce

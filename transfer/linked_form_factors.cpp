@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <string>
+#include <type_traits>
 
 #include "link_gather.h"
 #include "links_by_node.h"
@@ -18,6 +19,18 @@ namespace {
 
 // Trees of fewer nodes than this are walked before threads have met at every level.
 constexpr std::size_t kWorthThreads = 16384;
+
+/// What gathers along links, many lights with the widest instructions that there are.
+template <typename Columns>
+GatherAlongLinks<Columns> fastest_gather() {
+  if constexpr (std::is_same_v<Columns, ManyFloats>) {
+    return link_kernels().gather_floats;
+  } else if constexpr (std::is_same_v<Columns, ManyDoubles>) {
+    return link_kernels().gather_doubles;
+  } else {
+    return gather_along_links<Columns>;
+  }
+}
 
 std::array<std::uint16_t, 3> bfloat16s(const float* values) {
   return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
@@ -199,7 +212,7 @@ void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out
 template <typename Columns>
 void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
   std::vector<LinkLightOf<Columns>> light(node_.size()), arrived(node_.size());
-  gather(in, out, light.data(), arrived.data(), gather_along_links<Columns>);
+  gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>());
 }
 
 template <typename Columns, typename Lanes>
@@ -270,11 +283,9 @@ void LinkedFormFactors::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out
 
 template void LinkedFormFactors::gather(std::span<const std::array<float, 3>>,
                                         std::span<std::array<float, 3>>) const;
-template void LinkedFormFactors::gather(std::span<const std::array<float, 24>>,
-                                        std::span<std::array<float, 24>>) const;
+template void LinkedFormFactors::gather(std::span<const ManyFloats>, std::span<ManyFloats>) const;
 template void LinkedFormFactors::gather(std::span<const std::array<double, 3>>,
                                         std::span<std::array<double, 3>>) const;
-template void LinkedFormFactors::gather(std::span<const std::array<double, 24>>,
-                                        std::span<std::array<double, 24>>) const;
+template void LinkedFormFactors::gather(std::span<const ManyDoubles>, std::span<ManyDoubles>) const;
 
 }  // namespace rebounce

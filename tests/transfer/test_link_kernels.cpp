@@ -29,23 +29,36 @@ TEST(Bfloat16, IsTheNearest) {
   EXPECT_EQ(bfloat16_to_float(float_to_bfloat16(-1.5F)), -1.5F);
 }
 
-TEST(LinkKernels, AgreeWithEachOther) {
-  std::mt19937 engine(2);
+template <typename Lanes>
+std::vector<LinkLightOf<Lanes>> random_light(std::size_t count, std::mt19937& engine) {
   std::uniform_real_distribution<float> value(-1, 1);
-  std::vector<LinkLight> light(50);
-  for (LinkLight& l : light) {
-    for (float& x : l.mean) x = value(engine);
-    for (ColorLanes& first : l.first) {
-      for (float& x : first) x = value(engine);
+  std::vector<LinkLightOf<Lanes>> light(count);
+  for (LinkLightOf<Lanes>& l : light) {
+    for (auto& x : l.mean) x = value(engine);
+    for (Lanes& first : l.first) {
+      for (auto& x : first) x = value(engine);
     }
   }
-  std::vector<IncomingLink> links(200);
+  return light;
+}
+
+std::vector<IncomingLink> random_links(std::size_t count, std::size_t node_count,
+                                       std::mt19937& engine) {
+  std::uniform_real_distribution<float> value(-1, 1);
+  std::vector<IncomingLink> links(count);
   for (IncomingLink& link : links) {
-    link.from = static_cast<std::uint32_t>(engine() % light.size());
+    link.from = static_cast<std::uint32_t>(engine() % node_count);
     link.exchange_area = std::abs(value(engine));
     for (std::uint16_t& g : link.gradient_from) g = float_to_bfloat16(value(engine));
     for (std::uint16_t& g : link.gradient_to) g = float_to_bfloat16(value(engine));
   }
+  return links;
+}
+
+TEST(LinkKernels, AgreeWithEachOther) {
+  std::mt19937 engine(2);
+  const auto light = random_light<ColorLanes>(50, engine);
+  const std::vector<IncomingLink> links = random_links(200, light.size(), engine);
   for (const std::size_t count : {0UL, 1UL, 200UL}) {
     const LinkLight wanted = kLinkKernelsPortable.gather(links.data(), count, light.data());
     for (const LinkKernels* kernels : link_kernel_sets()) {
@@ -55,6 +68,26 @@ TEST(LinkKernels, AgreeWithEachOther) {
       for (std::size_t k = 0; k < found.size(); ++k) {
         EXPECT_NEAR(found[k], expected[k], 1e-4) << kernels->instruction_set << " " << k;
       }
+    }
+  }
+}
+
+TEST(LinkKernels, GiveTheSameBitsForManyLights) {
+  std::mt19937 engine(3);
+  const auto floats = random_light<ManyFloats>(50, engine);
+  const auto doubles = random_light<ManyDoubles>(50, engine);
+  const std::vector<IncomingLink> links = random_links(200, floats.size(), engine);
+  for (const std::size_t count : {0UL, 1UL, 200UL}) {
+    const auto wanted = kLinkKernelsPortable.gather_floats(links.data(), count, floats.data());
+    const auto exact = kLinkKernelsPortable.gather_doubles(links.data(), count, doubles.data());
+    for (const LinkKernels* kernels : link_kernel_sets()) {
+      SCOPED_TRACE(kernels->instruction_set);
+      const auto found = kernels->gather_floats(links.data(), count, floats.data());
+      EXPECT_EQ(found.mean, wanted.mean);
+      EXPECT_EQ(found.first, wanted.first);
+      const auto found_exact = kernels->gather_doubles(links.data(), count, doubles.data());
+      EXPECT_EQ(found_exact.mean, exact.mean);
+      EXPECT_EQ(found_exact.first, exact.first);
     }
   }
 }
