@@ -82,13 +82,25 @@ struct ChannelLanes {
 };
 
 /// out(row) = S in(column) and out(column) = S^T in(row), as its direction says, for one core after
-/// the other and each light; what was there before is overwritten. Coefficients of remainders are
-/// added to those that they belong to, and become zero; those that come out are written too.
-/// Sixteen values are read from the beginning of each entry.
+/// the other and each light; what was there before is overwritten, also where `out` is `in`.
+/// Coefficients of remainders are added to those that they belong to; those that come out are
+/// written too. Sixteen values are read from the beginning of each entry. `taken` has room for
+/// taken_size() of each core.
 template <typename Value>
 using CoreKernel = void (*)(const Value* values, std::span<const CoreBlock> cores,
                             const ChannelLanes& lanes, std::size_t light_count,
-                            Coefficients<float> in, Coefficients<float> out);
+                            Coefficients<const float> in, Coefficients<float> out, float* taken);
+
+/// Floats that the coefficients of one end of a core take up, in whole cache lines.
+constexpr std::size_t end_size(std::size_t coefficients) {
+  constexpr std::size_t kOfLine = 4;
+  return (coefficients + kOfLine - 1) / kOfLine * kOfLine * kChannelLanes;
+}
+
+/// Floats in which a core keeps what it takes.
+constexpr std::size_t taken_size(std::size_t rows, std::size_t columns) {
+  return end_size(rows) + end_size(columns);
+}
 
 /// A dense block of the only matrix of an operator, [rows][columns], both multiples of
 /// HierarchicalOperator::kAlignment.

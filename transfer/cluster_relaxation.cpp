@@ -93,8 +93,8 @@ class ClusterRelaxation final : public Relaxation {
         upper_(positions()),
         received_(positions()),
         sent_(plan_.coefficient_count),
-        taken_(plan_.coefficient_count),
-        arrived_(plan_.coefficient_count) {}
+        arrived_(plan_.coefficient_count),
+        taken_(plan_.largest_taken) {}
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     area_ = problem.area;
@@ -229,23 +229,7 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void multiply(std::span<const CoreBlock> cores) {
-    if (exchange_.precision != Precision::kQ8) return multiply(cores, sent_);
-    // Cores are multiplied more than once with what was sent, and parts of that are written anew in
-    // between: remainders are added to copies.
-    for (const CoreBlock& core : cores) {
-      copy_sent(core.row, core.rows + core.row_remainders);
-      copy_sent(core.column, core.columns + core.column_remainders);
-    }
-    multiply(cores, taken_);
-  }
-
-  void multiply(std::span<const CoreBlock> cores, CoefficientArray& in) {
-    cores_.multiply(core_values_, cores, lanes_, 1, in.to(0), arrived_.to(0));
-  }
-
-  void copy_sent(std::size_t first, std::size_t count) {
-    const float* const from = sent_.from(first).data;
-    std::copy_n(from, count * kChannelLanes, taken_.to(first).data);
+    cores_.multiply(core_values_, cores, lanes_, 1, sent_.from(0), arrived_.to(0), taken_.data());
   }
 
   void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
@@ -311,7 +295,7 @@ class ClusterRelaxation final : public Relaxation {
     for (std::uint32_t k = 0; k < size; ++k) {
       const std::uint32_t row = direction == SweepDirection::kForward ? k : size - 1 - k;
       row_block.values = step.values + std::uint64_t{row} * size;
-      multiply({&row_block, 1}, sent_);
+      multiply({&row_block, 1});
       changed_squared += relax_position(begin + row, step.coefficient);
       send(begin + row, step.coefficient + row);
     }
@@ -350,9 +334,10 @@ class ClusterRelaxation final : public Relaxation {
   ClusterSweepPlan plan_;
   /// R A^1/2 M0, R^2 rho x value_scale, R A^1/2 B.
   Planes light_, reflectance_, radiosity_;
-  std::vector<float> change_weight_;         ///< [positions] R^-2: changes are those of A^1/2 B
-  Planes lower_, upper_, received_;          ///< L x, L^T x, and both and D x
-  CoefficientArray sent_, taken_, arrived_;  ///< coefficients of x, as cores take them, of cores
+  std::vector<float> change_weight_;  ///< [positions] R^-2: changes are those of A^1/2 B
+  Planes lower_, upper_, received_;   ///< L x, L^T x, and both and D x
+  CoefficientArray sent_, arrived_;   ///< coefficients of x, and what cores make of them
+  std::vector<float> taken_;          ///< what one of them takes
   std::span<const float> area_;
   Known known_ = Known::kNothing;
   bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of x

@@ -53,6 +53,7 @@ class Planner {
     add_bases();
     add_products();
     plan_.coefficient_count = layout_.coefficient_count;
+    plan_.largest_taken = layout_.largest_taken;
   }
 
  private:

@@ -66,6 +66,7 @@ struct ClusterSweepPlan {
   Products to_ending_columns;     ///< at the step in which their columns end
   Products from_ending_columns;   ///< to rows, likewise
   std::uint32_t coefficient_count = 0;
+  std::size_t largest_taken = 0;  ///< as HierarchicalLayout has it
 };
 
 }  // namespace rebounce

@@ -27,6 +27,11 @@ REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std
   }
 }
 
+/// What a core takes: its coefficients at both ends.
+struct TakenEnds {
+  const float *row, *column;
+};
+
 /// Columns from `begin` on, as many as fill kWide vectors or are left, for one light. The lanes of
 /// a vector are the channels of neighbouring entries of a row: ranks are 5 in the mean, and vectors
 /// of as many entries as there are lanes would be two thirds empty. Lanes beyond the last column
@@ -34,7 +39,7 @@ REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std
 template <typename V, Direction kDirection, std::size_t kWide, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBlock& core,
                                              std::size_t begin, const ChannelLanes& lanes,
-                                             const float* in, float* out) {
+                                             const TakenEnds& taken, float* out) {
   constexpr bool kToRows = kDirection != Direction::kToColumns;
   constexpr bool kToColumns = kDirection != Direction::kToRows;
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes, kLast = kWide - 1;
@@ -43,8 +48,8 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBloc
   const std::size_t last_lanes =
       (std::min(core.columns - begin, kWide * kEntries) - kLast * kEntries) * kChannelLanes;
   const Value* const s = values + begin * lanes.matrix_count;
-  const float* const row_in = in + core.row * kChannelLanes;
-  const float* const column_in = in + (core.column + begin) * kChannelLanes;
+  const float* const row_in = taken.row;
+  const float* const column_in = taken.column + begin * kChannelLanes;
   float* const row_out = out + core.row * kChannelLanes;
   float* const column_out = out + (core.column + begin) * kChannelLanes;
   V from_columns[kWide], to_columns[kWide];
@@ -84,32 +89,36 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBloc
 
 template <typename V, Direction kDirection, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& core,
-                                          const ChannelLanes& lanes, const float* in, float* out) {
+                                          const ChannelLanes& lanes, const TakenEnds& taken,
+                                          float* out) {
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes;
   for_each_rows<V::kCoreVectors>((core.columns + kEntries - 1) / kEntries,
                                  [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
                                    multiply_columns<V, kDirection, kWide, Entries>(
-                                       values, core, first * kEntries, lanes, in, out);
+                                       values, core, first * kEntries, lanes, taken, out);
                                  });
 }
 
 // What there is of remainders is half a vector or less as a rule: masked vectors, as loops that g++
 // makes of such counts are mostly their beginnings and ends.
 
-/// Adds what came in for remainders to the coefficients that they belong to. Not twice, if a core
-/// is multiplied again with what came in.
+/// The coefficients of an end, with what came in for remainders added to those that they belong to.
+/// They are where they are, unless that changes them or they are written over: then in `taken`.
 template <typename V>
-REBOUNCE_INLINE inline void fold_remainders(float* in, std::size_t rank, std::size_t remainders) {
+REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
+                                             std::size_t remainders, bool in_place, float* taken) {
+  if (!in_place && remainders == 0) return in;
   const V scale = V::broadcast(1 / HierarchicalOperator::kRemainderScale);
-  float* const remainder = in + rank * kChannelLanes;
-  const std::size_t count = remainders * kChannelLanes;
+  const std::size_t count = rank * kChannelLanes, rest = remainders * kChannelLanes;
   for (std::size_t k = 0; k < count; k += V::kWidth) {
-    const std::size_t lanes = std::min(count - k, V::kWidth);
-    const V folded =
-        multiply_add(V::load_some(remainder + k, lanes), scale, V::load_some(in + k, lanes));
-    folded.store_some(in + k, lanes);
-    V::zero().store_some(remainder + k, lanes);
+    V coefficients = V::load_some(in + k, std::min(count - k, V::kWidth));
+    if (k < rest) {
+      const V remainder = V::load_some(in + count + k, std::min(rest - k, V::kWidth));
+      coefficients = multiply_add(remainder, scale, coefficients);
+    }
+    coefficients.store(taken + k);
   }
+  return taken;
 }
 
 /// What goes out to remainders.
@@ -128,23 +137,25 @@ REBOUNCE_INLINE inline void spread_remainders(float* out, std::size_t rank,
 /// A core in its direction, with the remainders at its ends.
 template <typename V, Direction kDirection, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CoreBlock& core,
-                                          const ChannelLanes& lanes, float* in, float* out) {
-  float* const row = in + std::size_t{core.row} * kChannelLanes;
-  float* const column = in + std::size_t{core.column} * kChannelLanes;
+                                          const ChannelLanes& lanes, const float* in, float* out,
+                                          float* taken) {
+  const std::size_t row = std::size_t{core.row} * kChannelLanes;
+  const std::size_t column = std::size_t{core.column} * kChannelLanes;
+  const bool in_place = in == out;
+  TakenEnds ends{};
   if constexpr (kDirection != Direction::kToColumns) {
-    fold_remainders<V>(column, core.columns, core.column_remainders);
+    ends.column = take_end<V>(in + column, core.columns, core.column_remainders, in_place, taken);
   }
   if constexpr (kDirection != Direction::kToRows) {
-    fold_remainders<V>(row, core.rows, core.row_remainders);
+    ends.row = take_end<V>(in + row, core.rows, core.row_remainders, in_place,
+                           taken + end_size(core.columns));
   }
-  multiply_core<V, kDirection, Entries>(values, core, lanes, in, out);
+  multiply_core<V, kDirection, Entries>(values, core, lanes, ends, out);
   if constexpr (kDirection != Direction::kToColumns) {
-    spread_remainders<V>(out + std::size_t{core.row} * kChannelLanes, core.rows,
-                         core.row_remainders);
+    spread_remainders<V>(out + row, core.rows, core.row_remainders);
   }
   if constexpr (kDirection != Direction::kToRows) {
-    spread_remainders<V>(out + std::size_t{core.column} * kChannelLanes, core.columns,
-                         core.column_remainders);
+    spread_remainders<V>(out + column, core.columns, core.column_remainders);
   }
 }
 
@@ -160,10 +171,10 @@ inline void ask_for_two_lines(const void* p) {
 
 template <typename V, typename Entries, typename Value>
 void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
-                         const ChannelLanes& lanes, std::size_t light_count, Coefficients<float> in,
-                         Coefficients<float> out) {
+                         const ChannelLanes& lanes, std::size_t light_count,
+                         Coefficients<const float> in, Coefficients<float> out, float* taken) {
   for (std::size_t l = 0; l < light_count; ++l) {
-    float* const from = in.data + l * in.stride;
+    const float* const from = in.data + l * in.stride;
     float* const to = out.data + l * out.stride;
     for (std::size_t k = 0; k < cores.size(); ++k) {
       const CoreBlock& core = cores[k];
@@ -173,13 +184,13 @@ void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
       }
       switch (core.direction) {
         case Direction::kBoth:
-          multiply_ends<V, Direction::kBoth, Entries>(s, core, lanes, from, to);
+          multiply_ends<V, Direction::kBoth, Entries>(s, core, lanes, from, to, taken);
           break;
         case Direction::kToRows:
-          multiply_ends<V, Direction::kToRows, Entries>(s, core, lanes, from, to);
+          multiply_ends<V, Direction::kToRows, Entries>(s, core, lanes, from, to, taken);
           break;
         case Direction::kToColumns:
-          multiply_ends<V, Direction::kToColumns, Entries>(s, core, lanes, from, to);
+          multiply_ends<V, Direction::kToColumns, Entries>(s, core, lanes, from, to, taken);
           break;
       }
     }
@@ -188,16 +199,16 @@ void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
 
 template <typename V, typename Value>
 void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
-                    const ChannelLanes& lanes, std::size_t light_count, Coefficients<float> in,
-                    Coefficients<float> out) {
+                    const ChannelLanes& lanes, std::size_t light_count,
+                    Coefficients<const float> in, Coefficients<float> out, float* taken) {
   if constexpr (V::kWidth == 16) {
     if (lanes.matrix_count == 1) {
       using Entries = typename V::OneMatrixEntries;
-      return multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out);
+      return multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out, taken);
     }
   }
   using Entries = typename V::template EntryLanes<Value>;
-  multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out);
+  multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out, taken);
 }
 
 }  // namespace

@@ -49,7 +49,8 @@ struct HierarchicalLayout {
   std::uint64_t basis_value_count = 0;
   std::uint64_t core_value_count = 0;  ///< cores and dense entries
   std::uint32_t coefficient_count = 0;
-  std::uint32_t rank_group;  ///< ranks that are kept together: 1, or of integers kRankGroup
+  std::size_t largest_taken = 0;  ///< taken_size() of the largest core
+  std::uint32_t rank_group;       ///< ranks that are kept together: 1, or of integers kRankGroup
   std::uint32_t moment_count = 0;
 
   /// `value_count` values with the zeros that follow them.

@@ -30,30 +30,33 @@ std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
 
-/// The vectors of an apply to some lights. Positions of patches are followed by moments.
+/// The vectors of an apply to some lights. Positions of patches are followed by moments. What cores
+/// and dense blocks make of coefficients is written over what they take: less memory to go through.
 struct WorkVectors {
   std::size_t light_count;
-  PlanarVectors<float> x;       ///< by position, times the root of the area
-  Coefficients<float> sent;     ///< of x in the bases
-  Coefficients<float> arrived;  ///< products of cores and dense blocks
-  PlanarVectors<float> y;       ///< by position, what arrives
+  PlanarVectors<float> x;           ///< by position, times the root of the area
+  Coefficients<float> coefficient;  ///< of x in the bases, and then of y
+  std::span<float> taken;           ///< by cores, of `taken_stride` floats for each part of them
+  std::size_t taken_stride;
+  PlanarVectors<float> y;  ///< by position, what arrives
 
   WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
               float* buffer)
-      : light_count(lights) {
+      : light_count(lights), taken_stride(layout.largest_taken) {
     const std::size_t vector = vector_size(positions, layout);
     const std::size_t coefficients = coefficients_size(layout);
     const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
     x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
-    sent = {take(light_count * coefficients), coefficients};
-    arrived = {take(light_count * coefficients), coefficients};
+    coefficient = {take(light_count * coefficients), coefficients};
+    taken = {take(taken_size(layout)), taken_size(layout)};
     y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
   }
 
   static std::size_t size(std::size_t positions, const HierarchicalLayout& layout,
                           std::size_t light_count) {
-    return 2 * (kChannelCount * vector_size(positions, layout) + coefficients_size(layout)) *
-           light_count;
+    return (2 * kChannelCount * vector_size(positions, layout) + coefficients_size(layout)) *
+               light_count +
+           taken_size(layout);
   }
 
  private:
@@ -62,6 +65,9 @@ struct WorkVectors {
   }
   static std::size_t coefficients_size(const HierarchicalLayout& layout) {
     return round_up(layout.coefficient_count * kChannelLanes, kLine);
+  }
+  static std::size_t taken_size(const HierarchicalLayout& layout) {
+    return HierarchicalPlan::kMostParts * layout.largest_taken;
   }
 };
 
@@ -96,13 +102,13 @@ class Phases {
         work_(work) {}
 
   void project(std::span<const BasisPart> parts) const {
-    bases_.project(basis_, parts, constant(work_.x), work_.sent);
+    bases_.project(basis_, parts, constant(work_.x), work_.coefficient);
   }
 
   void take_light(const DenseEnd& end) const {
     for (std::size_t v = 0; v < work_.x.count; ++v) {
       const float* const x = work_.x.data + v * work_.x.stride + end.position;
-      float* const lane = lane_of(work_.sent, v, end.coefficient);
+      float* const lane = lane_of(work_.coefficient, v, end.coefficient);
       for (std::size_t k = 0; k < end.count; ++k) lane[k * kChannelLanes] = x[k];
     }
   }
@@ -111,7 +117,7 @@ class Phases {
   void take_moments(const HierarchicalPlan::Moments& moments) const {
     const std::size_t stride = work_.x.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
-      float* const lane = lane_of(work_.sent, light * kChannelCount, moments.coefficient);
+      float* const lane = lane_of(work_.coefficient, light * kChannelCount, moments.coefficient);
       const float* const remainder = lane + moments.rank * kChannelLanes;
       for (std::size_t k = 0; k < moments.remainders * kChannelLanes; ++k) {
         lane[k] += kRemainder * remainder[k];
@@ -130,7 +136,7 @@ class Phases {
     const std::size_t stride = work_.y.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
       const float* const y = work_.y.data + light * kChannelCount * stride + moments.position;
-      float* const lane = lane_of(work_.arrived, light * kChannelCount, moments.coefficient);
+      float* const lane = lane_of(work_.coefficient, light * kChannelCount, moments.coefficient);
       for (std::size_t k = 0; k < moments.rank; ++k) {
         const float scale = moment_scale_[moments.scale + k] / basis_scale_;
         for (int c = 0; c < kChannelCount; ++c)
@@ -144,21 +150,23 @@ class Phases {
     }
   }
 
-  void multiply(std::span<const CoreBlock> cores) const {
-    cores_.multiply(value_, cores, lanes_, work_.light_count, work_.sent, work_.arrived);
+  /// Those of one part.
+  void multiply(std::span<const CoreBlock> cores, std::size_t part) const {
+    cores_.multiply(value_, cores, lanes_, work_.light_count, constant(work_.coefficient),
+                    work_.coefficient, work_.taken.data() + part * work_.taken_stride);
   }
 
   void multiply_dense(std::span<const DenseBlock> blocks) const {
-    cores_.multiply_dense(value_, blocks, constant(work_.x), work_.arrived);
+    cores_.multiply_dense(value_, blocks, constant(work_.x), work_.coefficient);
   }
 
   void expand(std::span<const BasisPart> parts) const {
-    bases_.expand(basis_, parts, constant(work_.arrived), work_.y);
+    bases_.expand(basis_, parts, constant(work_.coefficient), work_.y);
   }
 
   void add_light(std::span<const DenseEnd> ends) const {
     if (lanes_.matrix_count == 1) {
-      cores_.add_products(ends, constant(work_.arrived), product_scale(), work_.y);
+      cores_.add_products(ends, constant(work_.coefficient), product_scale(), work_.y);
     } else {
       for (const DenseEnd& end : ends) add_coefficients(end);
     }
@@ -178,7 +186,7 @@ class Phases {
 
   void add_coefficients(const DenseEnd& end) const {
     for (std::size_t v = 0; v < work_.y.count; ++v) {
-      const float* const lane = lane_of(work_.arrived, v, end.coefficient + end.first);
+      const float* const lane = lane_of(work_.coefficient, v, end.coefficient + end.first);
       float* const y = work_.y.data + v * work_.y.stride + end.position;
       for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale() * lane[k * kChannelLanes];
     }
@@ -300,7 +308,7 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
     }
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t part = 0; part < plan.core_parts.size() - 1; ++part) {
-      phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]));
+      phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]), part);
     }
     if (!plan.moments_out.empty()) {
       arrive(plan, plan.moment_arrivals, phases, work, [](const Arrival&) {});

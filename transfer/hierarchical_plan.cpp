@@ -8,17 +8,16 @@ namespace {
 
 constexpr std::uint32_t kAlignment = HierarchicalOperator::kAlignment;
 
-// Parts of a phase: enough for the threads of a desktop to share it evenly.
-constexpr std::uint64_t kPartCount = 16;
+constexpr std::uint64_t kMostParts = HierarchicalPlan::kMostParts;
 
-/// Bounds of kPartCount runs of entries of about equal total weight.
+/// Bounds of kMostParts runs of entries of about equal total weight.
 template <typename Entry, typename Weight>
 std::vector<std::uint32_t> share_out(const std::vector<Entry>& entries, const Weight& weight) {
   std::uint64_t total = 0, done = 0;
   for (const Entry& entry : entries) total += weight(entry);
   std::vector<std::uint32_t> bounds{0};
   for (std::uint32_t k = 0; k < entries.size(); ++k) {
-    if (done * kPartCount >= total * bounds.size()) bounds.push_back(k);
+    if (done * kMostParts >= total * bounds.size()) bounds.push_back(k);
     done += weight(entries[k]);
   }
   bounds.push_back(static_cast<std::uint32_t>(entries.size()));

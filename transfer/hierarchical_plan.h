@@ -17,6 +17,9 @@ namespace rebounce {
 /// the number of threads.
 class HierarchicalPlan {
  public:
+  /// Parts of a step at most: enough for the threads of a desktop to share it evenly.
+  static constexpr std::uint64_t kMostParts = 16;
+
   /// Positions or moments that one thread works out from the first addition to the last.
   struct Arrival {
     std::uint32_t begin, end;  ///< multiples of kAlignment

@@ -766,6 +766,20 @@ void check_integer_bases(const BasisKernels<Value>& kernels, std::size_t rank, s
   }
 }
 
+/// Products that are written over what they are of are the same.
+template <typename Value>
+void check_in_place(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
+                    const CoreBlock& core, const ChannelLanes& lanes, std::size_t lights,
+                    const std::vector<float>& in, const std::vector<float>& out) {
+  std::vector<float> both = in, taken(taken_size(core.rows, core.columns));
+  const std::size_t stride = in.size() / lights;
+  multiply_cores(values.data(), {&core, 1}, lanes, lights, {both.data(), stride},
+                 {both.data(), stride}, taken.data());
+  for (std::size_t k = 0; k < both.size(); ++k) {
+    EXPECT_EQ(both[k], out[k] == kUntouched ? in[k] : out[k]) << k;
+  }
+}
+
 template <typename Value>
 void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
                 const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
@@ -776,11 +790,14 @@ void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& valu
   const std::array<std::uint32_t, 3> matrix{last, 0, last};
   Random random;
   std::vector<float> in = random.floats(lights * kEnd * kChannelLanes);
+  const ChannelLanes lanes(matrix, matrices);
   for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
-    const std::vector<CoreBlock> cores{{8, rows, columns, kRow, kColumn, direction}};
+    const CoreBlock core{8, rows, columns, kRow, kColumn, direction};
     std::vector<float> out(lights * kEnd * kChannelLanes, kUntouched);
-    multiply_cores(values.data(), cores, ChannelLanes(matrix, matrices), lights,
-                   {in.data(), kEnd * kChannelLanes}, {out.data(), kEnd * kChannelLanes});
+    std::vector<float> taken(taken_size(rows, columns));
+    multiply_cores(values.data(), {&core, 1}, lanes, lights, {in.data(), kEnd * kChannelLanes},
+                   {out.data(), kEnd * kChannelLanes}, taken.data());
+    check_in_place(multiply_cores, values, core, lanes, lights, in, out);
     for (std::size_t v = 0; v < 3 * lights; ++v) {
       const auto at = [v](std::size_t k) { return (v / 3 * kEnd + k) * kChannelLanes + v % 3; };
       const auto entry = [&](std::size_t i, std::size_t j) {
@@ -945,19 +962,28 @@ TEST(BlockKernels, RemaindersBelongToTheFirstCoefficients) {
   const ChannelLanes lanes({0, 1, 2}, 3);
   for (const BlockKernelSet* set : block_kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
-    std::vector<float> expected(kEnd * kChannelLanes, kUntouched), out = expected, in = sent;
-    set->cores_f32.multiply(values.data(), {&plain, 1}, lanes, 1, {whole.data(), 0},
-                            {expected.data(), 0});
-    for (int times = 0; times < 2; ++times) {  // what came in is not added twice
-      set->cores_f32.multiply(values.data(), {&core, 1}, lanes, 1, {in.data(), 0}, {out.data(), 0});
+    std::vector<float> expected(kEnd * kChannelLanes, kUntouched), out = expected, both = sent;
+    std::vector<float> taken(taken_size(kRows, kColumns));
+    const auto multiply = [&](const CoreBlock& block, const std::vector<float>& in,
+                              std::vector<float>& to) {
+      set->cores_f32.multiply(values.data(), {&block, 1}, lanes, 1, {in.data(), 0}, {to.data(), 0},
+                              taken.data());
+    };
+    multiply(plain, whole, expected);
+    multiply(core, sent, out);
+    multiply(core, both, both);
+    for (const std::vector<float>* products : {&out, &both}) {
       for (std::uint32_t k = 0; k < kEnd; ++k) {
         const bool of_row = k >= kRow + kRows && k < kRow + kRows + 2;
         const bool of_column = k >= kColumn + kColumns && k < kColumn + kColumns + 3;
+        const bool inside =
+            (k >= kRow && k < kRow + kRows + 2) || (k >= kColumn && k < kColumn + kColumns + 3);
         for (std::uint32_t c = 0; c < 3; ++c) {
-          const float value = of_row      ? expected[at(k - kRows) + c] / kScale
-                              : of_column ? expected[at(k - kColumns) + c] / kScale
-                                          : expected[at(k) + c];
-          EXPECT_NEAR(out[at(k) + c], value, 1e-6F) << k;
+          const float value = of_row                       ? expected[at(k - kRows) + c] / kScale
+                              : of_column                  ? expected[at(k - kColumns) + c] / kScale
+                              : inside || products == &out ? expected[at(k) + c]
+                                                           : sent[at(k) + c];
+          EXPECT_NEAR((*products)[at(k) + c], value, 1e-6F) << k;
         }
       }
     }
