@@ -36,19 +36,18 @@ struct WorkVectors {
   std::size_t light_count;
   PlanarVectors<float> x;           ///< by position, times the root of the area
   Coefficients<float> coefficient;  ///< of x in the bases, and then of y
-  std::span<float> taken;           ///< by cores, of `taken_stride` floats for each part of them
-  std::size_t taken_stride;
-  PlanarVectors<float> y;  ///< by position, what arrives
+  PlanarVectors<float> taken;       ///< by the cores of each part
+  PlanarVectors<float> y;           ///< by position, what arrives
 
   WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
               float* buffer)
-      : light_count(lights), taken_stride(layout.largest_taken) {
+      : light_count(lights) {
     const std::size_t vector = vector_size(positions, layout);
     const std::size_t coefficients = coefficients_size(layout);
     const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
     x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
     coefficient = {take(light_count * coefficients), coefficients};
-    taken = {take(taken_size(layout)), taken_size(layout)};
+    taken = {take(kParts * layout.largest_taken), layout.largest_taken, kParts};
     y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
   }
 
@@ -56,18 +55,17 @@ struct WorkVectors {
                           std::size_t light_count) {
     return (2 * kChannelCount * vector_size(positions, layout) + coefficients_size(layout)) *
                light_count +
-           taken_size(layout);
+           kParts * layout.largest_taken;
   }
 
  private:
+  static constexpr std::size_t kParts = HierarchicalPlan::kMostParts;
+
   static std::size_t vector_size(std::size_t positions, const HierarchicalLayout& layout) {
     return round_up(positions + layout.moment_count, kLine);
   }
   static std::size_t coefficients_size(const HierarchicalLayout& layout) {
     return round_up(layout.coefficient_count * kChannelLanes, kLine);
-  }
-  static std::size_t taken_size(const HierarchicalLayout& layout) {
-    return HierarchicalPlan::kMostParts * layout.largest_taken;
   }
 };
 
@@ -153,7 +151,7 @@ class Phases {
   /// Those of one part.
   void multiply(std::span<const CoreBlock> cores, std::size_t part) const {
     cores_.multiply(value_, cores, lanes_, work_.light_count, constant(work_.coefficient),
-                    work_.coefficient, work_.taken.data() + part * work_.taken_stride);
+                    work_.coefficient, work_.taken.data + part * work_.taken.stride);
   }
 
   void multiply_dense(std::span<const DenseBlock> blocks) const {
