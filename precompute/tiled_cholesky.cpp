@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Dense>
 
+#include "flush_to_zero.h"
 #include "rebounce/transfer/error.h"
 #include "single_threaded_blas.h"
 
@@ -26,6 +27,16 @@ class StageProgress {
   std::size_t steps_;
 };
 
+/// work(k) for k < count, shared out among threads.
+template <typename Work>
+void for_each_tile(std::size_t count, const Work& work) {
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t k = 0; k < count; ++k) {
+    const FlushToZero flush;  // of this thread; some cycles, where a tile takes a million
+    work(k);
+  }
+}
+
 template <typename Scalar>
 void factor(TiledMatrix<Scalar>& m, const StageProgress& progress) {
   for (std::size_t k = 0; k < m.side(); ++k) {
@@ -35,21 +46,19 @@ void factor(TiledMatrix<Scalar>& m, const StageProgress& progress) {
       throw Error("the radiosity system is not positive definite; a reflectance must be 1 or more");
     }
     diagonal = llt.matrixL();
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t i = k + 1; i < m.side(); ++i) {
-      auto a = m.tile(i, k);
+    const std::size_t left = m.side() - k - 1;
+    for_each_tile(left, [&](std::size_t index) {
+      auto a = m.tile(k + 1 + index, k);
       diagonal.template triangularView<Eigen::Lower>()
           .transpose()
           .template solveInPlace<Eigen::OnTheRight>(a);
-    }
+    });
     // All tiles (i, j) with k < j <= i, as one index so that threads share them evenly.
-    const std::size_t left = m.side() - k - 1;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t index = 0; index < left * left; ++index) {
+    for_each_tile(left * left, [&](std::size_t index) {
       const std::size_t i = k + 1 + index / left, j = k + 1 + index % left;
-      if (j > i) continue;
+      if (j > i) return;
       m.tile(i, j).noalias() -= m.tile(i, k) * m.tile(j, k).transpose();
-    }
+    });
     const double rest = 1 - progress.fraction(k);
     progress.report(0, 1 - rest * rest * rest);
   }
@@ -62,22 +71,19 @@ void invert_lower(TiledMatrix<Scalar>& m, const StageProgress& progress) {
     auto diagonal = m.tile(k, k);
     const auto lower = diagonal.template triangularView<Eigen::Lower>();
     const std::size_t below = m.side() - k - 1;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t i = k + 1; i < m.side(); ++i) {
-      auto a = m.tile(i, k);
+    for_each_tile(below, [&](std::size_t index) {
+      auto a = m.tile(k + 1 + index, k);
       lower.template solveInPlace<Eigen::OnTheRight>(a);
       a = -a;
-    }
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t index = 0; index < below * k; ++index) {
+    });
+    for_each_tile(below * k, [&](std::size_t index) {
       const std::size_t i = k + 1 + index / k, j = index % k;
       m.tile(i, j).noalias() += m.tile(i, k) * m.tile(k, j);
-    }
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t j = 0; j < k; ++j) {
+    });
+    for_each_tile(k, [&](std::size_t j) {
       auto a = m.tile(k, j);
       lower.solveInPlace(a);
-    }
+    });
     Matrix inverse = Matrix::Identity(m.kTile, m.kTile);
     lower.solveInPlace(inverse);
     diagonal = inverse;
@@ -89,18 +95,16 @@ void invert_lower(TiledMatrix<Scalar>& m, const StageProgress& progress) {
 template <typename Scalar>
 void multiply_by_transpose(TiledMatrix<Scalar>& m, const StageProgress& progress) {
   for (std::size_t k = 0; k < m.side(); ++k) {
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t index = 0; index < k * k; ++index) {
+    for_each_tile(k * k, [&](std::size_t index) {
       const std::size_t i = index / k, j = index % k;
-      if (j > i) continue;
+      if (j > i) return;
       m.tile(i, j).noalias() += m.tile(k, i).transpose() * m.tile(k, j);
-    }
+    });
     auto diagonal = m.tile(k, k);
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t j = 0; j < k; ++j) {
+    for_each_tile(k, [&](std::size_t j) {
       auto a = m.tile(k, j);
       a = diagonal.template triangularView<Eigen::Lower>().transpose() * a.eval();
-    }
+    });
     const typename TiledMatrix<Scalar>::Matrix product = diagonal.transpose() * diagonal;
     diagonal = product;
     const double done = progress.fraction(k);
@@ -125,6 +129,7 @@ std::size_t TiledMatrix<Scalar>::bytes(std::size_t size) {
 template <typename Scalar>
 void invert_positive_definite(TiledMatrix<Scalar>& matrix, const Progress& progress) {
   const SingleThreadedBlas single_threaded;
+  const FlushToZero flush;
   const StageProgress stages(progress, matrix.side());
   factor(matrix, stages);
   invert_lower(matrix, stages);

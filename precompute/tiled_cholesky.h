@@ -47,7 +47,9 @@ class TiledMatrix {
 /// of parallel tiled linear algebra algorithms for multicore architectures", 2009. Every tile meets
 /// its updates in a fixed order and BLAS runs on one thread, so the bits do not depend on the
 /// number of OpenMP threads. Throws Error if the matrix is not positive definite, Cancelled if
-/// asked to stop. For doubles and floats.
+/// asked to stop. Denormal numbers count as zero: where patches exchange next to nothing, products
+/// of little with little are, and took two thirds of the time (Sponza of 16,000 patches, on a
+/// processor of Intel). For doubles and floats.
 template <typename Scalar>
 void invert_positive_definite(TiledMatrix<Scalar>& matrix, const Progress& progress = {});
 
