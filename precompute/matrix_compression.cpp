@@ -22,10 +22,10 @@ namespace {
 // Measured: notes/operator.md.
 constexpr std::uint32_t kLeafSize = 32;
 
-// The search for the price ends with an error between these parts of the tolerance: other lights
-// than those that it sees may do a little worse.
+// The search for the price aims at this part of the tolerance, and ends at kMost at most: other
+// lights than those that it sees may do a little worse.
 constexpr int kMostRounds = 8;
-constexpr double kLeast = 0.72, kAim = 0.76, kMost = 0.8;
+constexpr double kAim = 0.76, kMost = 0.8;
 
 // Rounds that the search takes as a rule.
 constexpr int kUsualRounds = 4;
@@ -41,6 +41,9 @@ constexpr double kFirstPrice = 2.5;
 // Operators with moments mostly end far above it. Their search begins higher by this power of how
 // many times so many patches they have, and by so much at most. Measured: notes/operator.md.
 constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
+
+// Those without, form factors, end at 2.5 to 22 times it as a rule.
+constexpr double kPlainStart = 2;
 
 // From one round to the next, the strength of a shaping light changes by a factor between these.
 constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
@@ -222,7 +225,7 @@ class Best {
 /// The price that a search begins with.
 double search_start(const HierarchicalSettings& settings, std::size_t patch_count) {
   const double usual = first_price(settings.tolerance, patch_count);
-  if (!settings.moments) return usual;
+  if (!settings.moments) return kPlainStart * usual;
   const double times = static_cast<double>(patch_count) / kStartPatches;
   return usual * std::clamp(std::pow(times, kStartGrowth), 1.0, kHighestStart);
 }
@@ -266,7 +269,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
                           form_of(settings));
   const double tolerance = settings.tolerance;
   PriceSearch search(compression.price_of(search_start(settings, patches.size())),
-                     {kLeast * tolerance, kAim * tolerance, kMost * tolerance});
+                     {kAim * tolerance, kMost * tolerance});
   Best best(kMost * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
@@ -276,7 +279,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
             compression.at(search.price(), kept, part), settings.precision));
     const double error = judged_error(judging.errors(*candidate));
     best.offer(candidate, error);
-    search.report(error);
+    search.report(error, static_cast<double>(candidate->bytes()));
     if (!search.done()) compression.emphasise(*candidate);
   }
   return best.take();

@@ -7,14 +7,19 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 namespace rebounce {
 namespace {
 
-constexpr PriceSearch::Range kWanted{0.65, 0.72, 0.8};
+constexpr PriceSearch::Range kWanted{0.72, 0.8};
 
+// Errors of less leave more to save than is left, along kShrinking.
+constexpr double kShrinking = 0.3, kLeastGood = 0.65;
+
+/// The smallest of what is good.
 struct Found {
-  double error = 0;
+  double error = 0, size = std::numeric_limits<double>::infinity();
   int rounds = 0;
 };
 
@@ -22,15 +27,20 @@ Found search(double first_price, const std::function<double(double)>& error_of) 
   PriceSearch search(first_price, kWanted);
   Found found;
   while (!search.done() && found.rounds < 50) {
-    found.error = error_of(search.price());
-    search.report(found.error);
+    const double price = search.price();
+    const double error = error_of(price), size = std::pow(price, -kShrinking);
+    if (error <= kWanted.most && size < found.size) {
+      found.error = error;
+      found.size = size;
+    }
+    search.report(error, size);
     ++found.rounds;
   }
   return found;
 }
 
 void expect_good(const Found& found, int most_rounds) {
-  EXPECT_GE(found.error, kWanted.least);
+  EXPECT_GE(found.error, kLeastGood);
   EXPECT_LE(found.error, kWanted.most);
   EXPECT_LE(found.rounds, most_rounds);
 }
@@ -59,6 +69,31 @@ TEST(PriceSearch, BendsWithAFloorAndACeiling) {
   // As operators do: rounding below, everything left out above.
   const auto error = [](double price) { return std::clamp(3 * std::pow(price, 0.6), 0.2, 100.0); };
   for (const double first : {1e-6, 1e-2, 1.0, 1e4}) expect_good(search(first, error), 8);
+}
+
+/// Whether a search ends at an error of 0.6 that a second trial gives, of so much of the size of
+/// the first, whose error was half of it.
+bool ends_at(double part_of_size) {
+  PriceSearch search(1, kWanted);
+  search.report(0.3, 1000);
+  EXPECT_FALSE(search.done());
+  search.report(0.6, 1000 * part_of_size);
+  return search.done();
+}
+
+TEST(PriceSearch, EndsWhereAnotherTrialWouldSaveLittle) {
+  EXPECT_TRUE(ends_at(0.95));
+  EXPECT_FALSE(ends_at(0.6));
+}
+
+TEST(PriceSearch, DoesNotEndWhileNoErrorWasGood) {
+  PriceSearch search(1, kWanted);
+  for (const double error : {5.0, 3.0, 2.0, 0.81}) {
+    search.report(error, 1000);
+    EXPECT_FALSE(search.done()) << error;
+  }
+  search.report(0.79, 1000);
+  EXPECT_TRUE(search.done());
 }
 
 TEST(PriceSearch, StopsAtAJumpThatHasNoGoodError) {
