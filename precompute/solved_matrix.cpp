@@ -35,6 +35,15 @@ std::vector<Group> make_groups(std::span<const Cluster> panels, std::size_t patc
   return groups;
 }
 
+/// Rows fall from one panel to the next: what the first took is kept, as new pages are cleared when
+/// they are written to.
+void make_room(SolvedTransfer::Vectors& part, std::size_t rows, std::size_t columns) {
+  const Index rows_had = part.rows(), columns_had = part.cols();
+  if (rows_had >= static_cast<Index>(rows) && columns_had >= static_cast<Index>(columns)) return;
+  part.resize(std::max(rows_had, static_cast<Index>(rows)),
+              std::max(columns_had, static_cast<Index>(columns)));
+}
+
 }  // namespace
 
 void PanelMatrix::solve(const ClusterTree& tree, std::span<const Cluster> panels,
@@ -43,7 +52,7 @@ void PanelMatrix::solve(const ClusterTree& tree, std::span<const Cluster> panels
   const auto rows = std::span(tree.patch).subspan(panels.front().begin);
   const std::size_t width = groups.back().begin + groups.back().count;
   panel_.resize(matrix_count());
-  for (auto& part : panel_) part.resize(static_cast<Index>(rows.size()), static_cast<Index>(width));
+  for (auto& part : panel_) make_room(part, rows.size(), width);
   place_.assign(tree.patch.size(), kNone);
   for (std::uint32_t k = 0; k < rows.size(); ++k) place_[rows[k]] = k;
 

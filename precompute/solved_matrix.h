@@ -57,7 +57,7 @@ class PanelMatrix final : public SolvedMatrix {
   /// Solutions [positions][k] as the columns of the panels from `begin` on.
   void keep(const SolvedTransfer::Vectors& columns, std::uint32_t matrix, std::size_t begin);
 
-  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, [rows][columns] of all panels
+  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, [rows][columns] at the least
   std::vector<std::uint32_t> place_;            ///< [n] row, and column, of a patch
 };
 
