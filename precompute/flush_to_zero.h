@@ -16,16 +16,13 @@ class FlushToZero {
 
 #if defined(__x86_64__)
   FlushToZero() : before_(_mm_getcsr()) {
-    _mm_setcsr(before_ | _MM_FLUSH_ZERO_ON | kDenormalsAreZero);
+    _mm_setcsr(before_ | _MM_FLUSH_ZERO_ON | _MM_DENORMALS_ZERO_ON);
   }
   ~FlushToZero() {
     _mm_setcsr(before_);
   }
 
  private:
-  // _MM_DENORMALS_ZERO_ON, which compilers declare for targets with SSE3 alone.
-  static constexpr unsigned kDenormalsAreZero = 0x40;
-
   unsigned before_;
 #else
   FlushToZero() {}
