@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/exchange_results.h"
 
 namespace rebounce {
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/exchange_results.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/ray_tracer.h"

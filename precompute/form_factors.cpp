@@ -83,26 +83,6 @@ class FormFactorAssembly {
 
 }  // namespace
 
-FormFactorSettings with_quality(FormFactorQuality quality, FormFactorSettings settings) {
-  const FormFactorSettings standard;
-  settings.probe_rays = standard.probe_rays;
-  settings.full_rays = standard.full_rays;
-  settings.hemisphere_rays = standard.hemisphere_rays;
-  settings.kernel_tolerance = standard.kernel_tolerance;
-  if (quality == FormFactorQuality::kLow) {
-    settings.probe_rays = 4;
-    settings.full_rays = 16;
-    settings.hemisphere_rays = 1024;
-    settings.kernel_tolerance = 3e-3;
-  } else if (quality == FormFactorQuality::kHigh) {
-    settings.probe_rays = 32;
-    settings.full_rays = 256;
-    settings.hemisphere_rays = 65536;
-    settings.kernel_tolerance = 1e-5;
-  }
-  return settings;
-}
-
 FormFactors compute_form_factors(const PatchModel& model, const RayTracer& tracer,
                                  const FormFactorSettings& settings, const Progress& progress) {
   check_form_factor_settings(settings);

@@ -7,7 +7,7 @@
 #include "link_rays.h"
 #include "link_tree.h"
 #include "pair_kernel.h"
-#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/form_factor_settings.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "shadow_rays.h"

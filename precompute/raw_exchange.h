@@ -5,6 +5,8 @@
 
 #include "closure.h"
 #include "escape.h"
+#include "rebounce/precompute/exchange_results.h"
+#include "rebounce/precompute/form_factor_settings.h"
 #include "rebounce/precompute/progress.h"
 #include "shadow_rays.h"
 

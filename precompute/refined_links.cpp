@@ -1,7 +1,6 @@
 #include "refined_links.h"
 
 #include "link_sums.h"
-#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {
@@ -50,20 +49,6 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
   result.ray_count = refinement.ray_count();
   result.candidate_count = refinement.candidate_count();
   return result;
-}
-
-void check_form_factor_settings(const FormFactorSettings& settings) {
-  const auto in_range = [](int rays) {
-    return rays >= 1 && rays <= static_cast<int>(ShadowRays::kMostRays);
-  };
-  if (!in_range(settings.probe_rays) || !in_range(settings.full_rays) ||
-      settings.hemisphere_rays < 1) {
-    throw Error(
-        "form factors: rays per pair must be between 1 and 256, hemisphere rays at least 1");
-  }
-  if (!(settings.link_epsilon >= 0)) {
-    throw Error("form factors: the error of a link must not be negative");
-  }
 }
 
 }  // namespace rebounce

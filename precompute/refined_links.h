@@ -7,7 +7,7 @@
 #include "escape.h"
 #include "link_refinement.h"
 #include "link_tree.h"
-#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/form_factor_settings.h"
 #include "rebounce/precompute/progress.h"
 #include "row_targets.h"
 #include "shadow_rays.h"
@@ -29,8 +29,5 @@ struct RefinedLinks {
 RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
                           const RayTracer& tracer, const FormFactorSettings& settings,
                           std::span<const float> weight, const Progress& progress);
-
-/// Throws Error if a setting is out of range.
-void check_form_factor_settings(const FormFactorSettings& settings);
 
 }  // namespace rebounce

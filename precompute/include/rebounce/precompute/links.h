@@ -3,7 +3,8 @@
 #include <cstdint>
 #include <span>
 
-#include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/exchange_results.h"
+#include "rebounce/precompute/form_factor_settings.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/runtime/ray_tracer.h"
