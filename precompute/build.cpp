@@ -8,6 +8,7 @@
 #include "build_estimate.h"
 #include "operator_stage.h"
 #include "phase_clock.h"
+#include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/link_fitting.h"
 #include "rebounce/precompute/links.h"

@@ -5,7 +5,8 @@
 #include <optional>
 #include <span>
 
-#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/build_report.h"
+#include "rebounce/precompute/build_settings.h"
 #include "rebounce/precompute/patch_model.h"
 #include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/patch_roles.h"

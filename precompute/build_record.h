@@ -2,7 +2,8 @@
 
 #include <vector>
 
-#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/build_report.h"
+#include "rebounce/precompute/build_settings.h"
 #include "rebounce/precompute/measured_error.h"
 
 namespace rebounce {

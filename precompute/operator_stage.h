@@ -1,7 +1,8 @@
 #pragma once
 
 #include "phase_clock.h"
-#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/build_report.h"
+#include "rebounce/precompute/build_settings.h"
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/transfer/patch_roles.h"

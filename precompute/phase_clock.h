@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-#include "rebounce/precompute/build.h"
+#include "rebounce/precompute/build_report.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "rebounce/precompute/exchange_results.h"
+#include "rebounce/precompute/form_factor_compression.h"
+
+namespace rebounce {
+
+/// What the expensive part, or what is left of it, will take with the threads that there are.
+struct CostEstimate {
+  std::size_t patch_count = 0;
+  std::size_t receiver_count = 0, source_count = 0;
+  std::size_t link_count = 0;  ///< 0: not known yet, or there are none
+  std::uint64_t peak_bytes = 0;
+  /// Rough. As long as links are not known, they are taken to be as many as in a furnished room,
+  /// for the least as in a bare one. Afterwards both are the same, and follow from their number and
+  /// from how long it took to find them.
+  double seconds = 0, least_seconds = 0;
+  /// Of `seconds`, what all patches take whatever receivers and sources there are: form factors,
+  /// the dense inverse, lights and their truths.
+  double whole_seconds = 0;
+};
+
+struct BuildReport {
+  std::size_t triangle_count = 0;  ///< of the scene, without degenerate ones
+  std::size_t degenerate_triangle_count = 0;
+  std::size_t display_triangle_count = 0;
+  std::size_t patch_count = 0;
+  std::size_t sliver_count = 0;
+  std::size_t unlit_side_count = 0, covered_side_count = 0, opening_side_count = 0,
+              buried_side_count = 0;
+  float patch_size_min = 0, patch_size_median = 0, patch_size_max = 0;  ///< sqrt(area), metres
+  std::vector<std::string> warnings;
+  std::vector<std::pair<std::string, double>> seconds;  ///< by phase, in order
+  std::uint64_t ray_count = 0, pair_count = 0, form_factor_count = 0;
+  std::size_t link_count = 0;  ///< that are stored
+  ClosureReport closure;
+  /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
+  /// were not fitted to.
+  std::optional<FormFactorError> form_factor_error;
+  double form_factor_tolerance = 0;  ///< that they were compressed to
+  CostEstimate estimate;
+  std::optional<CostEstimate> estimate_after_links;  ///< of what is left then
+};
+
+/// Called when a phase begins, during it and at its end; returning false stops the build.
+using BuildProgress = std::function<bool(std::string_view phase, double fraction)>;
+
+/// Called once patches are known and before form factors are begun, and where an operator is made
+/// from links again when these are found, with what is left.
+using EstimateListener = std::function<void(const CostEstimate&)>;
+
+}  // namespace rebounce
