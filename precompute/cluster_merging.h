@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "element_neighbours.h"
-#include "rebounce/precompute/element_clusters.h"
+#include "rebounce/precompute/elements.h"
 
 namespace rebounce {
 

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "rebounce/precompute/subdivision.h"
+#include "rebounce/precompute/welded_positions.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {

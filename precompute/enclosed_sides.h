@@ -2,7 +2,10 @@
 
 #include <vector>
 
-#include "rebounce/precompute/lit_sides.h"
+#include "rebounce/precompute/progress.h"
+#include "rebounce/precompute/scene.h"
+#include "rebounce/precompute/triangle_sides.h"
+#include "rebounce/runtime/ray_tracer.h"
 
 namespace rebounce {
 

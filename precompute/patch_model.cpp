@@ -13,6 +13,7 @@
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/opacity_sampling.h"
 #include "rebounce/precompute/texture_sampling.h"
+#include "rebounce/precompute/welded_positions.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/transfer/error.h"
 #include "seen_part.h"

@@ -11,7 +11,7 @@
 #include "disjoint_sets.h"
 #include "edge_table.h"
 #include "hemisphere_rays.h"
-#include "rebounce/precompute/subdivision.h"
+#include "rebounce/precompute/welded_positions.h"
 #include "rebounce/runtime/ray_tracer.h"
 #include "rebounce/runtime/triangle.h"
 

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "rebounce/precompute/form_factors.h"
+#include "rebounce/precompute/welded_positions.h"
 #include "test_scenes.h"
 
 namespace rebounce {

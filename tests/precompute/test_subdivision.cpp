@@ -6,6 +6,7 @@
 #include <random>
 #include <set>
 
+#include "rebounce/precompute/welded_positions.h"
 #include "test_scenes.h"
 
 namespace rebounce {

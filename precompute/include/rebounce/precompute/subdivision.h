@@ -48,11 +48,4 @@ std::vector<std::uint32_t> subdivide(Scene& scene,
                                      const SubdivisionSettings& settings,
                                      std::span<const float> importance = {});
 
-/// For each vertex the number of its position, equal for vertices at the same place, in [0, count).
-struct WeldedPositions {
-  std::vector<std::uint32_t> id;  ///< [v]
-  std::uint32_t count = 0;
-};
-WeldedPositions weld_positions(std::span<const Float3> position);
-
 }  // namespace rebounce
