@@ -8,7 +8,10 @@
 #include "block_checkpoint.h"
 #include "cluster_tree.h"
 #include "light_weights.h"
-#include "rebounce/precompute/hierarchical_transfer.h"
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/precompute/hierarchical_settings.h"
+#include "rebounce/precompute/progress.h"
+#include "rebounce/transfer/hierarchical_operator.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {

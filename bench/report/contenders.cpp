@@ -10,6 +10,7 @@
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/form_factor_compression.h"
+#include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/precompute/low_rank_transfer.h"
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/error.h"

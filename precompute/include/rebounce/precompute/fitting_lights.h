@@ -1,13 +1,23 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
-#include "rebounce/precompute/hierarchical_transfer.h"
 #include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/patch_roles.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
+
+/// Lights that the operator is fitted to, each an initial exitance [n] in lx.
+struct FittingLights {
+  /// What light patches give off: errors in what such lights do weigh more than others.
+  std::span<const std::vector<Float3>> shaping;
+  /// Those that the tolerance is held under. Others than the first, or the error looks smaller than
+  /// it is.
+  std::span<const std::vector<Float3>> judging;
+};
 
 /// Lights drawn to fit an operator to, each an initial exitance [n] in lx.
 struct DrawnLights {

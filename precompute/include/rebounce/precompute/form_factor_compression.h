@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "rebounce/precompute/fitting_lights.h"
-#include "rebounce/precompute/hierarchical_transfer.h"
+#include "rebounce/precompute/hierarchical_settings.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/hierarchical_operator.h"

@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/precompute/fitting_lights.h"
+#include "rebounce/precompute/hierarchical_settings.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/hierarchical_operator.h"
@@ -11,27 +13,6 @@
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
-
-struct HierarchicalSettings {
-  /// Relative area-weighted L2 error of the indirect irradiance that lights may have in the mean;
-  /// twice the tolerance takes about 0.6 of the bytes.
-  double tolerance = 0.005;
-  Precision precision = Precision::kQ8;  ///< kF32: twice the bytes, no less error worth mention
-  /// Whether it is for applies: large blocks may then be of moments (TransferBlock), which is
-  /// smaller from some thousand patches on and which sweeps over compressed form factors do not
-  /// know, and blocks are priced by the time that they take, too. Patches are equilibrated
-  /// (HierarchicalOperator) in these and wherever bases are integers.
-  bool moments = true;
-};
-
-/// Lights that the operator is fitted to, each an initial exitance [n] in lx.
-struct FittingLights {
-  /// What light patches give off: errors in what such lights do weigh more than others.
-  std::span<const std::vector<Float3>> shaping;
-  /// Those that the tolerance is held under. Others than the first, or the error looks smaller than
-  /// it is.
-  std::span<const std::vector<Float3>> judging;
-};
 
 /// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
 /// Frobenius norm of Yhat, with the weights that the `shaping` lights give (light_weights.h), is
