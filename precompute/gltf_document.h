@@ -1,44 +1,12 @@
 #pragma once
 
-#include <tiny_gltf.h>
-
-#include <deque>
 #include <filesystem>
-#include <map>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
+#include "gltf_asset.h"
 #include "gltf_container.h"
 #include "gltf_warnings.h"
 
 namespace rebounce::gltf {
-
-/// An image as the asset carries it.
-struct EncodedImage {
-  Bytes bytes;          ///< empty where it could not be had
-  std::string problem;  ///< why, then
-};
-
-/// Where a primitive's compressed geometry lies (KHR_draco_mesh_compression).
-struct DracoSource {
-  int buffer_view = -1;
-  std::map<std::string, std::uint32_t> unique_id;  ///< of the attributes in there, by name
-  std::optional<std::size_t> index_count;  ///< of the primitive's index accessor, where it has one
-  bool has_fallback = false;               ///< the asset holds the geometry uncompressed as well
-};
-
-/// A glTF asset with checked indices: its structure in tinygltf's types, its data as bytes.
-struct Document {
-  tinygltf::Model model;       ///< without buffers and images: those are below
-  std::vector<Bytes> buffers;  ///< byteLength bytes each; empty where the asset has no data for it
-  std::vector<Bytes> decoded_views;  ///< of the compressed buffer views, empty for the others
-  std::vector<EncodedImage> images;
-  std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco;  ///< by mesh and primitive
-  std::string hash;                                                  ///< as Scene::hash
-  std::deque<std::vector<std::uint8_t>> storage;  ///< what the views above look into
-};
 
 /// Reads a .glb or .gltf file, its buffers and its images. Throws Error (without the file's name)
 /// for a file that is damaged, hostile, or needs something unsupported; an image that is missing is

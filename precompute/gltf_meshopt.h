@@ -2,7 +2,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "gltf_document.h"
+#include "gltf_asset.h"
+#include "gltf_warnings.h"
 
 namespace rebounce::gltf {
 
