@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/arithmetic.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {

@@ -6,16 +6,13 @@
 #include <memory>
 #include <span>
 
+#include "rebounce/precompute/arithmetic.h"
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/exchange_matrix.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
-
-/// In what the system is inverted: double precision, for operators that are compared with, or
-/// single for those that are compressed, in half of the time.
-enum class Arithmetic : std::uint8_t { kDouble, kSingle };
 
 /// Builds Y = F (I - rho F)^-1 for each channel, dense.
 ///
