@@ -8,7 +8,6 @@
 #include <numeric>
 #include <span>
 
-#include "progress_part.h"
 #include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 

@@ -9,7 +9,6 @@
 #include "cluster_merging.h"
 #include "element_blocks.h"
 #include "element_neighbours.h"
-#include "progress_part.h"
 #include "rebounce/runtime/float3_glm.h"
 
 namespace rebounce {

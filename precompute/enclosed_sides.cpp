@@ -7,7 +7,6 @@
 #include <span>
 
 #include "hemisphere_rays.h"
-#include "progress_part.h"
 #include "rebounce/precompute/texture_sampling.h"
 
 namespace rebounce {

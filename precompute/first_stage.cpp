@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "progress_part.h"
 #include "rebounce/precompute/patch_selection.h"
+#include "rebounce/precompute/progress.h"
 
 namespace rebounce {
 namespace {

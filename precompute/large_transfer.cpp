@@ -10,7 +10,6 @@
 #include "first_stage.h"
 #include "hierarchical_matrix.h"
 #include "matrix_compression.h"
-#include "progress_part.h"
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/content_hash.h"

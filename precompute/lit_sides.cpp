@@ -6,7 +6,6 @@
 
 #include "enclosed_sides.h"
 #include "hemisphere_rays.h"
-#include "progress_part.h"
 #include "rebounce/runtime/box.h"
 
 namespace rebounce {

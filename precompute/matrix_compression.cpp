@@ -13,7 +13,6 @@
 #include "lit_truth.h"
 #include "nested_bases.h"
 #include "price_search.h"
-#include "progress_part.h"
 #include "wanted_blocks.h"
 
 namespace rebounce {

@@ -8,7 +8,6 @@
 
 #include "contact_cuts.h"
 #include "covers.h"
-#include "progress_part.h"
 #include "rebounce/precompute/element_clusters.h"
 #include "rebounce/precompute/lit_sides.h"
 #include "rebounce/precompute/opacity_sampling.h"

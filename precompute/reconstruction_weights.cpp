@@ -10,7 +10,6 @@
 #include "giver_search.h"
 #include "local_max_entropy.h"
 #include "mean_preservation.h"
-#include "progress_part.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
 #include "rebounce/runtime/sampling.h"
