@@ -4,10 +4,10 @@
 #include <cmath>
 #include <optional>
 
-#include "blas_speed.h"
 #include "build_estimate.h"
 #include "operator_stage.h"
 #include "phase_clock.h"
+#include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/precompute/link_fitting.h"
@@ -21,11 +21,6 @@
 
 namespace rebounce {
 namespace {
-
-// How many times as fast or as slow as that of the estimates a machine is taken to be at most,
-// whatever it took to find links: that may have been too short to tell, and patches of many
-// triangles take longer there and nowhere else (notes/operator.md).
-constexpr double kFastest = 6, kSlowest = 2;
 
 void describe_patches(const PatchModel& model, BuildReport& report) {
   report.display_triangle_count = model.mesh.triangle.size();
@@ -52,15 +47,8 @@ OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& mo
                                                             : OperatorKind::kDense;
 }
 
-std::uint64_t peak_bytes_from_pairs(BuildSettings settings, const PatchModel& model,
-                                    const PatchRoles& roles) {
-  settings.operator_kind = kind_from_pairs(settings, model);
-  return estimate_cost_of_pairs(model, roles, settings).peak_bytes;
-}
-
 /// What the operator is to be made from, if that was left open.
-FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model,
-                                   const PatchRoles& roles) {
+FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
   const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
                           settings.operator_kind == OperatorKind::kHierarchical;
   if (settings.form_factor_kind == FormFactorKind::kLinks && !from_links &&
@@ -68,16 +56,18 @@ FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchMod
     throw Error("from links only a hierarchical operator is made; ask for that, or for pairs");
   }
   if (settings.form_factor_kind != FormFactorKind::kAutomatic) return settings.form_factor_kind;
+  const std::size_t n = model.patches.size();
   const bool too_many =
-      model.patches.size() > kPairsPatchCount ||
-      peak_bytes_from_pairs(settings, model, roles) > memory_limit_bytes(settings);
+      n > kPairsPatchCount ||
+      peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
+                          kind_from_pairs(settings, model)) > memory_limit_bytes(settings);
   return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
 }
 
 /// The settings with what was left open decided.
-BuildSettings decide(BuildSettings settings, const PatchModel& model, const PatchRoles& roles) {
+BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   settings.memory_limit_bytes = memory_limit_bytes(settings);
-  settings.form_factor_kind = choose_form_factors(settings, model, roles);
+  settings.form_factor_kind = choose_form_factors(settings, model);
   const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
   const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
   if (settings.operator_kind == OperatorKind::kAutomatic) {
@@ -149,12 +139,12 @@ class TransferBuild {
       data_.lightmap = clock_.run(
           "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
     }
-    decided_ = decide(settings_, model_, roles_);
+    decided_ = decide(settings_, model_);
     report_.estimate = estimate_cost(model_, roles_, decided_);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
     const bool all_pairs = decided_.form_factor_kind == FormFactorKind::kPairs &&
                            decided_.form_factors.link_epsilon == 0;
-    if (fits && all_pairs) measure_speed();
+    if (fits && all_pairs) forecast_pairs();
     announce(report_.estimate);
   }
 
@@ -209,14 +199,17 @@ class TransferBuild {
   TransferData take() { return std::move(data_); }
 
  private:
-  /// Estimates a build from pairs by how fast this machine is.
-  void measure_speed() {
+  /// Says by short samples how long a build from pairs takes.
+  void forecast_pairs() {
     tracer_.emplace(make_surface_tracer(model_.mesh));
     clock_.run("estimate", [&](const Progress& part) {
-      const double seconds =
+      CostEstimate& estimate = report_.estimate;
+      estimate.form_factor_seconds =
           forecast_form_factors(model_, *tracer_, decided_.form_factors, part).seconds;
-      report_.estimate = estimate_cost_of_pairs(model_, roles_, decided_,
-                                                PairSpeed{seconds, measure_blas_speed()});
+      if (decided_.operator_kind == OperatorKind::kNoOperator) return true;
+      estimate.inverse_seconds = forecast_dense_transfer(
+          estimate.patch_count, distinct_channels(model_.patches.reflectance),
+          arithmetic_of(decided_.operator_kind));
       return true;
     });
   }
@@ -253,22 +246,15 @@ class TransferBuild {
     report_.pair_count = build.candidate_count;
     report_.link_count = build.links.pair.size();
     report_.closure = build.closure;
-    if (decided_.operator_kind != OperatorKind::kNoOperator) estimate_rest(build);
+    if (decided_.operator_kind != OperatorKind::kNoOperator) {
+      const LinkedBuild known{model_.patches.size(), report_.link_count,
+                              distinct_channels(model_.patches.reflectance), roles_,
+                              decided_.tolerance};
+      announce(report_.estimate_after_links.emplace(
+          estimate_after_links(known, decided_.memory_limit_bytes)));
+    }
     data_.links = std::move(build.links);
     return build;
-  }
-
-  /// With links known, and how long they took to find.
-  void estimate_rest(const LinkBuild& links) {
-    const LinkedBuild build =
-        linked_build(links.links, model_.patches, links.sky_visibility, roles_, decided_.tolerance);
-    const double slowness = std::clamp(
-        report_.seconds.back().second / estimate_links(build).seconds, 1 / kFastest, kSlowest);
-    CostEstimate rest = estimate_operator_from_links(build, decided_.memory_limit_bytes);
-    rest.seconds *= slowness;
-    rest.whole_seconds *= slowness;
-    rest.least_seconds = rest.seconds;
-    announce(report_.estimate_after_links.emplace(rest));
   }
 
   const BuildSettings& settings_;

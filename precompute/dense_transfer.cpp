@@ -1,10 +1,14 @@
 #include "rebounce/precompute/dense_transfer.h"
 
+#include <omp.h>
+
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <random>
 
 #include "rebounce/transfer/area_norm.h"
+#include "single_threaded_blas.h"
 #include "tiled_cholesky.h"
 
 namespace rebounce {
@@ -99,6 +103,30 @@ void solve_channel(const ExchangeMatrix& exchange, const PatchTable& patches, in
   write_diagonal(exchange, patches.area, root, tiles);
 }
 
+/// Floating-point operations a second in products of tiles, all threads together.
+template <typename Scalar>
+double measure_tile_speed() {
+  using Matrix = typename TiledMatrix<Scalar>::Matrix;
+  constexpr Eigen::Index kSide = TiledMatrix<Scalar>::kTile;
+  constexpr int kProducts = 16;  // of each thread: some milliseconds
+  const SingleThreadedBlas single_threaded;
+  const Matrix tile = Matrix::Constant(kSide, kSide, Scalar(1) / kSide);
+  std::vector<Matrix> sums(static_cast<std::size_t>(omp_get_max_threads()),
+                           Matrix::Zero(kSide, kSide));
+  const auto multiply = [&] {
+    const auto begin = std::chrono::steady_clock::now();
+#pragma omp parallel for schedule(static)
+    for (Matrix& sum : sums) {
+      for (int k = 0; k < kProducts; ++k) sum.noalias() += tile * tile;
+    }
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    return 2.0 * kSide * kSide * kSide * kProducts * static_cast<double>(sums.size()) /
+           seconds.count();
+  };
+  multiply();  // starts the threads, and touches what they write to
+  return multiply();
+}
+
 }  // namespace
 
 std::uint32_t distinct_channels(std::span<const Float3> reflectance,
@@ -126,6 +154,14 @@ std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matri
       DenseOperator::tile_count(patch_count) * kTile * kTile * sizeof(float) * matrix_count;
   return tiles + (arithmetic == Arithmetic::kDouble ? TiledMatrix<double>::bytes(patch_count)
                                                     : TiledMatrix<float>::bytes(patch_count));
+}
+
+double forecast_dense_transfer(std::size_t patch_count, std::size_t matrix_count,
+                               Arithmetic arithmetic) {
+  const auto n = static_cast<double>(patch_count);
+  const double speed = arithmetic == Arithmetic::kDouble ? measure_tile_speed<double>()
+                                                         : measure_tile_speed<float>();
+  return 2 * n * n * n * static_cast<double>(matrix_count) / speed;
 }
 
 std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& exchange,

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "rebounce/precompute/patch_selection.h"
 #include "rebounce/precompute/progress.h"
 
 namespace rebounce {
@@ -46,12 +45,6 @@ void FirstStage::make_panels() {
   for (std::size_t k = 0; k < panels_.size(); ++k) {
     panels_[k].name = fmt::format("panel_{:04}", k);
   }
-}
-
-double FirstStage::usual_work(std::size_t patch_count, const PatchRoles& roles) {
-  const std::size_t columns = std::min(roles.count(PatchRoles::kReceiver, patch_count),
-                                       roles.count(PatchRoles::kSource, patch_count));
-  return static_cast<double>(columns) + kCompression * wanted_part(roles, patch_count);
 }
 
 double FirstStage::compression_work(const Panel& panel) const {

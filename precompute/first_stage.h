@@ -33,9 +33,6 @@ class FirstStage {
   /// What is left to do, in columns that are solved for.
   double work() const { return work_of(panels_); }
 
-  /// The same of all panels over so many patches with these roles.
-  static double usual_work(std::size_t patch_count, const PatchRoles& roles = {});
-
   /// Does it, and keeps every panel in the checkpoint; once. Throws Cancelled if asked to stop.
   HierarchicalOperator::Storage run(const Progress& progress);
 

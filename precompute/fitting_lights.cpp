@@ -14,6 +14,9 @@ namespace {
 constexpr int kShapingPointCount = 128, kShapingSpotCount = 32, kShapingSunCount = 32;
 constexpr int kJudgingPointCount = 512;
 
+static_assert(kMostShapingLights == kShapingPointCount + kShapingSpotCount + kShapingSunCount + 1);
+static_assert(kMostJudgingLights == kJudgingPointCount + 1);
+
 }  // namespace
 
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,

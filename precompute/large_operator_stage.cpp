@@ -138,9 +138,10 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     LargeTransferSettings settings;
     settings.compression = {decided.tolerance, *decided.precision};
     settings.roles = roles;
-    settings.memory_limit_bytes = memory_of_large_transfer(
-        linked_build(data.links, patches, patches.sky_visibility, roles, decided.tolerance),
-        decided.memory_limit_bytes);
+    settings.memory_limit_bytes =
+        memory_of_large_transfer({patches.size(), data.links.pair.size(),
+                                  distinct_channels(patches.reflectance), roles, decided.tolerance},
+                                 decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;
     return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
                                 settings, part);

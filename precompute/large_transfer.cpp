@@ -11,6 +11,7 @@
 #include "hierarchical_matrix.h"
 #include "matrix_compression.h"
 #include "rebounce/precompute/dense_transfer.h"
+#include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/content_hash.h"
 #include "rebounce/transfer/error.h"
@@ -34,28 +35,19 @@ constexpr double kCoarsePart = 4;
 // go about like the root of the price: a quarter of what the second stage may do.
 constexpr double kFinePart = 1.0 / 16;
 
-// What is done before the first panel, and before the first round of the second stage, takes as
-// long as so many columns; all rounds together as many, where there are kRoundsPatches, and growing
-// with this power of their number. Measured: notes/operator.md.
-constexpr double kColumnsBefore = 5500;
-constexpr double kRounds = 6000, kRoundsPatches = 4000, kRoundsGrowth = 0.33;
+// For the progress alone: what is done before the first panel, and again before the first round of
+// the second stage, and all rounds together, in columns that are solved for.
+constexpr double kColumnsBefore = 5500, kColumnsOfRounds = 6000;
 
-// Products with all of the form factors that take as long as a column, of which most are with
-// coarser ones, and operations a second of a slow core.
-constexpr double kProducts = 2.4, kOperationsPerSecond = 6e10;
+// Bytes a patch of lights: each, a copy and what it leads to; of those that shape, how they fall on
+// clusters too.
+constexpr std::size_t kLightBytes = 3 * sizeof(Float3) * (kMostShapingLights + kMostJudgingLights) +
+                                    sizeof(double) * kMostShapingLights;
 
-// Bytes a patch: lights, what they lead to and how they fall on clusters; and, for each matrix, an
-// operator of the first stage and the rounds of the second, at a tolerance, with the power by which
-// less of that takes more. Measured, and about a fifth more than all that was used:
-// notes/operator.md.
-constexpr double kLightBytes = 26.4e3, kOperatorBytes = 10.5e3;
-constexpr double kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
-
-/// The rounds of the second stage, in columns that are solved for.
-double work_of_rounds(std::size_t patch_count, const PatchRoles& roles) {
-  return kRounds * wanted_part(roles, patch_count) *
-         std::pow(static_cast<double>(patch_count) / kRoundsPatches, kRoundsGrowth);
-}
+// Bytes a patch, for each matrix, of the operator of the first stage and the rounds of the second:
+// an upper estimate, as they are only known later, at a tolerance, with the power by which less of
+// that takes more.
+constexpr double kOperatorBytes = 10.5e3, kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
 
 /// Throws Error unless the limit, if there is one, has room for a plan.
 void check_memory(std::size_t patch_count, const LargeTransferPlan& plan, std::uint64_t limit) {
@@ -133,8 +125,8 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
       kOperatorBytes * static_cast<double>(matrix_count) *
       wanted_part(settings.roles, patch_count) *
       std::pow(kOperatorTolerance / settings.compression.tolerance, kOperatorGrowth);
-  const auto kept =
-      static_cast<std::size_t>(static_cast<double>(patch_count) * (kLightBytes + operators));
+  const std::size_t kept = patch_count * kLightBytes +
+                           static_cast<std::size_t>(static_cast<double>(patch_count) * operators);
 
   LargeTransferPlan plan;
   for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
@@ -144,15 +136,6 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
                       threads * kBlasBytes + kept;
     if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
-}
-
-double large_transfer_seconds(std::size_t patch_count, std::size_t matrix_count,
-                              double form_factor_bytes, const PatchRoles& roles) {
-  // A value of two bytes is multiplied and added twice, there and back.
-  const double column =
-      2 * form_factor_bytes * kProducts / kOperationsPerSecond * static_cast<double>(matrix_count);
-  return column * (2 * kColumnsBefore + FirstStage::usual_work(patch_count, roles) +
-                   work_of_rounds(patch_count, roles));
 }
 
 std::shared_ptr<const HierarchicalOperator> build_large_transfer(
@@ -170,7 +153,7 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
   const SolvedTransfer solved(form_factors, coarser(form_factors, patches, lights, tolerance),
                               patches, kResidualPart * tolerance);
   const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
-  const double work_after = kColumnsBefore + work_of_rounds(patches.size(), settings.roles);
+  const double work_after = kColumnsBefore + kColumnsOfRounds;
   double searching = 0;  // when the search of the second stage begins
   HierarchicalOperator::Storage fine;
   {

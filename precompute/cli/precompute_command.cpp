@@ -34,36 +34,30 @@ std::uint64_t peak_memory_bytes() {
 }
 
 std::string rough_time(double seconds) {
-  if (seconds < 120) return fmt::format("{:.2g} s", seconds);
+  if (seconds < 120) return fmt::format("{:.0f} s", std::max(seconds, 1.0));
   if (seconds < 7200) return fmt::format("{:.0f} min", seconds / 60);
   return fmt::format("{:.1f} h", seconds / 3600);
 }
 
-bool of_some(const CostEstimate& estimate) {
-  return estimate.receiver_count < estimate.patch_count ||
-         estimate.source_count < estimate.patch_count;
-}
-
-std::string roles_of(const CostEstimate& estimate) {
-  if (!of_some(estimate)) return "";
-  return fmt::format(" ({} receivers, {} sources)", estimate.receiver_count, estimate.source_count);
-}
-
-/// What receivers and sources do not shorten.
-std::string whole_part(const CostEstimate& estimate) {
-  if (!of_some(estimate)) return "";
-  return fmt::format(", {} of it whatever receivers and sources there are,",
-                     rough_time(estimate.whole_seconds));
-}
-
 std::string described(const CostEstimate& estimate) {
   const bool links_known = estimate.link_count > 0;
-  const std::string most = rough_time(estimate.seconds), least = rough_time(estimate.least_seconds);
-  return fmt::format("{} {}{}: about {}{}{}{} and {:.2g} GiB",
-                     links_known ? estimate.link_count : estimate.patch_count,
-                     links_known ? "links" : "patches", roles_of(estimate),
-                     least == most ? "" : least + " to ", most, links_known ? " more" : "",
-                     whole_part(estimate), static_cast<double>(estimate.peak_bytes) / (1ULL << 30));
+  const bool of_some = estimate.receiver_count < estimate.patch_count ||
+                       estimate.source_count < estimate.patch_count;
+  std::string line = fmt::format("{} {}", links_known ? estimate.link_count : estimate.patch_count,
+                                 links_known ? "links" : "patches");
+  if (of_some) {
+    line +=
+        fmt::format(" ({} receivers, {} sources)", estimate.receiver_count, estimate.source_count);
+  }
+  line +=
+      fmt::format(": about {:.2g} GiB", static_cast<double>(estimate.peak_bytes) / (1ULL << 30));
+  if (estimate.form_factor_seconds > 0) {
+    line += fmt::format(", {} for form factors", rough_time(estimate.form_factor_seconds));
+  }
+  if (estimate.inverse_seconds > 0) {
+    line += fmt::format(" and {} for the dense inverse", rough_time(estimate.inverse_seconds));
+  }
+  return line;
 }
 
 /// What of an error's lights is no part of it.
@@ -85,15 +79,11 @@ void print_json(const TransferData& data, const BuildReport& report, std::uint64
   summary["seconds"] = seconds;
   summary["rays"] = report.ray_count;
   summary["peak_memory_bytes"] = peak_memory_bytes();
-  const auto json_of = [](const CostEstimate& estimate) {
-    return nlohmann::json{{"seconds", estimate.seconds},
-                          {"least_seconds", estimate.least_seconds},
-                          {"whole_seconds", estimate.whole_seconds},
-                          {"peak_bytes", estimate.peak_bytes}};
-  };
-  summary["estimate"] = json_of(report.estimate);
+  summary["estimate"] = {{"peak_bytes", report.estimate.peak_bytes},
+                         {"form_factor_seconds", report.estimate.form_factor_seconds},
+                         {"inverse_seconds", report.estimate.inverse_seconds}};
   if (report.estimate_after_links) {
-    summary["estimate_after_links"] = json_of(*report.estimate_after_links);
+    summary["estimate_after_links"] = {{"peak_bytes", report.estimate_after_links->peak_bytes}};
   }
   fmt::print("{}\n", summary.dump(2));
 }

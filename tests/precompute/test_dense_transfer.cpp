@@ -222,6 +222,13 @@ TEST(DenseTransfer, GreyScenesStoreOneMatrix) {
   EXPECT_EQ(solve(colourful_room(), 100).transfer->storage().matrix_count, 3U);
 }
 
+TEST(DenseTransfer, IsForecastForItsArithmeticAndChannels) {
+  for (const Arithmetic arithmetic : {Arithmetic::kDouble, Arithmetic::kSingle}) {
+    EXPECT_GT(forecast_dense_transfer(1000, 1, arithmetic), 0);
+    EXPECT_EQ(forecast_dense_transfer(0, 3, arithmetic), 0);
+  }
+}
+
 TEST(DenseTransfer, RefusesReflectancesThatMakeLightGrow) {
   Scene scene = test::empty_scene({0.5F, 0.5F, 0.5F});
   test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);

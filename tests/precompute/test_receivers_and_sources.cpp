@@ -470,5 +470,16 @@ TEST(PatchSelection, MeshesAreKnownAfterTheirTrianglesAreCut) {
   EXPECT_GT(area, 10);
 }
 
+TEST(WantedPart, CountsPairsThatWantLightBothWaysOnce) {
+  constexpr std::uint8_t kNeither = 0, kReceiver = PatchRoles::kReceiver,
+                         kSource = PatchRoles::kSource, kBoth = PatchRoles::kBoth;
+  EXPECT_EQ(wanted_part({}, 4), 1);
+  EXPECT_EQ(wanted_part({{kBoth, kBoth, kBoth, kBoth}}, 4), 1);
+  EXPECT_NEAR(wanted_part({{kReceiver, kReceiver, kSource, kSource}}, 4), 0.5, 1e-12)
+      << "from one half to the other";
+  EXPECT_NEAR(wanted_part({{kBoth, kBoth, kSource, kSource}}, 4), 0.75, 1e-12);
+  EXPECT_NEAR(wanted_part({{kBoth, kNeither, kNeither, kNeither}}, 4), 1.0 / 16, 1e-12);
+}
+
 }  // namespace
 }  // namespace rebounce

@@ -14,19 +14,16 @@
 
 namespace rebounce {
 
-/// What the expensive part, or what is left of it, will take with the threads that there are.
+/// What the expensive part, or what is left of it, will take.
 struct CostEstimate {
   std::size_t patch_count = 0;
   std::size_t receiver_count = 0, source_count = 0;
   std::size_t link_count = 0;  ///< 0: not known yet, or there are none
+  /// As long as links are not known, they are taken to be as many as in a furnished room.
   std::uint64_t peak_bytes = 0;
-  /// Rough. As long as links are not known, they are taken to be as many as in a furnished room,
-  /// for the least as in a bare one. Afterwards both are the same, and follow from their number and
-  /// from how long it took to find them.
-  double seconds = 0, least_seconds = 0;
-  /// Of `seconds`, what all patches take whatever receivers and sources there are: form factors,
-  /// the dense inverse, lights and their truths.
-  double whole_seconds = 0;
+  /// With pairs, what form factors and the dense inverse will take with the threads that there are,
+  /// by short samples of either: rough. 0: no sample was taken.
+  double form_factor_seconds = 0, inverse_seconds = 0;
 };
 
 struct BuildReport {

@@ -35,6 +35,11 @@ std::shared_ptr<const DenseOperator> build_dense_transfer(
 std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count,
                                       Arithmetic arithmetic);
 
+/// Seconds that build_dense_transfer will take with the threads that there are, by the time of a
+/// few products of tiles, as if it did nothing else: rough, and rather too few.
+double forecast_dense_transfer(std::size_t patch_count, std::size_t matrix_count,
+                               Arithmetic arithmetic);
+
 /// Number of different reflectance channels, 1 to 3, and which of them each channel uses.
 std::uint32_t distinct_channels(std::span<const Float3> reflectance,
                                 std::array<std::uint32_t, kChannelCount>& channel_matrix);

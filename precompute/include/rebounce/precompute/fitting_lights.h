@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -26,6 +27,9 @@ struct DrawnLights {
   /// Valid as long as this lives and stays as it is.
   FittingLights view() const { return {shaping, judging}; }
 };
+
+/// How many there are at most: in an open scene, with its own lamps.
+inline constexpr std::size_t kMostShapingLights = 193, kMostJudgingLights = 513;
 
 /// Draws the lights that the operator of a scene is fitted to: points, spots and, where it is open,
 /// suns to shape it, other points to judge it, and for both the light of the scene's own lamps,

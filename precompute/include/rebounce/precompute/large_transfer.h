@@ -40,11 +40,6 @@ struct LargeTransferPlan {
 LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
                                       const LargeTransferSettings& settings = {});
 
-/// Seconds that build_large_transfer takes of one processor, about a slow one, without a
-/// checkpoint: rough. `form_factor_bytes`: those of the form factors.
-double large_transfer_seconds(std::size_t patch_count, std::size_t matrix_count,
-                              double form_factor_bytes, const PatchRoles& roles = {});
-
 /// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
 /// are solved for by conjugate gradients, a panel of neighbouring patches at a time, and each panel
 /// is compressed finely as soon as it is there. The operator that this leaves, a few times as large
