@@ -1,7 +1,10 @@
 #include "blas_peak.h"
 
-#include <cblas.h>
 #include <omp.h>
+
+#include <Eigen/Core>
+
+#include "blas.h"
 
 namespace rebounce::bench {
 
@@ -15,12 +18,13 @@ BlasPeak::BlasPeak() : operands_(static_cast<std::size_t>(omp_get_max_threads())
 }
 
 void BlasPeak::run() {
-  openblas_set_num_threads(1);
-  constexpr auto kN = static_cast<blasint>(kSize);
+  load_blas();
+  constexpr auto kN = static_cast<int>(kSize);
+  constexpr double kOne = 1, kZero = 0;
 #pragma omp parallel for schedule(static)
   for (Operands& own : operands_) {
-    cblas_dgemm(CblasColMajor, CblasNoTrans, CblasTrans, kN, kN, kN, 1.0, own.a.data(), kN,
-                own.b.data(), kN, 0.0, own.c.data(), kN);
+    dgemm_("N", "T", &kN, &kN, &kN, &kOne, own.a.data(), &kN, own.b.data(), &kN, &kZero,
+           own.c.data(), &kN);
   }
 }
 

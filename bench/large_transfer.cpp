@@ -20,7 +20,6 @@
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/reflection.h"
-#include "single_threaded_blas.h"
 #include "solved_transfer.h"
 
 namespace rebounce::bench {
@@ -123,7 +122,6 @@ class SceneBench {
 
   /// Errors at a residual: of some columns, and of the light of all their patches together.
   void try_residual(const SolvedTransfer& exact, double residual) {
-    const SingleThreadedBlas single_threaded;
     const SolvedTransfer solved(*form_factors_, data_.patches, residual);
     const auto order = solved.patch();
     const std::size_t n = order.size(), count = SolvedTransfer::kTogether;

@@ -6,7 +6,6 @@
 #include <exception>
 
 #include "machine.h"
-#include "rebounce/precompute/blas_kernels.h"
 #include "rebounce/transfer/atomic_file.h"
 
 namespace rebounce::bench {
@@ -85,7 +84,6 @@ void run_at_thread_counts(const CommonOptions& options, const std::function<void
 
 int run_program(CLI::App& app, int argc, char** argv, const CommonOptions& options,
                 const std::function<void()>& work) {
-  restart_with_better_blas_kernels(argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

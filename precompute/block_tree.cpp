@@ -5,9 +5,9 @@
 #include <optional>
 
 #include "basis_remainders.h"
+#include "blas.h"
 #include "block_compression.h"
 #include "rebounce/precompute/parallel_progress.h"
-#include "single_threaded_blas.h"
 
 namespace rebounce {
 namespace {
@@ -262,7 +262,7 @@ std::vector<BlockPiece> BlockTreeCompressor::pieces() const {
 
 BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double price,
                                         const Progress& progress) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   std::vector<BlockPart> parts(pieces.size());
   ParallelProgress loop(progress, pieces.size());
 #pragma omp parallel for schedule(dynamic, 1)

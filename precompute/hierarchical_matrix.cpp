@@ -1,13 +1,11 @@
 #include "hierarchical_matrix.h"
 
-#include <cblas.h>
-
 #include <algorithm>
 
+#include "blas.h"
 #include "hierarchical_storage.h"
 #include "hierarchical_values.h"
 #include "rebounce/transfer/error.h"
-#include "single_threaded_blas.h"
 
 namespace rebounce {
 namespace {
@@ -28,11 +26,11 @@ constexpr Index kTogether = 32;
 enum class Write { kSet, kAdd };
 void product(bool transposed, Index rows, Index columns, const float* matrix, const float* from,
              float* to, Index width, Write write) {
-  cblas_sgemm(CblasRowMajor, transposed ? CblasTrans : CblasNoTrans, CblasNoTrans,
-              static_cast<blasint>(rows), static_cast<blasint>(width),
-              static_cast<blasint>(columns), 1, matrix,
-              static_cast<blasint>(transposed ? rows : columns), from, static_cast<blasint>(width),
-              write == Write::kAdd ? 1 : 0, to, static_cast<blasint>(width));
+  // The BLAS's matrices are column after column: these, transposed.
+  const auto m = static_cast<int>(width), n = static_cast<int>(rows), k = static_cast<int>(columns),
+             stride = transposed ? n : k;
+  const float one = 1, kept = write == Write::kAdd ? 1 : 0;
+  sgemm_("N", transposed ? "T" : "N", &m, &n, &k, &one, from, &m, matrix, &stride, &kept, to, &m);
 }
 
 }  // namespace
@@ -244,7 +242,7 @@ void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x,
 }
 
 MatrixXf HierarchicalMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   MatrixXf result(x.rows(), x.cols());
 #pragma omp parallel for schedule(dynamic, 1)
   for (Index begin = 0; begin < x.cols(); begin += kTogether) {

@@ -36,7 +36,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
     Vectors sent, received;  ///< coefficients before and after the cores
   };
 
-  /// y = matrix x on one thread, all [positions][k]; y must not be x. BLAS must run on one thread.
+  /// y = matrix x on one thread, all [positions][k]; y must not be x.
   void multiply(std::uint32_t matrix, const Vectors& x, Vectors& y, Workspace& workspace) const;
 
  private:

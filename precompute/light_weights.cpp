@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "single_threaded_blas.h"
+#include "blas.h"
 
 namespace rebounce {
 namespace {
@@ -115,7 +115,7 @@ std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const M
       roles.count(PatchRoles::kSource, static_cast<std::size_t>(relative.rows())));
   const double variance = std::max(kBackground * relative.squaredNorm() / positions,
                                    std::numeric_limits<double>::min());
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   std::vector<Principal> principal(tree.clusters.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < tree.clusters.size(); ++k) {

@@ -6,8 +6,8 @@
 #include <optional>
 #include <random>
 
+#include "blas.h"
 #include "rebounce/transfer/error.h"
-#include "single_threaded_blas.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {
@@ -120,7 +120,7 @@ std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperat
                                                                const ExchangeMatrix& exchange,
                                                                const LowRankSettings& settings,
                                                                const Progress& progress) {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   const Remainder remainder(dense, exchange, settings.first_bounce);
   const Index n = remainder.size();
   const Index rank = std::min(n, static_cast<Index>(settings.rank));

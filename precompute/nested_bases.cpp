@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "basis_remainders.h"
-#include "single_threaded_blas.h"
+#include "blas.h"
 
 namespace rebounce {
 namespace {
@@ -499,7 +499,7 @@ class Nesting {
 }  // namespace
 
 Storage nest_bases(Storage storage, const NestingFrame& frame) {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   Nesting nesting(storage, frame);
   return nesting.pays() ? nesting.nested() : storage;
 }

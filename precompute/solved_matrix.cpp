@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <exception>
 
+#include "blas.h"
 #include "rebounce/precompute/parallel_progress.h"
-#include "single_threaded_blas.h"
 
 namespace rebounce {
 namespace {
@@ -56,7 +56,7 @@ void PanelMatrix::solve(const ClusterTree& tree, std::span<const Cluster> panels
   place_.assign(tree.patch.size(), kNone);
   for (std::uint32_t k = 0; k < rows.size(); ++k) place_[rows[k]] = k;
 
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   std::exception_ptr failure;
   ParallelProgress loop(progress, groups.size());
 #pragma omp parallel

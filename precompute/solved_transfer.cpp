@@ -7,9 +7,9 @@
 #include <random>
 #include <utility>
 
+#include "blas.h"
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/transfer/error.h"
-#include "single_threaded_blas.h"
 
 namespace rebounce {
 namespace {
@@ -90,7 +90,7 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
 }
 
 Vectors SolvedTransfer::gather(const Vectors& x) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   Vectors result(x.rows(), x.cols());
 #pragma omp parallel for schedule(dynamic, 1)
   for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
@@ -105,7 +105,7 @@ Vectors SolvedTransfer::gather(const Vectors& x) const {
 
 /// By subspace iteration.
 SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   const auto n = static_cast<Index>(patch().size());
   const Index count = std::clamp<Index>(n / kLeadingPart, 1, kLeadingCount);
   Leading leading;
@@ -186,7 +186,7 @@ const Vectors& SolvedTransfer::columns(std::uint32_t matrix, std::span<const std
 }
 
 MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   MatrixXf result(x.rows(), x.cols());
   std::exception_ptr failure;
 #pragma omp parallel for schedule(dynamic, 1)

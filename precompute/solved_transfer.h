@@ -58,8 +58,7 @@ class SolvedTransfer {
   };
 
   /// The columns of Yhat that belong to `patches`, kTogether of them at most, [positions][k], on
-  /// one thread; valid until the workspace is used again. BLAS must run on one thread. Throws Error
-  /// likewise.
+  /// one thread; valid until the workspace is used again. Throws Error likewise.
   const Vectors& columns(std::uint32_t matrix, std::span<const std::uint32_t> patches,
                          Workspace& workspace) const;
 

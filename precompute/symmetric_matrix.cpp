@@ -4,7 +4,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "single_threaded_blas.h"
+#include "blas.h"
 
 namespace rebounce {
 namespace {
@@ -38,7 +38,7 @@ std::vector<std::uint32_t> with_role(std::span<const std::uint32_t> patches,
 }  // namespace
 
 Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   const auto sources = with_role(order, roles_, PatchRoles::kSource);
   const auto receivers = with_role(order, roles_, PatchRoles::kReceiver);
   Eigen::VectorXd energy = Eigen::VectorXd::Zero(static_cast<Index>(order.size()));
@@ -87,7 +87,7 @@ const float* DenseMatrix::tiles_of(std::uint32_t matrix) const {
 }
 
 MatrixXf DenseMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   const auto n = static_cast<Index>(dense_.patch_count());
   const Index side = (n + kTile - 1) / kTile;
   const float* const tiles = tiles_of(matrix);
@@ -142,7 +142,7 @@ void FormFactorMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::ui
 // Rows are spread out to full length, some at a time: most patches of a room see each other, and a
 // product of full matrices is many times faster than gathering entry by entry.
 MatrixXf FormFactorMatrix::multiply(std::uint32_t /*matrix*/, const MatrixXf& x) const {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   const Index n = x.rows(), strips = (n + kTile - 1) / kTile;
   MatrixXf result(n, x.cols());
 #pragma omp parallel

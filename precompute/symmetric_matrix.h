@@ -31,7 +31,7 @@ class SymmetricMatrix {
   virtual std::array<std::uint32_t, kChannelCount> channel_matrix() const { return {0, 0, 0}; }
 
   /// Writes the entries between two lists of patches without repetitions, which are the same or
-  /// have none in common; `entries` is [rows][columns]. BLAS must run on one thread.
+  /// have none in common; `entries` is [rows][columns].
   virtual void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                        std::span<const std::uint32_t> columns,
                        Eigen::Ref<Eigen::MatrixXf> entries) const = 0;

@@ -3,9 +3,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Dense>
 
+#include "blas.h"
 #include "flush_to_zero.h"
 #include "rebounce/transfer/error.h"
-#include "single_threaded_blas.h"
 
 namespace rebounce {
 namespace {
@@ -128,7 +128,7 @@ std::size_t TiledMatrix<Scalar>::bytes(std::size_t size) {
 
 template <typename Scalar>
 void invert_positive_definite(TiledMatrix<Scalar>& matrix, const Progress& progress) {
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   const FlushToZero flush;
   const StageProgress stages(progress, matrix.side());
   factor(matrix, stages);

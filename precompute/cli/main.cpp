@@ -7,7 +7,6 @@
 
 #include "commands.h"
 #include "console.h"
-#include "rebounce/precompute/blas_kernels.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/version.h"
 
@@ -68,7 +67,6 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  rebounce::restart_with_better_blas_kernels(argv);
   rebounce::cli::install_interrupt_handler();
   try {
     return run(argc, argv);

@@ -10,7 +10,6 @@
 #include <random>
 
 #include "hierarchical_samples.h"
-#include "single_threaded_blas.h"
 #include "with_threads.h"
 
 namespace rebounce {
@@ -48,7 +47,6 @@ class HierarchicalMatrixOf : public testing::TestWithParam<Kind> {
  protected:
   HierarchicalOperator transfer = sample(GetParam());
   HierarchicalMatrix matrix{transfer.storage()};
-  SingleThreadedBlas single_threaded;
 };
 
 TEST_P(HierarchicalMatrixOf, EntriesAreThoseOfTheOperator) {

@@ -17,7 +17,6 @@
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/transfer/area_norm.h"
-#include "single_threaded_blas.h"
 #include "solved_transfer.h"
 #include "temporary_folder.h"
 #include "test_scenes.h"
@@ -154,7 +153,6 @@ double mean_error(const ColouredRoom& room, const TransferOperator& transfer,
 
 /// Of three runs of columns, relative to the dense inverse.
 std::vector<double> column_errors(const SolvedTransfer& solved, const ColouredRoom& room) {
-  const SingleThreadedBlas single_threaded;
   SolvedTransfer::Workspace workspace;
   std::vector<double> errors;
   for (const std::size_t begin : {0U, 320U, 640U}) {
