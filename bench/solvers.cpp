@@ -125,7 +125,6 @@ class SolverBenchmark {
       if (form.name == "rows") continue;  // nobody iterates on it: see the sweeps
       for (const NamedSolveMethod& named : kSolveMethods) {
         if (named.method == SolveMethod::kJacobi) continue;  // gathering
-        if (named.method == SolveMethod::kSouthwell && form.name != "blocks") continue;
         if (sweeps_over_rows(named.method) && form.sweepable() == nullptr) continue;
         const auto solver =
             make_solver(named.method, *form.form_factors,

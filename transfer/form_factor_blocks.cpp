@@ -113,16 +113,4 @@ Float3 FormFactorBlocks::gather_inside_group(std::size_t row, std::span<const fl
   return gather_range(inside_begin_[row], row_begin_[row + 1], planes);
 }
 
-void FormFactorBlocks::shoot(std::size_t row, const Float3& power, std::span<const float> scale,
-                             std::span<float> planes) const {
-  const std::uint64_t begin = row_begin_[row];
-  gather_kernels().shoot(block_.data() + begin, position_.data() + begin,
-                         row_begin_[row + 1] - begin, power.data(), scale.data(), planes.data(),
-                         plane_size());
-}
-
-std::size_t FormFactorBlocks::largest(std::span<const float> planes) const {
-  return gather_kernels().largest(planes.data(), plane_size());
-}
-
 }  // namespace rebounce

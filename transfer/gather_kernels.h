@@ -18,10 +18,6 @@ struct GatherKernels {
   void (*gather)(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
                  const float* x, std::size_t stride, float* sum);
 
-  /// y_c(j) += weight[c] scale_c(j) F(j) for the columns j.
-  void (*shoot)(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
-                const float* weight, const float* scale, float* y, std::size_t stride);
-
   /// sum[c] = sum over the columns j of F(j) x_c(j), and y_c(j) += value[c] F(j): a row of a
   /// symmetric matrix and the column that is its mirror image.
   void (*gather_and_spread)(const FormFactorBlock* values, const std::uint32_t* position,
@@ -31,9 +27,6 @@ struct GatherKernels {
   /// The second half of that: y_c(j) += value[c] F(j).
   void (*spread)(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
                  const float* value, float* y, std::size_t stride);
-
-  /// The lowest of those indices below `stride` at which |x_0| + |x_1| + |x_2| is largest.
-  std::size_t (*largest)(const float* x, std::size_t stride);
 };
 
 extern const GatherKernels kGatherKernelsPortable;

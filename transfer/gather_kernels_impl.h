@@ -1,11 +1,10 @@
 #pragma once
 
 // The kernels on rows of F, written once over a vector type `V` with kWidth floats: load, store,
-// zero, broadcast, add, multiply_add, absolute, maximum, sum, largest. Included by one file per
-// instruction set; everything is in an unnamed namespace so that no two share an instantiation.
+// zero, broadcast, add, multiply_add, sum. Included by one file per instruction set; everything is
+// in an unnamed namespace so that no two share an instantiation.
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -44,24 +43,6 @@ void gather_blocks(const FormFactorBlock* values, const std::uint32_t* position,
     for (int c = 0; c < kChannelCount; ++c) total[c] = add(total[c], add(even[c], odd[c]));
   }
   for (int c = 0; c < kChannelCount; ++c) sum[c] = total[c].sum();
-}
-
-template <typename V>
-void shoot_blocks(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
-                  const float* weight, const float* scale, float* y, std::size_t stride) {
-  constexpr std::size_t kVectors = kFormFactorBlock / V::kWidth;
-  const V w[kChannelCount] = {V::broadcast(weight[0]), V::broadcast(weight[1]),
-                              V::broadcast(weight[2])};
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t at = kFormFactorBlock * static_cast<std::size_t>(position[k]);
-    for (std::size_t v = 0; v < kVectors; ++v) {
-      const V f = V::load(values[k].value + v * V::kWidth);
-      for (int c = 0; c < kChannelCount; ++c) {
-        const std::size_t j = at + c * stride + v * V::kWidth;
-        multiply_add(multiply(w[c], f), V::load(scale + j), V::load(y + j)).store(y + j);
-      }
-    }
-  }
 }
 
 template <typename V>
@@ -105,38 +86,8 @@ void spread_blocks(const FormFactorBlock* values, const std::uint32_t* position,
 }
 
 template <typename V>
-V magnitude(const float* x, std::size_t stride) {
-  return add(add(absolute(V::load(x)), absolute(V::load(x + stride))),
-             absolute(V::load(x + 2 * stride)));
-}
-
-template <typename V>
-std::size_t largest_magnitude(const float* x, std::size_t stride) {
-  constexpr std::size_t kChunk = 256;
-  float largest = 0;
-  std::size_t chunk = 0;
-  for (std::size_t begin = 0; begin < stride; begin += kChunk) {
-    V most = V::zero();
-    for (std::size_t j = begin; j < std::min(begin + kChunk, stride); j += V::kWidth) {
-      most = maximum(most, magnitude<V>(x + j, stride));
-    }
-    if (most.largest() > largest) {
-      largest = most.largest();
-      chunk = begin;
-    }
-  }
-  for (std::size_t j = chunk; j < std::min(chunk + kChunk, stride); ++j) {
-    if ((std::abs(x[j]) + std::abs(x[j + stride])) + std::abs(x[j + 2 * stride]) == largest) {
-      return j;
-    }
-  }
-  return 0;
-}
-
-template <typename V>
 constexpr GatherKernels make_gather_kernels(const char* instruction_set) {
-  return {instruction_set,  gather_blocks<V>,    shoot_blocks<V>, gather_and_spread_blocks<V>,
-          spread_blocks<V>, largest_magnitude<V>};
+  return {instruction_set, gather_blocks<V>, gather_and_spread_blocks<V>, spread_blocks<V>};
 }
 
 }  // namespace

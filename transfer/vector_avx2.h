@@ -49,15 +49,8 @@ struct Vector8 {
     const __m128 pair = _mm_add_ps(half, _mm_movehl_ps(half, half));
     return _mm_cvtss_f32(_mm_add_ss(pair, _mm_movehdup_ps(pair)));
   }
-  float largest() const {
-    const __m128 half = _mm_max_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
-    const __m128 pair = _mm_max_ps(half, _mm_movehl_ps(half, half));
-    return _mm_cvtss_f32(_mm_max_ss(pair, _mm_movehdup_ps(pair)));
-  }
   friend Vector8 add(Vector8 a, Vector8 b) { return {_mm256_add_ps(a.v, b.v)}; }
   friend Vector8 multiply(Vector8 a, Vector8 b) { return {_mm256_mul_ps(a.v, b.v)}; }
-  friend Vector8 absolute(Vector8 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0F), a.v)}; }
-  friend Vector8 maximum(Vector8 a, Vector8 b) { return {_mm256_max_ps(a.v, b.v)}; }
   friend Vector8 multiply_add(Vector8 a, Vector8 b, Vector8 c) {
     return {_mm256_fmadd_ps(a.v, b.v, c.v)};
   }

@@ -2,7 +2,6 @@
 
 // The portable vector type of the kernels; see vector_load.h.
 
-#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -56,17 +55,12 @@ struct Vector4 {
   }
   static Vector4 sums_of_fours(const Vector4 (&a)[1]) { return a[0]; }
   float sum() const { return (v[0] + v[2]) + (v[1] + v[3]); }
-  float largest() const { return std::max(std::max(v[0], v[1]), std::max(v[2], v[3])); }
 
   friend Vector4 add(const Vector4& a, const Vector4& b) { return {a.v + b.v}; }
   friend Vector4 multiply(const Vector4& a, const Vector4& b) { return {a.v * b.v}; }
   friend Vector4 multiply_add(const Vector4& a, const Vector4& b, const Vector4& c) {
     return {a.v * b.v + c.v};
   }
-  friend Vector4 absolute(const Vector4& a) {
-    return {std::bit_cast<Floats>(std::bit_cast<Bits>(a.v) & 0x7FFFFFFFU)};
-  }
-  friend Vector4 maximum(const Vector4& a, const Vector4& b) { return {a.v > b.v ? a.v : b.v}; }
 
   /// Loads entries with their channels side by side.
   template <typename Value>

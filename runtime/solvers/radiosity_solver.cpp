@@ -136,7 +136,8 @@ SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_
     best = std::min(best, result.residual);
     const bool there = settings.residual > 0 && result.residual <= settings.residual;
     const bool last = report.stuck || report.diverged || result.sweeps >= settings.max_sweeps ||
-                      out_of_time() || (settings.residual > 0 && since_best >= kPatience);
+                      Clock::now() >= deadline_ ||
+                      (settings.residual > 0 && since_best >= kPatience);
     if (!there && !last) continue;
 
     stop_clock();

@@ -4,7 +4,6 @@
 #include "rebounce/runtime/gathering_solver.h"
 #include "rebounce/runtime/gauss_seidel_solver.h"
 #include "rebounce/runtime/refinement_solver.h"
-#include "rebounce/runtime/southwell_solver.h"
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/exchange_blocks.h"
@@ -13,25 +12,14 @@
 namespace rebounce {
 namespace {
 
-/// `form_factors` as what a method needs it to be.
-template <typename Form>
-const Form& as(const FormFactorOperator& form_factors, const char* refusal) {
-  const auto* form = dynamic_cast<const Form*>(&form_factors);
-  if (form == nullptr) throw Error(refusal);
-  return *form;
-}
-
 const SweepableFormFactors& sweepable(const FormFactorOperator& form_factors) {
-  return as<SweepableFormFactors>(form_factors,
-                                  "solver: gauss-seidel cannot sweep over these form factors; "
-                                  "take gathering or conjugate-gradient");
-}
-
-/// A shot goes from one patch to all that it sees.
-const FormFactorBlocks& rows_of(const FormFactorOperator& form_factors) {
-  return as<FormFactorBlocks>(
-      form_factors,
-      "solver: southwell needs form factors by rows, and these are not; take gauss-seidel");
+  const auto* form = dynamic_cast<const SweepableFormFactors*>(&form_factors);
+  if (form == nullptr) {
+    throw Error(
+        "solver: gauss-seidel cannot sweep over these form factors; take gathering or "
+        "conjugate-gradient");
+  }
+  return *form;
 }
 
 }  // namespace
@@ -39,7 +27,7 @@ const FormFactorBlocks& rows_of(const FormFactorOperator& form_factors) {
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
                                                               const ExchangeMatrix& exchange,
                                                               std::span<const float> area) {
-  if (method == SolveMethod::kGaussSeidel || method == SolveMethod::kSouthwell) {
+  if (method == SolveMethod::kGaussSeidel) {
     return std::make_unique<FormFactorBlocks>(exchange, area);
   }
   return std::make_unique<ExchangeBlocks>(exchange, area);
@@ -67,8 +55,6 @@ std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
                                                  SweepOrder::kSymmetric);
     case SolveMethod::kConjugateGradient:
       return std::make_unique<ConjugateGradientSolver>(form_factors, problem);
-    case SolveMethod::kSouthwell:
-      return std::make_unique<SouthwellSolver>(rows_of(form_factors), problem);
     case SolveMethod::kRefine:
       return std::make_unique<RefinementSolver>(form_factors, problem, std::move(transfer));
     case SolveMethod::kPreconditionedConjugateGradient:

@@ -344,7 +344,6 @@ TEST_F(CommandLine, WorksWithoutPairs) {
   const auto solve = [&](const char* option, const char* value) {
     return Words{"solve", file, "--lights", kLights, "-o", path("y.csv"), option, value};
   };
-  expect_refused(solve("--method", "southwell"), "by rows");
   expect_refused(solve("--form-factors", "exact"), "compressed only");
   expect_refused({"export", file, "--what", "form-factors", "-o", path("x.npz")},
                  "--form-factors pairs");
@@ -771,7 +770,8 @@ TEST_F(CommandLine, TheShippedScenesAreWhatTheirScriptsMake) {
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(test::read_bytes(path("box.gltf")), test::read_bytes(kScene));
   ASSERT_EQ(std::system(("python3 '" + kScenes + "make_rooms.py' '" + path(".") + "'").c_str()), 0);
-  for (const std::string name : {"two_rooms", "three_rooms", "furnished_room", "white_room", "pavilion"}) {
+  for (const std::string name :
+       {"two_rooms", "three_rooms", "furnished_room", "white_room", "pavilion"}) {
     const std::string file = name + ".gltf";
     EXPECT_EQ(test::read_bytes(path(file)), test::read_bytes(kScenes + file)) << name;
   }

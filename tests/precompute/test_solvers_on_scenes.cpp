@@ -129,9 +129,8 @@ TEST_P(SolversOnScenes, FurnaceIsUniform) {
 
 TEST(RelaxationOnScenes, ContractsByTheReflectanceOrBetter) {
   const std::vector<Float3> m0 = lamp_light(bright().patches.size(), 6);
-  for (const SolveMethod method :
-       {SolveMethod::kGathering, SolveMethod::kJacobi, SolveMethod::kGaussSeidel,
-        SolveMethod::kSymmetricGaussSeidel, SolveMethod::kSouthwell}) {
+  for (const SolveMethod method : {SolveMethod::kGathering, SolveMethod::kJacobi,
+                                   SolveMethod::kGaussSeidel, SolveMethod::kSymmetricGaussSeidel}) {
     const auto solver = bright().solver(method);
     double before = solver->solve(m0, {.max_sweeps = 1, .residual = 0}).residual;
     for (int sweep = 0; sweep < 8; ++sweep) {
@@ -343,7 +342,6 @@ TEST(CompressedFormFactorsOnScenes, AreSolvedByEveryMethod) {
   for (const Precision precision : {Precision::kF32, Precision::kF16}) {
     const CompressedRoom compressed(furnished(), 0.002, precision);
     for (const NamedSolveMethod& named : kSolveMethods) {
-      if (named.method == SolveMethod::kSouthwell) continue;  // it needs rows
       const auto solver = compressed.solver(named.method);
       const SolveResult result = solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
       EXPECT_FALSE(result.diverged) << named.name;

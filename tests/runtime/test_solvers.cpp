@@ -182,7 +182,6 @@ std::vector<MethodAndForm> methods_and_forms() {
   std::vector<MethodAndForm> all;
   for (const NamedSolveMethod& named : kSolveMethods) {
     for (const Form form : {Form::kRows, Form::kBlocks, Form::kExchange, Form::kCompressed}) {
-      if (named.method == SolveMethod::kSouthwell && form != Form::kBlocks) continue;
       all.push_back({named, form});
     }
   }
@@ -222,7 +221,7 @@ TEST_P(EveryMethod, BlackPatchesKeepTheirOwnLight) {
   const auto solver = c.solver(method());
   solver->solve(c.system.initial_exitance);
   for (std::size_t i = 0; i < kPatchCount; i += 5) {
-    for (int k = 0; k < kChannelCount; ++k) {  // Southwell rounds: it keeps area times light
+    for (int k = 0; k < kChannelCount; ++k) {
       EXPECT_FLOAT_EQ(solver->radiosity()[i][k], c.system.initial_exitance[i][k]);
     }
   }
@@ -446,7 +445,6 @@ class Gatherer final : public FormFactorOperator {
 
 TEST(Solvers, FormsThatAMethodCannotUseAreRefused) {
   const Case c(0.5F, Form::kExchange);
-  EXPECT_THROW(c.solver(SolveMethod::kSouthwell), Error);
   const Gatherer gatherer(c.blocks);
   for (const SolveMethod method : {SolveMethod::kGaussSeidel, SolveMethod::kSymmetricGaussSeidel}) {
     EXPECT_THROW(make_solver(method, gatherer, c.system.problem()), Error);
@@ -461,20 +459,6 @@ TEST(Solvers, EveryMethodHasAFormOfItsOwn) {
     const auto solver = make_solver(named.method, *form, c.system.problem(), c.operator_);
     EXPECT_TRUE(solver->solve(c.system.initial_exitance, {.residual = 1e-5}).converged);
   }
-}
-
-TEST(Southwell, ShootsTheLargestPowerFirst) {
-  // One lamp among dark patches: the first shot is the lamp's, the second that of the patch that
-  // got most of it.
-  Case c(0.8F);
-  for (Float3& m0 : c.system.initial_exitance) m0 = {0, 0, 0};
-  c.system.initial_exitance[123] = {5, 5, 5};
-  const auto southwell = c.solver(SolveMethod::kSouthwell);
-  const double residual =
-      southwell->solve(c.system.initial_exitance, {.max_sweeps = 1, .residual = 0}).residual;
-  const auto gathering = c.solver(SolveMethod::kGathering);
-  EXPECT_LT(residual,
-            gathering->solve(c.system.initial_exitance, {.max_sweeps = 1, .residual = 0}).residual);
 }
 
 }  // namespace

@@ -168,7 +168,6 @@ TEST(IndirectSolver, EveryIterationFindsTheSameLight) {
   exact.choose({.iteration = SolveMethod::kGaussSeidel, .sweeps = 100, .warm = false});
   const auto truth = exact.solve(exitance);
   for (const NamedSolveMethod& named : kSolveMethods) {
-    if (named.method == SolveMethod::kSouthwell) continue;  // its sweeps are single shots
     other.choose({.iteration = named.method, .sweeps = 100});
     EXPECT_LT(relative_difference(other.solve(exitance), truth, data->patches.area), 1e-4)
         << named.name;

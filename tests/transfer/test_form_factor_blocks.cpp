@@ -69,40 +69,6 @@ TEST(FormFactorBlocks, PlanesGoThereAndBack) {
   EXPECT_EQ(planes[77], 0);  // past the last patch
 }
 
-TEST(FormFactorBlocks, ShootingIsGatheringTransposed) {
-  const std::size_t n = 300;
-  const Pairs pairs(n);
-  const FormFactorRows rows(pairs.exchange, pairs.area);
-  const FormFactorBlocks blocks(rows);
-  std::vector<float> scale(kChannelCount * blocks.plane_size(), 0.5F), planes(scale.size(), 1.0F);
-  blocks.shoot(100, {1, 2, 3}, scale, planes);
-  std::vector<float> expected(n, 0.0F);
-  for (std::size_t k = 0; k < rows.columns(100).size(); ++k) {
-    expected[rows.columns(100)[k]] = rows.form_factors(100)[k];
-  }
-  for (std::size_t j = 0; j < n; ++j) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      const float weight = 0.5F * static_cast<float>(c + 1);
-      EXPECT_FLOAT_EQ(planes[c * blocks.plane_size() + j], 1 + weight * expected[j]);
-    }
-  }
-}
-
-TEST(FormFactorBlocks, LargestTakesTheFirstOfEquals) {
-  const Pairs pairs(100);
-  const FormFactorBlocks blocks(pairs.exchange, pairs.area);
-  std::vector<Float3> power(100, {1, 0, 0});
-  power[33] = {-1, 2, 1};
-  power[34] = {2, 1, -1};
-  power[90] = {1, -1, 2};
-  std::vector<float> planes(kChannelCount * blocks.plane_size());
-  blocks.to_planes(power, planes);
-  for (const GatherKernels* kernels : gather_kernel_sets()) {
-    EXPECT_EQ(kernels->largest(planes.data(), blocks.plane_size()), 33U);
-  }
-  EXPECT_EQ(blocks.largest(planes), 33U);
-}
-
 TEST(FormFactorBlocks, InstructionSetsAgree) {
   constexpr std::size_t kCount = 500, kStride = kCount * kFormFactorBlock;
   std::mt19937_64 engine(3);
@@ -123,9 +89,9 @@ TEST(FormFactorBlocks, InstructionSetsAgree) {
   expect_near(a, b, 1e-6);
   const Float3 weight{1, 2, 3};
   std::vector<float> y1 = x, y2 = x;
-  kGatherKernelsPortable.shoot(values.data(), position.data(), kCount, weight.data(), x.data(),
-                               y1.data(), kStride);
-  wide.shoot(values.data(), position.data(), kCount, weight.data(), x.data(), y2.data(), kStride);
+  kGatherKernelsPortable.spread(values.data(), position.data(), kCount, weight.data(), y1.data(),
+                                kStride);
+  wide.spread(values.data(), position.data(), kCount, weight.data(), y2.data(), kStride);
   for (std::size_t k = 0; k < y1.size(); ++k) EXPECT_NEAR(y1[k], y2[k], 1e-6F * y1[k]);
 }
 

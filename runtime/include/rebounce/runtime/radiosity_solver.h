@@ -93,9 +93,6 @@ class RadiositySolver {
   /// residual_ = M0 + rho F B - B, and its norm: one gather.
   double compute_residual();
 
-  /// The time budget of the solve that is running is spent.
-  bool out_of_time() const { return Clock::now() >= deadline_; }
-
   const FormFactorOperator& form_factors_;
   std::vector<float> area_;
   std::vector<Float3> reflectance_;

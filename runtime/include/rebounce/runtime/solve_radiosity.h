@@ -21,7 +21,6 @@ enum class SolveMethod : std::uint8_t {
   kGaussSeidel,           ///< needs SweepableFormFactors
   kSymmetricGaussSeidel,  ///< likewise
   kConjugateGradient,
-  kSouthwell,                        ///< needs FormFactorBlocks
   kRefine,                           ///< needs a stored operator that serves all patches
   kPreconditionedConjugateGradient,  ///< likewise
 };
@@ -31,13 +30,12 @@ struct NamedSolveMethod {
   SolveMethod method;
 };
 
-inline constexpr std::array<NamedSolveMethod, 8> kSolveMethods = {{
+inline constexpr std::array<NamedSolveMethod, 7> kSolveMethods = {{
     {"gathering", SolveMethod::kGathering},
     {"jacobi", SolveMethod::kJacobi},
     {"gauss-seidel", SolveMethod::kGaussSeidel},
     {"symmetric-gauss-seidel", SolveMethod::kSymmetricGaussSeidel},
     {"conjugate-gradient", SolveMethod::kConjugateGradient},
-    {"southwell", SolveMethod::kSouthwell},
     {"refine", SolveMethod::kRefine},
     {"preconditioned-conjugate-gradient", SolveMethod::kPreconditionedConjugateGradient},
 }};
@@ -53,8 +51,8 @@ std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method
                                                               const ExchangeMatrix& exchange,
                                                               std::span<const float> area);
 
-/// The best F that `data` hold: by pairs, as above, or where those are not kept compressed, for all
-/// methods but southwell. Throws Error if there is neither.
+/// The best F that `data` hold: by pairs, as above, or compressed where those are not kept. Throws
+/// Error if there is neither.
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
                                                               const TransferData& data);
 

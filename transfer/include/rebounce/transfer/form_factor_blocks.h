@@ -68,14 +68,6 @@ class FormFactorBlocks final : public SweepableFormFactors {
   Float3 gather_outside_group(std::size_t row, std::span<const float> planes) const;
   Float3 gather_inside_group(std::size_t row, std::span<const float> planes) const;
 
-  /// Shoots from `row`: planes_c(j) += power[c] scale_c(j) F(row, j) for every j.
-  void shoot(std::size_t row, const Float3& power, std::span<const float> scale,
-             std::span<float> planes) const;
-
-  /// The patch at which the channels of `planes` have the largest sum of magnitudes; of equals the
-  /// first.
-  std::size_t largest(std::span<const float> planes) const;
-
  private:
   Float3 gather_range(std::uint64_t begin, std::uint64_t end, std::span<const float> planes) const;
 
