@@ -140,7 +140,7 @@ def where_gauss_seidel_wins(headlines):
                 f"{span([h.switch_any for h in headlines])}.",
                 f"- With caches that something else has used, after a switch to 0.1 %: {span(cold)}.",
                 "- Before break-even (below), and where memory for F is there and for an operator is not.",
-                "- `--method auto` chooses by the rule in [solvers.md](solvers.md), which follows from these figures.",
+                "- Which method to take when: [solvers.md](solvers.md#which-one).",
             )
         )
     )

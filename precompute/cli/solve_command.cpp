@@ -11,7 +11,6 @@
 #include "method_names.h"
 #include "rebounce/precompute/csv_writer.h"
 #include "rebounce/precompute/npz_writer.h"
-#include "rebounce/runtime/automatic_solver.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
@@ -25,13 +24,9 @@ namespace {
 // F as methods see it.
 constexpr const char *kExact = "exact", *kCompressed = "compressed", *kLinks = "links";
 
-// The runtime's choice: automatic_solver.h.
-constexpr const char* kAutomatic = "auto";
-
 struct SolveOptions {
   std::string file, lights, method = kTransferMethod, form_factors, output;
   SolveSettings settings;
-  double error = 0.01;  // that kAutomatic may leave
 };
 
 struct Solution {
@@ -39,7 +34,6 @@ struct Solution {
   int sweeps = 0;
   bool diverged = false;
   double microseconds = 0;
-  std::string chosen{};  ///< by kAutomatic
 };
 
 /// Median of the microseconds that `work` says it took, repeated for about half a second but at
@@ -87,31 +81,6 @@ Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
   return solution;
 }
 
-Solution solve_automatically(const SolveOptions& chosen, const Engine& engine,
-                             const FormFactorOperator& form_factors) {
-  const auto* const sweepable = dynamic_cast<const SweepableFormFactors*>(&form_factors);
-  if (sweepable == nullptr) {
-    throw Error(
-        "auto weighs methods that do not run on links; name one, such as "
-        "conjugate-gradient");
-  }
-  const TransferData& data = engine.data();
-  AutomaticSolver solver(*sweepable, {data.patches.area, data.patches.reflectance}, data.transfer,
-                         data.record.error_mean);
-  Solution solution;
-  AutomaticSolver::Result result;
-  solution.microseconds = median_microseconds([&] {
-    solver.forget();
-    result = solver.solve(engine.initial_exitance(), chosen.error, chosen.settings.max_sweeps);
-    return result.microseconds;
-  });
-  solution.sweeps = result.sweeps;
-  solution.chosen = name(result.method);
-  solution.radiosity.assign(solver.radiosity().begin(), solver.radiosity().end());
-  solution.indirect_irradiance = gather(form_factors, solution.radiosity);
-  return solution;
-}
-
 /// |M0 + rho F B - B| / |M0| in the area-weighted norm.
 double radiosity_residual(const Engine& engine, const FormFactorOperator& form_factors,
                           const std::vector<Float3>& radiosity) {
@@ -150,7 +119,7 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
   write_csv(path, columns);
 }
 
-/// What --method names; for the product and for the choice, a method that reads F least.
+/// What --method names; for the product, a method that reads F least.
 SolveMethod method_of(const SolveOptions& chosen) {
   if (chosen.method == kHierarchicalMethod) return SolveMethod::kJacobi;
   const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
@@ -160,7 +129,6 @@ SolveMethod method_of(const SolveOptions& chosen) {
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
                        const FormFactorOperator& form_factors) {
   if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
-  if (chosen.method == kAutomatic) return solve_automatically(chosen, engine, form_factors);
   const TransferData& data = engine.data();
   const auto solver = make_solver(method_of(chosen), form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
@@ -219,17 +187,15 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   const double residual = radiosity_residual(engine, *form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);
   if (options.json) {
-    nlohmann::json summary = {{"method", chosen.method},
-                              {"form_factors", kind},
-                              {"sweeps", solution.sweeps},
-                              {"residual", residual},
-                              {"microseconds", solution.microseconds}};
-    if (!solution.chosen.empty()) summary["chosen"] = solution.chosen;
+    const nlohmann::json summary = {{"method", chosen.method},
+                                    {"form_factors", kind},
+                                    {"sweeps", solution.sweeps},
+                                    {"residual", residual},
+                                    {"microseconds", solution.microseconds}};
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
-    fmt::print("{}: {:.0f} microseconds, {} sweeps, residual {:.2e}\n",
-               solution.chosen.empty() ? chosen.method : solution.chosen, solution.microseconds,
-               solution.sweeps, residual);
+    fmt::print("{}: {:.0f} microseconds, {} sweeps, residual {:.2e}\n", chosen.method,
+               solution.microseconds, solution.sweeps, residual);
   }
 }
 
@@ -237,16 +203,12 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
 
 void add_solve_command(CLI::App& app, const CommonOptions& options) {
   auto chosen = std::make_shared<SolveOptions>();
-  std::vector<std::string> methods = method_names();
-  methods.emplace_back(kAutomatic);
   CLI::App* command = app.add_subcommand("solve", "Relight a transfer file once");
   command->add_option("file", chosen->file, "Transfer file")->required();
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
-  command
-      ->add_option("--method", chosen->method,
-                   "How to find the indirect light; auto: whichever is cheapest for --error")
-      ->check(CLI::IsMember(methods))
+  command->add_option("--method", chosen->method, "How to find the indirect light")
+      ->check(CLI::IsMember(method_names()))
       ->capture_default_str();
   command
       ->add_option("--form-factors", chosen->form_factors,
@@ -263,11 +225,6 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--residual", chosen->settings.residual,
                    "Stop an iterative method at this part of the initial exitance")
       ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  command
-      ->add_option("--error", chosen->error,
-                   "Error of the reflected light that auto may leave, relative")
-      ->check(CLI::Range(1e-6, 1.0))
       ->capture_default_str();
   command
       ->add_option("--time-budget", chosen->settings.time_budget_microseconds,

@@ -335,7 +335,7 @@ TEST_F(CommandLine, WorksWithoutPairs) {
   summary_of({"solve", file, "--lights", kLights, "-o", once});
   for (const std::string method :
        {"gathering", "jacobi", "gauss-seidel", "symmetric-gauss-seidel", "conjugate-gradient",
-        "refine", "preconditioned-conjugate-gradient", "hierarchical", "auto"}) {
+        "refine", "preconditioned-conjugate-gradient", "hierarchical"}) {
     const json solved = summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"),
                                     "--method", method, "--residual", "1e-5"});
     EXPECT_EQ(solved["form_factors"], method == "hierarchical" ? "links" : "compressed") << method;
@@ -369,18 +369,6 @@ TEST_F(CommandLine, QualitySetsTheRaysOfFormFactors) {
   EXPECT_EQ(usual["settings"]["hemisphere_rays"], 4096);
 }
 
-TEST_F(CommandLine, ChoosesByTheErrorThatMayBeLeft) {
-  const std::string file = precompute("box.safetensors", {"--tolerance", "0.01"});
-  const auto chosen = [&](const char* error) {
-    return summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"), "--method", "auto",
-                       "--error", error});
-  };
-  EXPECT_EQ(chosen("0.05")["chosen"], "transfer");
-  const json exact = chosen("1e-5");
-  EXPECT_NE(exact["chosen"], "transfer");
-  EXPECT_LT(exact["residual"], 1e-5);
-}
-
 TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
   const std::string file =
       precompute("box.safetensors", {"--store-links", "--link-epsilon", "0.0005"});
@@ -410,7 +398,6 @@ TEST_F(CommandLine, GathersAlongLinksWithAnyMethodThatGathers) {
   EXPECT_LT(conjugate["sweeps"], jacobi["sweeps"]);
   EXPECT_LT(difference(read_csv(path("jacobi.csv")), read_csv(path("conjugate.csv")), 6), 1e-3);
   expect_refused(solve("gauss-seidel", "x.csv"), "gather");
-  expect_refused(solve("auto", "x.csv"), "links");
 }
 
 TEST_F(CommandLine, WritesTheSameSolutionAsCsvAndNpz) {

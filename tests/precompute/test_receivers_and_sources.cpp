@@ -18,7 +18,6 @@
 #include "rebounce/precompute/large_transfer.h"
 #include "rebounce/precompute/patch_selection.h"
 #include "rebounce/precompute/random_lights.h"
-#include "rebounce/runtime/automatic_solver.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/solve_radiosity.h"
 #include "rebounce/transfer/area_norm.h"
@@ -351,11 +350,6 @@ TEST(ReceiversAndSources, SolversOfAllPatchesDoWithoutTheOperator) {
     test::expect_error([&] { make_solver(method, form_factors, problem, data.transfer); },
                        "receivers or sources");
   }
-  AutomaticSolver solver(form_factors, problem, data.transfer, data.record.error_mean);
-  const std::vector<Float3> light(data.patches.size(), Float3{1, 1, 1});
-  const auto result = solver.solve(light, 0.1);
-  EXPECT_TRUE(result.method == AutomaticMethod::kGaussSeidel ||
-              result.method == AutomaticMethod::kConjugateGradient);
 }
 
 TEST(ReceiversAndSources, TheFileIsTheSameForAnyNumberOfThreads) {
