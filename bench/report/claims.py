@@ -192,15 +192,13 @@ def all_claims(result):
 
 
 def repainted(result, target=0.001):
-    """After surfaces were repainted the operator is a preconditioner at best."""
+    """After surfaces were repainted the operator serves refinement at best."""
     return time_claim(
         result,
         "equal error",
         results.REPAINTED,
         target,
-        result.fastest(
-            results.REPAINTED, (*results.INVERSES, "preconditioned-conjugate-gradient"), target
-        ),
+        result.fastest(results.REPAINTED, results.INVERSES, target),
         result.fastest(results.REPAINTED, results.ITERATIONS, target),
     )
 

@@ -48,16 +48,9 @@ struct Run {
   std::vector<double> budgets{};
 };
 
-/// Preconditioned conjugate gradients are for repainted scenes.
-bool takes_part(const Contestant& contestant) {
-  return contestant.method != SolveMethod::kPreconditionedConjugateGradient;
-}
-
-std::vector<Run> list_runs(const std::vector<Contestant>& contestants,
-                           const std::vector<RunTime>& times, const std::vector<double>& budgets) {
+std::vector<Run> list_runs(const std::vector<RunTime>& times, const std::vector<double>& budgets) {
   std::vector<Run> runs;
   for (std::size_t k = 0; k < times.size(); ++k) {
-    if (!takes_part(contestants[k])) continue;
     for (const double budget : budgets) {
       const int sweeps = times[k].sweeps_within(budget);
       const bool same =
@@ -116,7 +109,7 @@ std::vector<FrameRow> measure_frames(const Contenders& contenders,
   const TransferData& data = *contenders.data;
   const std::vector<LightPath> paths =
       make_light_paths(data, *contenders.tracer, settings.frame_count, settings.seed);
-  const std::vector<Run> runs = list_runs(contestants, times, settings.budgets);
+  const std::vector<Run> runs = list_runs(times, settings.budgets);
   DirectLighting direct(data, *contenders.tracer);
   std::vector<FrameRow> rows;
   for (std::size_t p = 0; p < paths.size(); ++p) {

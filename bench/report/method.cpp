@@ -112,20 +112,17 @@ void add_iterations(const Contenders& contenders, std::vector<Contestant>& list)
   }
 }
 
-/// Those that need both: on exact form factors and on the most exact compressed ones.
+/// What needs both: on exact form factors and on the most exact compressed ones.
 void add_refinements(const Contenders& contenders, const ReportSettings& settings,
                      std::vector<Contestant>& list) {
   const StoredOperator& stored = contenders.operators.front();
   for (const std::string& form :
        {std::string(kExactHalf), compressed_name(settings.form_factor_tolerances.front())}) {
-    for (const SolveMethod method :
-         {SolveMethod::kRefine, SolveMethod::kPreconditionedConjugateGradient}) {
-      list.push_back({.name = name_of(method),
-                      .transfer = stored.name,
-                      .form = form,
-                      .bytes = stored.transfer->bytes() + contenders.form(form)->bytes(),
-                      .method = method});
-    }
+    list.push_back({.name = name_of(SolveMethod::kRefine),
+                    .transfer = stored.name,
+                    .form = form,
+                    .bytes = stored.transfer->bytes() + contenders.form(form)->bytes(),
+                    .method = SolveMethod::kRefine});
   }
 }
 

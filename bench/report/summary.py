@@ -134,8 +134,8 @@ def where_gauss_seidel_wins(headlines):
     parts.append(
         "\n".join(
             (
-                "- Repainted (the commonest material reflects half of what it did): the operator is wrong, and helps only as a "
-                f"preconditioner. Time of the best iteration ÷ time of the best method that uses it: {span(repainted)}.",
+                "- Repainted (the commonest material reflects half of what it did): the operator is wrong, and helps only with "
+                f"refinement. Time of the best iteration ÷ time of the best method that uses it: {span(repainted)}.",
                 f"- Against the best iteration of any kind instead of Gauss-Seidel, after a switch to 0.1 %: "
                 f"{span([h.switch_any for h in headlines])}.",
                 f"- With caches that something else has used, after a switch to 0.1 %: {span(cold)}.",

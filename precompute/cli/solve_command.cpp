@@ -182,7 +182,7 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   if (solution.diverged) {
     throw Error(chosen.method + " diverges: the operator of " + chosen.file +
                 " does not fit its form factors; use another method, such as "
-                "preconditioned-conjugate-gradient");
+                "conjugate-gradient");
   }
   const double residual = radiosity_residual(engine, *form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rebounce/transfer/error.h"
-
 namespace rebounce {
 namespace {
 
@@ -27,25 +25,12 @@ void add_scaled(const std::array<double, kChannelCount>& factor, std::span<const
 
 }  // namespace
 
-ConjugateGradientSolver::ConjugateGradientSolver(
-    const FormFactorOperator& form_factors, const RadiosityProblem& problem,
-    std::shared_ptr<const TransferOperator> preconditioner)
-    : RadiositySolver(form_factors, problem), preconditioner_(std::move(preconditioner)) {
-  const std::size_t n = patch_count();
-  for (auto* vector : {&sqrt_reflectance_, &unknown_, &rest_, &direction_, &preconditioned_,
-                       &product_, &scaled_}) {
-    vector->resize(n);
+ConjugateGradientSolver::ConjugateGradientSolver(const FormFactorOperator& form_factors,
+                                                 const RadiosityProblem& problem)
+    : RadiositySolver(form_factors, problem) {
+  for (auto* vector : {&sqrt_reflectance_, &unknown_, &rest_, &direction_, &product_, &scaled_}) {
+    vector->resize(patch_count());
   }
-  if (!preconditioner_) return;
-  if (preconditioner_->patch_count() != n) {
-    throw Error("solver: form factors and operator differ in their number of patches");
-  }
-  if (!preconditioner_->roles().all_are_both()) {
-    throw Error(
-        "solver: preconditioning needs an operator that serves all patches, and this one has "
-        "receivers or sources; go without");
-  }
-  transfer_workspace_.resize(preconditioner_->workspace_size());
 }
 
 void ConjugateGradientSolver::begin(bool cold) {
@@ -63,9 +48,8 @@ void ConjugateGradientSolver::begin(bool cold) {
   form_factors_.gather(radiosity_, scaled_, gather_workspace_);
   scale(sqrt_reflectance_, scaled_, rest_);
   add_scaled({-1, -1, -1}, unknown_, rest_);
-  precondition();
-  direction_ = preconditioned_;
-  rest_square_ = inner_product(rest_, preconditioned_);
+  direction_ = rest_;
+  rest_square_ = inner_product(rest_, rest_);
 }
 
 RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
@@ -82,31 +66,18 @@ RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
   }
   add_scaled(step, direction_, unknown_);
   add_scaled(back_step, product_, rest_);
-  precondition();
-  const Scalars next = inner_product(rest_, preconditioned_);
-  const Scalars turn = turn_of_direction(step, next);
+  const Scalars next = inner_product(rest_, rest_);
+  Scalars turn{};
+  for (int c = 0; c < kChannelCount; ++c) {
+    if (rest_square_[c] > 0) turn[c] = next[c] / rest_square_[c];
+  }
   rest_square_ = next;
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
-      direction_[i][c] = static_cast<float>(preconditioned_[i][c] + turn[c] * direction_[i][c]);
+      direction_[i][c] = static_cast<float>(rest_[i][c] + turn[c] * direction_[i][c]);
     }
   }
   return {.residual = radiosity_residual_norm()};
-}
-
-ConjugateGradientSolver::Scalars ConjugateGradientSolver::turn_of_direction(
-    const Scalars& step, const Scalars& next) const {
-  // <rest, preconditioned> as it should be, or as it is: the rest has changed by -step product.
-  Scalars square = next;
-  if (preconditioner_) {
-    square = inner_product(product_, preconditioned_);
-    for (int c = 0; c < kChannelCount; ++c) square[c] *= -step[c];
-  }
-  Scalars turn{};
-  for (int c = 0; c < kChannelCount; ++c) {
-    turn[c] = rest_square_[c] > 0 ? square[c] / rest_square_[c] : 0;
-  }
-  return turn;
 }
 
 void ConjugateGradientSolver::finish() {
@@ -125,17 +96,6 @@ void ConjugateGradientSolver::multiply_direction() {
       product_[i][c] = direction_[i][c] - sqrt_reflectance_[i][c] * product_[i][c];
     }
   }
-}
-
-void ConjugateGradientSolver::precondition() {
-  if (!preconditioner_) {
-    std::ranges::copy(rest_, preconditioned_.begin());
-    return;
-  }
-  scale(sqrt_reflectance_, rest_, scaled_);
-  preconditioner_->apply(scaled_, preconditioned_, transfer_workspace_);
-  scale(sqrt_reflectance_, preconditioned_, preconditioned_);
-  add_scaled({1, 1, 1}, rest_, preconditioned_);
 }
 
 double ConjugateGradientSolver::radiosity_residual_norm() const {

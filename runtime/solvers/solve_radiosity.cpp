@@ -57,9 +57,6 @@ std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,
       return std::make_unique<ConjugateGradientSolver>(form_factors, problem);
     case SolveMethod::kRefine:
       return std::make_unique<RefinementSolver>(form_factors, problem, std::move(transfer));
-    case SolveMethod::kPreconditionedConjugateGradient:
-      if (!transfer) throw Error("solver: preconditioning needs an operator, and there is none");
-      return std::make_unique<ConjugateGradientSolver>(form_factors, problem, std::move(transfer));
   }
   throw Error("solver: no such method");
 }

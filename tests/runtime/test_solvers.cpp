@@ -399,32 +399,13 @@ TEST(Refinement, AnAbsurdOperatorIsReported) {
   }
 }
 
-TEST(ConjugateGradient, AGoodOperatorSavesSweeps) {
-  const Case c(0.9F);
-  const SolveSettings settings = {.residual = 1e-6};
-  const int plain =
-      c.solver(SolveMethod::kConjugateGradient)->solve(c.system.initial_exitance, settings).sweeps;
-  const int preconditioned = c.solver(SolveMethod::kPreconditionedConjugateGradient)
-                                 ->solve(c.system.initial_exitance, settings)
-                                 .sweeps;
-  EXPECT_LT(preconditioned, plain);
-  const auto broken = std::make_shared<const SeriesOperator>(
-      c.blocks, c.system.reflectance, std::numeric_limits<float>::quiet_NaN());
-  const auto solver = make_solver(SolveMethod::kPreconditionedConjugateGradient, c.blocks,
-                                  c.system.problem(), broken);
-  EXPECT_TRUE(solver->solve(c.system.initial_exitance).diverged);
-  for (const Float3& b : solver->radiosity()) EXPECT_TRUE(std::isfinite(b[0]));
-}
-
 TEST(Solvers, MissingOrOtherOperatorsAreRefused) {
   const Case c(0.5F);
-  for (const SolveMethod method :
-       {SolveMethod::kRefine, SolveMethod::kPreconditionedConjugateGradient}) {
-    EXPECT_THROW(make_solver(method, c.blocks, c.system.problem()), Error);
-    const System small(0.5F, 20);
-    const FormFactorBlocks small_blocks(small.exchange, small.area);
-    EXPECT_THROW(make_solver(method, small_blocks, small.problem(), c.operator_), Error);
-  }
+  EXPECT_THROW(make_solver(SolveMethod::kRefine, c.blocks, c.system.problem()), Error);
+  const System small(0.5F, 20);
+  const FormFactorBlocks small_blocks(small.exchange, small.area);
+  EXPECT_THROW(make_solver(SolveMethod::kRefine, small_blocks, small.problem(), c.operator_),
+               Error);
 }
 
 /// F that can only gather.

@@ -21,8 +21,7 @@ enum class SolveMethod : std::uint8_t {
   kGaussSeidel,           ///< needs SweepableFormFactors
   kSymmetricGaussSeidel,  ///< likewise
   kConjugateGradient,
-  kRefine,                           ///< needs a stored operator that serves all patches
-  kPreconditionedConjugateGradient,  ///< likewise
+  kRefine,  ///< needs a stored operator that serves all patches
 };
 
 struct NamedSolveMethod {
@@ -30,18 +29,17 @@ struct NamedSolveMethod {
   SolveMethod method;
 };
 
-inline constexpr std::array<NamedSolveMethod, 7> kSolveMethods = {{
+inline constexpr std::array<NamedSolveMethod, 6> kSolveMethods = {{
     {"gathering", SolveMethod::kGathering},
     {"jacobi", SolveMethod::kJacobi},
     {"gauss-seidel", SolveMethod::kGaussSeidel},
     {"symmetric-gauss-seidel", SolveMethod::kSymmetricGaussSeidel},
     {"conjugate-gradient", SolveMethod::kConjugateGradient},
     {"refine", SolveMethod::kRefine},
-    {"preconditioned-conjugate-gradient", SolveMethod::kPreconditionedConjugateGradient},
 }};
 
 constexpr bool needs_operator(SolveMethod method) {
-  return method == SolveMethod::kRefine || method == SolveMethod::kPreconditionedConjugateGradient;
+  return method == SolveMethod::kRefine;
 }
 
 /// Sparse F in the form that `method` is fastest on: rows in blocks where it goes by rows in one
