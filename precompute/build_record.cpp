@@ -12,8 +12,6 @@ const char* name(OperatorKind kind) {
       return "hierarchical";
     case OperatorKind::kLowRank:
       return "low-rank";
-    case OperatorKind::kFirstBounce:
-      return "first-bounce";
     case OperatorKind::kNoOperator:
       return "none";
     case OperatorKind::kAutomatic:

@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
-#include <optional>
 #include <random>
 
 #include "blas.h"
@@ -20,32 +19,10 @@ using Eigen::MatrixXf;
 // Up to this many patches all eigenvectors are found: seconds at most.
 constexpr Index kDenseSize = 700;
 
-// Columns beyond the rank, a half of it and some, and multiplications by sum W². The spectrum falls
-// slowly (corners): with fewer of either the subspace is some per cent off the best.
+// Columns beyond the rank, a half of it and some, and multiplications by sum Yhat². The spectrum
+// falls slowly (corners): with fewer of either the subspace is some per cent off the best.
 constexpr Index kOversamplingPart = 2, kOversampling = 8;
 constexpr int kIterations = 4;
-
-/// W of each matrix as a product: Yhat, or Yhat - G.
-class Remainder {
- public:
-  Remainder(const DenseOperator& dense, const ExchangeMatrix& exchange, bool first_bounce)
-      : dense_(dense) {
-    if (first_bounce) first_bounce_.emplace(exchange, dense.storage().area);
-  }
-
-  Index size() const { return static_cast<Index>(dense_.area().size()); }
-  std::uint32_t matrix_count() const { return dense_.matrix_count(); }
-
-  MatrixXf multiply(std::uint32_t matrix, const MatrixXf& x) const {
-    MatrixXf result = dense_.multiply(matrix, x);
-    if (first_bounce_) result -= first_bounce_->multiply(0, x);
-    return result;
-  }
-
- private:
-  DenseMatrix dense_;
-  std::optional<FormFactorMatrix> first_bounce_;
-};
 
 MatrixXf orthonormal(const MatrixXf& a) {
   return Eigen::HouseholderQR<MatrixXf>(a).householderQ() *
@@ -61,26 +38,26 @@ MatrixXf random_start(Index rows, Index columns) {
   return random;
 }
 
-/// Turns a subspace towards the leading eigenvectors of sum W².
-MatrixXf iterate(const Remainder& remainder, const MatrixXf& basis) {
+/// Turns a subspace towards the leading eigenvectors of sum Yhat².
+MatrixXf iterate(const DenseMatrix& dense, const MatrixXf& basis) {
   MatrixXf sum = MatrixXf::Zero(basis.rows(), basis.cols());
-  for (std::uint32_t m = 0; m < remainder.matrix_count(); ++m) {
-    sum += remainder.multiply(m, remainder.multiply(m, basis));
+  for (std::uint32_t m = 0; m < dense.matrix_count(); ++m) {
+    sum += dense.multiply(m, dense.multiply(m, basis));
   }
   return orthonormal(sum);
 }
 
-/// W V of each matrix, for the leading eigenvectors V of sum W² within the span of `basis`.
+/// Yhat V of each matrix, for the leading eigenvectors V of sum Yhat² within the span of `basis`.
 struct RitzVectors {
   MatrixXf basis;
   std::vector<MatrixXf> images;
 };
 
-RitzVectors ritz_vectors(const Remainder& remainder, const MatrixXf& basis, Index rank) {
+RitzVectors ritz_vectors(const DenseMatrix& dense, const MatrixXf& basis, Index rank) {
   RitzVectors result;
   MatrixXd gram = MatrixXd::Zero(basis.cols(), basis.cols());
-  for (std::uint32_t m = 0; m < remainder.matrix_count(); ++m) {
-    result.images.push_back(remainder.multiply(m, basis));
+  for (std::uint32_t m = 0; m < dense.matrix_count(); ++m) {
+    result.images.push_back(dense.multiply(m, basis));
     const MatrixXd image = result.images.back().cast<double>();
     gram += image.transpose() * image;
   }
@@ -117,12 +94,11 @@ SharedArray<float> make_cores(const RitzVectors& vectors) {
 }  // namespace
 
 std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperator& dense,
-                                                               const ExchangeMatrix& exchange,
                                                                const LowRankSettings& settings,
                                                                const Progress& progress) {
   load_blas();
-  const Remainder remainder(dense, exchange, settings.first_bounce);
-  const Index n = remainder.size();
+  const DenseMatrix matrix(dense);
+  const auto n = static_cast<Index>(matrix.area().size());
   const Index rank = std::min(n, static_cast<Index>(settings.rank));
   const auto report = [&](double done) {
     if (progress && !progress(done)) throw Cancelled();
@@ -133,11 +109,11 @@ std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperat
   if (n > kDenseSize && columns < n) {
     basis = orthonormal(random_start(n, columns));
     for (int k = 0; k < kIterations; ++k) {
-      basis = iterate(remainder, basis);
+      basis = iterate(matrix, basis);
       report((k + 1.0) / (kIterations + 1));
     }
   }
-  const RitzVectors vectors = ritz_vectors(remainder, basis, rank);
+  const RitzVectors vectors = ritz_vectors(matrix, basis, rank);
   report(1);
 
   LowRankOperator::Storage storage;
@@ -148,11 +124,7 @@ std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperat
   storage.basis_f32 = tile_basis(vectors.basis);
   storage.core = make_cores(vectors);
   if (settings.precision == Precision::kF16) storage = LowRankOperator::encode_half(storage);
-  std::shared_ptr<const FormFactorOperator> first_bounce;
-  if (settings.first_bounce) {
-    first_bounce = std::make_shared<const FormFactorBlocks>(exchange, storage.area);
-  }
-  return std::make_shared<const LowRankOperator>(std::move(storage), std::move(first_bounce));
+  return std::make_shared<const LowRankOperator>(std::move(storage));
 }
 
 }  // namespace rebounce

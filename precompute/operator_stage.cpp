@@ -35,9 +35,7 @@ std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
                                                  const PatchRoles& roles,
                                                  const Progress& progress) {
   if (settings.operator_kind != OperatorKind::kHierarchical) {
-    const bool first_bounce = settings.operator_kind == OperatorKind::kFirstBounce;
-    return build_low_rank_transfer(dense, data.exchange,
-                                   {settings.rank, *settings.precision, first_bounce}, progress);
+    return build_low_rank_transfer(dense, {settings.rank, *settings.precision}, progress);
   }
   const DrawnLights lights = draw_fitting_lights(data, tracer, settings.form_factors.seed, roles);
   return build_hierarchical_transfer(dense, data.patches, lights.view(),

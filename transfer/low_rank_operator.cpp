@@ -52,9 +52,7 @@ LowRankOperator::Storage LowRankOperator::encode_half(const Storage& storage) {
   return half;
 }
 
-LowRankOperator::LowRankOperator(Storage storage,
-                                 std::shared_ptr<const FormFactorOperator> first_bounce)
-    : storage_(std::move(storage)), first_bounce_(std::move(first_bounce)) {
+LowRankOperator::LowRankOperator(Storage storage) : storage_(std::move(storage)) {
   const std::size_t n = patch_count(), rank = storage_.rank;
   if (n == 0) refuse("there are no patches");
   if (rank > n) refuse("its rank is above the number of patches");
@@ -70,9 +68,6 @@ LowRankOperator::LowRankOperator(Storage storage,
   if (storage_.core.size() != storage_.matrix_count * rank * rank) {
     refuse("the cores are of another size");
   }
-  if (first_bounce_ && first_bounce_->patch_count() != n) {
-    refuse("the form factors are those of another scene");
-  }
   sqrt_area_.reserve(n);
   for (const float area : storage_.area) sqrt_area_.push_back(std::sqrt(area));
   rank_stride_ = (rank + kVector - 1) / kVector * kVector;
@@ -80,20 +75,16 @@ LowRankOperator::LowRankOperator(Storage storage,
 
 std::size_t LowRankOperator::bytes() const {
   return storage_.basis_f32.size_bytes() + storage_.basis_f16.size_bytes() +
-         storage_.core.size_bytes() + (first_bounce_ ? first_bounce_->bytes() : 0);
+         storage_.core.size_bytes();
 }
 
 std::size_t LowRankOperator::bytes_per_apply() const {
   const std::size_t twice = storage_.basis_f32.size_bytes() + storage_.basis_f16.size_bytes();
-  return 2 * twice + storage_.core.size_bytes() +
-         (first_bounce_ ? first_bounce_->bytes_per_gather() : 0);
+  return 2 * twice + storage_.core.size_bytes();
 }
 
 std::size_t LowRankOperator::workspace_size() const {
-  const std::size_t own =
-      kChannelCount * stride() + (tile_count(patch_count()) + 2) * coefficient_size();
-  return std::max(own,
-                  first_bounce_ ? kChannelCount * stride() + first_bounce_->workspace_size() : 0);
+  return kChannelCount * stride() + (tile_count(patch_count()) + 2) * coefficient_size();
 }
 
 void LowRankOperator::project(const float* x, float* tile_coefficient, float* coefficient) const {
@@ -177,15 +168,9 @@ void LowRankOperator::apply(std::span<const Float3> initial_exitance,
   project(x, multiplied + coefficient_size(), coefficient);
   multiply_cores(coefficient, multiplied);
   expand_tiles(multiplied, x);
-  if (first_bounce_) {
-    first_bounce_->gather(initial_exitance, indirect_irradiance,
-                          workspace.subspan(kChannelCount * stride()));
-  } else {
-    std::ranges::fill(indirect_irradiance, Float3{0, 0, 0});
-  }
   for (std::size_t i = 0; i < n; ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
-      indirect_irradiance[i][c] += x[c * stride() + i] / sqrt_area_[i];
+      indirect_irradiance[i][c] = x[c * stride() + i] / sqrt_area_[i];
     }
   }
 }

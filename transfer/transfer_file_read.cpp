@@ -312,10 +312,9 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
 }
 
 std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsFile& file,
-                                                              const TransferData& data,
-                                                              bool first_bounce) {
+                                                              const std::vector<float>& area) {
   LowRankOperator::Storage storage;
-  storage.area = data.patches.area;
+  storage.area = area;
   const TensorInfo& basis = file.info(tensor::kLowRankBasis);
   const TensorShape shape{LowRankOperator::tile_count(storage.area.size()), kAnySize,
                           LowRankOperator::kTile};
@@ -330,13 +329,8 @@ std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsF
   storage.matrix_count = static_cast<std::uint32_t>(file.info(tensor::kLowRankCore).shape[0]);
   storage.channel_matrix =
       read_channel_matrix(file, tensor::kLowRankChannelMatrix, storage.matrix_count);
-  std::shared_ptr<const FormFactorOperator> gather;
-  if (first_bounce) {
-    if (data.exchange.empty()) refuse(file, "its operator needs form factors by pairs");
-    gather = std::make_shared<const FormFactorBlocks>(data.exchange, data.patches.area);
-  }
   try {
-    return std::make_shared<const LowRankOperator>(std::move(storage), std::move(gather));
+    return std::make_shared<const LowRankOperator>(std::move(storage));
   } catch (const Error& error) {
     refuse(file, error.what());
   }
@@ -348,9 +342,7 @@ std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& fil
   const std::string& kind = metadata(file, key::kOperator);
   if (kind == "dense") return read_dense_operator(file, area);
   if (kind == "hierarchical") return read_hierarchical_operator(file, kHierarchicalTransfer, area);
-  if (kind == "low-rank" || kind == "first-bounce") {
-    return read_low_rank_operator(file, data, kind == "first-bounce");
-  }
+  if (kind == "low-rank") return read_low_rank_operator(file, area);
   refuse(file, "the operator is of a kind that this program does not know");
 }
 

@@ -46,7 +46,7 @@ class ContenderBuilder {
     for (const double tolerance : settings_.form_factor_tolerances) {
       add_compressed(tolerance, radiosities);
     }
-    for (const std::size_t rank : settings_.ranks) add_low_ranks(rank);
+    for (const std::size_t rank : settings_.ranks) add_low_rank(rank);
     if (settings_.links) add_links();
     measure_file();
     return std::move(result_);
@@ -100,25 +100,12 @@ class ContenderBuilder {
     result_.operators.push_back({name, timed(name, work, bytes_of_operator)});
   }
 
-  void add_low_ranks(std::size_t rank) {
-    for (const bool first_bounce : {false, true}) {
-      const std::string name =
-          fmt::format("{}low rank {}", first_bounce ? "first bounce + " : "", rank);
-      const auto work = [&](const Progress& progress) {
-        return build_low_rank_transfer(dense(), result_.data->exchange,
-                                       {rank, Precision::kF16, first_bounce}, progress);
-      };
-      const auto made = timed(name, work, bytes_of_operator);
-      result_.operators.push_back({name, made});
-      if (first_bounce) add_compressed_first_bounce(name, *made);
-    }
-  }
-
-  /// The same operator, its first bounce through the most exact compressed form factors.
-  void add_compressed_first_bounce(const std::string& name, const LowRankOperator& exact) {
-    const std::string form = compressed_name(settings_.form_factor_tolerances.front());
-    result_.operators.push_back({name + ", F " + form, std::make_shared<const LowRankOperator>(
-                                                           exact.storage(), result_.form(form))});
+  void add_low_rank(std::size_t rank) {
+    const std::string name = fmt::format("low rank {}", rank);
+    const auto work = [&](const Progress& progress) {
+      return build_low_rank_transfer(dense(), {rank, Precision::kF16}, progress);
+    };
+    result_.operators.push_back({name, timed(name, work, bytes_of_operator)});
   }
 
   void add_exact_forms() {

@@ -77,7 +77,7 @@ std::string product_name(const TransferOperator& transfer) {
   const std::string kind = transfer.kind();
   if (kind == "dense") return kDenseInverse;
   if (kind == "hierarchical") return "inverse";
-  return kind == "low-rank" ? "low rank" : "first bounce + low rank";
+  return "low rank";
 }
 
 void add_products(const Contenders& contenders, std::vector<Contestant>& list) {

@@ -14,7 +14,6 @@ STYLE = {
     "inverse": ("tab:red", "o", "inverse (hierarchical)"),
     "dense inverse": ("darkred", "s", "inverse (dense)"),
     "low rank": ("tab:pink", "v", "low rank"),
-    "first bounce + low rank": ("tab:purple", "^", "first bounce + low rank"),
     "refine": ("tab:orange", "o", "refine"),
     "gathering": ("tab:cyan", ".", "gathering (Jacobi)"),
     "gauss-seidel": ("tab:blue", ".", "Gauss-Seidel"),

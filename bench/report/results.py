@@ -7,7 +7,7 @@ import pathlib
 GAUSS_SEIDEL = ("gauss-seidel", "symmetric-gauss-seidel")
 ITERATIONS = (*GAUSS_SEIDEL, "gathering", "conjugate-gradient", "hierarchical radiosity")
 INVERSES = ("inverse", "dense inverse", "refine")
-PRODUCTS = ("inverse", "dense inverse", "low rank", "first bounce + low rank")
+PRODUCTS = ("inverse", "dense inverse", "low rank")
 
 FROM_ZERO, SWITCHED, REPAINTED = "from zero", "switched", "repainted"
 TARGETS = (0.01, 0.003, 0.001, 0.0001)

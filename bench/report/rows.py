@@ -125,7 +125,7 @@ def frame_rows(result, budget=PATH_BUDGET):
             ("inverse", results_module.INVERSES),
             ("Gauss-Seidel", results_module.GAUSS_SEIDEL),
             ("conjugate gradients", ("conjugate-gradient",)),
-            ("low rank", ("low rank", "first bounce + low rank")),
+            ("low rank", ("low rank",)),
             ("hierarchical radiosity", ("hierarchical radiosity",)),
         ):
             row = result.best_frames(path, methods, budget)

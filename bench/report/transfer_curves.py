@@ -13,7 +13,6 @@ plt = plots.plt
 LINES = (
     ("dense inverse", "", "darkred", "s-", "dense f32"),
     ("low rank", "", "tab:pink", "v-", "low rank"),
-    ("first bounce + low rank", "compressed", "tab:purple", "^-", "first bounce, F compressed, + low rank"),
     ("inverse", "f32", "tab:orange", "o-", "hierarchical f32"),
     ("inverse", "f16", "gold", "o-", "hierarchical f16"),
     ("inverse", "q16", "tab:red", "o-", "hierarchical q16"),

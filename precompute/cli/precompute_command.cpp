@@ -182,7 +182,6 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
   if (chosen.operator_kind == "low-rank") settings.operator_kind = OperatorKind::kLowRank;
-  if (chosen.operator_kind == "first-bounce") settings.operator_kind = OperatorKind::kFirstBounce;
   if (chosen.operator_kind == "hierarchical" ||
       (chosen.operator_kind.empty() && chosen.tolerance_given)) {
     settings.operator_kind = OperatorKind::kHierarchical;
@@ -269,10 +268,10 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
           "--operator", chosen.operator_kind,
           "Kind of the operator; by default hierarchical if a tolerance is given or there are "
           "more than 5000 patches, otherwise dense")
-      ->check(CLI::IsMember({"hierarchical", "low-rank", "first-bounce", "dense"}));
+      ->check(CLI::IsMember({"hierarchical", "low-rank", "dense"}));
   command
       .add_option("--rank", chosen.settings.rank,
-                  "Rank of a low-rank or first-bounce operator; bytes and time grow with it")
+                  "Rank of a low-rank operator; bytes and time grow with it")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command

@@ -21,11 +21,10 @@ namespace {
 
 struct Room {
   PatchTable patches;
-  ExchangeMatrix exchange;
   std::shared_ptr<const DenseOperator> dense;
 
   std::shared_ptr<const LowRankOperator> low_rank(const LowRankSettings& settings) const {
-    return build_low_rank_transfer(*dense, exchange, settings);
+    return build_low_rank_transfer(*dense, settings);
   }
 };
 
@@ -35,8 +34,7 @@ Room make_room(std::size_t patch_count, const Float3& reflectance) {
   test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 0);
   PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  return {model.patches, f.exchange,
-          build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
+  return {model.patches, build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
 }
 
 const Room& small_room() {
@@ -64,19 +62,6 @@ Eigen::MatrixXd symmetric(const TransferOperator& transfer, const PatchTable& pa
   return result;
 }
 
-Eigen::MatrixXd first_bounce(const Room& room) {
-  const std::size_t n = room.patches.size();
-  Eigen::MatrixXd g = Eigen::MatrixXd::Zero(n, n);
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::uint64_t k = room.exchange.row_begin[i]; k < room.exchange.row_begin[i + 1]; ++k) {
-      const std::size_t j = room.exchange.column[k];
-      g(i, j) = g(j, i) =
-          room.exchange.exchange_area[k] / std::sqrt(room.patches.area[i] * room.patches.area[j]);
-    }
-  }
-  return g;
-}
-
 /// Frobenius norm of what the best approximation of this rank misses (Eckart and Young).
 double least_error(const Eigen::MatrixXd& symmetric, int rank) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(symmetric, Eigen::EigenvaluesOnly);
@@ -96,82 +81,60 @@ std::vector<Float3> smooth_light(const PatchTable& patches) {
 
 TEST(LowRankTransfer, AFullRankIsExact) {
   const Room& room = small_room();
-  for (const bool bounce : {false, true}) {
-    const auto transfer = room.low_rank({100000, Precision::kF32, bounce});
-    EXPECT_EQ(transfer->storage().rank, room.patches.size());
-    const std::vector<Float3> light = smooth_light(room.patches);
-    EXPECT_LT(relative_difference(product(*transfer, light), product(*room.dense, light),
-                                  room.patches.area),
-              1e-5);
-  }
+  const auto transfer = room.low_rank({100000, Precision::kF32});
+  EXPECT_EQ(transfer->storage().rank, room.patches.size());
+  const std::vector<Float3> light = smooth_light(room.patches);
+  EXPECT_LT(relative_difference(product(*transfer, light), product(*room.dense, light),
+                                room.patches.area),
+            1e-5);
 }
 
 TEST(LowRankTransfer, NoOtherOfItsRankIsNearer) {
   // A grey room has one matrix, for which the optimum is known; 760 patches take the sketch.
   const Room& room = grey_room();
   const Eigen::MatrixXd y = symmetric(*room.dense, room.patches, 0);
-  for (const bool bounce : {false, true}) {
-    const auto transfer = room.low_rank({64, Precision::kF32, bounce});
-    const double error = (symmetric(*transfer, room.patches, 0) - y).norm();
-    const double least = least_error(bounce ? Eigen::MatrixXd(y - first_bounce(room)) : y, 64);
-    // Subspace iteration tells eigenvalues that are nearly equal apart slowly: 4 % were measured.
-    EXPECT_LT(error, 1.05 * least + 1e-5 * y.norm());
-    EXPECT_GT(error, 0.99 * least);
-  }
+  const auto transfer = room.low_rank({64, Precision::kF32});
+  const double error = (symmetric(*transfer, room.patches, 0) - y).norm();
+  const double least = least_error(y, 64);
+  // Subspace iteration tells eigenvalues that are nearly equal apart slowly.
+  EXPECT_LT(error, 1.05 * least + 1e-5 * y.norm());
+  EXPECT_GT(error, 0.99 * least);
 }
 
 TEST(LowRankTransfer, IsSymmetric) {
   const Room& room = small_room();
-  for (const bool bounce : {false, true}) {
-    const auto transfer = room.low_rank({20, Precision::kF16, bounce});
-    for (int c = 0; c < kChannelCount; ++c) {
-      const Eigen::MatrixXd y = symmetric(*transfer, room.patches, c);
-      EXPECT_LT((y - y.transpose()).norm(), 1e-5 * y.norm());
-    }
+  const auto transfer = room.low_rank({20, Precision::kF16});
+  for (int c = 0; c < kChannelCount; ++c) {
+    const Eigen::MatrixXd y = symmetric(*transfer, room.patches, c);
+    EXPECT_LT((y - y.transpose()).norm(), 1e-5 * y.norm());
   }
 }
 
-TEST(LowRankTransfer, TheFirstBounceRescuesALowRank) {
+TEST(LowRankTransfer, MoreRanksAreMoreExactAndMoreBytes) {
   const Room& room = small_room();
   const std::vector<Float3> light = smooth_light(room.patches);
   const std::vector<Float3> truth = product(*room.dense, light);
-  double plain = 1, bounced = 1;
+  double before = 1;
   for (const std::size_t rank : {4, 16, 64}) {
-    const double p = relative_difference(
-        product(*room.low_rank({rank, Precision::kF16, false}), light), truth, room.patches.area);
-    const double b = relative_difference(
-        product(*room.low_rank({rank, Precision::kF16, true}), light), truth, room.patches.area);
-    EXPECT_LT(p, plain);
-    EXPECT_LT(b, bounced);
-    EXPECT_LT(b, 0.5 * p);
-    plain = p;
-    bounced = b;
+    const auto transfer = room.low_rank({rank, Precision::kF16});
+    EXPECT_EQ(transfer->kind(), "low-rank");
+    EXPECT_LT(transfer->bytes(), room.low_rank({rank, Precision::kF32})->bytes());
+    const double error = relative_difference(product(*transfer, light), truth, room.patches.area);
+    EXPECT_LT(error, before);
+    before = error;
   }
-  EXPECT_LT(bounced, 0.01);
-}
-
-TEST(LowRankTransfer, CountsTheFormFactorsThatItReads) {
-  const Room& room = small_room();
-  const auto plain = room.low_rank({16, Precision::kF16, false});
-  const auto bounced = room.low_rank({16, Precision::kF16, true});
-  EXPECT_EQ(plain->kind(), "low-rank");
-  EXPECT_EQ(bounced->kind(), "first-bounce");
-  EXPECT_GT(bounced->bytes(), plain->bytes() + 4 * room.exchange.column.size());
-  EXPECT_LT(plain->bytes(), room.low_rank({16, Precision::kF32, false})->bytes());
 }
 
 TEST(LowRankTransfer, SameBitsForAnyNumberOfThreads) {
   const Room& room = grey_room();
   const std::vector<Float3> light = smooth_light(room.patches);
-  const auto make = [&] { return product(*room.low_rank({32, Precision::kF16, true}), light); };
+  const auto make = [&] { return product(*room.low_rank({32, Precision::kF16}), light); };
   EXPECT_EQ(test::with_threads(1, make), test::with_threads(3, make));
 }
 
 TEST(LowRankTransfer, StopsWhenAsked) {
   const Room& room = grey_room();
-  EXPECT_THROW(
-      build_low_rank_transfer(*room.dense, room.exchange, {}, [](double) { return false; }),
-      Cancelled);
+  EXPECT_THROW(build_low_rank_transfer(*room.dense, {}, [](double) { return false; }), Cancelled);
 }
 
 TEST(LowRankTransfer, RefusesSizesThatDoNotAgree) {

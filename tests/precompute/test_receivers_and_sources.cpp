@@ -361,8 +361,7 @@ TEST(ReceiversAndSources, TheFileIsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(ReceiversAndSources, OtherOperatorsRefuseThem) {
-  for (const OperatorKind kind :
-       {OperatorKind::kDense, OperatorKind::kLowRank, OperatorKind::kFirstBounce}) {
+  for (const OperatorKind kind : {OperatorKind::kDense, OperatorKind::kLowRank}) {
     BuildSettings settings = settings_of_rooms(FormFactorKind::kPairs);
     settings.operator_kind = kind;
     test::expect_error([&] { build(settings); }, "hierarchical operators alone");

@@ -48,29 +48,9 @@ LowRankOperator::Storage sample_storage(Precision precision) {
   return precision == Precision::kF16 ? LowRankOperator::encode_half(storage) : storage;
 }
 
-/// Each patch sees the next one.
-ExchangeMatrix chain() {
-  std::vector<std::uint64_t> row_begin;
-  std::vector<std::uint32_t> column;
-  for (std::uint32_t i = 0; i < kPatchCount; ++i) {
-    row_begin.push_back(i);
-    if (i + 1 < kPatchCount) column.push_back(i + 1);
-  }
-  row_begin.push_back(column.size());
-  std::vector<float> exchange_area(column.size(), 0.1F);
-  return {SharedArray(std::move(row_begin)), SharedArray(std::move(column)),
-          SharedArray(std::move(exchange_area))};
-}
-
-TransferData sample_data(Precision precision, bool first_bounce) {
+TransferData sample_data(Precision precision) {
   TransferData data = test::plain_data(std::vector<float>(kPatchCount, 0.25F));
-  data.exchange = chain();
-  std::shared_ptr<const FormFactorOperator> form_factors;
-  if (first_bounce) {
-    form_factors = std::make_shared<const FormFactorBlocks>(data.exchange, data.patches.area);
-  }
-  data.transfer =
-      std::make_shared<const LowRankOperator>(sample_storage(precision), std::move(form_factors));
+  data.transfer = std::make_shared<const LowRankOperator>(sample_storage(precision));
   return data;
 }
 
@@ -82,17 +62,15 @@ std::vector<Float3> relit(const TransferData& data) {
 
 TEST(LowRankFile, RoundTrips) {
   for (const Precision precision : {Precision::kF32, Precision::kF16}) {
-    for (const bool first_bounce : {false, true}) {
-      const test::TemporaryFolder folder;
-      const TransferData data = sample_data(precision, first_bounce);
-      save_transfer_file(folder / "file", data);
-      const TransferData loaded = load_transfer_file(folder / "file");
-      EXPECT_EQ(loaded.transfer->kind(), first_bounce ? "first-bounce" : "low-rank");
-      EXPECT_EQ(loaded.transfer->bytes(), data.transfer->bytes());
-      EXPECT_EQ(relit(loaded), relit(data));
-      save_transfer_file(folder / "again", loaded);
-      EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
-    }
+    const test::TemporaryFolder folder;
+    const TransferData data = sample_data(precision);
+    save_transfer_file(folder / "file", data);
+    const TransferData loaded = load_transfer_file(folder / "file");
+    EXPECT_EQ(loaded.transfer->kind(), "low-rank");
+    EXPECT_EQ(loaded.transfer->bytes(), data.transfer->bytes());
+    EXPECT_EQ(relit(loaded), relit(data));
+    save_transfer_file(folder / "again", loaded);
+    EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
   }
 }
 
@@ -108,9 +86,16 @@ void tamper(const std::filesystem::path& path, const std::string& before,
   test::write_bytes(path, bytes);
 }
 
+TEST(LowRankFile, RefusesAKindThatIsNotKnown) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "file", sample_data(Precision::kF32));
+  tamper(folder / "file", "\"low-rank\"", "\"low-bank\"");
+  expect_error([&] { load_transfer_file(folder / "file"); }, "of a kind");
+}
+
 TEST(LowRankFile, RefusesAChannelWithoutAMatrix) {
   const test::TemporaryFolder folder;
-  save_transfer_file(folder / "file", sample_data(Precision::kF32, false));
+  save_transfer_file(folder / "file", sample_data(Precision::kF32));
   std::string bytes = test::read_bytes(folder / "file");
   const SafetensorsFile file(folder / "file");
   const std::uint32_t matrix = 2;
@@ -136,7 +121,7 @@ TEST(LowRankFile, RefusesTensorsThatDoNotFit) {
   };
   for (const Fault& fault : faults) {
     SCOPED_TRACE(fault.after);
-    save_transfer_file(folder / "file", sample_data(Precision::kF32, false));
+    save_transfer_file(folder / "file", sample_data(Precision::kF32));
     tamper(folder / "file", fault.before, fault.after);
     EXPECT_THROW(load_transfer_file(folder / "file"), Error);
   }

@@ -20,9 +20,8 @@ enum class OperatorKind : std::uint8_t {
   kAutomatic,  ///< dense up to kDensePatchCount patches, hierarchical above
   kDense,
   kHierarchical,
-  kLowRank,      ///< one rank for the whole scene: low_rank_operator.h
-  kFirstBounce,  ///< the same after a first bounce through F
-  kNoOperator,   ///< nothing is made or checked: for who solves with the form factors
+  kLowRank,     ///< one rank for the whole scene: low_rank_operator.h
+  kNoOperator,  ///< nothing is made or checked: for who solves with the form factors
 };
 
 /// Up to this many patches the dense operator, which is exact to rounding, is small enough to have
@@ -56,7 +55,7 @@ struct BuildSettings {
   SurfaceHarmonicSettings surface_harmonics;  ///< by default none
   OperatorKind operator_kind = OperatorKind::kAutomatic;
   double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
-  std::size_t rank = 256;    ///< of kLowRank and kFirstBounce: see LowRankSettings
+  std::size_t rank = 256;    ///< of kLowRank: see LowRankSettings
   /// By default kF32 for a dense operator, kQ8 for a hierarchical one, kF16 (half the bytes, an
   /// error of some 1e-4) for others.
   std::optional<Precision> precision;

@@ -9,17 +9,12 @@
 #include <vector>
 
 #include "rebounce/transfer/dense_operator.h"
-#include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/shared_array.h"
 #include "rebounce/transfer/transfer_operator.h"
 
 namespace rebounce {
 
-/// Y of one low rank for the whole scene, in its symmetric form Yhat = A^1/2 Y A^-1/2:
-///
-///   low-rank      Yhat ~ V S V^T
-///   first-bounce  Yhat ~ G + V S V^T with G = A^1/2 F A^-1/2: light that has met one surface is
-///                 gathered through F and exact, the rest, which is smoother, is of low rank
+/// Y of one low rank for the whole scene, in its symmetric form Yhat = A^1/2 Y A^-1/2 ~ V S V^T.
 ///
 /// The channels share the basis V, whose columns are orthonormal, and have a symmetric core S each.
 class LowRankOperator final : public TransferOperator {
@@ -43,19 +38,16 @@ class LowRankOperator final : public TransferOperator {
   /// The same with the basis as half-precision numbers.
   static Storage encode_half(const Storage& storage);
 
-  /// Takes over `storage`. With `first_bounce`, that is F and the core is what is missing from it.
-  /// Throws Error if sizes do not agree.
-  explicit LowRankOperator(Storage storage,
-                           std::shared_ptr<const FormFactorOperator> first_bounce = nullptr);
+  /// Takes over `storage`. Throws Error if sizes do not agree.
+  explicit LowRankOperator(Storage storage);
 
   const Storage& storage() const { return storage_; }
 
   std::size_t patch_count() const override { return storage_.area.size(); }
-  /// With F where it is used: an apply reads it too.
   std::size_t bytes() const override;
   /// The basis is read twice, to project light and to expand it.
   std::size_t bytes_per_apply() const override;
-  std::string kind() const override { return first_bounce_ ? "first-bounce" : "low-rank"; }
+  std::string kind() const override { return "low-rank"; }
   std::size_t workspace_size() const override;
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
              std::span<float> workspace) const override;
@@ -70,7 +62,6 @@ class LowRankOperator final : public TransferOperator {
   void expand_tiles(const float* coefficient, float* y) const;
 
   Storage storage_;
-  std::shared_ptr<const FormFactorOperator> first_bounce_;
   std::vector<float> sqrt_area_;  ///< [n]
   std::size_t rank_stride_ = 0;
 };

@@ -31,8 +31,7 @@ class TransferOperator {
   /// Bytes of it that an apply to one light reads, those that it reads twice counted twice.
   virtual std::size_t bytes_per_apply() const { return bytes(); }
 
-  /// The kind as the command line names it: "dense", "hierarchical", "low-rank",
-  /// "first-bounce".
+  /// The kind as the command line names it: "dense", "hierarchical", "low-rank".
   virtual std::string kind() const = 0;
 
   /// Floats of workspace that `apply` needs.
