@@ -17,13 +17,12 @@ struct ScalingSample {
   double wall_seconds = 0;
   double processor_seconds = 0;  ///< of all threads, which others on the machine disturb less
   std::uint64_t ray_count = 0;
-  std::uint64_t entry_count = 0;  ///< links, or pairs of patches that they were expanded to
+  std::uint64_t entry_count = 0;  ///< links
   double peak_bytes = 0;          ///< of the process so far: go from few patches to many
 };
 
 /// Finds F of the scene at `path` with about `patch_count` patches and links of `epsilon`.
-ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, double epsilon,
-                              LinkedForm form) {
+ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, double epsilon) {
   const PatchModel model = model_of_scene(path, patch_count);
   const RayTracer tracer = make_surface_tracer(model.mesh);
   FormFactorSettings settings;
@@ -31,15 +30,9 @@ ScalingSample measure_scaling(const std::string& path, std::size_t patch_count, 
   ScalingSample sample{.patch_count = model.patches.size()};
   const double before = processor_seconds();
   sample.wall_seconds = seconds_of([&] {
-    if (form == LinkedForm::kLinks) {
-      const LinkBuild build = build_links(model, tracer, settings);
-      sample.ray_count = build.ray_count;
-      sample.entry_count = build.links.pair.size();
-    } else {
-      const FormFactors f = compute_form_factors(model, tracer, settings);
-      sample.ray_count = f.ray_count;
-      sample.entry_count = f.exchange.column.size();
-    }
+    const LinkBuild build = build_links(model, tracer, settings);
+    sample.ray_count = build.ray_count;
+    sample.entry_count = build.links.pair.size();
   });
   sample.processor_seconds = processor_seconds() - before;
   sample.peak_bytes = static_cast<double>(peak_memory_bytes());
@@ -55,12 +48,12 @@ double scaling_exponent(const ScalingSample& few, const ScalingSample& many) {
 }  // namespace
 
 void measure_growth(const std::string& path, std::span<const std::size_t> patch_counts,
-                    double epsilon, LinkedForm form, AskedTable& report) {
+                    double epsilon, AskedTable& report) {
   const std::string name = scene_name(path);
-  const char* what = form == LinkedForm::kLinks ? "links" : "pairs";
+  constexpr const char* what = "links";
   std::vector<ScalingSample> samples;
   for (const std::size_t count : patch_counts) {
-    const ScalingSample s = measure_scaling(path, count, epsilon, form);
+    const ScalingSample s = measure_scaling(path, count, epsilon);
     const auto add = [&](const std::string& measure, double value, double asked = 0) {
       report.at_most(name, s.patch_count, what, measure, value, asked);
     };

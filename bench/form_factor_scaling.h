@@ -8,14 +8,11 @@
 
 namespace rebounce::bench {
 
-/// What F is kept as.
-enum class LinkedForm : std::uint8_t { kLinks, kPairs };
-
-/// Measures what finding F with links of `epsilon` takes, from patches to form factors, of the
+/// Measures what finding links of `epsilon` takes, from patches to form factors, of the
 /// scene at `path` with about as many patches as each of `patch_counts`, ascending; the exponent
 /// with which processor seconds grow is over the whole range. Throws Error if the scene cannot be
 /// used.
 void measure_growth(const std::string& path, std::span<const std::size_t> patch_counts,
-                    double epsilon, LinkedForm form, AskedTable& report);
+                    double epsilon, AskedTable& report);
 
 }  // namespace rebounce::bench

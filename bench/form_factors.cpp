@@ -27,10 +27,8 @@ void run(const Options& options) {
   const bool all = options.part == "all";
   if (all || options.part == "closed-forms") measure_closed_forms(options.table, report);
   for (const std::string& scene : options.scenes) {
-    if (options.part.starts_with("growth")) {
-      const bool links = options.part == "growth-of-links";
-      measure_growth(scene, options.scaling_patches, options.link_epsilon,
-                     links ? LinkedForm::kLinks : LinkedForm::kPairs, report);
+    if (options.part == "growth-of-links") {
+      measure_growth(scene, options.scaling_patches, options.link_epsilon, report);
       continue;
     }
     SceneFormFactors bench(scene, options.patch_count, report);
@@ -62,14 +60,13 @@ int main(int argc, char** argv) {
   app.add_option("--ray-limit", options.ray_limit, "Rays that lie ready for bare Embree at most")
       ->check(CLI::Range(1e3, 1e9))
       ->capture_default_str();
-  app.add_option("--growth-patches", options.scaling_patches, "Patches of the parts growth-of-...")
+  app.add_option("--growth-patches", options.scaling_patches, "Patches of growth-of-links")
       ->capture_default_str();
   app.add_option("--link-epsilon", options.link_epsilon, "Error of a link, likewise")
       ->capture_default_str();
   app.add_option("--part", options.part,
                  "What to measure; all but closed-forms for each scene; all: without growth")
-      ->check(CLI::IsMember(
-          {"all", "closed-forms", "convergence", "speed", "growth-of-links", "growth-of-pairs"}))
+      ->check(CLI::IsMember({"all", "closed-forms", "convergence", "speed", "growth-of-links"}))
       ->capture_default_str();
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] { run(options); });

@@ -85,9 +85,11 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
     throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
   }
   if (!hierarchical) settings.tolerance = 0;
-  if (links && settings.form_factors.link_epsilon == 0) {
-    settings.form_factors.link_epsilon = kLinkEpsilon;
+  double& link_epsilon = settings.form_factors.link_epsilon;
+  if (!links && link_epsilon > 0) {
+    throw Error("the error of a link is for form factors from links; ask for these");
   }
+  if (links && link_epsilon == 0) link_epsilon = kLinkEpsilon;
   if (links && settings.form_factor_tolerance == 0 && !of_some) {
     settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
   }
@@ -142,9 +144,7 @@ class TransferBuild {
     decided_ = decide(settings_, model_);
     report_.estimate = estimate_cost(model_, roles_, decided_);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
-    const bool all_pairs = decided_.form_factor_kind == FormFactorKind::kPairs &&
-                           decided_.form_factors.link_epsilon == 0;
-    if (fits && all_pairs) forecast_pairs();
+    if (fits && decided_.form_factor_kind == FormFactorKind::kPairs) forecast_pairs();
     announce(report_.estimate);
   }
 

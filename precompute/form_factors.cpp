@@ -2,10 +2,8 @@
 
 #include "closure.h"
 #include "escape.h"
-#include "link_expansion.h"
 #include "raw_exchange.h"
 #include "rebounce/transfer/error.h"
-#include "refined_links.h"
 #include "shadow_rays.h"
 
 namespace rebounce {
@@ -23,7 +21,6 @@ class FormFactorAssembly {
         shadow_rays_(geometry_, settings.seed, settings.kernel_tolerance) {}
 
   FormFactors run() const {
-    if (settings_.link_epsilon > 0) return close(exchange_of_links());
     return close(compute_raw_exchange(model_, shadow_rays_, tracer_, settings_, progress_));
   }
 
@@ -32,21 +29,6 @@ class FormFactorAssembly {
   }
 
  private:
-  RawExchange exchange_of_links() const {
-    const RefinedLinks refined =
-        refine_links(model_, shadow_rays_, tracer_, settings_, {}, progress_);
-    RawExchange raw;
-    raw.rows = expand_links(refined.tree, shadow_rays_, refined.links, progress_);
-    for (auto& row : raw.rows) {
-      for (ExchangeEntry& entry : row) entry.visibility_variance += kVisibilityVarianceFloor;
-    }
-    raw.escape = refined.escape;
-    raw.target = refined.target;
-    raw.ray_count = refined.ray_count + refined.escape.size() * settings_.hemisphere_rays;
-    raw.pair_count = refined.candidate_count;
-    return raw;
-  }
-
   FormFactors close(RawExchange raw) const {
     FormFactors result;
     result.closure = enforce_closure(raw.rows, geometry_.areas(), raw.target);

@@ -245,8 +245,7 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->capture_default_str();
   command
       .add_option("--link-epsilon", chosen.settings.form_factors.link_epsilon,
-                  "Find form factors by links between sets of patches of this error each, with "
-                  "fewer rays (0.0005 is usual); 0: look at all pairs of patches")
+                  "Error that a link may have, with --form-factors links; 0: the usual 0.0005")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command.add_flag("--store-links", chosen.settings.store_links,

@@ -357,6 +357,12 @@ TEST_F(CommandLine, LinksMakeHierarchicalOperatorsOnly) {
   }
 }
 
+TEST_F(CommandLine, PairsHaveNoErrorOfALink) {
+  expect_refused({"precompute", kScene, "--patches", "100", "--link-epsilon", "0.001", "-o",
+                  path("x.safetensors")},
+                 "from links");
+}
+
 TEST_F(CommandLine, QualitySetsTheRaysOfFormFactors) {
   const json low = summary_of({"info", precompute("low.safetensors", {"--quality", "low"})});
   const json usual = summary_of({"info", precompute("usual.safetensors")});
@@ -366,8 +372,7 @@ TEST_F(CommandLine, QualitySetsTheRaysOfFormFactors) {
 }
 
 TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
-  const std::string file =
-      precompute("box.safetensors", {"--store-links", "--link-epsilon", "0.0005"});
+  const std::string file = precompute("box.safetensors", {"--store-links"});
   const std::string flat = path("flat.csv"), linked = path("linked.csv");
   summary_of({"solve", file, "--lights", kLights, "-o", flat, "--method", "gauss-seidel"});
   const json solved =

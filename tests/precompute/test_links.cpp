@@ -39,15 +39,15 @@ LinkBuild links_of(const PatchModel& model, double epsilon = kLinkEpsilon,
   return build_links(model, test::make_tracer(model), {.link_epsilon = epsilon}, weight);
 }
 
-FormFactors form_factors_of(const PatchModel& model, double epsilon) {
-  return compute_form_factors(model, test::make_tracer(model), {.link_epsilon = epsilon});
+FormFactors form_factors_of(const PatchModel& model) {
+  return compute_form_factors(model, test::make_tracer(model));
 }
 
 /// What several tests look at, made once: the furnished room, its links and all its pairs.
 struct Furnished {
   PatchModel model = model_of(test::furnished_room());
   LinkBuild build = links_of(model);
-  FormFactors pairs = form_factors_of(model, 0);
+  FormFactors pairs = form_factors_of(model);
 };
 
 const Furnished& furnished() {
@@ -66,30 +66,6 @@ std::vector<Float3> smooth_light(const PatchTable& patches) {
     light.push_back({1 + 0.5F * std::sin(p[0]), 2 + p[1], 1 + 0.3F * std::cos(p[2])});
   }
   return light;
-}
-
-/// |S - T| / |T| of the symmetric forms, Frobenius.
-double frobenius_difference(const ExchangeMatrix& s, const ExchangeMatrix& t,
-                            const PatchTable& patches) {
-  const std::size_t n = patches.size();
-  std::vector<double> row(n, 0.0);
-  double difference = 0, norm = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    std::ranges::fill(row, 0.0);
-    const auto add = [&](const ExchangeMatrix& m, double sign) {
-      for (std::uint64_t k = m.row_begin[i]; k < m.row_begin[i + 1]; ++k) {
-        row[m.column[k]] += sign * m.exchange_area[k];
-        const double scale = patches.area[i] * patches.area[m.column[k]];
-        if (sign < 0) norm += m.exchange_area[k] * m.exchange_area[k] / scale;
-      }
-    };
-    add(s, 1);
-    add(t, -1);
-    for (std::size_t j = i; j < n; ++j) {
-      difference += row[j] * row[j] / (patches.area[i] * patches.area[j]);
-    }
-  }
-  return std::sqrt(difference / norm);
 }
 
 TEST(Links, CarryTheEnergyOfThePairs) {
@@ -153,24 +129,6 @@ TEST(Links, GatherAndSolveLikeAllPairs) {
   flat.solve(emitted);
   EXPECT_LT(relative_difference(hierarchical.radiosity(), flat.radiosity(), model.patches.area),
             1e-2);
-}
-
-TEST(Links, ExpandToAllPairs) {
-  const PatchModel& model = furnished().model;
-  const FormFactors links = form_factors_of(model, kLinkEpsilon);
-  EXPECT_LT(frobenius_difference(links.exchange, furnished().pairs.exchange, model.patches), 0.03);
-  EXPECT_LT(links.closure.row_sum_error_after, 1e-3);
-}
-
-TEST(Links, WithoutErrorAreAllPairs) {
-  // But for what hemisphere rays add to pairs that are partly hidden.
-  const PatchModel model = model_of(test::furnished_room(), 300);
-  const FormFactors pairs = form_factors_of(model, 0), links = form_factors_of(model, 1e-30);
-  const std::vector<Float3> light = smooth_light(model.patches);
-  const auto gathered = [&](const FormFactors& f) {
-    return gather(FormFactorBlocks(f.exchange, model.patches.area), light);
-  };
-  EXPECT_LT(relative_difference(gathered(links), gathered(pairs), model.patches.area), 1e-3);
 }
 
 TEST(Links, SmallerErrorsAreSmaller) {
@@ -254,7 +212,7 @@ Scene rooms_with_a_door() {
 TEST(Links, WhatGoesThroughADoorDoes) {
   const PatchModel model = model_of(rooms_with_a_door(), 700);
   const LinkedFormFactors links = operator_of(links_of(model), model.patches);
-  const FormFactorBlocks pairs(form_factors_of(model, 0).exchange, model.patches.area);
+  const FormFactorBlocks pairs(form_factors_of(model).exchange, model.patches.area);
   std::vector<Float3> light(model.patches.size(), {0, 0, 0});
   for (std::size_t i = 0; i < light.size(); ++i) {
     if (model.patches.centroid[i][0] < 2.9F) light[i] = {1, 1, 1};
@@ -282,7 +240,7 @@ TEST(Links, AreDimmedByGlass) {
   test::add_polygon(scene, std::array<glm::dvec3, 4>{{{2, 0, 0}, {2, 3, 0}, {2, 3, 3}, {2, 0, 3}}},
                     1);
   const PatchModel model = model_of(scene, 300);
-  const FormFactorBlocks pairs(form_factors_of(model, 0).exchange, model.patches.area);
+  const FormFactorBlocks pairs(form_factors_of(model).exchange, model.patches.area);
   const LinkBuild build = links_of(model);
   std::vector<Float3> light(model.patches.size(), {0, 0, 0});
   for (std::size_t i = 0; i < light.size(); ++i) {
@@ -299,10 +257,9 @@ TEST(Links, SameBitsForAnyNumberOfThreads) {
   struct Made {
     LinkBuild build;
     std::vector<Float3> gathered;
-    FormFactors pairs;
   };
   const auto make = [&] {
-    Made made{links_of(model), {}, form_factors_of(model, kLinkEpsilon)};
+    Made made{links_of(model), {}};
     made.gathered = gather(operator_of(made.build, model.patches), light);
     return made;
   };
@@ -313,8 +270,6 @@ TEST(Links, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.build.links.scale, three.build.links.scale);
   EXPECT_EQ(one.build.ray_count, three.build.ray_count);
   EXPECT_EQ(one.gathered, three.gathered);
-  EXPECT_TRUE(
-      std::ranges::equal(one.pairs.exchange.exchange_area, three.pairs.exchange.exchange_area));
 }
 
 TEST(Links, StopWhenAskedTo) {

@@ -42,6 +42,7 @@ struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
+  /// kPairs: link_epsilon is 0.
   /// kLinks: link_epsilon 0 stands for kLinkEpsilon, and the operator is hierarchical or none.
   FormFactorKind form_factor_kind = FormFactorKind::kAutomatic;
   /// Store links too, for hierarchical radiosity: fitted to the form factors of all pairs, or to

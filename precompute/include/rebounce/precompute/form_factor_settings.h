@@ -18,10 +18,9 @@ struct FormFactorSettings {
   int hemisphere_rays = 4096;
   /// Relative error aimed at by the unoccluded kernel.
   double kernel_tolerance = 3e-4;
-  /// Above 0: visibility is found for links between sets of patches (links.h) instead of for all
-  /// pairs, which takes a fraction of the rays. A link may have this error: of the part of the
-  /// symmetric form A^1/2 F A^-1/2 that it stands for, Frobenius, absolute. Smaller: smaller sets,
-  /// more links.
+  /// Of links alone (links.h), for which it is above 0: the error that a link may have, of the part
+  /// of the symmetric form A^1/2 F A^-1/2 that it stands for, Frobenius, absolute. Smaller: smaller
+  /// sets, more links.
   double link_epsilon = 0;
 };
 

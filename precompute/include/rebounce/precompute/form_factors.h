@@ -29,9 +29,8 @@ FormFactors compute_form_factors(const PatchModel& model, const RayTracer& trace
                                  const FormFactorSettings& settings = {},
                                  const Progress& progress = {});
 
-/// What compute_form_factors will take for all pairs, whatever settings.link_epsilon is: by a
-/// sample of them, in about a hundredth of the time. Rough. Throws Cancelled when `progress` says
-/// so.
+/// What compute_form_factors will take: by a sample of the pairs, in about a hundredth of the time.
+/// Rough. Throws Cancelled when `progress` says so.
 FormFactorForecast forecast_form_factors(const PatchModel& model, const RayTracer& tracer,
                                          const FormFactorSettings& settings = {},
                                          const Progress& progress = {});
