@@ -75,16 +75,20 @@ class Truth {
   std::shared_ptr<const DenseOperator> dense_;  ///< null: solver_ iterates
 };
 
-/// Throws Error if the form factors that the operator was made from are not there.
-void check_has_truth(const TransferData& data) {
-  if (!data.exchange.empty()) return;
-  const auto settings = nlohmann::json::parse(data.record.settings_json, nullptr, false);
-  const bool are_all =
-      settings.is_object() && settings.value("store_all_links", nlohmann::json()) == true;
-  if (!data.links.empty() && are_all) return;
-  throw Error(data.record.scene_name +
-              ": the file does not hold the pairs or all of the links that the operator was made "
-              "from, which the truth is found with; give the scene, with --form-factors links");
+/// With the form factors that the operator was made from: of a scene from links they are found once
+/// more. Throws Error if a file does not hold them.
+TransferData load_or_build_with_truth(const std::string& input, BuildSettings settings) {
+  TransferData data = load_or_build(input, settings);
+  if (!data.exchange.empty()) return data;
+  if (std::filesystem::path(input).extension() == ".safetensors") {
+    throw Error(data.record.scene_name +
+                ": the file does not hold the pairs that its operator was made from, which the "
+                "truth is found with; give the scene, with --form-factors links");
+  }
+  settings.form_factor_kind = FormFactorKind::kLinks;
+  settings.operator_kind = OperatorKind::kNoOperator;
+  data.links = load_or_build(input, settings).links;
+  return data;
 }
 
 /// What the file says of lights of one kind; nothing where it was not measured.
@@ -113,7 +117,6 @@ Table::Cell groups_above(std::span<const LightError> errors, double limit) {
 }
 
 void measure(const TransferData& data, const LightErrorOptions& options, Table& table) {
-  check_has_truth(data);
   const RayTracer tracer = make_surface_tracer(data.mesh);
   const Truth truth(data, options.iterate);
   const BuildRecord& record = data.record;
@@ -147,7 +150,7 @@ void run(const LightErrorOptions& options) {
     for (const std::size_t patch_count : options.patch_counts) {
       BuildSettings settings = options.settings;
       settings.subdivision.patch_count = patch_count;
-      measure(load_or_build(input, settings), options, table);
+      measure(load_or_build_with_truth(input, settings), options, table);
       if (file) break;
     }
   }
@@ -161,7 +164,6 @@ int main(int argc, char** argv) {
   using namespace rebounce::bench;
   LightErrorOptions options;
   options.settings.operator_kind = rebounce::OperatorKind::kHierarchical;
-  options.settings.store_all_links = true;
   CLI::App app("Tries operators under fresh lights of every kind, against the bound in their files",
                "bench_light_errors");
   add_input_option(app, options.inputs);

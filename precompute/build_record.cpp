@@ -44,7 +44,6 @@ std::string settings_json(const BuildSettings& settings) {
                         {"hemisphere_rays", f.hemisphere_rays},
                         {"link_epsilon", f.link_epsilon},
                         {"store_links", settings.store_links},
-                        {"store_all_links", settings.store_all_links},
                         {"kernel_tolerance", f.kernel_tolerance},
                         {"probe_grid", settings.probes.grid},
                         {"probe_spacing", settings.probes.spacing},

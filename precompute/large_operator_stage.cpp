@@ -156,10 +156,8 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
                          seed, part);
   });
   // The check is the last that needs them all.
-  if (!decided.store_all_links) {
-    data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
-    if (decided.store_links) report.link_count = data.links.pair.size();
-  }
+  data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
+  if (decided.store_links) report.link_count = data.links.pair.size();
   record_build(decided, report, errors, data.record);
 }
 

@@ -160,18 +160,6 @@ TEST(BuildFromLinks, KeepsNoPairsAndIsTheirLightWithTheErrorOnRecord) {
   EXPECT_LT(std::ranges::max(of_pairs), kErrorInNooks);
 }
 
-TEST(BuildFromLinks, StoresTheLinksThatItIsMadeFromIfAskedTo) {
-  BuildSettings settings = quick_settings();
-  settings.store_all_links = true;
-  const Built built = build(kBareRoom, settings);
-  settings.operator_kind = OperatorKind::kNoOperator;
-  const Built found = build(kBareRoom, settings);
-  EXPECT_EQ(built.data.links.pair, found.data.links.pair);
-  EXPECT_EQ(built.data.links.exchange_area, found.data.links.exchange_area);
-  EXPECT_EQ(built.data.links.scale, found.data.links.scale);
-  EXPECT_EQ(built.report.link_count, found.data.links.pair.size());
-}
-
 TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
   for (const std::string scene : {"furnished_room.gltf", "pavilion.gltf"}) {
     const Built of_pairs = exchange_of(scene, FormFactorKind::kPairs, 200),

@@ -48,9 +48,6 @@ struct BuildSettings {
   /// Store links too, for hierarchical radiosity: fitted to the form factors of all pairs, or to
   /// the links that were found instead.
   bool store_links = false;
-  /// With kLinks, store those that were found, some 2.5 times as many as fitted ones: what the
-  /// operator is made from and its error is of.
-  bool store_all_links = false;
   ProbeSettings probes;                       ///< by default none
   LightmapSettings lightmap;                  ///< by default none
   SurfaceHarmonicSettings surface_harmonics;  ///< by default none
