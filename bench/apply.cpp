@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <functional>
 
-#include "dense_kernels.h"
 #include "input.h"
+#include "kernels.h"
 #include "light_changes.h"
 #include "program.h"
 #include "read_buffer.h"
@@ -21,6 +21,7 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "tile_product.h"
 #include "timing.h"
 
@@ -154,7 +155,7 @@ class ApplyBenchmark {
       return error_of(result_);
     };
     measures_.push_back({.name = what,
-                         .instruction_set = dense_kernels().instruction_set,
+                         .instruction_set = kernels().instruction_set,
                          .precision = precision,
                          .bytes = transfer.bytes(),
                          .reads = static_cast<double>(transfer.bytes_per_apply()) /
@@ -184,7 +185,7 @@ class ApplyBenchmark {
       return error_of(std::span(batch->result).last(patches_.size()));
     };
     measures_.push_back({.name = "batch of 4",
-                         .instruction_set = dense_kernels().instruction_set,
+                         .instruction_set = kernels().instruction_set,
                          .precision = precision,
                          .bytes = transfer.bytes(),
                          .error = error,
@@ -207,7 +208,7 @@ class ApplyBenchmark {
     };
     measures_.push_back(
         {.name = "apply to 1/8",
-         .instruction_set = dense_kernels().instruction_set,
+         .instruction_set = kernels().instruction_set,
          .precision = precision,
          .bytes = static_cast<std::size_t>(static_cast<double>(blocks.bytes()) *
                                            static_cast<double>(receivers->value_count()) /
@@ -220,15 +221,15 @@ class ApplyBenchmark {
     const Precision precision = dense.storage().precision;
     add_read(read, dense.bytes());
     add_product("apply dense", precision_name(precision), dense);
-    for (const DenseKernels* kernels : dense_kernel_sets()) add_tiles(dense, *kernels);
+    for (const KernelSet* set : kernel_sets()) add_tiles(dense, *set);
   }
 
-  void add_tiles(const DenseOperator& dense, const DenseKernels& kernels) {
-    const auto product = std::make_shared<TileProduct>(dense, kernels, initial_exitance_);
+  void add_tiles(const DenseOperator& dense, const KernelSet& set) {
+    const auto product = std::make_shared<TileProduct>(dense, set.dense, initial_exitance_);
     const auto multiply = [product] { product->run(); };
     const auto error = [this, product] { return error_of(product->indirect_irradiance()); };
     measures_.push_back({.name = "tiles alone",
-                         .instruction_set = kernels.instruction_set,
+                         .instruction_set = set.instruction_set,
                          .precision = precision_name(dense.storage().precision),
                          .bytes = dense.bytes(),
                          .error = error,

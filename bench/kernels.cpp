@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
-#include "dense_kernels.h"
 #include "half_float.h"
+#include "kernels.h"
 #include "machine.h"
 #include "rebounce/precompute/form_factor_kernel.h"
 #include "rebounce/transfer/dense_operator.h"
@@ -84,22 +84,22 @@ void time_product(benchmark::State& state, const TileKernels<Value>& kernels, bo
 
 /// Arguments: which instruction set, and whether half precision and a tile on the diagonal.
 void time_tile(benchmark::State& state) {
-  const DenseKernels& set = *dense_kernel_sets()[static_cast<std::size_t>(state.range(0))];
+  const KernelSet& set = *kernel_sets()[static_cast<std::size_t>(state.range(0))];
   state.SetLabel(set.instruction_set);
   const bool half = state.range(1) != 0, diagonal = state.range(2) != 0;
   if (half) {
-    time_product(state, set.f16, diagonal);
+    time_product(state, set.dense.f16, diagonal);
   } else {
-    time_product(state, set.f32, diagonal);
+    time_product(state, set.dense.f32, diagonal);
   }
 }
 BENCHMARK(time_tile)
     ->Name("tile")
     ->ArgNames({"set", "f16", "diagonal"})
-    ->ArgsProduct({benchmark::CreateDenseRange(
-                       0, static_cast<std::int64_t>(dense_kernel_sets().size()) - 1, 1),
-                   {0, 1},
-                   {0, 1}});
+    ->ArgsProduct(
+        {benchmark::CreateDenseRange(0, static_cast<std::int64_t>(kernel_sets().size()) - 1, 1),
+         {0, 1},
+         {0, 1}});
 
 void time_float_to_half(benchmark::State& state) {
   const std::vector<float> values = random_values(kTile * kTile);

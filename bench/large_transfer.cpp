@@ -19,6 +19,7 @@
 #include "rebounce/precompute/links.h"
 #include "rebounce/precompute/random_lights.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/reflection.h"
 #include "solved_transfer.h"
 

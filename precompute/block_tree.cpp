@@ -280,9 +280,9 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   return whole;
 }
 
-HierarchicalOperator::Storage BlockTreeCompressor::assemble(BlockPart whole) const {
-  whole.values.resize(whole.values.size() + HierarchicalOperator::kPadding, 0.0F);
-  HierarchicalOperator::Storage storage;
+HierarchicalStorage BlockTreeCompressor::assemble(BlockPart whole) const {
+  whole.values.resize(whole.values.size() + HierarchicalFormat::kPadding, 0.0F);
+  HierarchicalStorage storage;
   storage.area.assign(matrix_.area().begin(), matrix_.area().end());
   storage.patch = tree_.patch;
   storage.channel_matrix = matrix_.channel_matrix();

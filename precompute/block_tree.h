@@ -8,7 +8,7 @@
 #include "cluster_tree.h"
 #include "light_weights.h"
 #include "rebounce/precompute/progress.h"
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "symmetric_matrix.h"
 #include "wanted_blocks.h"
 
@@ -64,7 +64,7 @@ class BlockTreeCompressor {
                      const Progress& progress = {}) const;
 
   /// The operator that all parts together are.
-  HierarchicalOperator::Storage assemble(BlockPart whole) const;
+  HierarchicalStorage assemble(BlockPart whole) const;
 
  private:
   const SymmetricMatrix& matrix_;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/operator_format.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -34,7 +34,7 @@ struct ClusterTree {
 /// cannot part, and clusters of whole groups have patches of several.
 ClusterTree build_cluster_tree(
     const PatchTable& patches, std::uint32_t leaf_size,
-    std::uint32_t alignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment),
+    std::uint32_t alignment = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment),
     std::span<const std::uint8_t> group = {});
 
 /// Those at the positions of a cluster that hold one.

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <random>
 
+#include "blas.h"
 #include "rebounce/transfer/area_norm.h"
-#include "single_threaded_blas.h"
 #include "tiled_cholesky.h"
 
 namespace rebounce {
@@ -109,7 +109,7 @@ double measure_tile_speed() {
   using Matrix = typename TiledMatrix<Scalar>::Matrix;
   constexpr Eigen::Index kSide = TiledMatrix<Scalar>::kTile;
   constexpr int kProducts = 16;  // of each thread: some milliseconds
-  const SingleThreadedBlas single_threaded;
+  load_blas();
   const Matrix tile = Matrix::Constant(kSide, kSide, Scalar(1) / kSide);
   std::vector<Matrix> sums(static_cast<std::size_t>(omp_get_max_threads()),
                            Matrix::Zero(kSide, kSide));

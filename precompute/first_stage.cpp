@@ -60,7 +60,7 @@ double FirstStage::work_of(std::span<const Panel> panels) const {
   return work;
 }
 
-HierarchicalOperator::Storage FirstStage::run(const Progress& progress) {
+HierarchicalStorage FirstStage::run(const Progress& progress) {
   const double all = work();
   for (std::size_t first = 0; first < panels_.size(); ++first) {
     std::size_t end = first;

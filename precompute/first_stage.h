@@ -9,6 +9,7 @@
 
 #include "block_checkpoint.h"
 #include "matrix_compression.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "solved_matrix.h"
 
 namespace rebounce {
@@ -34,7 +35,7 @@ class FirstStage {
   double work() const { return work_of(panels_); }
 
   /// Does it, and keeps every panel in the checkpoint; once. Throws Cancelled if asked to stop.
-  HierarchicalOperator::Storage run(const Progress& progress);
+  HierarchicalStorage run(const Progress& progress);
 
  private:
   /// All pieces of a column of pieces.

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "blas.h"
-#include "hierarchical_storage.h"
 #include "hierarchical_values.h"
 #include "rebounce/transfer/error.h"
 
@@ -52,7 +51,7 @@ struct HierarchicalMatrix::Places {
   }
 };
 
-HierarchicalMatrix::HierarchicalMatrix(const HierarchicalOperator::Storage& storage)
+HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage)
     : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
   if (layout_.moment_count > 0) throw Error("hierarchical matrix: its blocks have moments");
   const SharedArray<float> values = std::exchange(storage_.values_f32, {});
@@ -74,7 +73,7 @@ HierarchicalMatrix::HierarchicalMatrix(const HierarchicalOperator::Storage& stor
 /// R K R instead of K; in powers of two, so that nothing is rounded.
 void HierarchicalMatrix::take_scales() {
   std::vector<float> scale(static_cast<std::size_t>(position_count()), 1.0F);
-  for (std::size_t k = 0; k < position_.size(); ++k) scale[k] = position_scale(storage_, k);
+  for (std::size_t k = 0; k < position_.size(); ++k) scale[k] = storage_.position_scale(k);
   storage_.scale_exponent.clear();
   const auto at = [&](std::uint32_t begin, std::uint32_t count) {
     return Eigen::Map<const Eigen::VectorXf>(scale.data() + begin, count).asDiagonal();
@@ -97,7 +96,7 @@ void HierarchicalMatrix::take_scales() {
 }
 
 Index HierarchicalMatrix::position_count() const {
-  return static_cast<Index>(HierarchicalOperator::position_count(storage_.patch.size()));
+  return static_cast<Index>(HierarchicalFormat::position_count(storage_.patch.size()));
 }
 
 void HierarchicalMatrix::sort_blocks() {

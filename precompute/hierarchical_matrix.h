@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "hierarchical_layout.h"
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {
@@ -16,7 +16,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   /// Some vectors side by side: the rows are positions, with those that hold no patch.
   using Vectors = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  explicit HierarchicalMatrix(const HierarchicalOperator::Storage& storage);
+  explicit HierarchicalMatrix(const HierarchicalStorage& storage);
 
   std::span<const float> area() const override { return storage_.area; }
   std::uint32_t matrix_count() const override { return storage_.matrix_count; }
@@ -59,7 +59,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   const float* basis(const HierarchicalLayout::End& end) const;
   const float* core(std::uint32_t matrix, std::size_t block) const;
 
-  HierarchicalOperator::Storage storage_;  ///< f32, without values
+  HierarchicalStorage storage_;  ///< f32, without values
   HierarchicalLayout layout_;
   std::vector<float> bases_;                          ///< [rank][size] by cluster
   std::vector<std::vector<float>> cores_;             ///< of each matrix: S or the entries by block

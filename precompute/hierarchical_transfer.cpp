@@ -1,14 +1,13 @@
 #include "rebounce/precompute/hierarchical_transfer.h"
 
 #include "matrix_compression.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 
 namespace rebounce {
 
-HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
-                                                const PatchTable& patches,
-                                                std::span<const std::vector<Float3>> shaping,
-                                                double price, const Progress& progress,
-                                                const PatchRoles& roles) {
+HierarchicalStorage compress_transfer(const DenseOperator& dense, const PatchTable& patches,
+                                      std::span<const std::vector<Float3>> shaping, double price,
+                                      const Progress& progress, const PatchRoles& roles) {
   return compress_matrix(DenseMatrix(dense, roles), patches, shaping, price, progress);
 }
 

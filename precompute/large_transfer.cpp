@@ -15,6 +15,7 @@
 #include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/content_hash.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "rebounce/transfer/version.h"
 #include "solved_matrix.h"
@@ -66,9 +67,8 @@ void update(ContentHash& hash, std::span<const T> values) {
 }
 
 /// Form factors as the steps of columns take them.
-HierarchicalOperator::Storage coarser(const HierarchicalOperator& form_factors,
-                                      const PatchTable& patches, const FittingLights& lights,
-                                      double tolerance) {
+HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const PatchTable& patches,
+                            const FittingLights& lights, double tolerance) {
   return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, lights.shaping,
                          first_price(kCoarsePart * tolerance, patches.size()));
 }
@@ -80,7 +80,7 @@ std::string first_key(const HierarchicalOperator& form_factors, const PatchTable
   update(hash, std::span(std::string_view(version())));
   update<int>(hash, {{kFileFormatVersion}});
   update<double>(hash, {{price, kResidualPart, kCoarsePart}});
-  const HierarchicalOperator::Storage& f = form_factors.storage();
+  const HierarchicalStorage& f = form_factors.storage();
   update(hash, std::span(f.blocks));
   update(hash, f.values_f32.span());
   update(hash, f.values_f16.span());
@@ -117,7 +117,7 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
   const std::size_t group = kVectors * patch_count * kTogether * sizeof(float);
   const std::size_t panel = patch_count * kWidth * matrix_count * sizeof(float);
   const std::size_t side =
-      largest_piece(static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count)));
+      largest_piece(static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count)));
   const std::size_t piece = side * side * matrix_count * (sizeof(float) + 3 * sizeof(double));
   const std::size_t groups_of_panel = matrix_count * kWidth / kTogether;
   const std::uint64_t limit = settings.memory_limit_bytes;
@@ -155,7 +155,7 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
   const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
   const double work_after = kColumnsBefore + kColumnsOfRounds;
   double searching = 0;  // when the search of the second stage begins
-  HierarchicalOperator::Storage fine;
+  HierarchicalStorage fine;
   {
     PanelMatrix matrix(solved, energies, settings.roles);
     FirstStage stage(matrix, patches, lights.shaping, price, plan.panel_count, panels);

@@ -84,8 +84,7 @@ void ClusterWeight::take_away(MatrixXd& basis) const {
 }
 
 VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree) {
-  const auto positions =
-      static_cast<Index>(HierarchicalOperator::position_count(tree.patch.size()));
+  const auto positions = static_cast<Index>(HierarchicalFormat::position_count(tree.patch.size()));
   VectorXd background = VectorXd::Ones(positions);
   const VectorXd of_patch = matrix.energies(tree.patch);
   std::vector<double> sorted;

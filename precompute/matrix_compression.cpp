@@ -13,6 +13,7 @@
 #include "lit_truth.h"
 #include "nested_bases.h"
 #include "price_search.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 #include "wanted_blocks.h"
 
 namespace rebounce {
@@ -76,14 +77,14 @@ double mean(const std::vector<double>& errors) {
 
 CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patches,
                           const LitTruth& shaping) {
-  constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
+  constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment);
   CompressionFrame frame;
   frame.roles = matrix.roles();
   frame.received_part = shaping.received().part();
   frame.tree = build_cluster_tree(patches, kLeafSize, kAlignment, role_groups(frame.roles));
   frame.background = background_light(matrix, frame.tree);
   frame.sample = shaping.normalised_lights(frame.tree.patch,
-                                           HierarchicalOperator::position_count(patches.size()));
+                                           HierarchicalFormat::position_count(patches.size()));
   frame.sample.col(0) *= std::sqrt(kUniformShare * static_cast<double>(frame.sample.cols()));
   return frame;
 }
@@ -149,8 +150,7 @@ class Compression {
     balanced_.emplace(matrix, by_patch(exponent_, frame_.tree));
   }
 
-  HierarchicalOperator::Storage at(double price, const KeptParts& kept,
-                                   const Progress& progress) const {
+  HierarchicalStorage at(double price, const KeptParts& kept, const Progress& progress) const {
     const std::vector<ClusterWeight> weights = frame_.weights();
     const BlockTreeCompressor compressor(balanced_ ? *balanced_ : matrix_, frame_.tree, weights,
                                          sizes_);
@@ -167,7 +167,7 @@ class Compression {
                                        [&] { return compressor.compress(some, price, part); }));
       report_progress(part, 1);
     }
-    HierarchicalOperator::Storage storage = compressor.assemble(std::move(whole));
+    HierarchicalStorage storage = compressor.assemble(std::move(whole));
     if (nested_) {
       const CompressionCost cost{.price = price, .sizes = sizes_};
       const WantedBlocks wanted(frame_.roles, frame_.tree);
@@ -252,9 +252,8 @@ double first_price(double tolerance, std::size_t patch_count) {
   return kFirstPrice * tolerance * tolerance / static_cast<double>(patch_count);
 }
 
-HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
-                                              const PatchTable& patches, Exitances shaping,
-                                              double price, const Progress& progress) {
+HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
+                                    Exitances shaping, double price, const Progress& progress) {
   return Compression(matrix, patches, shaping, PartSizes(), Form())
       .at(price, {BlockCheckpoint(), {}}, progress);
 }
@@ -273,9 +272,8 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
-    const auto candidate =
-        std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode(
-            compression.at(search.price(), kept, part), settings.precision));
+    const auto candidate = std::make_shared<const HierarchicalOperator>(
+        encode_values(compression.at(search.price(), kept, part), settings.precision));
     const double error = judged_error(judging.errors(*candidate));
     best.offer(candidate, error);
     search.report(error, static_cast<double>(candidate->bytes()));

@@ -11,7 +11,7 @@
 #include "rebounce/precompute/fitting_lights.h"
 #include "rebounce/precompute/hierarchical_settings.h"
 #include "rebounce/precompute/progress.h"
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "symmetric_matrix.h"
 
 namespace rebounce {
@@ -45,10 +45,9 @@ CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTab
 double first_price(double tolerance, std::size_t patch_count);
 
 /// Compresses `matrix` as compress_transfer does. `patches` are those of the matrix.
-HierarchicalOperator::Storage compress_matrix(const SymmetricMatrix& matrix,
-                                              const PatchTable& patches,
-                                              std::span<const std::vector<Float3>> shaping,
-                                              double price, const Progress& progress = {});
+HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
+                                    std::span<const std::vector<Float3>> shaping, double price,
+                                    const Progress& progress = {});
 
 /// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. What each round of the
 /// search does is kept in `checkpoint`, made for all that is given here, and taken from there: the

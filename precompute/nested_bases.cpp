@@ -16,7 +16,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using Storage = HierarchicalOperator::Storage;
+using Storage = HierarchicalStorage;
 using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // Cells have so many positions at most; a side of a block has moments if it is made of whole
@@ -24,12 +24,12 @@ using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::Row
 constexpr std::uint32_t kCell = 128, kGroup = 256;
 
 // The largest entry of a core between moments: half of what half precision has room for.
-constexpr double kLargestCore = 32768 / HierarchicalOperator::kHalfScale;
+constexpr double kLargestCore = 32768 / HierarchicalFormat::kHalfScale;
 
 // A cell's description, in values.
 constexpr double kCellOverhead = 32;
 
-constexpr auto kAlignment = static_cast<Index>(HierarchicalOperator::kAlignment);
+constexpr auto kAlignment = static_cast<Index>(HierarchicalFormat::kAlignment);
 
 /// Clusters that the rows and columns of large blocks are made of, in the order of positions.
 struct Cells {
@@ -395,7 +395,7 @@ class Nesting {
     result.blocks.clear();
     std::vector<float> values;
     const auto positions =
-        static_cast<std::uint32_t>(HierarchicalOperator::position_count(tree_.patch.size()));
+        static_cast<std::uint32_t>(HierarchicalFormat::position_count(tree_.patch.size()));
     add_moments(positions, result, values);
     const std::map<std::size_t, NestedSides> sides = sides_of_blocks();
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
@@ -409,7 +409,7 @@ class Nesting {
         add_block(b, found->second, positions, result, values);
       }
     }
-    values.resize(values.size() + HierarchicalOperator::kPadding, 0.0F);
+    values.resize(values.size() + HierarchicalFormat::kPadding, 0.0F);
     result.values_f32 = SharedArray(std::move(values));
     return result;
   }

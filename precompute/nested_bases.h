@@ -3,7 +3,7 @@
 #include "block_compression.h"
 #include "cluster_tree.h"
 #include "light_weights.h"
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "wanted_blocks.h"
 
 namespace rebounce {
@@ -25,7 +25,6 @@ struct NestingFrame {
 /// H2-matrices", 2002). How many vectors a cell has follows from the price, as ranks of blocks do:
 /// as long as one takes away more error, weighed in the same way, than its values cost. Where there
 /// is nothing to gain the operator is returned as it is.
-HierarchicalOperator::Storage nest_bases(HierarchicalOperator::Storage storage,
-                                         const NestingFrame& frame);
+HierarchicalStorage nest_bases(HierarchicalStorage storage, const NestingFrame& frame);
 
 }  // namespace rebounce

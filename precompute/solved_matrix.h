@@ -5,6 +5,7 @@
 #include "cluster_tree.h"
 #include "hierarchical_matrix.h"
 #include "rebounce/precompute/progress.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "solved_transfer.h"
 #include "symmetric_matrix.h"
 
@@ -65,7 +66,7 @@ class PanelMatrix final : public SolvedMatrix {
 class RoundedMatrix final : public SolvedMatrix {
  public:
   RoundedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies,
-                const HierarchicalOperator::Storage& rounded)
+                const HierarchicalStorage& rounded)
       : SolvedMatrix(solved, std::move(energies), rounded.roles), rounded_(rounded) {}
 
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,

@@ -83,8 +83,8 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors, const P
 }
 
 SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
-                               const HierarchicalOperator::Storage& coarse,
-                               const PatchTable& patches, double residual)
+                               const HierarchicalStorage& coarse, const PatchTable& patches,
+                               double residual)
     : SolvedTransfer(form_factors, patches, residual) {
   coarse_.emplace(coarse);
 }

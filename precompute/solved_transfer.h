@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "hierarchical_matrix.h"
+#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -34,9 +36,8 @@ class SolvedTransfer {
   /// itself gives what they begin with, R G b less what leading eigenvectors have of it, and of the
   /// small rest that they are taken for an error in proportion is allowed (V. Simoncini, D. B.
   /// Szyld, "Theory of inexact Krylov subspace methods", 2003).
-  SolvedTransfer(const HierarchicalOperator& form_factors,
-                 const HierarchicalOperator::Storage& coarse, const PatchTable& patches,
-                 double residual);
+  SolvedTransfer(const HierarchicalOperator& form_factors, const HierarchicalStorage& coarse,
+                 const PatchTable& patches, double residual);
 
   std::span<const float> area() const { return form_factors_.area(); }
   std::uint32_t matrix_count() const { return static_cast<std::uint32_t>(root_.size()); }

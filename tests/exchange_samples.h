@@ -10,6 +10,7 @@
 
 #include "rebounce/transfer/compressed_form_factors.h"
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 
 namespace rebounce::test {
 
@@ -19,7 +20,7 @@ inline std::shared_ptr<const HierarchicalOperator> dense_blocks(const ExchangeMa
                                                                 std::span<const float> area) {
   constexpr std::uint32_t kLeaf = 32;
   const std::size_t n = area.size();
-  const auto positions = static_cast<std::uint32_t>(HierarchicalOperator::position_count(n));
+  const auto positions = static_cast<std::uint32_t>(HierarchicalFormat::position_count(n));
   std::vector<float> full(std::size_t{positions} * positions, 0.0F);
   const FormFactorRows rows(exchange, area);
   for (std::size_t i = 0; i < n; ++i) {
@@ -29,7 +30,7 @@ inline std::shared_ptr<const HierarchicalOperator> dense_blocks(const ExchangeMa
           rows.form_factors(i)[k] * std::sqrt(area[i] / area[j]);
     }
   }
-  HierarchicalOperator::Storage storage;
+  HierarchicalStorage storage;
   storage.area.assign(area.begin(), area.end());
   storage.patch.resize(n);
   for (std::size_t i = 0; i < n; ++i) storage.patch[i] = static_cast<std::uint32_t>(n - 1 - i);
@@ -48,7 +49,7 @@ inline std::shared_ptr<const HierarchicalOperator> dense_blocks(const ExchangeMa
       }
     }
   }
-  values.resize(values.size() + HierarchicalOperator::kPadding, 0.0F);
+  values.resize(values.size() + HierarchicalFormat::kPadding, 0.0F);
   storage.values_f32 = SharedArray(std::move(values));
   return std::make_shared<const HierarchicalOperator>(std::move(storage));
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 
 namespace rebounce::test {
 
@@ -20,7 +21,7 @@ class RandomHierarchicalStorage {
   RandomHierarchicalStorage(std::size_t patch_count, std::uint32_t matrix_count, std::uint64_t seed,
                             bool nested)
       : engine_(seed),
-        positions_(static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count))),
+        positions_(static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count))),
         nested_(nested) {
     storage.matrix_count = matrix_count;
     storage.channel_matrix = {0, matrix_count > 1 ? 1U : 0U, matrix_count - 1};
@@ -30,14 +31,14 @@ class RandomHierarchicalStorage {
     std::shuffle(storage.patch.begin(), storage.patch.end(), engine_);
     if (nested_) add_moments();
     add_diagonal(0, positions_);
-    values_.resize(values_.size() + HierarchicalOperator::kPadding, 0.0F);
+    values_.resize(values_.size() + HierarchicalFormat::kPadding, 0.0F);
     storage.values_f32 = SharedArray(std::move(values_));
   }
 
-  HierarchicalOperator::Storage storage;
+  HierarchicalStorage storage;
 
  private:
-  static constexpr std::uint32_t kLeaf = 32, kAlignment = HierarchicalOperator::kAlignment;
+  static constexpr std::uint32_t kLeaf = 32, kAlignment = HierarchicalFormat::kAlignment;
 
   float uniform() { return std::uniform_real_distribution<float>(0, 1)(engine_); }
 
@@ -154,22 +155,20 @@ class RandomHierarchicalStorage {
   std::vector<float> values_;
 };
 
-inline HierarchicalOperator::Storage random_hierarchical_storage(std::size_t patch_count,
-                                                                 std::uint32_t matrix_count,
-                                                                 std::uint64_t seed) {
+inline HierarchicalStorage random_hierarchical_storage(std::size_t patch_count,
+                                                       std::uint32_t matrix_count,
+                                                       std::uint64_t seed) {
   return RandomHierarchicalStorage(patch_count, matrix_count, seed, false).storage;
 }
 
 /// With moments for the positions of some blocks.
-inline HierarchicalOperator::Storage random_nested_storage(std::size_t patch_count,
-                                                           std::uint32_t matrix_count,
-                                                           std::uint64_t seed) {
+inline HierarchicalStorage random_nested_storage(std::size_t patch_count,
+                                                 std::uint32_t matrix_count, std::uint64_t seed) {
   return RandomHierarchicalStorage(patch_count, matrix_count, seed, true).storage;
 }
 
 /// The same with scales of positions from 1/64 to 4.
-inline HierarchicalOperator::Storage equilibrated(HierarchicalOperator::Storage storage,
-                                                  std::uint64_t seed) {
+inline HierarchicalStorage equilibrated(HierarchicalStorage storage, std::uint64_t seed) {
   std::mt19937_64 engine(seed);
   std::uniform_int_distribution<int> exponent(-6, 2);
   for (std::size_t k = 0; k < storage.area.size(); ++k) {

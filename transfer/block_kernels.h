@@ -31,7 +31,7 @@ struct Coefficients {
 
 /// Ranks and positions of the bases over a cluster, [rank][size]; integers in the order of
 /// integer_kernels_impl.h. Sizes and positions are multiples of
-/// HierarchicalOperator::kAlignment.
+/// HierarchicalFormat::kAlignment.
 struct BasisPart {
   std::uint64_t values;                   ///< where the bases of the cluster begin
   std::uint32_t rank, size;               ///< of the cluster
@@ -49,7 +49,7 @@ template <typename Value>
 struct BasisKernels {
   /// coefficient[r] = sum over k of basis[r][k] x[k] for the lights of x and the ranks of each
   /// part, over all positions of its cluster. Of integers, ranks begin with a multiple of
-  /// HierarchicalOperator::kRankGroup, and coefficients are written up to the next one.
+  /// HierarchicalFormat::kRankGroup, and coefficients are written up to the next one.
   void (*project)(const Value* values, std::span<const BasisPart> parts,
                   PlanarVectors<const float> x, Coefficients<float> coefficient);
 
@@ -68,7 +68,7 @@ struct CoreBlock {
   std::uint32_t row, column;  ///< first coefficients at its ends
   Direction direction;
   /// Of the coefficients at its ends, those of remainders, after its own
-  /// (HierarchicalOperator::kRemainderScale).
+  /// (HierarchicalFormat::kRemainderScale).
   std::uint32_t row_remainders = 0, column_remainders = 0;
 };
 
@@ -103,7 +103,7 @@ constexpr std::size_t taken_size(std::size_t rows, std::size_t columns) {
 }
 
 /// A dense block of the only matrix of an operator, [rows][columns], both multiples of
-/// HierarchicalOperator::kAlignment.
+/// HierarchicalFormat::kAlignment.
 struct DenseBlock {
   using Direction = CoreBlock::Direction;
 
@@ -141,8 +141,8 @@ struct CoreKernels {
                     PlanarVectors<const float> x, float scale, PlanarVectors<float> y);
 };
 
-struct BlockKernelSet {
-  const char* instruction_set;
+/// Products with the values of hierarchical operators, for one instruction set.
+struct BlockKernels {
   BasisKernels<float> bases_f32;
   BasisKernels<std::uint16_t> bases_f16;
   BasisKernels<std::int16_t> bases_q16;
@@ -150,13 +150,5 @@ struct BlockKernelSet {
   CoreKernels<float> cores_f32;
   CoreKernels<std::uint16_t> cores_f16;
 };
-
-extern const BlockKernelSet kBlockKernelsPortable;
-extern const BlockKernelSet kBlockKernelsAvx2;
-extern const BlockKernelSet kBlockKernelsAvx512;
-
-/// The kernels that this processor runs, narrowest first, and the widest of them.
-std::span<const BlockKernelSet* const> block_kernel_sets();
-const BlockKernelSet& block_kernels();
 
 }  // namespace rebounce

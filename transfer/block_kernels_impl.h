@@ -25,9 +25,8 @@ constexpr BasisKernels<Value> make_integer_kernels() {
 }
 
 template <typename V, typename N>
-constexpr BlockKernelSet make_block_kernels(const char* instruction_set) {
+constexpr BlockKernels make_block_kernels() {
   return {
-      instruction_set,
       make_basis_kernels<V, float>(),
       make_basis_kernels<V, std::uint16_t>(),
       make_integer_kernels<N, std::int16_t>(),

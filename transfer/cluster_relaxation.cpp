@@ -19,13 +19,12 @@
 
 #include "block_kernels.h"
 #include "cluster_sweep_plan.h"
-#include "hierarchical_storage.h"
 #include "kernels_of_storage.h"
 
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kAlignment = HierarchicalOperator::kAlignment;
+constexpr std::size_t kAlignment = HierarchicalFormat::kAlignment;
 
 /// Three vectors, one to each channel, with room for whole vectors at the end.
 class Planes {
@@ -74,7 +73,7 @@ class CoefficientArray {
 template <typename Basis, typename Value>
 class ClusterRelaxation final : public Relaxation {
  public:
-  ClusterRelaxation(const HierarchicalOperator::Storage& exchange, const BasisKernels<Basis>& bases,
+  ClusterRelaxation(const HierarchicalStorage& exchange, const BasisKernels<Basis>& bases,
                     const CoreKernels<Value>& cores, const Basis* basis_values,
                     const Value* core_values, float basis_scale)
       : exchange_(exchange),
@@ -100,7 +99,7 @@ class ClusterRelaxation final : public Relaxation {
     area_ = problem.area;
     for (std::size_t k = 0; k < exchange_.patch.size(); ++k) {
       const std::uint32_t p = exchange_.patch[k];
-      const float scale = position_scale(exchange_, k), root = scaled_root(k);
+      const float scale = exchange_.position_scale(k), root = scaled_root(k);
       for (int c = 0; c < kChannelCount; ++c) {
         light_.at(c, k) = root * problem.initial_exitance[p][c];
         reflectance_.at(c, k) = scale * scale * value_scale_ * problem.reflectance[p][c];
@@ -135,12 +134,12 @@ class ClusterRelaxation final : public Relaxation {
   enum class Known : std::uint8_t { kNothing, kLower, kUpper };
 
   std::size_t positions() const {
-    return HierarchicalOperator::position_count(exchange_.area.size());
+    return HierarchicalFormat::position_count(exchange_.area.size());
   }
 
   /// What x at a position is of the radiosity there.
   float scaled_root(std::size_t position) const {
-    return position_scale(exchange_, position) * std::sqrt(area_[exchange_.patch[position]]);
+    return exchange_.position_scale(position) * std::sqrt(area_[exchange_.patch[position]]);
   }
 
   double sweep_forward() {
@@ -323,7 +322,7 @@ class ClusterRelaxation final : public Relaxation {
     return changed_squared;
   }
 
-  const HierarchicalOperator::Storage& exchange_;
+  const HierarchicalStorage& exchange_;
   const BasisKernels<Basis>& bases_;
   const CoreKernels<Value>& cores_;
   ChannelLanes lanes_{{0, 0, 0}, 1};  ///< one matrix for all channels
@@ -345,7 +344,7 @@ class ClusterRelaxation final : public Relaxation {
 
 }  // namespace
 
-std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::Storage& exchange) {
+std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalStorage& exchange) {
   const auto make = [&](const auto& bases, const auto& cores, const auto* basis_values,
                         const auto* core_values, float basis_scale) -> std::unique_ptr<Relaxation> {
     return std::make_unique<ClusterRelaxation<std::remove_cvref_t<decltype(*basis_values)>,

@@ -2,13 +2,13 @@
 
 #include <memory>
 
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/relaxation.h"
 
 namespace rebounce {
 
 /// Gauss-Seidel sweeps over the first matrix of `exchange`, a symmetric matrix G = A^1/2 F A^-1/2
 /// in hierarchical form, which must outlive them. See CompressedFormFactors::make_relaxation.
-std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalOperator::Storage& exchange);
+std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalStorage& exchange);
 
 }  // namespace rebounce

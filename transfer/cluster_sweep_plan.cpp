@@ -6,7 +6,7 @@
 namespace rebounce {
 namespace {
 
-constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalOperator::kAlignment);
+constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment);
 
 using Step = ClusterSweepPlan::Step;
 using Direction = CoreBlock::Direction;
@@ -42,11 +42,11 @@ struct ProductsOfSteps {
 
 class Planner {
  public:
-  Planner(const HierarchicalOperator::Storage& storage, ClusterSweepPlan& plan)
+  Planner(const HierarchicalStorage& storage, ClusterSweepPlan& plan)
       : blocks_(storage.blocks),
         layout_(storage),
         plan_(plan),
-        step_at_(HierarchicalOperator::position_count(storage.area.size()) / kAlignment, 0) {}
+        step_at_(HierarchicalFormat::position_count(storage.area.size()) / kAlignment, 0) {}
 
   void run() {
     add_steps();
@@ -211,7 +211,7 @@ class Planner {
 
 }  // namespace
 
-ClusterSweepPlan::ClusterSweepPlan(const HierarchicalOperator::Storage& storage) {
+ClusterSweepPlan::ClusterSweepPlan(const HierarchicalStorage& storage) {
   Planner(storage, *this).run();
 }
 

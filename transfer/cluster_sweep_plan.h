@@ -6,6 +6,7 @@
 
 #include "block_kernels.h"
 #include "hierarchical_layout.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 
 namespace rebounce {
 
@@ -57,7 +58,7 @@ struct ClusterSweepPlan {
     ByStep<DenseBlock> dense;
   };
 
-  explicit ClusterSweepPlan(const HierarchicalOperator::Storage& storage);
+  explicit ClusterSweepPlan(const HierarchicalStorage& storage);
 
   std::vector<Step> steps;  ///< by position
   Bases row_bases, column_bases;

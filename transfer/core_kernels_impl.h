@@ -8,7 +8,7 @@
 #include <span>
 
 #include "block_kernels.h"
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/operator_format.h"
 #include "vector_load.h"
 
 namespace rebounce {
@@ -108,7 +108,7 @@ template <typename V>
 REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
                                              std::size_t remainders, bool in_place, float* taken) {
   if (!in_place && remainders == 0) return in;
-  const V scale = V::broadcast(1 / HierarchicalOperator::kRemainderScale);
+  const V scale = V::broadcast(1 / HierarchicalFormat::kRemainderScale);
   const std::size_t count = rank * kChannelLanes, rest = remainders * kChannelLanes;
   for (std::size_t k = 0; k < count; k += V::kWidth) {
     V coefficients = V::load_some(in + k, std::min(count - k, V::kWidth));
@@ -125,7 +125,7 @@ REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
 template <typename V>
 REBOUNCE_INLINE inline void spread_remainders(float* out, std::size_t rank,
                                               std::size_t remainders) {
-  const V scale = V::broadcast(1 / HierarchicalOperator::kRemainderScale);
+  const V scale = V::broadcast(1 / HierarchicalFormat::kRemainderScale);
   float* const remainder = out + rank * kChannelLanes;
   const std::size_t count = remainders * kChannelLanes;
   for (std::size_t k = 0; k < count; k += V::kWidth) {

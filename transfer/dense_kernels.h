@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 namespace rebounce {
 
@@ -20,17 +19,8 @@ struct TileKernels {
 };
 
 struct DenseKernels {
-  const char* instruction_set;
   TileKernels<float> f32;
   TileKernels<std::uint16_t> f16;
 };
-
-extern const DenseKernels kDenseKernelsPortable;
-extern const DenseKernels kDenseKernelsAvx2;
-extern const DenseKernels kDenseKernelsAvx512;
-
-/// The kernels that this processor runs, narrowest first, and the widest of them.
-std::span<const DenseKernels* const> dense_kernel_sets();
-const DenseKernels& dense_kernels();
 
 }  // namespace rebounce

@@ -7,7 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "rebounce/transfer/dense_operator.h"
+#include "dense_kernels.h"
+#include "rebounce/transfer/operator_format.h"
 #include "vector_load.h"
 
 namespace rebounce {
@@ -15,7 +16,7 @@ namespace {
 
 template <typename V, typename Value>
 void multiply_diagonal(const Value* tile, const float* x_column, float* y_row) {
-  constexpr std::size_t kSize = DenseOperator::kTile;
+  constexpr std::size_t kSize = kDenseTile;
   constexpr std::size_t kVectors = kSize / V::kWidth;
   for (std::size_t row = 0; row < kSize; ++row) {
     V sum = V::zero();
@@ -30,7 +31,7 @@ void multiply_diagonal(const Value* tile, const float* x_column, float* y_row) {
 template <typename V, typename Value>
 void multiply_off_diagonal(const Value* tile, const float* x_column, const float* x_row,
                            float* y_row, float* y_column) {
-  constexpr std::size_t kSize = DenseOperator::kTile;
+  constexpr std::size_t kSize = kDenseTile;
   // Columns in strips of eight vectors, so that the strip's y stays in registers.
   constexpr std::size_t kVectors = kSize / V::kWidth < 8 ? kSize / V::kWidth : 8;
   constexpr std::size_t kStrip = kVectors * V::kWidth;
@@ -52,9 +53,8 @@ void multiply_off_diagonal(const Value* tile, const float* x_column, const float
 }
 
 template <typename V>
-constexpr DenseKernels make_dense_kernels(const char* instruction_set) {
-  return {instruction_set,
-          {multiply_off_diagonal<V, float>, multiply_diagonal<V, float>},
+constexpr DenseKernels make_dense_kernels() {
+  return {{multiply_off_diagonal<V, float>, multiply_diagonal<V, float>},
           {multiply_off_diagonal<V, std::uint16_t>, multiply_diagonal<V, std::uint16_t>}};
 }
 

@@ -4,8 +4,8 @@
 #include <cassert>
 #include <cmath>
 
-#include "dense_kernels.h"
 #include "half_float.h"
+#include "kernels.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -120,20 +120,6 @@ void add_slots(const DenseOperator::Storage& storage, int channel, const float* 
 
 }  // namespace
 
-std::string precision_name(Precision precision) {
-  switch (precision) {
-    case Precision::kF16:
-      return "f16";
-    case Precision::kQ16:
-      return "q16";
-    case Precision::kQ8:
-      return "q8";
-    case Precision::kF32:
-      break;
-  }
-  return "f32";
-}
-
 std::size_t DenseOperator::tile_count(std::size_t patch_count) {
   const std::size_t side = tiles_per_side(patch_count);
   return side * (side + 1) / 2;
@@ -181,9 +167,9 @@ void DenseOperator::apply(std::span<const Float3> initial_exitance,
 
   const bool half = storage_.precision == Precision::kF16;
   if (half) {
-    apply_tiles(dense_kernels().f16, storage_.tiles_f16.data(), storage_, x, slots, stride);
+    apply_tiles(kernels().dense.f16, storage_.tiles_f16.data(), storage_, x, slots, stride);
   } else {
-    apply_tiles(dense_kernels().f32, storage_.tiles_f32.data(), storage_, x, slots, stride);
+    apply_tiles(kernels().dense.f32, storage_.tiles_f32.data(), storage_, x, slots, stride);
   }
 
   const float scale = half ? 1.0F / kHalfScale : 1.0F;
@@ -198,8 +184,7 @@ void DenseOperator::apply(std::span<const Float3> initial_exitance,
 
 float DenseOperator::symmetric_entry(std::uint32_t matrix, std::size_t row,
                                      std::size_t column) const {
-  const std::size_t k =
-      matrix * tile_count(patch_count()) * kTileSize + entry_index(row, column);
+  const std::size_t k = matrix * tile_count(patch_count()) * kTileSize + entry_index(row, column);
   return storage_.precision == Precision::kF16 ? half_to_float(storage_.tiles_f16[k]) / kHalfScale
                                                : storage_.tiles_f32[k];
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "gather_kernels.h"
+#include "kernels.h"
 #include "planes.h"
 
 namespace rebounce {
@@ -70,7 +70,7 @@ void ExchangeBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
     for (std::size_t i = slot_row_[s]; i < slot_row_[s + 1]; ++i) {
       const Row blocks = row(i);
       Float3 sum;
-      gather_kernels().gather_and_spread(blocks.blocks, blocks.position,
+      kernels().gather.gather_and_spread(blocks.blocks, blocks.position,
                                          blocks.outside + blocks.inside, in[i].data(), x, y, stride,
                                          sum.data());
       for (int c = 0; c < kChannelCount; ++c) y[c * stride + i] += sum[c] + diagonal_[i] * in[i][c];

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "gather_kernels.h"
+#include "kernels.h"
 #include "planes.h"
 #include "rebounce/transfer/exchange_blocks.h"
 
@@ -110,7 +110,7 @@ class ExchangeRelaxation final : public Relaxation {
   void gather_outside_row(std::size_t i) {
     const ExchangeBlocks::Row row = exchange_.row(i);
     Float3 sum;
-    gather_kernels().gather(row.blocks, row.position, row.outside, radiosity_.data(), stride_,
+    kernels().gather.gather(row.blocks, row.position, row.outside, radiosity_.data(), stride_,
                             sum.data());
     for (int c = 0; c < kChannelCount; ++c) lower_[c * stride_ + i] = sum[c];
   }
@@ -118,7 +118,7 @@ class ExchangeRelaxation final : public Relaxation {
   void gather_inside(std::size_t i) {
     const ExchangeBlocks::Row row = exchange_.row(i);
     Float3 sum;
-    gather_kernels().gather(row.blocks + row.outside, row.position + row.outside, row.inside,
+    kernels().gather.gather(row.blocks + row.outside, row.position + row.outside, row.inside,
                             radiosity_.data(), stride_, sum.data());
     for (int c = 0; c < kChannelCount; ++c) lower_[c * stride_ + i] += sum[c];
   }
@@ -141,7 +141,7 @@ class ExchangeRelaxation final : public Relaxation {
 
   void spread(const FormFactorBlock* blocks, const std::uint32_t* position, std::size_t count,
               std::size_t row, std::size_t slot) {
-    gather_kernels().spread(blocks, position, count, radiosity_at(row).data(),
+    kernels().gather.spread(blocks, position, count, radiosity_at(row).data(),
                             upper_.data() + slot * kChannelCount * stride_, stride_);
   }
 

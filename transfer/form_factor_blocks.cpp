@@ -3,7 +3,7 @@
 #include <array>
 #include <cassert>
 
-#include "gather_kernels.h"
+#include "kernels.h"
 #include "planes.h"
 
 namespace rebounce {
@@ -95,7 +95,7 @@ void FormFactorBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
 Float3 FormFactorBlocks::gather_range(std::uint64_t begin, std::uint64_t end,
                                       std::span<const float> planes) const {
   Float3 sum{0, 0, 0};
-  gather_kernels().gather(block_.data() + begin, position_.data() + begin, end - begin,
+  kernels().gather.gather(block_.data() + begin, position_.data() + begin, end - begin,
                           planes.data(), plane_size(), sum.data());
   return sum;
 }

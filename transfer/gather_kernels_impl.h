@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include "gather_kernels.h"
+#include "rebounce/transfer/types.h"
 
 namespace rebounce {
 namespace {
@@ -18,10 +19,10 @@ void gather_blocks(const FormFactorBlock* values, const std::uint32_t* position,
                    const float* x, std::size_t stride, float* sum) {
   constexpr std::size_t kVectors = kFormFactorBlock / V::kWidth;
   // Sums of sums: a lane adds at most this many numbers, so that rounding stays near one unit.
-  constexpr std::size_t kChunk = 64;
+  constexpr std::size_t kBlocksOfSum = 64;
   V total[kChannelCount] = {V::zero(), V::zero(), V::zero()};
-  for (std::size_t begin = 0; begin < count; begin += kChunk) {
-    const std::size_t end = std::min(begin + kChunk, count);
+  for (std::size_t begin = 0; begin < count; begin += kBlocksOfSum) {
+    const std::size_t end = std::min(begin + kBlocksOfSum, count);
     // Two sums for each channel, so that one addition need not wait for the one before.
     V even[kChannelCount] = {V::zero(), V::zero(), V::zero()};
     V odd[kChannelCount] = {V::zero(), V::zero(), V::zero()};
@@ -86,8 +87,8 @@ void spread_blocks(const FormFactorBlock* values, const std::uint32_t* position,
 }
 
 template <typename V>
-constexpr GatherKernels make_gather_kernels(const char* instruction_set) {
-  return {instruction_set, gather_blocks<V>, gather_and_spread_blocks<V>, spread_blocks<V>};
+constexpr GatherKernels make_gather_kernels() {
+  return {gather_blocks<V>, gather_and_spread_blocks<V>, spread_blocks<V>};
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-constexpr std::uint64_t kStrip = HierarchicalOperator::kStrip;
+constexpr std::uint64_t kStrip = HierarchicalFormat::kStrip;
 
 // More values than any memory holds: sums of block sizes stay far from the end of 64 bits.
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 48;
@@ -60,7 +60,7 @@ bool has_values(const TransferBlock& block) {
 HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
                                        std::uint32_t matrix_count, Precision precision)
     : places(blocks.size()),
-      rank_group(has_integer_bases(precision) ? HierarchicalOperator::kRankGroup : 1) {
+      rank_group(has_integer_bases(precision) ? HierarchicalFormat::kRankGroup : 1) {
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
     total += block.value_count(matrix_count);
@@ -159,7 +159,7 @@ void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
 
 std::uint64_t HierarchicalLayout::padded(std::uint64_t value_count) {
   constexpr std::uint64_t kMultiple = 64;
-  return (value_count + HierarchicalOperator::kPadding + kMultiple - 1) / kMultiple * kMultiple;
+  return (value_count + HierarchicalFormat::kPadding + kMultiple - 1) / kMultiple * kMultiple;
 }
 
 }  // namespace rebounce

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 
 namespace rebounce {
 
@@ -13,7 +13,7 @@ namespace rebounce {
 /// to a multiple of `rank_group`. Those of dense blocks, whose bases are the identity, follow.
 struct HierarchicalLayout {
   /// All bases over one cluster of positions: [rank][size], or in 16 bits in strips and groups of
-  /// ranks, the last of which is filled up with zeros (HierarchicalOperator::Order).
+  /// ranks, the last of which is filled up with zeros (HierarchicalStorage::Order).
   struct Cluster {
     std::uint32_t begin = 0, size = 0;  ///< positions
     std::uint32_t rank = 0;
@@ -37,7 +37,7 @@ struct HierarchicalLayout {
                      Precision precision);
 
   /// Of the blocks of an operator.
-  explicit HierarchicalLayout(const HierarchicalOperator::Storage& storage)
+  explicit HierarchicalLayout(const HierarchicalStorage& storage)
       : HierarchicalLayout(storage.blocks, storage.matrix_count, storage.precision) {}
 
   /// Where the value of a basis is: a rank of one end of a low-rank block, at a position of its

@@ -7,10 +7,10 @@
 
 #include "block_kernels.h"
 #include "hierarchical_plan.h"
-#include "hierarchical_storage.h"
 #include "hierarchical_values.h"
 #include "kernels_of_storage.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 
 namespace rebounce {
 namespace {
@@ -171,7 +171,7 @@ class Phases {
   }
 
  private:
-  static constexpr float kRemainder = 1 / HierarchicalOperator::kRemainderScale;
+  static constexpr float kRemainder = 1 / HierarchicalFormat::kRemainderScale;
 
   /// Of light that goes through no bases, which other light does twice.
   float product_scale() const { return basis_scale_ * basis_scale_; }
@@ -285,7 +285,7 @@ void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
               std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance) {
   using Moments = HierarchicalPlan::Moments;
   using Arrival = HierarchicalPlan::Arrival;
-  const std::size_t positions = HierarchicalOperator::position_count(exchange.patch.size());
+  const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
 #pragma omp parallel
   {
 #pragma omp for schedule(static)
@@ -326,18 +326,16 @@ std::uint64_t HierarchicalOperator::Receivers::value_count() const {
   return plan_->value_count;
 }
 
-std::size_t HierarchicalOperator::position_count(std::size_t patch_count) {
-  return round_up(patch_count, kAlignment);
-}
-
-HierarchicalOperator::HierarchicalOperator(Storage storage)
-    : storage_(stream(storage)), layout_(std::make_shared<HierarchicalLayout>(storage_)) {
-  gather_scale_.reserve(patch_count());
-  scatter_scale_.reserve(patch_count());
-  const float scale = product_scale(storage_.precision);
-  for (std::size_t k = 0; k < patch_count(); ++k) {
-    const std::uint32_t p = storage_.patch[k];
-    const float root = std::sqrt(storage_.area[p]), of_position = position_scale(storage_, k);
+HierarchicalOperator::HierarchicalOperator(HierarchicalStorage storage)
+    : storage_(std::make_shared<HierarchicalStorage>(stream_values(storage))),
+      layout_(std::make_shared<HierarchicalLayout>(*storage_)) {
+  const std::size_t n = storage_->area.size();
+  gather_scale_.reserve(n);
+  scatter_scale_.reserve(n);
+  const float scale = product_scale(storage_->precision);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::uint32_t p = storage_->patch[k];
+    const float root = std::sqrt(storage_->area[p]), of_position = storage_->position_scale(k);
     gather_scale_.push_back(roles().is_source(p) ? of_position * root : 0);
     scatter_scale_.push_back(of_position * scale / root);
   }
@@ -348,7 +346,7 @@ std::shared_ptr<const HierarchicalPlan> HierarchicalOperator::plan_to(
     const std::vector<bool>& wanted) const {
   std::vector<std::uint32_t> positions, dark;
   for (std::uint32_t k = 0; k < patch_count(); ++k) {
-    const std::uint32_t p = storage_.patch[k];
+    const std::uint32_t p = storage_->patch[k];
     if (!wanted[p]) continue;
     if (roles().is_receiver(p)) {
       positions.push_back(k);
@@ -356,26 +354,32 @@ std::shared_ptr<const HierarchicalPlan> HierarchicalOperator::plan_to(
       dark.push_back(p);
     }
   }
-  return std::make_shared<HierarchicalPlan>(storage_, *layout_, std::move(positions),
+  return std::make_shared<HierarchicalPlan>(*storage_, *layout_, std::move(positions),
                                             std::move(dark));
 }
 
+const PatchRoles& HierarchicalOperator::roles() const {
+  return storage_->roles;
+}
+
 std::size_t HierarchicalOperator::bytes() const {
-  return storage_.values_f16.size_bytes() + storage_.values_f32.size_bytes() +
-         storage_.bases_q16.size_bytes() + storage_.bases_q8.size_bytes() +
-         storage_.blocks.size() * sizeof(TransferBlock) +
-         storage_.moment_scale.size() * sizeof(float) + storage_.scale_exponent.size() +
-         storage_.patch.size() * sizeof(std::uint32_t) + storage_.roles.role.size();
+  return storage_->values_f16.size_bytes() + storage_->values_f32.size_bytes() +
+         storage_->bases_q16.size_bytes() + storage_->bases_q8.size_bytes() +
+         storage_->blocks.size() * sizeof(TransferBlock) +
+         storage_->moment_scale.size() * sizeof(float) + storage_->scale_exponent.size() +
+         storage_->patch.size() * sizeof(std::uint32_t) + storage_->roles.role.size();
 }
 
 std::size_t HierarchicalOperator::bytes_per_apply() const {
   const auto bytes_of_bases = [this](const auto&, const auto&, const auto* basis, const auto*,
                                      float) { return layout_->basis_value_count * sizeof(*basis); };
-  return bytes() + with_kernels_of(storage_, *layout_, bytes_of_bases);
+  return bytes() + with_kernels_of(*storage_, *layout_, bytes_of_bases);
 }
 
 std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
-  return WorkVectors::size(position_count(patch_count()), *layout_, light_count) + kLine;
+  return WorkVectors::size(HierarchicalFormat::position_count(patch_count()), *layout_,
+                           light_count) +
+         kLine;
 }
 
 void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_count,
@@ -388,9 +392,10 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   // The workspace has room for one line more than its vectors, so that they may begin with one.
   const std::size_t misplaced = reinterpret_cast<std::uintptr_t>(workspace.data()) / sizeof(float);
   float* const aligned = workspace.data() + (kLine - misplaced % kLine) % kLine;
-  const WorkVectors work(position_count(patch_count()), *layout_, light_count, aligned);
-  const Exchange exchange{storage_.patch, gather_scale_, scatter_scale_, work};
-  const ChannelLanes lanes(storage_.channel_matrix, storage_.matrix_count);
+  const WorkVectors work(HierarchicalFormat::position_count(patch_count()), *layout_, light_count,
+                         aligned);
+  const Exchange exchange{storage_->patch, gather_scale_, scatter_scale_, work};
+  const ChannelLanes lanes(storage_->channel_matrix, storage_->matrix_count);
   for (std::size_t light = 0; light < light_count; ++light) {
     for (const std::uint32_t p : plan.dark) {
       indirect_irradiance[light * patch_count() + p] = {0, 0, 0};
@@ -398,10 +403,11 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   }
   const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
                                 const auto* core, float basis_scale) {
-    const Phases phases(bases, cores, basis, core, lanes, basis_scale, storage_.moment_scale, work);
+    const Phases phases(bases, cores, basis, core, lanes, basis_scale, storage_->moment_scale,
+                        work);
     run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
   };
-  with_kernels_of(storage_, *layout_, apply_phases);
+  with_kernels_of(*storage_, *layout_, apply_phases);
 }
 
 void HierarchicalOperator::apply(std::span<const Float3> initial_exitance,
@@ -442,26 +448,26 @@ void HierarchicalOperator::expand(int channel, std::span<float> transfer) const 
   assert(transfer.size() == n * n);
   std::ranges::fill(transfer, 0.0F);
   const auto put = [&](std::size_t i, std::size_t j, double value) {
-    const std::size_t row = storage_.patch[i], column = storage_.patch[j];
+    const std::size_t row = storage_->patch[i], column = storage_->patch[j];
     if (!roles().is_receiver(row) || !roles().is_source(column)) return;
-    transfer[row * n + column] = static_cast<float>(value * std::sqrt(storage_.area[column]) /
-                                                    std::sqrt(storage_.area[row]));
+    transfer[row * n + column] = static_cast<float>(value * std::sqrt(storage_->area[column]) /
+                                                    std::sqrt(storage_->area[row]));
   };
-  for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
-    if (is_moments(storage_.blocks[b])) continue;
+  for (std::size_t b = 0; b < storage_->blocks.size(); ++b) {
+    if (is_moments(storage_->blocks[b])) continue;
     const BlockOfPositions block =
-        block_of_positions(storage_, *layout_, b, storage_.channel_matrix[channel]);
+        block_of_positions(*storage_, *layout_, b, storage_->channel_matrix[channel]);
     for (std::size_t r = 0; r < block.rows.size(); ++r) {
       const std::size_t i = block.rows[r];
       if (i >= n) continue;
-      const double scale = position_scale(storage_, i);
+      const double scale = storage_->position_scale(i);
       for (std::size_t c = 0; c < block.columns.size(); ++c) {
         const std::size_t j = block.columns[c];
         if (j >= n) continue;
         const double entry =
-            scale * position_scale(storage_, j) * block.entries[r * block.columns.size() + c];
+            scale * storage_->position_scale(j) * block.entries[r * block.columns.size() + c];
         put(i, j, entry);
-        if (!storage_.blocks[b].on_diagonal()) put(j, i, entry);
+        if (!storage_->blocks[b].on_diagonal()) put(j, i, entry);
       }
     }
   }

@@ -6,7 +6,7 @@
 namespace rebounce {
 namespace {
 
-constexpr std::uint32_t kAlignment = HierarchicalOperator::kAlignment;
+constexpr std::uint32_t kAlignment = HierarchicalFormat::kAlignment;
 
 constexpr std::uint64_t kMostParts = HierarchicalPlan::kMostParts;
 
@@ -25,7 +25,7 @@ std::vector<std::uint32_t> share_out(const std::vector<Entry>& entries, const We
 }
 
 /// The positions of patches that are sources.
-std::vector<std::uint32_t> source_positions(const HierarchicalOperator::Storage& storage) {
+std::vector<std::uint32_t> source_positions(const HierarchicalStorage& storage) {
   std::vector<std::uint32_t> positions;
   for (std::uint32_t k = 0; k < storage.patch.size(); ++k) {
     if (storage.roles.is_source(storage.patch[k])) positions.push_back(k);
@@ -65,9 +65,8 @@ class WantedRuns {
 };
 
 /// The moments that light at any of these positions has come after them.
-WantedRuns with_moments(const HierarchicalOperator::Storage& storage,
-                        std::vector<std::uint32_t> positions, std::size_t position_count,
-                        std::size_t moment_count) {
+WantedRuns with_moments(const HierarchicalStorage& storage, std::vector<std::uint32_t> positions,
+                        std::size_t position_count, std::size_t moment_count) {
   const WantedRuns wanted(positions, position_count);
   for (const TransferBlock& block : storage.blocks) {
     if (!is_moments(block) || !wanted.any(block.row_begin, block.row_count)) continue;
@@ -83,11 +82,11 @@ class Planner {
   using Layout = HierarchicalLayout;
   using Plan = HierarchicalPlan;
 
-  Planner(const HierarchicalOperator::Storage& storage, const Layout& layout, Plan& plan)
+  Planner(const HierarchicalStorage& storage, const Layout& layout, Plan& plan)
       : storage_(storage),
         layout_(layout),
         plan_(plan),
-        positions_(HierarchicalOperator::position_count(storage.area.size())),
+        positions_(HierarchicalFormat::position_count(storage.area.size())),
         wanted_(with_moments(storage, plan.targets, positions_, layout.moment_count)),
         lit_(with_moments(storage, source_positions(storage), positions_, layout.moment_count)),
         in_(layout.coefficient_count),
@@ -384,7 +383,7 @@ class Planner {
     }
   }
 
-  const HierarchicalOperator::Storage& storage_;
+  const HierarchicalStorage& storage_;
   const Layout& layout_;
   Plan& plan_;
   std::size_t positions_;       ///< of patches, before those of moments
@@ -396,7 +395,7 @@ class Planner {
 
 }  // namespace
 
-HierarchicalPlan::HierarchicalPlan(const HierarchicalOperator::Storage& storage,
+HierarchicalPlan::HierarchicalPlan(const HierarchicalStorage& storage,
                                    const HierarchicalLayout& layout,
                                    std::vector<std::uint32_t> target_positions,
                                    std::vector<std::uint32_t> dark_patches)

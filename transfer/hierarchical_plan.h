@@ -6,6 +6,7 @@
 
 #include "block_kernels.h"
 #include "hierarchical_layout.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 
 namespace rebounce {
 
@@ -39,7 +40,7 @@ class HierarchicalPlan {
 
   /// Everything that it takes to write the positions `targets`, ascending, and to leave the patches
   /// `dark` without light.
-  HierarchicalPlan(const HierarchicalOperator::Storage& storage, const HierarchicalLayout& layout,
+  HierarchicalPlan(const HierarchicalStorage& storage, const HierarchicalLayout& layout,
                    std::vector<std::uint32_t> targets, std::vector<std::uint32_t> dark);
 
   std::vector<BasisPart> projections;         ///< of the light at positions

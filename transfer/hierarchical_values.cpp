@@ -4,11 +4,12 @@
 #include <utility>
 
 #include "half_float.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 
 namespace rebounce {
 namespace {
 
-using Storage = HierarchicalOperator::Storage;
+using Storage = HierarchicalStorage;
 
 /// Reads values of any precision as what they stand for.
 class ValueReader {
@@ -22,14 +23,14 @@ class ValueReader {
     const double value = stored_basis(layout_.basis_index(end, vector, position));
     if (vector >= end.remainders) return value;
     return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
-                       double{HierarchicalOperator::kRemainderScale};
+                       double{HierarchicalFormat::kRemainderScale};
   }
   /// Of a core or a dense entry.
   double core(std::uint64_t index) const {
     if (storage_.precision == Precision::kF32) return storage_.values_f32[first_core_ + index];
     const std::uint64_t first = storage_.precision == Precision::kF16 ? first_core_ : 0;
     return half_to_float(storage_.values_f16[first + index]) /
-           double{HierarchicalOperator::kHalfScale};
+           double{HierarchicalFormat::kHalfScale};
   }
 
   const Storage& storage() const { return storage_; }
@@ -41,9 +42,9 @@ class ValueReader {
       case Precision::kF16:
         return half_to_float(storage_.values_f16[index]);
       case Precision::kQ16:
-        return storage_.bases_q16[index] / double{HierarchicalOperator::kShortScale};
+        return storage_.bases_q16[index] / double{HierarchicalFormat::kShortScale};
       case Precision::kQ8:
-        return storage_.bases_q8[index] / double{HierarchicalOperator::kByteScale};
+        return storage_.bases_q8[index] / double{HierarchicalFormat::kByteScale};
       case Precision::kF32:
         break;
     }
@@ -106,7 +107,7 @@ std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_
                                  std::vector<double> entries,
                                  std::vector<std::uint32_t>& positions) {
   const Storage& storage = read.storage();
-  const std::size_t position_count = HierarchicalOperator::position_count(storage.area.size());
+  const std::size_t position_count = HierarchicalFormat::position_count(storage.area.size());
   if (rows.begin < position_count) {
     for (std::uint32_t k = 0; k < rows.count; ++k) positions.push_back(rows.begin + k);
     return entries;
@@ -138,7 +139,7 @@ std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_
 }  // namespace
 
 Storage decode(const Storage& storage) {
-  const Storage streamed = HierarchicalOperator::stream(storage);
+  const Storage streamed = stream_values(storage);
   if (streamed.precision == Precision::kF32) return streamed;
   Storage decoded = streamed;
   decoded.precision = Precision::kF32;

@@ -8,7 +8,7 @@
 namespace rebounce {
 
 /// What the values of an operator stand for, in f32 and in the order kStreamed.
-HierarchicalOperator::Storage decode(const HierarchicalOperator::Storage& storage);
+HierarchicalStorage decode(const HierarchicalStorage& storage);
 
 /// The entries of one block, of one matrix, between the positions whose light it takes, directly or
 /// as moments.
@@ -18,7 +18,7 @@ struct BlockOfPositions {
 };
 
 /// Of a block that is not of moments itself; values in the order kStreamed.
-BlockOfPositions block_of_positions(const HierarchicalOperator::Storage& storage,
+BlockOfPositions block_of_positions(const HierarchicalStorage& storage,
                                     const HierarchicalLayout& layout, std::size_t block,
                                     std::uint32_t matrix);
 

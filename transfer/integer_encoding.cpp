@@ -6,13 +6,14 @@
 #include <span>
 #include <vector>
 
+#include "half_float.h"
 #include "hierarchical_layout.h"
-#include "hierarchical_storage.h"
+#include "rebounce/transfer/error.h"
 
 namespace rebounce {
 namespace {
 
-using Storage = HierarchicalOperator::Storage;
+using Storage = HierarchicalStorage;
 using Layout = HierarchicalLayout;
 
 /// A kind of integers that bases are rounded to: their largest magnitude, and which of them stands
@@ -21,12 +22,12 @@ template <typename Integer>
 struct IntegerRange;
 template <>
 struct IntegerRange<std::int8_t> {
-  static constexpr float kLargest = 127, kScale = HierarchicalOperator::kByteScale;
+  static constexpr float kLargest = 127, kScale = HierarchicalFormat::kByteScale;
 };
 template <>
 struct IntegerRange<std::int16_t> {
-  static constexpr float kLargest = HierarchicalOperator::kLargestShort;
-  static constexpr float kScale = HierarchicalOperator::kShortScale;
+  static constexpr float kLargest = HierarchicalFormat::kLargestShort;
+  static constexpr float kScale = HierarchicalFormat::kShortScale;
 };
 
 /// Rounds the bases of operators in f32, and multiplies their cores to make up for the scales.
@@ -89,7 +90,7 @@ class IntegerEncoder {
       const float step = largest / kLargest;
       put_multiples(rest, step, to, r);
       if (r < to.remainders) {
-        put_multiples(rest, step / HierarchicalOperator::kRemainderScale, to, rank + r);
+        put_multiples(rest, step / HierarchicalFormat::kRemainderScale, to, rank + r);
       }
       scales.push_back(step * IntegerRange<Integer>::kScale);
     }
@@ -125,6 +126,18 @@ void encode(const Storage& exact, Storage& rounded, SharedArray<Integer> Storage
 }
 
 }  // namespace
+
+std::uint16_t encode_core_value(float value) {
+  const std::uint16_t half = float_to_half(value * HierarchicalFormat::kHalfScale);
+  if ((half & 0x7FFFU) >= 0x7C00U) {
+    throw Error("an entry of the operator is too large for f16; use --precision f32");
+  }
+  return half;
+}
+
+void drop_remainders(Storage& storage) {
+  for (TransferBlock& block : storage.blocks) block.row_remainders = block.column_remainders = 0;
+}
 
 Storage encode_integers(const Storage& exact, Precision precision) {
   Storage rounded = exact;

@@ -35,15 +35,15 @@
 #include <cstdint>
 
 #include "block_kernels.h"
-#include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/operator_format.h"
 #include "rebounce/transfer/types.h"
 #include "vector_load.h"
 
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kRankGroup = HierarchicalOperator::kRankGroup;
-constexpr std::size_t kBasisStrip = HierarchicalOperator::kStrip;
+constexpr std::size_t kRankGroup = HierarchicalFormat::kRankGroup;
+constexpr std::size_t kBasisStrip = HierarchicalFormat::kStrip;
 
 // Positions or ranks whose products are added as integers.
 constexpr std::size_t kChunk = 128;

@@ -2,11 +2,19 @@
 
 #include <array>
 #include <cstddef>
-#include <span>
-
-#include "rebounce/transfer/linked_form_factors.h"
+#include <cstdint>
 
 namespace rebounce {
+
+/// A link as the node that gathers along it sees it: 20 bytes. Gradients are corrections, and are
+/// kept as bfloat16, the upper half of a float.
+struct IncomingLink {
+  std::array<std::uint16_t, 3> gradient_from;  ///< of the exchange area over the other node, m
+  std::array<std::uint16_t, 3> gradient_to;    ///< over the node that gathers
+  std::uint32_t from;                          ///< the other node
+  float exchange_area;                         ///< m²
+};
+static_assert(sizeof(IncomingLink) == 20);
 
 // Colour channels and one more, so that a colour is one vector.
 inline constexpr std::size_t kColorLanes = 4;
@@ -33,18 +41,9 @@ using ManyDoubles = std::array<double, 24>;
 
 /// Gathering along links, for one instruction set; many lights with the same bits for any of them.
 struct LinkKernels {
-  const char* instruction_set;
   GatherAlongLinks<ColorLanes> gather;
   GatherAlongLinks<ManyFloats> gather_floats;
   GatherAlongLinks<ManyDoubles> gather_doubles;
 };
-
-extern const LinkKernels kLinkKernelsPortable;
-extern const LinkKernels kLinkKernelsAvx2;
-extern const LinkKernels kLinkKernelsAvx512;
-
-/// The kernels that this processor runs, narrowest first, and the widest of them.
-std::span<const LinkKernels* const> link_kernel_sets();
-const LinkKernels& link_kernels();
 
 }  // namespace rebounce

@@ -6,6 +6,7 @@
 #include <string>
 #include <type_traits>
 
+#include "kernels.h"
 #include "link_gather.h"
 #include "links_by_node.h"
 #include "rebounce/transfer/error.h"
@@ -24,9 +25,9 @@ constexpr std::size_t kWorthThreads = 16384;
 template <typename Columns>
 GatherAlongLinks<Columns> fastest_gather() {
   if constexpr (std::is_same_v<Columns, ManyFloats>) {
-    return link_kernels().gather_floats;
+    return kernels().link.gather_floats;
   } else if constexpr (std::is_same_v<Columns, ManyDoubles>) {
-    return link_kernels().gather_doubles;
+    return kernels().link.gather_doubles;
   } else {
     return gather_along_links<Columns>;
   }
@@ -118,8 +119,49 @@ std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
   return begin;
 }
 
-LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
-                                     std::span<const Float3> centroid)
+/// The nodes and their links in the order in which a gather goes through them.
+class LinkedFormFactors::Tree {
+ public:
+  Tree(const FormFactorLinks& links, std::span<const float> area, std::span<const Float3> centroid);
+
+  std::size_t patch_count() const { return scale_.size(); }
+  std::size_t node_count() const { return node_.size(); }
+  std::size_t bytes() const;
+
+  /// Pulls, gathers and pushes; `light` and `arrived` are [m].
+  template <typename Columns, typename Lanes>
+  void gather(std::span<const Columns> in, std::span<Columns> out, LinkLightOf<Lanes>* light,
+              LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node) const;
+
+ private:
+  struct Node {
+    std::uint32_t first_child = kNone;
+    std::uint32_t patch = kNone;  ///< of a leaf
+    float area = 0;
+    float part = 1;        ///< of its parent's area
+    Float3 from_parent{};  ///< its centre less that of its parent, metres
+  };
+
+  void build_tree(const FormFactorLinks& links, std::span<const float> area,
+                  std::span<const Float3> centroid);
+  void place_children(std::span<const std::array<double, 4>> sum);
+  void find_levels();
+  void sort_links(const FormFactorLinks& links);
+
+  template <typename Columns, typename Lanes>
+  void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const;
+  template <typename Lanes, typename Columns>
+  void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const;
+
+  std::vector<Node> node_;                     ///< level by level
+  std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number
+  std::vector<std::uint64_t> incoming_begin_;  ///< [m + 1]
+  std::vector<IncomingLink> incoming_;         ///< every link twice, by the node that gathers
+  std::vector<float> scale_;                   ///< [n]
+};
+
+LinkedFormFactors::Tree::Tree(const FormFactorLinks& links, std::span<const float> area,
+                              std::span<const Float3> centroid)
     : scale_(links.scale) {
   check_links(links, area.size());
   if (centroid.size() != area.size()) refuse("centroids and areas differ in number");
@@ -128,8 +170,8 @@ LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<con
 }
 
 /// Lays out the nodes, and their areas and centres.
-void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const float> area,
-                                   std::span<const Float3> centroid) {
+void LinkedFormFactors::Tree::build_tree(const FormFactorLinks& links, std::span<const float> area,
+                                         std::span<const Float3> centroid) {
   const std::size_t m = links.first_child.size();
   const std::vector<std::uint32_t> begin = first_positions(links);
   node_.resize(m);
@@ -154,7 +196,7 @@ void LinkedFormFactors::build_tree(const FormFactorLinks& links, std::span<const
 
 /// Where children lie in their parent; `sum` has the area times the centre of each node, and the
 /// area.
-void LinkedFormFactors::place_children(std::span<const std::array<double, 4>> sum) {
+void LinkedFormFactors::Tree::place_children(std::span<const std::array<double, 4>> sum) {
   for (std::size_t k = 0; k < node_.size(); ++k) {
     if (node_[k].patch != kNone) continue;
     for (std::uint32_t c = node_[k].first_child; c < node_[k].first_child + 2; ++c) {
@@ -168,7 +210,7 @@ void LinkedFormFactors::place_children(std::span<const std::array<double, 4>> su
 }
 
 /// The root, then its children, then theirs.
-void LinkedFormFactors::find_levels() {
+void LinkedFormFactors::Tree::find_levels() {
   level_begin_ = {0, 1};
   while (level_begin_.back() < node_.size()) {
     const std::uint32_t begin = level_begin_[level_begin_.size() - 2], end = level_begin_.back();
@@ -181,7 +223,7 @@ void LinkedFormFactors::find_levels() {
 }
 
 /// Every link twice, once for each of its nodes, by the node that gathers.
-void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
+void LinkedFormFactors::Tree::sort_links(const FormFactorLinks& links) {
   const LinksByNode of_node =
       links_by_node(node_.size(), links.pair.size(), [&](std::size_t k) { return links.pair[k]; });
   incoming_begin_ = of_node.offsets();
@@ -193,32 +235,15 @@ void LinkedFormFactors::sort_links(const FormFactorLinks& links) {
   }
 }
 
-std::size_t LinkedFormFactors::bytes() const {
+std::size_t LinkedFormFactors::Tree::bytes() const {
   return incoming_.size() * sizeof(IncomingLink) + incoming_begin_.size() * sizeof(std::uint64_t) +
          2 * node_.size() * sizeof(Node);
 }
 
-std::size_t LinkedFormFactors::workspace_size() const {
-  return 2 * node_.size() * sizeof(LinkLight) / sizeof(float);
-}
-
-void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
-                               std::span<float> workspace) const {
-  assert(workspace.size() >= workspace_size());
-  auto* light = reinterpret_cast<LinkLight*>(workspace.data());
-  gather(in, out, light, light + node_.size(), link_kernels().gather);
-}
-
-template <typename Columns>
-void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
-  std::vector<LinkLightOf<Columns>> light(node_.size()), arrived(node_.size());
-  gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>());
-}
-
 template <typename Columns, typename Lanes>
-void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out,
-                               LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived,
-                               GatherAlongLinks<Lanes> gather_node) const {
+void LinkedFormFactors::Tree::gather(std::span<const Columns> in, std::span<Columns> out,
+                                     LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived,
+                                     GatherAlongLinks<Lanes> gather_node) const {
   assert(in.size() == patch_count() && out.size() == patch_count());
   pull(in, light);
 #pragma omp parallel for schedule(dynamic, 64)
@@ -230,7 +255,7 @@ void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> o
 }
 
 template <typename Columns, typename Lanes>
-void LinkedFormFactors::pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const {
+void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
 #pragma omp for schedule(static)
@@ -256,7 +281,7 @@ void LinkedFormFactors::pull(std::span<const Columns> in, LinkLightOf<Lanes>* li
 }
 
 template <typename Lanes, typename Columns>
-void LinkedFormFactors::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const {
+void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const {
 #pragma omp parallel if (node_.size() >= kWorthThreads)
   for (std::size_t level = 0; level + 1 < level_begin_.size(); ++level) {
 #pragma omp for schedule(static)
@@ -279,6 +304,39 @@ void LinkedFormFactors::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out
       }
     }
   }
+}
+
+LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
+                                     std::span<const Float3> centroid)
+    : tree_(std::make_shared<const Tree>(links, area, centroid)) {}
+
+std::size_t LinkedFormFactors::patch_count() const {
+  return tree_->patch_count();
+}
+
+std::size_t LinkedFormFactors::node_count() const {
+  return tree_->node_count();
+}
+
+std::size_t LinkedFormFactors::bytes() const {
+  return tree_->bytes();
+}
+
+std::size_t LinkedFormFactors::workspace_size() const {
+  return 2 * node_count() * sizeof(LinkLight) / sizeof(float);
+}
+
+void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
+                               std::span<float> workspace) const {
+  assert(workspace.size() >= workspace_size());
+  auto* light = reinterpret_cast<LinkLight*>(workspace.data());
+  tree_->gather(in, out, light, light + node_count(), kernels().link.gather);
+}
+
+template <typename Columns>
+void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
+  std::vector<LinkLightOf<Columns>> light(node_count()), arrived(node_count());
+  tree_->gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>());
 }
 
 template void LinkedFormFactors::gather(std::span<const std::array<float, 3>>,

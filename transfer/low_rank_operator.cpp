@@ -4,8 +4,8 @@
 #include <cassert>
 #include <cmath>
 
-#include "block_kernels.h"
 #include "half_float.h"
+#include "kernels.h"
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
@@ -89,16 +89,16 @@ std::size_t LowRankOperator::workspace_size() const {
 
 void LowRankOperator::project(const float* x, float* tile_coefficient, float* coefficient) const {
   const std::size_t tiles = tile_count(patch_count());
-  const BlockKernelSet& kernels = block_kernels();
+  const BlockKernels& blocks = kernels().blocks;
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < tiles; ++t) {
     const BasisPart part = basis_of_tile(t, storage_.rank);
     const PlanarVectors<const float> in{x, stride(), kChannelCount};
     const Coefficients<float> out{tile_coefficient + t * coefficient_size(), coefficient_size()};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.project(storage_.basis_f16.data(), {&part, 1}, in, out);
+      blocks.bases_f16.project(storage_.basis_f16.data(), {&part, 1}, in, out);
     } else {
-      kernels.bases_f32.project(storage_.basis_f32.data(), {&part, 1}, in, out);
+      blocks.bases_f32.project(storage_.basis_f32.data(), {&part, 1}, in, out);
     }
   }
   std::fill_n(coefficient, coefficient_size(), 0.0F);
@@ -136,7 +136,7 @@ void LowRankOperator::multiply_cores(const float* in, float* out) const {
 
 void LowRankOperator::expand_tiles(const float* coefficient, float* y) const {
   const std::size_t tiles = tile_count(patch_count());
-  const BlockKernelSet& kernels = block_kernels();
+  const BlockKernels& blocks = kernels().blocks;
   const Coefficients<const float> in{coefficient, coefficient_size()};
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < tiles; ++t) {
@@ -144,9 +144,9 @@ void LowRankOperator::expand_tiles(const float* coefficient, float* y) const {
     const BasisPart part = basis_of_tile(t, storage_.rank);
     const PlanarVectors<float> out{y, stride(), kChannelCount};
     if (storage_.precision == Precision::kF16) {
-      kernels.bases_f16.expand(storage_.basis_f16.data(), {&part, 1}, in, out);
+      blocks.bases_f16.expand(storage_.basis_f16.data(), {&part, 1}, in, out);
     } else {
-      kernels.bases_f32.expand(storage_.basis_f32.data(), {&part, 1}, in, out);
+      blocks.bases_f32.expand(storage_.basis_f32.data(), {&part, 1}, in, out);
     }
   }
 }

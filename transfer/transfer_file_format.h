@@ -12,6 +12,7 @@
 #include <type_traits>
 
 #include "rebounce/transfer/content_hash.h"
+#include "rebounce/transfer/operator_format.h"
 #include "rebounce/transfer/safetensors.h"
 #include "rebounce/transfer/transfer_data.h"
 

@@ -7,7 +7,9 @@
 #include "checked_json.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/low_rank_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "transfer_data_check.h"
@@ -260,7 +262,7 @@ std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* 
 }
 
 void read_integer_bases(const SafetensorsFile& file, const char* name,
-                        HierarchicalOperator::Storage& storage) {
+                        HierarchicalStorage& storage) {
   if (file.info(name).type == TensorType::kI16) {
     storage.precision = Precision::kQ16;
     storage.bases_q16 = file.tensor<std::int16_t>(name, {kAnySize}, TensorType::kI16);
@@ -281,9 +283,9 @@ PatchRoles read_roles(const SafetensorsFile& file, const char* name, std::size_t
 
 std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
     const SafetensorsFile& file, const HierarchicalTensors& names, const std::vector<float>& area) {
-  HierarchicalOperator::Storage storage;
+  HierarchicalStorage storage;
   storage.area = area;
-  storage.order = HierarchicalOperator::Order::kStreamed;
+  storage.order = HierarchicalStorage::Order::kStreamed;
   TensorReader{file}(names.patch, storage.patch);
   storage.blocks = read_blocks(file, names.blocks);
   storage.channel_matrix = read_channel_matrix(file, names.channel_matrix, kChannelCount);

@@ -5,6 +5,7 @@
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/low_rank_operator.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "shortest_decimal.h"
@@ -82,7 +83,7 @@ void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollect
                                storage.channel_matrix);
 }
 
-void collect_hierarchical_operator(const HierarchicalOperator::Storage& storage,
+void collect_hierarchical_operator(const HierarchicalStorage& storage,
                                    const HierarchicalTensors& names, TensorCollector& collector) {
   std::vector<StoredBlock> blocks;
   for (const TransferBlock& b : storage.blocks) {

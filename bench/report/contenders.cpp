@@ -16,6 +16,7 @@
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/exchange_blocks.h"
 #include "rebounce/transfer/form_factor_blocks.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/linked_form_factors.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "timing.h"

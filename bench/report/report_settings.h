@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/precision.h"
 #include "reference/compare.h"
 
 namespace rebounce::bench {

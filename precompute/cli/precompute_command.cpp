@@ -13,6 +13,7 @@
 #include "rebounce/precompute/patch_selection.h"
 #include "rebounce/transfer/error.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/precision.h"
 #include "rebounce/transfer/transfer_file.h"
 
 namespace rebounce::cli {

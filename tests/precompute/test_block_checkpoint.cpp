@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "expect_error.h"
+#include "rebounce/transfer/operator_format.h"
 #include "temporary_folder.h"
 
 namespace rebounce {

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "hierarchical_samples.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 #include "with_threads.h"
 
 namespace rebounce {
@@ -38,9 +39,9 @@ struct Kind {
 };
 
 HierarchicalOperator sample(const Kind& kind) {
-  HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
+  HierarchicalStorage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
   if (kind.equilibrated) storage = test::equilibrated(std::move(storage), 6);
-  return HierarchicalOperator(HierarchicalOperator::encode(storage, kind.precision));
+  return HierarchicalOperator(encode_values(storage, kind.precision));
 }
 
 class HierarchicalMatrixOf : public testing::TestWithParam<Kind> {

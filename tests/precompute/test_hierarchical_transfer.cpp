@@ -11,6 +11,7 @@
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "test_scenes.h"
 #include "unshadowed_lights.h"
 #include "with_threads.h"
@@ -111,14 +112,14 @@ TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
   for (const double price : {1e-5, 1e-9}) {
     const HierarchicalOperator transfer(
         compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), price));
-    const std::size_t positions = HierarchicalOperator::position_count(room.patches.size()) /
-                                  HierarchicalOperator::kAlignment;
+    const std::size_t positions =
+        HierarchicalFormat::position_count(room.patches.size()) / HierarchicalFormat::kAlignment;
     std::vector<int> covered(positions * positions, 0);
     for (const TransferBlock& block : transfer.storage().blocks) {
-      for (std::size_t i = 0; i < block.row_count / HierarchicalOperator::kAlignment; ++i) {
-        for (std::size_t j = 0; j < block.column_count / HierarchicalOperator::kAlignment; ++j) {
-          const std::size_t row = block.row_begin / HierarchicalOperator::kAlignment + i;
-          const std::size_t column = block.column_begin / HierarchicalOperator::kAlignment + j;
+      for (std::size_t i = 0; i < block.row_count / HierarchicalFormat::kAlignment; ++i) {
+        for (std::size_t j = 0; j < block.column_count / HierarchicalFormat::kAlignment; ++j) {
+          const std::size_t row = block.row_begin / HierarchicalFormat::kAlignment + i;
+          const std::size_t column = block.column_begin / HierarchicalFormat::kAlignment + j;
           ++covered[row * positions + column];
           if (!block.on_diagonal()) ++covered[column * positions + row];
         }

@@ -17,6 +17,7 @@
 #include "rebounce/precompute/dense_transfer.h"
 #include "rebounce/precompute/form_factors.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "solved_transfer.h"
 #include "temporary_folder.h"
 #include "test_scenes.h"
@@ -188,8 +189,8 @@ TEST(SolvedTransfer, ErrorsOfTheStepsAreThoseOfTheRestThatTheyFind) {
   const Eigen::MatrixXf x = Eigen::MatrixXf::Random(room.patches.size(), 20);
   const Eigen::MatrixXf exact = form_factors.multiply(0, x);
   for (const double tolerance : {0.02, 0.1}) {
-    const HierarchicalOperator::Storage coarse = compress_matrix(
-        form_factors, room.patches, room.shaping, first_price(tolerance, room.patches.size()));
+    const HierarchicalStorage coarse = compress_matrix(form_factors, room.patches, room.shaping,
+                                                       first_price(tolerance, room.patches.size()));
     const double off = (HierarchicalMatrix(coarse).multiply(0, x) - exact).norm() / exact.norm();
     ASSERT_GT(off, tolerance / 2);
     const SolvedTransfer solved(*room.form_factors, coarse, room.patches, 1e-5);
@@ -224,7 +225,7 @@ TEST(SolvedTransfer, EstimatesEnergies) {
 
 TEST(SolvedTransfer, RefusesFormFactorsThatGainLight) {
   const Room& room = small_room();
-  HierarchicalOperator::Storage doubled = room.form_factors->storage();
+  HierarchicalStorage doubled = room.form_factors->storage();
   std::vector<float> values(doubled.values_f32.begin(), doubled.values_f32.end());
   const HierarchicalLayout layout(doubled);
   for (std::size_t k = layout.basis_value_count; k < values.size(); ++k) values[k] *= 2;

@@ -46,7 +46,7 @@ ClusterTree reversed_cluster(std::uint32_t patch_count) {
   tree.patch.resize(patch_count);
   std::iota(tree.patch.rbegin(), tree.patch.rend(), 0U);
   tree.clusters.push_back(
-      {0, static_cast<std::uint32_t>(HierarchicalOperator::position_count(patch_count))});
+      {0, static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count))});
   return tree;
 }
 

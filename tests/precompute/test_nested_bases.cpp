@@ -12,12 +12,14 @@
 #include "../../precompute/block_tree.h"
 #include "../../precompute/matrix_compression.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "with_threads.h"
 
 namespace rebounce {
 namespace {
 
-using Storage = HierarchicalOperator::Storage;
+using Storage = HierarchicalStorage;
 
 /// The walls of a box, of as many patches along its edges.
 PatchTable box_of(int side) {
@@ -130,7 +132,7 @@ struct CompressedBox {
   }
 
   double mean_error(const Storage& storage, Precision precision = Precision::kF32) const {
-    return mean_error(HierarchicalOperator(HierarchicalOperator::encode(storage, precision)));
+    return mean_error(HierarchicalOperator(encode_values(storage, precision)));
   }
 
   double mean_error(const HierarchicalOperator& op) const {
@@ -159,7 +161,7 @@ struct CompressedBox {
 };
 
 std::size_t bytes_of(const Storage& storage) {
-  return HierarchicalOperator(HierarchicalOperator::encode_bytes(storage)).bytes();
+  return HierarchicalOperator(encode_values(storage, Precision::kQ8)).bytes();
 }
 
 /// 3,456 patches.
@@ -236,7 +238,7 @@ TEST(NestedBases, VectorsHaveNormOneAndCoresFitHalfPrecision) {
   for (const double factor : {1.0, 1e8}) {  // the second has sides with more vectors than moments
     const Storage nested = box.nested(factor * box.cost.price);
     const auto positions =
-        static_cast<std::uint32_t>(HierarchicalOperator::position_count(box.patches.size()));
+        static_cast<std::uint32_t>(HierarchicalFormat::position_count(box.patches.size()));
     const float* values = nested.values_f32.data();
     float largest = 0;
     for (const TransferBlock& block : nested.blocks) {
@@ -254,8 +256,8 @@ TEST(NestedBases, VectorsHaveNormOneAndCoresFitHalfPrecision) {
       }
       values = end;
     }
-    EXPECT_LE(largest * HierarchicalOperator::kHalfScale, 33000);
-    EXPECT_GE(largest * HierarchicalOperator::kHalfScale, 30000);
+    EXPECT_LE(largest * HierarchicalFormat::kHalfScale, 33000);
+    EXPECT_GE(largest * HierarchicalFormat::kHalfScale, 30000);
   }
 }
 

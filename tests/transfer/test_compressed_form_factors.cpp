@@ -11,6 +11,7 @@
 #include "hierarchical_samples.h"
 #include "random_light.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 
 namespace rebounce {
 namespace {
@@ -23,9 +24,9 @@ struct System {
   std::vector<Float3> reflectance, light;
 
   System(std::size_t n, std::uint64_t seed, Precision precision, bool equilibrated = false) {
-    HierarchicalOperator::Storage storage = test::random_hierarchical_storage(n, 1, seed);
+    HierarchicalStorage storage = test::random_hierarchical_storage(n, 1, seed);
     if (equilibrated) storage = test::equilibrated(std::move(storage), seed);
-    storage = HierarchicalOperator::encode(storage, precision);
+    storage = encode_values(storage, precision);
     exchange = std::make_shared<const HierarchicalOperator>(std::move(storage));
     matrix.resize(n * n);
     exchange->expand(0, matrix);

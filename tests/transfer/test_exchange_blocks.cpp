@@ -6,7 +6,7 @@
 
 #include <random>
 
-#include "../../transfer/gather_kernels.h"
+#include "../../transfer/kernels.h"
 #include "random_pairs.h"
 #include "rebounce/transfer/error.h"
 
@@ -67,13 +67,13 @@ TEST(ExchangeBlocks, InstructionSetsAgree) {
   const Float3 value{1, 2, 3};
   Float3 sum_a{}, sum_b{};
   std::vector<float> a = x, b = x;
-  kGatherKernelsPortable.gather_and_spread(values.data(), position.data(), kCount, value.data(),
-                                           x.data(), a.data(), kStride, sum_a.data());
-  gather_kernels().gather_and_spread(values.data(), position.data(), kCount, value.data(), x.data(),
+  kKernelsPortable.gather.gather_and_spread(values.data(), position.data(), kCount, value.data(),
+                                            x.data(), a.data(), kStride, sum_a.data());
+  kernels().gather.gather_and_spread(values.data(), position.data(), kCount, value.data(), x.data(),
                                      b.data(), kStride, sum_b.data());
   expect_near(sum_a, sum_b, 1e-5);
   std::vector<float> c = x;
-  gather_kernels().spread(values.data(), position.data(), kCount, value.data(), c.data(), kStride);
+  kernels().gather.spread(values.data(), position.data(), kCount, value.data(), c.data(), kStride);
   for (std::size_t k = 0; k < a.size(); ++k) {
     EXPECT_NEAR(a[k], b[k], 1e-6F * a[k]);
     EXPECT_EQ(b[k], c[k]);

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "../../transfer/gather_kernels.h"
+#include "../../transfer/kernels.h"
 #include "random_pairs.h"
 #include "rebounce/transfer/error.h"
 
@@ -81,16 +81,16 @@ TEST(FormFactorBlocks, InstructionSetsAgree) {
     for (float& f : values[k].value) f = uniform(engine);
   }
   for (float& v : x) v = uniform(engine);
-  const GatherKernels& wide = gather_kernels();
+  const GatherKernels& wide = kernels().gather;
   Float3 a{}, b{};
-  kGatherKernelsPortable.gather(values.data(), position.data(), kCount, x.data(), kStride,
-                                a.data());
+  kKernelsPortable.gather.gather(values.data(), position.data(), kCount, x.data(), kStride,
+                                 a.data());
   wide.gather(values.data(), position.data(), kCount, x.data(), kStride, b.data());
   expect_near(a, b, 1e-6);
   const Float3 weight{1, 2, 3};
   std::vector<float> y1 = x, y2 = x;
-  kGatherKernelsPortable.spread(values.data(), position.data(), kCount, weight.data(), y1.data(),
-                                kStride);
+  kKernelsPortable.gather.spread(values.data(), position.data(), kCount, weight.data(), y1.data(),
+                                 kStride);
   wide.spread(values.data(), position.data(), kCount, weight.data(), y2.data(), kStride);
   for (std::size_t k = 0; k < y1.size(); ++k) EXPECT_NEAR(y1[k], y2[k], 1e-6F * y1[k]);
 }

@@ -12,6 +12,7 @@
 #include "hierarchical_samples.h"
 #include "plain_data.h"
 #include "rebounce/transfer/compressed_form_factors.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 #include "rebounce/transfer/safetensors.h"
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
@@ -25,9 +26,9 @@ using test::expect_error;
 constexpr std::size_t kPatchCount = 100;
 
 TransferData sample_data(Precision precision, const PatchRoles& roles = {}) {
-  HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
+  HierarchicalStorage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
   storage.roles = roles;
-  if (precision != Precision::kF32) storage = HierarchicalOperator::encode(storage, precision);
+  if (precision != Precision::kF32) storage = encode_values(storage, precision);
   TransferData data = test::plain_data(storage.area);
   data.transfer = std::make_shared<const HierarchicalOperator>(std::move(storage));
   return data;
@@ -37,19 +38,19 @@ TransferData sample_data(Precision precision, const PatchRoles& roles = {}) {
 TransferData nested_data(Precision precision) {
   TransferData data = sample_data(precision);
   data.transfer = std::make_shared<const HierarchicalOperator>(
-      HierarchicalOperator::encode(test::random_nested_storage(kPatchCount, 2, 5), precision));
+      encode_values(test::random_nested_storage(kPatchCount, 2, 5), precision));
   return data;
 }
 
 /// With scales of positions.
 TransferData equilibrated_data(Precision precision) {
   TransferData data = sample_data(precision);
-  data.transfer = std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode(
+  data.transfer = std::make_shared<const HierarchicalOperator>(encode_values(
       test::equilibrated(test::random_nested_storage(kPatchCount, 2, 5), 6), precision));
   return data;
 }
 
-const HierarchicalOperator::Storage& storage_of(const TransferData& data) {
+const HierarchicalStorage& storage_of(const TransferData& data) {
   return dynamic_cast<const HierarchicalOperator&>(*data.transfer).storage();
 }
 
@@ -138,9 +139,9 @@ TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
 }
 
 std::shared_ptr<const HierarchicalOperator> sample_form_factors(std::uint32_t matrix_count) {
-  const HierarchicalOperator::Storage storage =
+  const HierarchicalStorage storage =
       test::equilibrated(test::random_hierarchical_storage(kPatchCount, matrix_count, 5), 6);
-  return std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode_half(storage));
+  return std::make_shared<const HierarchicalOperator>(encode_values(storage, Precision::kF16));
 }
 
 TEST(HierarchicalFile, HoldsCompressedFormFactorsBesideTheOperator) {
@@ -315,7 +316,7 @@ TEST(HierarchicalFile, RefusesScalesThatDoNotFit) {
 
 TEST(HierarchicalFile, RefusesFormFactorsWithMoments) {
   const auto moments = std::make_shared<const HierarchicalOperator>(
-      HierarchicalOperator::encode_half(test::random_nested_storage(kPatchCount, 1, 5)));
+      encode_values(test::random_nested_storage(kPatchCount, 1, 5), Precision::kF16));
   expect_error([&] { CompressedFormFactors{moments}; }, "have moments");
 }
 

@@ -8,14 +8,15 @@
 #include <numeric>
 #include <random>
 
-#include "../../transfer/block_kernels.h"
 #include "../../transfer/half_float.h"
+#include "../../transfer/kernels.h"
 #include "allocation_counter.h"
 #include "expect_error.h"
 #include "hierarchical_samples.h"
 #include "random_light.h"
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 #include "with_threads.h"
 
 namespace rebounce {
@@ -87,9 +88,9 @@ TEST(HierarchicalOperator, ExpansionIsSymmetricInTheAreaNorm) {
 }
 
 TEST(HierarchicalOperator, HalfPrecisionIsAsGoodAsItsBits) {
-  const HierarchicalOperator::Storage storage = random_hierarchical_storage(500, 3, 5);
+  const HierarchicalStorage storage = random_hierarchical_storage(500, 3, 5);
   const HierarchicalOperator exact(storage);
-  const HierarchicalOperator half(HierarchicalOperator::encode_half(storage));
+  const HierarchicalOperator half(encode_values(storage, Precision::kF16));
   EXPECT_EQ(2 * half.storage().values_f16.size_bytes(), exact.storage().values_f32.size_bytes());
   const std::vector<Float3> m0 = test::random_light(500, 1, 100);
   const std::vector<float>& area = storage.area;
@@ -101,9 +102,9 @@ TEST(HierarchicalOperator, HalfPrecisionIsAsGoodAsItsBits) {
 
 TEST(HierarchicalOperator, BytesAreAsGoodAsTheirBits) {
   for (const std::uint32_t matrices : {1U, 2U, 3U}) {
-    const HierarchicalOperator::Storage storage = random_hierarchical_storage(500, matrices, 5);
+    const HierarchicalStorage storage = random_hierarchical_storage(500, matrices, 5);
     const HierarchicalOperator exact(storage);
-    const HierarchicalOperator bytes(HierarchicalOperator::encode_bytes(storage));
+    const HierarchicalOperator bytes(encode_values(storage, Precision::kQ8));
     EXPECT_LT(bytes.bytes(), exact.bytes() / 2);
     const std::vector<Float3> m0 = test::random_light(500, 1, 100);
     const std::vector<float>& area = storage.area;
@@ -117,9 +118,9 @@ TEST(HierarchicalOperator, BytesAreAsGoodAsTheirBits) {
 
 TEST(HierarchicalOperator, ShortsAreAsGoodAsTheirBits) {
   for (const std::uint32_t matrices : {1U, 2U, 3U}) {
-    const HierarchicalOperator::Storage storage = random_hierarchical_storage(500, matrices, 5);
+    const HierarchicalStorage storage = random_hierarchical_storage(500, matrices, 5);
     const HierarchicalOperator exact(storage);
-    const HierarchicalOperator shorts(HierarchicalOperator::encode_shorts(storage));
+    const HierarchicalOperator shorts(encode_values(storage, Precision::kQ16));
     EXPECT_LT(shorts.bytes(), exact.bytes());
     const std::vector<Float3> m0 = test::random_light(500, 1, 100);
     const std::vector<float>& area = storage.area;
@@ -132,20 +133,20 @@ TEST(HierarchicalOperator, ShortsAreAsGoodAsTheirBits) {
 }
 
 TEST(HierarchicalOperator, RefusesToRoundTwice) {
-  const HierarchicalOperator::Storage exact = random_hierarchical_storage(100, 1, 1);
+  const HierarchicalStorage exact = random_hierarchical_storage(100, 1, 1);
   for (const Precision first : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
-    const HierarchicalOperator::Storage rounded = HierarchicalOperator::encode(exact, first);
+    const HierarchicalStorage rounded = encode_values(exact, first);
     for (const Precision second :
          {Precision::kF32, Precision::kF16, Precision::kQ16, Precision::kQ8}) {
-      EXPECT_THROW(HierarchicalOperator::encode(rounded, second), Error)
+      EXPECT_THROW(encode_values(rounded, second), Error)
           << precision_name(first) << " to " << precision_name(second);
     }
   }
 }
 
 TEST(HierarchicalOperator, RefusesShortsWhoseSumsCouldOverflow) {
-  HierarchicalOperator::Storage storage =
-      HierarchicalOperator::encode_shorts(random_hierarchical_storage(100, 1, 1));
+  HierarchicalStorage storage =
+      encode_values(random_hierarchical_storage(100, 1, 1), Precision::kQ16);
   std::vector<std::int16_t> bases(storage.bases_q16.begin(), storage.bases_q16.end());
   for (const std::int16_t value : {4096, -4096, -32768}) {
     bases[7] = value;
@@ -155,10 +156,10 @@ TEST(HierarchicalOperator, RefusesShortsWhoseSumsCouldOverflow) {
 }
 
 TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
-  const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 6);
+  const HierarchicalStorage storage = random_hierarchical_storage(777, 3, 6);
   const std::vector<Float3> m0 = test::random_light(777, 2, 100);
   for (const Precision precision : {Precision::kF32, Precision::kQ16, Precision::kQ8}) {
-    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    const HierarchicalOperator op(encode_values(storage, precision));
     const auto multiply = [&] { return product(op, m0); };
     EXPECT_EQ(test::with_threads(1, multiply), test::with_threads(5, multiply));
   }
@@ -187,12 +188,11 @@ void check_batch(const HierarchicalOperator& op, std::size_t lights) {
 
 TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
   for (const std::uint32_t matrices : {1U, 2U, 3U}) {
-    const HierarchicalOperator::Storage storage =
-        random_hierarchical_storage(333, matrices, 40 + matrices);
+    const HierarchicalStorage storage = random_hierarchical_storage(333, matrices, 40 + matrices);
     for (const HierarchicalOperator& op :
          {HierarchicalOperator(storage),
-          HierarchicalOperator(HierarchicalOperator::encode_half(storage)),
-          HierarchicalOperator(HierarchicalOperator::encode_shorts(storage))}) {
+          HierarchicalOperator(encode_values(storage, Precision::kF16)),
+          HierarchicalOperator(encode_values(storage, Precision::kQ16))}) {
       for (const std::size_t lights : {1U, 2U, 3U, 5U}) check_batch(op, lights);
     }
   }
@@ -234,17 +234,17 @@ void check_receivers(const HierarchicalOperator& op, float allowed) {
 }
 
 TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
-  const HierarchicalOperator::Storage storage = random_hierarchical_storage(777, 3, 12);
+  const HierarchicalStorage storage = random_hierarchical_storage(777, 3, 12);
   check_receivers(HierarchicalOperator(storage), 1e-6F);
   // Coefficients are rounded by the largest of those that are wanted.
-  check_receivers(HierarchicalOperator(HierarchicalOperator::encode_shorts(storage)), 5e-4F);
+  check_receivers(HierarchicalOperator(encode_values(storage, Precision::kQ16)), 5e-4F);
 }
 
 TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
-  const HierarchicalOperator::Storage by_block = random_hierarchical_storage(500, 2, 9);
-  const HierarchicalOperator::Storage streamed = HierarchicalOperator::stream(by_block);
+  const HierarchicalStorage by_block = random_hierarchical_storage(500, 2, 9);
+  const HierarchicalStorage streamed = stream_values(by_block);
   const std::vector<Float3> m0 = test::random_light(500, 5, 100);
-  EXPECT_EQ(streamed.order, HierarchicalOperator::Order::kStreamed);
+  EXPECT_EQ(streamed.order, HierarchicalStorage::Order::kStreamed);
   EXPECT_EQ(streamed.values_f32.size() % 64, 0U);
   EXPECT_EQ(product(HierarchicalOperator(by_block), m0),
             product(HierarchicalOperator(streamed), m0));
@@ -264,7 +264,7 @@ TEST(HierarchicalOperator, AllocatesNothing) {
 }
 
 TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
-  using Storage = HierarchicalOperator::Storage;
+  using Storage = HierarchicalStorage;
   using Kind = TransferBlock::Kind;
   struct Fault {
     const char* message;
@@ -328,7 +328,7 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
          s.blocks[0].row_remainders = s.blocks[0].column_remainders = 1;
        }},
       {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
-      {"number of values", [](Storage& s) { s.order = HierarchicalOperator::Order::kStreamed; }},
+      {"number of values", [](Storage& s) { s.order = HierarchicalStorage::Order::kStreamed; }},
       {"number of values",
        [](Storage& s) {
          s.precision = Precision::kF16;
@@ -354,7 +354,7 @@ double rounding_of(Precision precision) {
 
 TEST(NestedOperator, TheTestOperatorHasMomentsOnAllSides) {
   int rows = 0, both = 0, diagonal = 0, neither = 0;
-  const std::size_t positions = HierarchicalOperator::position_count(1000);
+  const std::size_t positions = HierarchicalFormat::position_count(1000);
   for (const std::uint64_t seed : {1U, 6U, 11U, 12U, 1003U}) {
     for (const TransferBlock& block : random_nested_storage(1000, 3, seed).blocks) {
       if (block.kind != TransferBlock::Kind::kLowRank) continue;
@@ -368,14 +368,13 @@ TEST(NestedOperator, TheTestOperatorHasMomentsOnAllSides) {
 TEST(NestedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
   for (const std::size_t n : {64U, 500U, 1000U}) {
     for (const std::uint32_t matrices : {1U, 2U, 3U}) {
-      const HierarchicalOperator::Storage storage =
-          random_nested_storage(n, matrices, n + matrices);
+      const HierarchicalStorage storage = random_nested_storage(n, matrices, n + matrices);
       ASSERT_FALSE(storage.moment_scale.empty());
       const std::vector<Float3> m0 = test::random_light(n, n, 100);
       const HierarchicalOperator exact(storage);
       for (const Precision precision : kPrecisions) {
         SCOPED_TRACE(std::to_string(n) + " patches, " + std::to_string(matrices) + " matrices");
-        const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+        const HierarchicalOperator op(encode_values(storage, precision));
         EXPECT_LT(relative_difference(product(op, m0), multiply_expansion(op, m0), storage.area),
                   rounding_of(precision));
         EXPECT_LT(relative_difference(product(op, m0), product(exact, m0), storage.area), 5e-3);
@@ -387,7 +386,7 @@ TEST(NestedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
 TEST(NestedOperator, MomentsAreTheProductsThatTheyStandFor) {
   // One block of rank one over the moments of all positions but its own mirror image's:
   // Yhat = u v^T + v u^T with u = W D t and v = W D s, written out.
-  HierarchicalOperator::Storage storage;
+  HierarchicalStorage storage;
   storage.area.assign(64, 1.0F);
   storage.patch.resize(64);
   std::iota(storage.patch.begin(), storage.patch.end(), 0U);
@@ -416,7 +415,7 @@ TEST(NestedOperator, MomentsAreTheProductsThatTheyStandFor) {
   take(16, [](float k) { return std::cos(k); });
   take(16, [](float k) { return std::cos(2 * k); });
   take(1, [](float) { return 0.25F; });
-  values.resize(values.size() + HierarchicalOperator::kPadding);
+  values.resize(values.size() + HierarchicalFormat::kPadding);
   const auto vector_of = [&](std::size_t cell) {
     std::vector<double> u(32);
     for (std::size_t m = 0; m < 16; ++m) {
@@ -441,23 +440,23 @@ TEST(NestedOperator, MomentsAreTheProductsThatTheyStandFor) {
 }
 
 TEST(NestedOperator, SameBitsForAnyNumberOfThreads) {
-  const HierarchicalOperator::Storage storage = random_nested_storage(1000, 3, 6);
+  const HierarchicalStorage storage = random_nested_storage(1000, 3, 6);
   const std::vector<Float3> m0 = test::random_light(1000, 2, 100);
   for (const Precision precision : kPrecisions) {
-    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    const HierarchicalOperator op(encode_values(storage, precision));
     const auto multiply = [&] { return product(op, m0); };
     EXPECT_EQ(test::with_threads(1, multiply), test::with_threads(5, multiply));
   }
 }
 
 TEST(NestedOperator, ABatchIsAsManyAppliesAndReceiversGetTheirLight) {
-  const HierarchicalOperator::Storage storage = random_nested_storage(1000, 3, 11);
+  const HierarchicalStorage storage = random_nested_storage(1000, 3, 11);
   for (const Precision precision : kPrecisions) {
-    check_batch(HierarchicalOperator(HierarchicalOperator::encode(storage, precision)), 3);
+    check_batch(HierarchicalOperator(encode_values(storage, precision)), 3);
   }
   check_receivers(HierarchicalOperator(random_nested_storage(777, 3, 12)), 1e-6F);
   check_receivers(HierarchicalOperator(random_nested_storage(1000, 3, 12)), 1e-6F);
-  check_receivers(HierarchicalOperator(HierarchicalOperator::encode_bytes(storage)), 5e-4F);
+  check_receivers(HierarchicalOperator(encode_values(storage, Precision::kQ8)), 5e-4F);
 }
 
 TEST(NestedOperator, AllocatesNothing) {
@@ -470,7 +469,7 @@ TEST(NestedOperator, AllocatesNothing) {
 }
 
 TEST(NestedOperator, RefusesMomentsThatDoNotFit) {
-  using Storage = HierarchicalOperator::Storage;
+  using Storage = HierarchicalStorage;
   struct Fault {
     const char* message;
     std::function<void(Storage&)> make;
@@ -519,8 +518,8 @@ std::vector<float> expansion(const HierarchicalOperator& op) {
 }
 
 TEST(EquilibratedOperator, IsWhatItHoldsTimesTheScalesOfBothPatches) {
-  const HierarchicalOperator::Storage plain = random_nested_storage(500, 3, 21);
-  const HierarchicalOperator::Storage scaled = test::equilibrated(plain, 22);
+  const HierarchicalStorage plain = random_nested_storage(500, 3, 21);
+  const HierarchicalStorage scaled = test::equilibrated(plain, 22);
   std::vector<float> scale(500);
   for (std::size_t k = 0; k < scale.size(); ++k) {
     scale[plain.patch[k]] = std::exp2(static_cast<float>(scaled.scale_exponent[k]));
@@ -536,12 +535,11 @@ TEST(EquilibratedOperator, IsWhatItHoldsTimesTheScalesOfBothPatches) {
 
 TEST(EquilibratedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
   for (const std::size_t n : {777U, 1000U}) {
-    const HierarchicalOperator::Storage storage =
-        test::equilibrated(random_nested_storage(n, 3, n), n + 1);
+    const HierarchicalStorage storage = test::equilibrated(random_nested_storage(n, 3, n), n + 1);
     const std::vector<Float3> m0 = test::random_light(n, n, 100);
     for (const Precision precision : kPrecisions) {
       SCOPED_TRACE(std::to_string(n) + " patches, " + precision_name(precision));
-      const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+      const HierarchicalOperator op(encode_values(storage, precision));
       EXPECT_LT(relative_difference(product(op, m0), multiply_expansion(op, m0), storage.area),
                 rounding_of(precision));
       check_batch(op, 3);
@@ -552,13 +550,13 @@ TEST(EquilibratedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
 
 TEST(EquilibratedOperator, FitsHalvesByItsScales) {
   constexpr std::uint32_t kSize = 32;
-  HierarchicalOperator::Storage storage;
+  HierarchicalStorage storage;
   storage.area.assign(kSize, 1.0F);
   storage.patch.resize(kSize);
   std::iota(storage.patch.begin(), storage.patch.end(), 0U);
   storage.matrix_count = 1;
   storage.blocks.push_back({.row_count = kSize, .column_count = kSize});
-  std::vector<float> values(kSize * kSize + HierarchicalOperator::kPadding);
+  std::vector<float> values(kSize * kSize + HierarchicalFormat::kPadding);
   for (std::uint32_t i = 0; i < kSize; ++i) {
     for (std::uint32_t j = 0; j < kSize; ++j) {
       values[i * kSize + j] = static_cast<float>(1000 + i * j);  // x 512 is too much
@@ -566,20 +564,20 @@ TEST(EquilibratedOperator, FitsHalvesByItsScales) {
   }
   storage.values_f32 = SharedArray(std::move(values));
   for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
-    expect_error([&] { HierarchicalOperator::encode(storage, precision); }, "too large for f16");
+    expect_error([&] { encode_values(storage, precision); }, "too large for f16");
   }
   storage.scale_exponent.assign(kSize, -3);
   const HierarchicalOperator exact(storage);
   const std::vector<Float3> m0 = test::random_light(kSize, 24, 100);
   for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
-    const HierarchicalOperator op(HierarchicalOperator::encode(storage, precision));
+    const HierarchicalOperator op(encode_values(storage, precision));
     EXPECT_GT(op.storage().scale_exponent.front(), -3);
     EXPECT_LT(relative_difference(product(op, m0), product(exact, m0), storage.area), 1e-3);
   }
 }
 
 TEST(EquilibratedOperator, RefusesScalesThatDoNotFit) {
-  HierarchicalOperator::Storage storage = random_hierarchical_storage(100, 1, 1);
+  HierarchicalStorage storage = random_hierarchical_storage(100, 1, 1);
   storage.scale_exponent.assign(99, 0);
   expect_error([&] { HierarchicalOperator{storage}; }, "one scale for each position");
   storage.scale_exponent.assign(100, 0);
@@ -590,10 +588,10 @@ TEST(EquilibratedOperator, RefusesScalesThatDoNotFit) {
 }
 
 TEST(HierarchicalOperator, RefusesHalfPrecisionBeyondItsRange) {
-  HierarchicalOperator::Storage storage = random_hierarchical_storage(100, 1, 1);
+  HierarchicalStorage storage = random_hierarchical_storage(100, 1, 1);
   storage.values_f32 =
       SharedArray(std::vector<float>(storage.values_f32.size(), 130.0F));  // x 512 is too much
-  expect_error([&] { HierarchicalOperator::encode_half(storage); }, "too large for f16");
+  expect_error([&] { encode_values(storage, Precision::kF16); }, "too large for f16");
 }
 
 /// Vectors and matrices with random entries that half precision holds exactly.
@@ -737,7 +735,7 @@ std::vector<Value> in_strips(const PlainBasis& plain) {
 template <typename Value>
 constexpr float kLargestInteger = 127;
 template <>
-constexpr float kLargestInteger<std::int16_t> = HierarchicalOperator::kLargestShort;
+constexpr float kLargestInteger<std::int16_t> = HierarchicalFormat::kLargestShort;
 
 /// Integers up to the largest.
 template <typename Value>
@@ -913,10 +911,9 @@ void check_dense(const CoreKernels<Value>& kernels, const std::vector<Value>& va
   }
 }
 
-void check_kernels(const BlockKernelSet& kernels) {
-  SCOPED_TRACE(kernels.instruction_set);
+void check_kernels(const BlockKernels& kernels) {
   Random random;
-  const std::vector<float> values = random.floats(2 * 96 * 96 + 8 + HierarchicalOperator::kPadding);
+  const std::vector<float> values = random.floats(2 * 96 * 96 + 8 + HierarchicalFormat::kPadding);
   const std::vector<std::uint16_t> half = to_half(values);
   for (const std::size_t lights : {1U, 2U, 3U}) {
     for (const std::size_t rank : {1U, 2U, 3U, 4U, 7U, 17U}) {
@@ -945,10 +942,10 @@ void check_kernels(const BlockKernelSet& kernels) {
 
 TEST(BlockKernels, RemaindersBelongToTheFirstCoefficients) {
   constexpr std::uint32_t kRows = 5, kColumns = 7, kRow = 3, kColumn = 20, kEnd = 40;
-  constexpr float kScale = HierarchicalOperator::kRemainderScale;
+  constexpr float kScale = HierarchicalFormat::kRemainderScale;
   Random random;
   const std::vector<float> values =
-      random.floats(kRows * kColumns * 3 + HierarchicalOperator::kPadding);
+      random.floats(kRows * kColumns * 3 + HierarchicalFormat::kPadding);
   const std::vector<float> sent = random.floats(kEnd * kChannelLanes);
   const auto at = [](std::uint32_t k) { return k * kChannelLanes; };
   const CoreBlock core{0, kRows, kColumns, kRow, kColumn, CoreBlock::Direction::kBoth, 2, 3};
@@ -960,14 +957,14 @@ TEST(BlockKernels, RemaindersBelongToTheFirstCoefficients) {
   for (std::size_t k = 0; k < 3 * kChannelLanes; ++k)
     whole[at(kColumn) + k] += sent[at(kColumn + kColumns) + k] / kScale;
   const ChannelLanes lanes({0, 1, 2}, 3);
-  for (const BlockKernelSet* set : block_kernel_sets()) {
+  for (const KernelSet* set : kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
     std::vector<float> expected(kEnd * kChannelLanes, kUntouched), out = expected, both = sent;
     std::vector<float> taken(taken_size(kRows, kColumns));
     const auto multiply = [&](const CoreBlock& block, const std::vector<float>& in,
                               std::vector<float>& to) {
-      set->cores_f32.multiply(values.data(), {&block, 1}, lanes, 1, {in.data(), 0}, {to.data(), 0},
-                              taken.data());
+      set->blocks.cores_f32.multiply(values.data(), {&block, 1}, lanes, 1, {in.data(), 0},
+                                     {to.data(), 0}, taken.data());
     };
     multiply(plain, whole, expected);
     multiply(core, sent, out);
@@ -991,23 +988,26 @@ TEST(BlockKernels, RemaindersBelongToTheFirstCoefficients) {
 }
 
 TEST(BlockKernels, EveryInstructionSetAgrees) {
-  for (const BlockKernelSet* set : block_kernel_sets()) check_kernels(*set);
+  for (const KernelSet* set : kernel_sets()) {
+    SCOPED_TRACE(set->instruction_set);
+    check_kernels(set->blocks);
+  }
 }
 
 template <typename Value>
-const BasisKernels<Value>& integer_kernels(const BlockKernelSet& set);
+const BasisKernels<Value>& integer_kernels(const BlockKernels& set);
 template <>
-const BasisKernels<std::int16_t>& integer_kernels(const BlockKernelSet& set) {
+const BasisKernels<std::int16_t>& integer_kernels(const BlockKernels& set) {
   return set.bases_q16;
 }
 template <>
-const BasisKernels<std::int8_t>& integer_kernels(const BlockKernelSet& set) {
+const BasisKernels<std::int8_t>& integer_kernels(const BlockKernels& set) {
   return set.bases_q8;
 }
 
 /// What comes of x by way of coefficients and back: those, and the light.
 template <typename Value>
-std::vector<float> there_and_back(const BlockKernelSet& set, const PlainBasis& plain,
+std::vector<float> there_and_back(const BlockKernels& set, const PlainBasis& plain,
                                   const std::vector<float>& x) {
   const BasisKernels<Value>& kernels = integer_kernels<Value>(set);
   const std::vector<Value> basis = in_strips<Value>(plain);
@@ -1031,9 +1031,10 @@ TYPED_TEST(IntegerKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
   std::vector<float> x = random.floats(3 * kStride);
   for (const float brightest : {x[kFirstPosition + 37], 1e5F}) {  // even light, and uneven
     x[kFirstPosition + 37] = brightest;
-    const std::vector<float> expected = there_and_back<TypeParam>(kBlockKernelsPortable, plain, x);
-    for (const BlockKernelSet* set : block_kernel_sets()) {
-      EXPECT_EQ(there_and_back<TypeParam>(*set, plain, x), expected) << set->instruction_set;
+    const std::vector<float> expected =
+        there_and_back<TypeParam>(kKernelsPortable.blocks, plain, x);
+    for (const KernelSet* set : kernel_sets()) {
+      EXPECT_EQ(there_and_back<TypeParam>(set->blocks, plain, x), expected) << set->instruction_set;
     }
   }
 }
@@ -1052,10 +1053,10 @@ TYPED_TEST(IntegerKernels, BrightPatchesThatDoNotCountLeaveTheOthersTheirLight) 
   for (const std::size_t bright : {37U, 38U, 140U}) {
     for (std::size_t c = 0; c < 3; ++c) uneven[c * kStride + kFirstPosition + bright] = kBright;
   }
-  for (const BlockKernelSet* set : block_kernel_sets()) {
+  for (const KernelSet* set : kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
-    const std::vector<float> expected = there_and_back<TypeParam>(*set, plain, x);
-    const std::vector<float> result = there_and_back<TypeParam>(*set, plain, uneven);
+    const std::vector<float> expected = there_and_back<TypeParam>(set->blocks, plain, x);
+    const std::vector<float> result = there_and_back<TypeParam>(set->blocks, plain, uneven);
     float largest = 0;
     for (std::size_t r = 0; r < kRank * kChannelLanes; ++r) {
       largest = std::max(largest, std::abs(expected[coefficient_at(0, 0) + r]));
@@ -1075,10 +1076,10 @@ TYPED_TEST(IntegerKernels, SumsOfIntegersHaveRoomForTheLargest) {
   const PlainBasis plain{std::vector<float>(kRank * kSize, kLargest), kRank, kSize, 0};
   // Just below a power of two: it becomes the largest integer that there is.
   const float light = std::nextafter(1.0F, 0.0F);
-  for (const BlockKernelSet* set : block_kernel_sets()) {
+  for (const KernelSet* set : kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
     const std::vector<float> result =
-        there_and_back<TypeParam>(*set, plain, std::vector<float>(3 * kStride, light));
+        there_and_back<TypeParam>(set->blocks, plain, std::vector<float>(3 * kStride, light));
     const double sent = kSize * kLargest * light, y = kRank * kLargest * sent;
     EXPECT_NEAR(result[coefficient_at(0, 0)] / sent, 1, 3e-4);
     EXPECT_NEAR(result[kRankStride * kChannelLanes + kFirstPosition] / y, 1, 6e-4);
@@ -1088,9 +1089,9 @@ TYPED_TEST(IntegerKernels, SumsOfIntegersHaveRoomForTheLargest) {
 TYPED_TEST(IntegerKernels, NoLightStaysNone) {
   const PlainBasis plain = integer_basis<TypeParam>(7, 48);
   for (const float light : {0.0F, 1e-42F}) {
-    for (const BlockKernelSet* set : block_kernel_sets()) {
+    for (const KernelSet* set : kernel_sets()) {
       const std::vector<float> result =
-          there_and_back<TypeParam>(*set, plain, std::vector<float>(3 * kStride, light));
+          there_and_back<TypeParam>(set->blocks, plain, std::vector<float>(3 * kStride, light));
       for (const float value : result) EXPECT_LE(std::abs(value), 1e-20F);
     }
   }

@@ -4,6 +4,7 @@
 #include <random>
 #include <vector>
 
+#include "rebounce/transfer/hierarchical_encoding.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 
 namespace rebounce {
@@ -13,11 +14,10 @@ constexpr std::uint32_t kSide = 64;
 
 /// One block of low rank between two halves of the patches, with orthonormal bases (cosines) and a
 /// core of one matrix whose diagonal is `core`; remainders at its ends.
-HierarchicalOperator::Storage block_with(const std::vector<float>& core,
-                                         std::uint32_t row_remainders = 0,
-                                         std::uint32_t column_remainders = 0) {
+HierarchicalStorage block_with(const std::vector<float>& core, std::uint32_t row_remainders = 0,
+                               std::uint32_t column_remainders = 0) {
   const auto rank = static_cast<std::uint32_t>(core.size());
-  HierarchicalOperator::Storage storage;
+  HierarchicalStorage storage;
   storage.area.assign(2 * kSide, 1.0F);
   for (std::uint32_t p = 0; p < 2 * kSide; ++p) storage.patch.push_back(p);
   storage.matrix_count = 1;
@@ -35,14 +35,13 @@ HierarchicalOperator::Storage block_with(const std::vector<float>& core,
   for (std::uint32_t r = 0; r < rank; ++r) {
     for (std::uint32_t c = 0; c < rank; ++c) values.push_back(r == c ? core[r] : 0);
   }
-  values.resize(values.size() + HierarchicalOperator::kPadding);
+  values.resize(values.size() + HierarchicalFormat::kPadding);
   storage.values_f32 = SharedArray(std::move(values));
   return storage;
 }
 
 /// Frobenius norm of what an encoding changes.
-double change(const HierarchicalOperator::Storage& exact,
-              const HierarchicalOperator::Storage& encoded) {
+double change(const HierarchicalStorage& exact, const HierarchicalStorage& encoded) {
   const std::size_t n = exact.area.size();
   std::vector<float> a(n * n), b(n * n);
   HierarchicalOperator(exact).expand(0, a);
@@ -54,34 +53,33 @@ double change(const HierarchicalOperator::Storage& exact,
 
 TEST(IntegerEncoding, RemaindersAreAsGoodAsSixteenBits) {
   const std::vector<float> core{1, 0.03F, 0.002F, 0.001F};
-  const double bytes =
-      change(block_with(core), HierarchicalOperator::encode_bytes(block_with(core)));
+  const double bytes = change(block_with(core), encode_values(block_with(core), Precision::kQ8));
   // The step of the largest vectors is 0.18 / 127.
   EXPECT_GT(bytes, 4e-3);
   EXPECT_LT(bytes, 1e-2);
   const auto exact = block_with(core, 1, 2);
-  const auto encoded = HierarchicalOperator::encode_bytes(exact);
+  const auto encoded = encode_values(exact, Precision::kQ8);
   EXPECT_EQ(encoded.blocks.front().row_rank, 4U);
   EXPECT_EQ(encoded.blocks.front().row_remainders, 1U);
   EXPECT_EQ(encoded.blocks.front().column_remainders, 2U);
   EXPECT_LT(change(exact, encoded), 1e-3);
   // Five and six vectors instead of four at each end are eight: they come in groups of four.
-  const auto plain = HierarchicalOperator::encode_bytes(block_with(core));
+  const auto plain = encode_values(block_with(core), Precision::kQ8);
   EXPECT_EQ(HierarchicalOperator(encoded).bytes(), HierarchicalOperator(plain).bytes() + 8 * kSide);
 }
 
 TEST(IntegerEncoding, RemaindersAtOneEndLeaveTheOther) {
   const auto exact = block_with({1, 0.03F}, 1, 0);
-  const double one = change(exact, HierarchicalOperator::encode_bytes(exact));
+  const double one = change(exact, encode_values(exact, Precision::kQ8));
   const auto plain = block_with({1, 0.03F});
-  const double none = change(plain, HierarchicalOperator::encode_bytes(plain));
+  const double none = change(plain, encode_values(plain, Precision::kQ8));
   EXPECT_NEAR(one / none, std::sqrt(0.5), 0.1);
 }
 
 TEST(IntegerEncoding, OthersHaveNoRemainders) {
   const auto exact = block_with({1, 0.03F, 0.002F, 0.001F}, 2, 2);
   for (const Precision precision : {Precision::kF16, Precision::kQ16}) {
-    const auto encoded = HierarchicalOperator::encode(exact, precision);
+    const auto encoded = encode_values(exact, precision);
     EXPECT_EQ(encoded.blocks.front().row_remainders, 0U);
     EXPECT_LT(change(exact, encoded), 1e-3);
   }
@@ -89,7 +87,7 @@ TEST(IntegerEncoding, OthersHaveNoRemainders) {
 
 TEST(IntegerEncoding, NothingStaysNothing) {
   const auto exact = block_with({0, 0});
-  EXPECT_EQ(change(exact, HierarchicalOperator::encode_bytes(exact)), 0);
+  EXPECT_EQ(change(exact, encode_values(exact, Precision::kQ8)), 0);
 }
 
 }  // namespace

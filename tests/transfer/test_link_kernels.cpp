@@ -1,4 +1,4 @@
-#include "../../transfer/link_kernels.h"
+#include "../../transfer/kernels.h"
 
 #include <gtest/gtest.h>
 
@@ -60,13 +60,13 @@ TEST(LinkKernels, AgreeWithEachOther) {
   const auto light = random_light<ColorLanes>(50, engine);
   const std::vector<IncomingLink> links = random_links(200, light.size(), engine);
   for (const std::size_t count : {0UL, 1UL, 200UL}) {
-    const LinkLight wanted = kLinkKernelsPortable.gather(links.data(), count, light.data());
-    for (const LinkKernels* kernels : link_kernel_sets()) {
+    const LinkLight wanted = kKernelsPortable.link.gather(links.data(), count, light.data());
+    for (const KernelSet* set : kernel_sets()) {
       const auto found =
-          std::bit_cast<std::array<float, 16>>(kernels->gather(links.data(), count, light.data()));
+          std::bit_cast<std::array<float, 16>>(set->link.gather(links.data(), count, light.data()));
       const auto expected = std::bit_cast<std::array<float, 16>>(wanted);
       for (std::size_t k = 0; k < found.size(); ++k) {
-        EXPECT_NEAR(found[k], expected[k], 1e-4) << kernels->instruction_set << " " << k;
+        EXPECT_NEAR(found[k], expected[k], 1e-4) << set->instruction_set << " " << k;
       }
     }
   }
@@ -78,14 +78,14 @@ TEST(LinkKernels, GiveTheSameBitsForManyLights) {
   const auto doubles = random_light<ManyDoubles>(50, engine);
   const std::vector<IncomingLink> links = random_links(200, floats.size(), engine);
   for (const std::size_t count : {0UL, 1UL, 200UL}) {
-    const auto wanted = kLinkKernelsPortable.gather_floats(links.data(), count, floats.data());
-    const auto exact = kLinkKernelsPortable.gather_doubles(links.data(), count, doubles.data());
-    for (const LinkKernels* kernels : link_kernel_sets()) {
-      SCOPED_TRACE(kernels->instruction_set);
-      const auto found = kernels->gather_floats(links.data(), count, floats.data());
+    const auto wanted = kKernelsPortable.link.gather_floats(links.data(), count, floats.data());
+    const auto exact = kKernelsPortable.link.gather_doubles(links.data(), count, doubles.data());
+    for (const KernelSet* set : kernel_sets()) {
+      SCOPED_TRACE(set->instruction_set);
+      const auto found = set->link.gather_floats(links.data(), count, floats.data());
       EXPECT_EQ(found.mean, wanted.mean);
       EXPECT_EQ(found.first, wanted.first);
-      const auto found_exact = kernels->gather_doubles(links.data(), count, doubles.data());
+      const auto found_exact = set->link.gather_doubles(links.data(), count, doubles.data());
       EXPECT_EQ(found_exact.mean, exact.mean);
       EXPECT_EQ(found_exact.first, exact.first);
     }

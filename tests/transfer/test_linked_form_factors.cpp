@@ -138,7 +138,7 @@ TEST(LinkedFormFactors, RefuseWhatIsNotATreeWithLinks) {
 TransferData sample_data() {
   TransferData data = test::plain_data(kArea);
   data.patches.centroid = kCentroid;
-  HierarchicalOperator::Storage storage = test::random_hierarchical_storage(kPatchCount, 1, 5);
+  HierarchicalStorage storage = test::random_hierarchical_storage(kPatchCount, 1, 5);
   storage.area = kArea;
   data.transfer = std::make_shared<const HierarchicalOperator>(std::move(storage));
   return data;

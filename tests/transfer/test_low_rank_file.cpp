@@ -9,6 +9,7 @@
 #include "expect_error.h"
 #include "plain_data.h"
 #include "rebounce/transfer/error.h"
+#include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/low_rank_operator.h"
 #include "rebounce/transfer/safetensors.h"
 #include "rebounce/transfer/transfer_file.h"

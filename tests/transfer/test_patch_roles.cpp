@@ -12,6 +12,7 @@
 #include "expect_error.h"
 #include "hierarchical_samples.h"
 #include "rebounce/transfer/area_norm.h"
+#include "rebounce/transfer/hierarchical_encoding.h"
 #include "rebounce/transfer/hierarchical_operator.h"
 
 namespace rebounce {
@@ -22,7 +23,7 @@ using test::expect_error;
 constexpr std::size_t kPatchCount = 777;
 
 /// By position: the first third both, then receivers, sources, and patches with no role.
-PatchRoles roles_by_position(const HierarchicalOperator::Storage& storage) {
+PatchRoles roles_by_position(const HierarchicalStorage& storage) {
   PatchRoles roles;
   roles.role.resize(storage.patch.size());
   for (std::size_t k = 0; k < storage.patch.size(); ++k) {
@@ -35,7 +36,7 @@ PatchRoles roles_by_position(const HierarchicalOperator::Storage& storage) {
   return roles;
 }
 
-HierarchicalOperator::Storage with_roles(HierarchicalOperator::Storage storage) {
+HierarchicalStorage with_roles(HierarchicalStorage storage) {
   storage.roles = roles_by_position(storage);
   return storage;
 }
@@ -86,8 +87,8 @@ TEST(PatchRoles, AnApplyIsThatPartOfTheWhole) {
     for (const auto& [precision, allowed] :
          {std::pair(Precision::kF32, 2e-6), std::pair(Precision::kF16, 2e-6),
           std::pair(Precision::kQ16, 5e-4), std::pair(Precision::kQ8, 5e-5)}) {
-      const HierarchicalOperator whole(HierarchicalOperator::encode(storage, precision));
-      const HierarchicalOperator op(HierarchicalOperator::encode(some, precision));
+      const HierarchicalOperator whole(encode_values(storage, precision));
+      const HierarchicalOperator op(encode_values(some, precision));
       EXPECT_EQ(op.roles(), some.roles);
       const std::vector<Float3> h = product(op, m0);
       EXPECT_LT(relative_difference(h, part_of_product(whole, some.roles, m0), storage.area),

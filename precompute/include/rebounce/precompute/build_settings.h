@@ -12,7 +12,7 @@
 #include "rebounce/precompute/lightmap.h"
 #include "rebounce/precompute/subdivision.h"
 #include "rebounce/precompute/surface_harmonics.h"
-#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/precision.h"
 
 namespace rebounce {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/precision.h"
 
 namespace rebounce {
 

@@ -9,7 +9,9 @@
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "rebounce/transfer/hierarchical_storage.h"
 #include "rebounce/transfer/patch_roles.h"
+#include "rebounce/transfer/precision.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
@@ -19,11 +21,9 @@ namespace rebounce {
 /// worth 1 / `price` stored values. A uniform light is always among them. With `roles`, only what
 /// the light of sources does to receivers is looked at and stored. Throws Cancelled if asked to
 /// stop.
-HierarchicalOperator::Storage compress_transfer(const DenseOperator& dense,
-                                                const PatchTable& patches,
-                                                std::span<const std::vector<Float3>> shaping,
-                                                double price, const Progress& progress = {},
-                                                const PatchRoles& roles = {});
+HierarchicalStorage compress_transfer(const DenseOperator& dense, const PatchTable& patches,
+                                      std::span<const std::vector<Float3>> shaping, double price,
+                                      const Progress& progress = {}, const PatchRoles& roles = {});
 
 /// The smallest such operator whose errors under the judging lights are well within the tolerance
 /// in the mean, and within three times of it at most, found in a few rounds. From round to round,

@@ -6,6 +6,7 @@
 #include "rebounce/precompute/progress.h"
 #include "rebounce/transfer/dense_operator.h"
 #include "rebounce/transfer/low_rank_operator.h"
+#include "rebounce/transfer/precision.h"
 
 namespace rebounce {
 

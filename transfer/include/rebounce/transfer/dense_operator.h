@@ -8,22 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "rebounce/transfer/operator_format.h"
+#include "rebounce/transfer/precision.h"
 #include "rebounce/transfer/shared_array.h"
 #include "rebounce/transfer/transfer_operator.h"
 
 namespace rebounce {
-
-/// How values are stored. kQ16 and kQ8, the bases of a HierarchicalOperator as integers of 16 or 8
-/// bits and the rest as kF16, are for that alone.
-enum class Precision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
-
-/// Whether it is one of these two.
-constexpr bool has_integer_bases(Precision precision) {
-  return precision == Precision::kQ16 || precision == Precision::kQ8;
-}
-
-/// As the command line names it: "f16", "f32", "q16", "q8".
-std::string precision_name(Precision precision);
 
 /// Y stored whole, in its symmetric form Yhat = A^1/2 Y A^-1/2 = G (I - rho G)^-1 with
 /// G = A^1/2 F A^-1/2, of which only the lower triangle of tiles is kept.
@@ -33,7 +23,7 @@ std::string precision_name(Precision precision);
 /// Channels whose reflectances agree everywhere share one matrix.
 class DenseOperator final : public TransferOperator {
  public:
-  static constexpr std::size_t kTile = 64;
+  static constexpr std::size_t kTile = kDenseTile;
 
   /// Half-precision tiles hold the entries times this, so that small ones stay normal numbers.
   static constexpr float kHalfScale = 1024;

@@ -6,21 +6,10 @@
 #include <vector>
 
 #include "rebounce/transfer/exchange_matrix.h"
+#include "rebounce/transfer/form_factor_block.h"
 #include "rebounce/transfer/relaxation.h"
 
 namespace rebounce {
-
-/// Consecutive columns that FormFactorBlocks keeps together.
-inline constexpr std::size_t kFormFactorBlock = 8;
-
-/// `count`, rounded up to whole blocks.
-constexpr std::size_t in_whole_blocks(std::size_t count) {
-  return (count + kFormFactorBlock - 1) / kFormFactorBlock * kFormFactorBlock;
-}
-
-struct alignas(4 * kFormFactorBlock) FormFactorBlock {
-  float value[kFormFactorBlock];
-};
 
 /// Sparse F by rows, in blocks of eight consecutive columns: the form that iterates fastest.
 ///

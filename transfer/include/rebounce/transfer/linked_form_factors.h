@@ -3,15 +3,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "rebounce/transfer/form_factor_operator.h"
 
 namespace rebounce {
-
-template <typename Lanes>
-struct LinkLightOf;
 
 /// Form factors as links between nodes of a binary tree of patches, in flat arrays.
 ///
@@ -40,16 +38,6 @@ void check_links(const FormFactorLinks& links, std::size_t patch_count);
 /// [m] The position in `links`, which must be checked, of the first patch of each node.
 std::vector<std::uint32_t> first_positions(const FormFactorLinks& links);
 
-/// A link as the node that gathers along it sees it: 20 bytes. Gradients are corrections, and are
-/// kept as bfloat16, the upper half of a float.
-struct IncomingLink {
-  std::array<std::uint16_t, 3> gradient_from;  ///< of the exchange area over the other node, m
-  std::array<std::uint16_t, 3> gradient_to;    ///< over the node that gathers
-  std::uint32_t from;                          ///< the other node
-  float exchange_area;                         ///< m²
-};
-static_assert(sizeof(IncomingLink) == 20);
-
 /// Gathers with links: pulls light up the tree, gathers it at every level along the links, and
 /// pushes what arrived down again (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical
 /// radiosity algorithm", SIGGRAPH 1991), with a mean and a first moment for each node. The cost is
@@ -61,8 +49,8 @@ class LinkedFormFactors final : public FormFactorOperator {
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                     std::span<const Float3> centroid);
 
-  std::size_t patch_count() const override { return scale_.size(); }
-  std::size_t node_count() const { return node_.size(); }
+  std::size_t patch_count() const override;
+  std::size_t node_count() const;
   std::size_t bytes() const override;
   std::size_t workspace_size() const override;
   void gather(std::span<const Float3> in, std::span<Float3> out,
@@ -74,38 +62,8 @@ class LinkedFormFactors final : public FormFactorOperator {
   void gather(std::span<const Columns> in, std::span<Columns> out) const;
 
  private:
-  struct Node {
-    std::uint32_t first_child = kNone;
-    std::uint32_t patch = kNone;  ///< of a leaf
-    float area = 0;
-    float part = 1;        ///< of its parent's area
-    Float3 from_parent{};  ///< its centre less that of its parent, metres
-  };
-
-  void build_tree(const FormFactorLinks& links, std::span<const float> area,
-                  std::span<const Float3> centroid);
-  void place_children(std::span<const std::array<double, 4>> sum);
-  void find_levels();
-  void sort_links(const FormFactorLinks& links);
-
-  /// What arrives at one node along its links.
-  template <typename Lanes>
-  using GatherAlongLinks = LinkLightOf<Lanes> (*)(const IncomingLink* link, std::size_t count,
-                                                  const LinkLightOf<Lanes>* light);
-  /// Pulls, gathers and pushes; `light` and `arrived` are [m].
-  template <typename Columns, typename Lanes>
-  void gather(std::span<const Columns> in, std::span<Columns> out, LinkLightOf<Lanes>* light,
-              LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node) const;
-  template <typename Columns, typename Lanes>
-  void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const;
-  template <typename Lanes, typename Columns>
-  void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const;
-
-  std::vector<Node> node_;                     ///< level by level
-  std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number
-  std::vector<std::uint64_t> incoming_begin_;  ///< [m + 1]
-  std::vector<IncomingLink> incoming_;         ///< every link twice, by the node that gathers
-  std::vector<float> scale_;                   ///< [n]
+  class Tree;
+  std::shared_ptr<const Tree> tree_;
 };
 
 }  // namespace rebounce

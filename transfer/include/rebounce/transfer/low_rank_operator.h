@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "rebounce/transfer/dense_operator.h"
+#include "rebounce/transfer/precision.h"
 #include "rebounce/transfer/shared_array.h"
 #include "rebounce/transfer/transfer_operator.h"
 

@@ -1,15 +1,16 @@
-// Compiled with AVX2, FMA and F16C; called only on processors that have them. The light of a node
-// is two registers, a colour in each of their halves.
+#pragma once
+
+// Gathering along links with AVX2 and FMA. The light of a node is two registers, a colour in each of
+// their halves.
 
 #include <immintrin.h>
 
-#include "link_gather.h"
 #include "link_kernels.h"
 
 namespace rebounce {
 namespace {
 
-LinkLight gather(const IncomingLink* link, std::size_t count, const LinkLight* light) {
+LinkLight gather_avx2(const IncomingLink* link, std::size_t count, const LinkLight* light) {
   // Lane by lane the gradient, of the six that a link has, that its half is multiplied by.
   const __m256i from_x = _mm256_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0);
   const __m256i from_yz = _mm256_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2);
@@ -44,8 +45,4 @@ LinkLight gather(const IncomingLink* link, std::size_t count, const LinkLight* l
 }
 
 }  // namespace
-
-const LinkKernels kLinkKernelsAvx2 = {"avx2", gather, gather_along_links<ManyFloats>,
-                                      gather_along_links<ManyDoubles>};
-
 }  // namespace rebounce

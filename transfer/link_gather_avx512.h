@@ -1,9 +1,10 @@
-// Compiled with AVX-512F, BW and VL; called only on processors that have them. The light of a node
-// is one register, a colour in each of its quarters.
+#pragma once
+
+// Gathering along links with AVX-512F, BW and VL. The light of a node is one register, a colour in
+// each of its quarters.
 
 #include <immintrin.h>
 
-#include "link_gather.h"
 #include "link_kernels.h"
 
 namespace rebounce {
@@ -12,7 +13,7 @@ namespace {
 // Quarters of a register.
 constexpr __mmask16 kFirst = 0x000F, kOthers = 0xFFF0;
 
-LinkLight gather(const IncomingLink* link, std::size_t count, const LinkLight* light) {
+LinkLight gather_avx512(const IncomingLink* link, std::size_t count, const LinkLight* light) {
   // Lane by lane the gradient, of the six that a link has, that its quarter is multiplied by.
   const __m512i from_lanes = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2);
   const __m512i to_lanes = _mm512_setr_epi32(0, 0, 0, 0, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5);
@@ -38,8 +39,4 @@ LinkLight gather(const IncomingLink* link, std::size_t count, const LinkLight* l
 }
 
 }  // namespace
-
-const LinkKernels kLinkKernelsAvx512 = {"avx512", gather, gather_along_links<ManyFloats>,
-                                        gather_along_links<ManyDoubles>};
-
 }  // namespace rebounce
