@@ -111,7 +111,7 @@ class ClusterRelaxation final : public Relaxation {
     rows_are_sent_ = false;
   }
 
-  double sweep(SweepDirection direction) override {
+  double sweep(SweepDirection direction, const Scheduler& /*scheduler*/) override {
     return direction == SweepDirection::kForward ? sweep_forward() : sweep_backward();
   }
 

@@ -17,8 +17,8 @@ CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalO
 }
 
 void CompressedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
-                                   std::span<float> workspace) const {
-  exchange_->apply(in, out, workspace);
+                                   std::span<float> workspace, const Scheduler& scheduler) const {
+  exchange_->apply(in, out, workspace, scheduler);
 }
 
 std::unique_ptr<Relaxation> CompressedFormFactors::make_relaxation() const {

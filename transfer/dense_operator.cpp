@@ -83,10 +83,9 @@ struct SlotPart {
 template <typename Value>
 void apply_tiles(const TileKernels<Value>& kernels, const Value* tiles,
                  const DenseOperator::Storage& storage, const float* x, float* slots,
-                 std::size_t stride) {
+                 std::size_t stride, const Scheduler& scheduler) {
   const std::size_t per_matrix = DenseOperator::tile_count(storage.area.size());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t slot = 0; slot < kSlotCount; ++slot) {
+  parallel_for(scheduler, kSlotCount, [&](std::size_t slot) {
     float* y = slots + slot * kChannelCount * stride;
     for (std::uint32_t matrix = 0; matrix < storage.matrix_count; ++matrix) {
       const SlotPart part(slot, matrix, per_matrix, storage.matrix_count);
@@ -102,7 +101,7 @@ void apply_tiles(const TileKernels<Value>& kernels, const Value* tiles,
         apply_tile(kernels, tile, at, storage.channel_matrix, matrix, x, y, stride);
       }
     }
-  }
+  });
 }
 
 /// Adds up what the slots hold of one channel, in their order, into sum [stride].
@@ -151,7 +150,8 @@ std::size_t DenseOperator::workspace_size() const {
 }
 
 void DenseOperator::apply(std::span<const Float3> initial_exitance,
-                          std::span<Float3> indirect_irradiance, std::span<float> workspace) const {
+                          std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                          const Scheduler& scheduler) const {
   const std::size_t n = patch_count(), stride = padded_size(n);
   assert(initial_exitance.size() == n && indirect_irradiance.size() == n);
   assert(workspace.size() >= workspace_size());
@@ -167,9 +167,11 @@ void DenseOperator::apply(std::span<const Float3> initial_exitance,
 
   const bool half = storage_.precision == Precision::kF16;
   if (half) {
-    apply_tiles(kernels().dense.f16, storage_.tiles_f16.data(), storage_, x, slots, stride);
+    apply_tiles(kernels().dense.f16, storage_.tiles_f16.data(), storage_, x, slots, stride,
+                scheduler);
   } else {
-    apply_tiles(kernels().dense.f32, storage_.tiles_f32.data(), storage_, x, slots, stride);
+    apply_tiles(kernels().dense.f32, storage_.tiles_f32.data(), storage_, x, slots, stride,
+                scheduler);
   }
 
   const float scale = half ? 1.0F / kHalfScale : 1.0F;
@@ -193,12 +195,11 @@ void DenseOperator::expand(int channel, std::span<float> transfer) const {
   const std::size_t n = patch_count();
   assert(transfer.size() == n * n);
   const std::uint32_t matrix = storage_.channel_matrix[channel];
-#pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < n; ++i) {
+  parallel_for({}, n, [&](std::size_t i) {
     for (std::size_t j = 0; j < n; ++j) {
       transfer[i * n + j] = symmetric_entry(matrix, i, j) * sqrt_area_[j] / sqrt_area_[i];
     }
-  }
+  });
 }
 
 std::vector<std::uint16_t> DenseOperator::encode_half(std::span<const float> tiles) {

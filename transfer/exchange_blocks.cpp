@@ -8,6 +8,8 @@
 
 namespace rebounce {
 
+constexpr std::size_t kAddedPerTask = 1024;  // patches
+
 ExchangeBlocks::ExchangeBlocks(const ExchangeMatrix& exchange, std::span<const float> area)
     : area_(area.begin(), area.end()), diagonal_(area.size(), 0.0F) {
   const FormFactorRows rows(exchange, area);
@@ -58,13 +60,12 @@ ExchangeBlocks::Row ExchangeBlocks::row(std::size_t row) const {
 }
 
 void ExchangeBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
-                            std::span<float> workspace) const {
+                            std::span<float> workspace, const Scheduler& scheduler) const {
   const std::size_t n = patch_count(), stride = plane_size(), planes = kChannelCount * stride;
   assert(in.size() == n && out.size() == n && workspace.size() >= workspace_size());
   float* const x = workspace.data();
   to_planes(in, stride, x);
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t s = 0; s < kSlotCount; ++s) {
+  const auto gather_slot = [&](std::size_t s) {
     float* const y = x + (1 + s) * planes;
     std::fill_n(y, planes, 0.0F);
     for (std::size_t i = slot_row_[s]; i < slot_row_[s + 1]; ++i) {
@@ -75,15 +76,16 @@ void ExchangeBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
                                          sum.data());
       for (int c = 0; c < kChannelCount; ++c) y[c * stride + i] += sum[c] + diagonal_[i] * in[i][c];
     }
-  }
-#pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < n; ++i) {
+  };
+  const auto add_up = [&](std::size_t i) {
     for (int c = 0; c < kChannelCount; ++c) {
       float sum = 0;
       for (std::size_t s = 0; s < kSlotCount; ++s) sum += x[(1 + s) * planes + c * stride + i];
       out[i][c] = sum / area_[i];
     }
-  }
+  };
+  run_in_turn(scheduler, {{kSlotCount, gather_slot},
+                          {piece_count(n, kAddedPerTask), on_piece(n, kAddedPerTask, add_up)}});
 }
 
 }  // namespace rebounce

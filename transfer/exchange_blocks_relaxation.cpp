@@ -13,6 +13,7 @@ namespace rebounce {
 namespace {
 
 constexpr std::size_t kGroup = ExchangeBlocks::kGroup, kSlotCount = ExchangeBlocks::kSlotCount;
+constexpr std::size_t kRowsPerTask = 16;
 
 class ExchangeRelaxation final : public Relaxation {
  public:
@@ -29,8 +30,9 @@ class ExchangeRelaxation final : public Relaxation {
     known_ = Known::kNothing;
   }
 
-  double sweep(SweepDirection direction) override {
-    return direction == SweepDirection::kForward ? sweep_forward() : sweep_backward();
+  double sweep(SweepDirection direction, const Scheduler& scheduler) override {
+    return direction == SweepDirection::kForward ? sweep_forward(scheduler)
+                                                 : sweep_backward(scheduler);
   }
 
   void end(std::span<Float3> radiosity) const override {
@@ -45,15 +47,13 @@ class ExchangeRelaxation final : public Relaxation {
   /// Which product with the present radiosity there is.
   enum class Known : std::uint8_t { kNothing, kLower, kUpper };
 
-  double sweep_forward() {
-    if (known_ != Known::kUpper) spread_all();
+  double sweep_forward(const Scheduler& scheduler) {
+    if (known_ != Known::kUpper) spread_all(scheduler);
     double changed_squared = 0;
     const std::size_t n = exchange_.patch_count();
-#pragma omp parallel
     for (std::size_t begin = 0; begin < n; begin += kGroup) {
       const std::size_t end = std::min(begin + kGroup, n);
-      gather_outside(begin, end);
-#pragma omp single
+      gather_outside(begin, end, scheduler);
       for (std::size_t i = begin; i < end; ++i) {
         gather_inside(i);
         changed_squared += relax(i);
@@ -63,48 +63,43 @@ class ExchangeRelaxation final : public Relaxation {
     return changed_squared;
   }
 
-  double sweep_backward() {
-    if (known_ != Known::kLower) gather_all();
+  double sweep_backward(const Scheduler& scheduler) {
+    if (known_ != Known::kLower) gather_all(scheduler);
     std::ranges::fill(upper_, 0.0F);
     double changed_squared = 0;
     const std::size_t n = exchange_.patch_count(), groups = (n + kGroup - 1) / kGroup;
-#pragma omp parallel
     for (std::size_t k = groups; k-- > 0;) {
       const std::size_t begin = k * kGroup, end = std::min(begin + kGroup, n);
-#pragma omp single
       for (std::size_t i = end; i-- > begin;) {
         changed_squared += relax(i);
         spread_inside(i);
       }
-      spread_outside(begin, end);
+      spread_outside(begin, end, scheduler);
     }
     known_ = Known::kUpper;
     return changed_squared;
   }
 
-  void gather_all() {
-#pragma omp parallel for schedule(dynamic, 64)
-    for (std::size_t i = 0; i < exchange_.patch_count(); ++i) {
+  void gather_all(const Scheduler& scheduler) {
+    parallel_for_pieces(scheduler, exchange_.patch_count(), kRowsPerTask, [this](std::size_t i) {
       gather_outside_row(i);
       gather_inside(i);
-    }
+    });
   }
 
-  void spread_all() {
+  void spread_all(const Scheduler& scheduler) {
     std::ranges::fill(upper_, 0.0F);
     const std::size_t n = exchange_.patch_count();
-#pragma omp parallel
     for (std::size_t begin = 0; begin < n; begin += kGroup) {
       const std::size_t end = std::min(begin + kGroup, n);
-#pragma omp single
       for (std::size_t i = begin; i < end; ++i) spread_inside(i);
-      spread_outside(begin, end);
+      spread_outside(begin, end, scheduler);
     }
   }
 
-  void gather_outside(std::size_t begin, std::size_t end) {
-#pragma omp for schedule(dynamic, 16)
-    for (std::size_t i = begin; i < end; ++i) gather_outside_row(i);
+  void gather_outside(std::size_t begin, std::size_t end, const Scheduler& scheduler) {
+    parallel_for_pieces(scheduler, end - begin, kRowsPerTask,
+                        [this, begin](std::size_t k) { gather_outside_row(begin + k); });
   }
 
   void gather_outside_row(std::size_t i) {
@@ -124,14 +119,13 @@ class ExchangeRelaxation final : public Relaxation {
   }
 
   /// Each slot takes its share of the group's rows.
-  void spread_outside(std::size_t begin, std::size_t end) {
-#pragma omp for schedule(static)
-    for (std::size_t s = 0; s < kSlotCount; ++s) {
+  void spread_outside(std::size_t begin, std::size_t end, const Scheduler& scheduler) {
+    parallel_for(scheduler, kSlotCount, [&](std::size_t s) {
       for (std::size_t i = begin + s; i < end; i += kSlotCount) {
         const ExchangeBlocks::Row row = exchange_.row(i);
         spread(row.blocks, row.position, row.outside, i, s);
       }
-    }
+    });
   }
 
   void spread_inside(std::size_t i) {

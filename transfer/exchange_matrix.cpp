@@ -8,6 +8,8 @@
 namespace rebounce {
 namespace {
 
+constexpr std::size_t kRowsPerTask = 64;
+
 class RowRelaxation final : public Relaxation {
  public:
   explicit RowRelaxation(const FormFactorRows& rows)
@@ -18,7 +20,7 @@ class RowRelaxation final : public Relaxation {
     std::ranges::copy(radiosity, radiosity_.begin());
   }
 
-  double sweep(SweepDirection direction) override {
+  double sweep(SweepDirection direction, const Scheduler& /*scheduler*/) override {
     const std::size_t n = radiosity_.size();
     double changed_squared = 0;
     for (std::size_t k = 0; k < n; ++k) {
@@ -96,11 +98,10 @@ std::size_t FormFactorRows::bytes() const {
 }
 
 void FormFactorRows::gather(std::span<const Float3> in, std::span<Float3> out,
-                            std::span<float> /*workspace*/) const {
+                            std::span<float> /*workspace*/, const Scheduler& scheduler) const {
   assert(in.size() == patch_count() && out.size() == patch_count());
-  const auto n = static_cast<std::int64_t>(patch_count());
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::int64_t i = 0; i < n; ++i) out[i] = gather_row(i, in);
+  parallel_for_pieces(scheduler, patch_count(), kRowsPerTask,
+                      [&](std::size_t i) { out[i] = gather_row(i, in); });
 }
 
 std::unique_ptr<Relaxation> FormFactorRows::make_relaxation() const {

@@ -83,7 +83,7 @@ void FormFactorBlocks::from_planes(std::span<const float> planes, std::span<Floa
 }
 
 void FormFactorBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
-                              std::span<float> workspace) const {
+                              std::span<float> workspace, const Scheduler& /*scheduler*/) const {
   assert(out.size() == patch_count() && workspace.size() >= workspace_size());
   const std::span<float> planes = workspace.first(kChannelCount * plane_size());
   to_planes(in, planes);

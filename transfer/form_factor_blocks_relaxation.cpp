@@ -17,7 +17,7 @@ class BlockRowRelaxation final : public Relaxation {
     blocks_.to_planes(radiosity, planes_);
   }
 
-  double sweep(SweepDirection direction) override {
+  double sweep(SweepDirection direction, const Scheduler& /*scheduler*/) override {
     const std::size_t n = blocks_.patch_count(), group_count = (n + kGroup - 1) / kGroup;
     const bool backward = direction == SweepDirection::kBackward;
     double changed_squared = 0;

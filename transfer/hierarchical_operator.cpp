@@ -18,8 +18,11 @@ namespace {
 // Of the vectors in the workspace, in floats: a cache line.
 constexpr std::size_t kLine = 16;
 
-// Positions whose light a thread takes in at a time.
-constexpr std::size_t kGathered = 512;
+// Positions whose light a task takes in.
+constexpr std::size_t kGathered = 1024;
+
+// Ends of dense blocks whose light a task takes, and bases of moments.
+constexpr std::size_t kDenseEndsPerTask = 64, kMomentsPerTask = 32;
 
 // Positions ahead at which the light of a patch is asked for. A second-level cache has more loads
 // under way at a time than the nearest one.
@@ -248,76 +251,79 @@ struct Exchange {
   }
 };
 
-// The steps of an apply that phases have several of, shared out among the threads.
-
+/// All that arrives at some positions or moments.
 template <typename Phases>
-void project_parts(const std::vector<BasisPart>& projections,
-                   const std::vector<std::uint32_t>& parts, const Phases& phases) {
-#pragma omp for schedule(dynamic, 1)
-  for (std::size_t part = 0; part < parts.size() - 1; ++part) {
-    phases.project(between(projections, parts[part], parts[part + 1]));
-  }
+void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arrival,
+            const Phases& phases, const WorkVectors& work) {
+  clear(work.y, arrival.begin, arrival.end);
+  phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
+  phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
 }
 
-template <typename Work>
-void for_all_moments(const std::vector<HierarchicalPlan::Moments>& moments, const Work& work) {
-#pragma omp for schedule(static)
-  for (std::size_t k = 0; k < moments.size(); ++k) work(moments[k]);
-}
-
-/// All that arrives at some positions or moments, then `finish(arrival)`; the last of them first.
-template <typename Phases, typename Finish>
-void arrive(const HierarchicalPlan& plan, const std::vector<HierarchicalPlan::Arrival>& arrivals,
-            const Phases& phases, const WorkVectors& work, const Finish& finish) {
-#pragma omp for schedule(dynamic, 1)
-  for (std::size_t k = arrivals.size(); k > 0; --k) {
-    const HierarchicalPlan::Arrival& arrival = arrivals[k - 1];
-    clear(work.y, arrival.begin, arrival.end);
-    phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
-    phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
-    finish(arrival);
-  }
+/// Of the entries of a part of a step.
+template <typename Entry>
+std::span<const Entry> of_part(const std::vector<Entry>& entries,
+                               const std::vector<std::uint32_t>& parts, std::size_t part) {
+  return between(entries, parts[part], parts[part + 1]);
 }
 
 template <typename Basis, typename Value>
 void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
               const Exchange& exchange, const WorkVectors& work,
-              std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance) {
-  using Moments = HierarchicalPlan::Moments;
-  using Arrival = HierarchicalPlan::Arrival;
+              std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+              const Scheduler& scheduler) {
   const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
-#pragma omp parallel
-  {
-#pragma omp for schedule(static)
-    for (std::size_t k = 0; k < positions; k += kGathered) {
-      exchange.gather(initial_exitance, k, std::min(k + kGathered, positions));
+  const auto gather = [&](std::size_t k) {
+    const std::size_t begin = k * kGathered;
+    exchange.gather(initial_exitance, begin, std::min(begin + kGathered, positions));
+  };
+  // Light goes to dense blocks of several matrices while it is projected for others.
+  const std::size_t dense_ends = piece_count(plan.dense_in.size(), kDenseEndsPerTask);
+  const auto take_light = [&](std::size_t k) { phases.take_light(plan.dense_in[k]); };
+  const auto take_piece = on_piece(plan.dense_in.size(), kDenseEndsPerTask, take_light);
+  const auto project = [&](std::size_t k) {
+    if (k < dense_ends) {
+      take_piece(k);
+    } else {
+      phases.project(of_part(plan.projections, plan.projection_parts, k - dense_ends));
     }
-#pragma omp for schedule(dynamic, 1) nowait
-    for (std::size_t k = 0; k < plan.dense_in.size(); ++k) phases.take_light(plan.dense_in[k]);
-    project_parts(plan.projections, plan.projection_parts, phases);
-    if (!plan.moments_in.empty()) {
-      for_all_moments(plan.moments_in, [&](const Moments& m) { phases.take_moments(m); });
-      project_parts(plan.moment_projections, plan.moment_projection_parts, phases);
+  };
+  const std::size_t moments_in = plan.moments_in.size(), moments_out = plan.moments_out.size();
+  const auto take_moments = [&](std::size_t k) { phases.take_moments(plan.moments_in[k]); };
+  const auto project_moments = [&](std::size_t k) {
+    phases.project(of_part(plan.moment_projections, plan.moment_projection_parts, k));
+  };
+  const std::size_t dense_parts = plan.dense_parts.size() - 1;
+  const auto multiply = [&](std::size_t k) {
+    if (k < dense_parts) {
+      phases.multiply_dense(of_part(plan.dense, plan.dense_parts, k));
+    } else {
+      const std::size_t part = k - dense_parts;
+      phases.multiply(of_part(plan.cores, plan.core_parts, part), part);
     }
-#pragma omp for schedule(dynamic, 1) nowait
-    for (std::size_t part = 0; part < plan.dense_parts.size() - 1; ++part) {
-      phases.multiply_dense(
-          between(plan.dense, plan.dense_parts[part], plan.dense_parts[part + 1]));
-    }
-#pragma omp for schedule(dynamic, 1)
-    for (std::size_t part = 0; part < plan.core_parts.size() - 1; ++part) {
-      phases.multiply(between(plan.cores, plan.core_parts[part], plan.core_parts[part + 1]), part);
-    }
-    if (!plan.moments_out.empty()) {
-      arrive(plan, plan.moment_arrivals, phases, work, [](const Arrival&) {});
-      for_all_moments(plan.moments_out, [&](const Moments& m) { phases.put_moments(m); });
-    }
-    arrive(plan, plan.arrivals, phases, work, [&](const Arrival& arrival) {
-      const std::span targets(plan.targets);
-      exchange.scatter(targets.subspan(arrival.first_target, arrival.target_count()),
-                       indirect_irradiance);
-    });
-  }
+  };
+  const auto arrive_at_moments = [&](std::size_t k) {
+    arrive(plan, plan.moment_arrivals[plan.moment_arrivals.size() - 1 - k], phases, work);
+  };
+  const auto put_moments = [&](std::size_t k) { phases.put_moments(plan.moments_out[k]); };
+  // The last of them first.
+  const auto arrive_at_patches = [&](std::size_t k) {
+    const HierarchicalPlan::Arrival& arrival = plan.arrivals[plan.arrivals.size() - 1 - k];
+    arrive(plan, arrival, phases, work);
+    exchange.scatter(between(plan.targets, arrival.first_target, arrival.last_target),
+                     indirect_irradiance);
+  };
+  run_in_turn(scheduler,
+              {{piece_count(positions, kGathered), gather},
+               {dense_ends + plan.projection_parts.size() - 1, project},
+               {piece_count(moments_in, kMomentsPerTask),
+                on_piece(moments_in, kMomentsPerTask, take_moments)},
+               {moments_in == 0 ? 0 : plan.moment_projection_parts.size() - 1, project_moments},
+               {dense_parts + plan.core_parts.size() - 1, multiply},
+               {moments_out == 0 ? 0 : plan.moment_arrivals.size(), arrive_at_moments},
+               {piece_count(moments_out, kMomentsPerTask),
+                on_piece(moments_out, kMomentsPerTask, put_moments)},
+               {plan.arrivals.size(), arrive_at_patches}});
 }
 
 }  // namespace
@@ -384,8 +390,8 @@ std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) 
 
 void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_count,
                                std::span<const Float3> initial_exitance,
-                               std::span<Float3> indirect_irradiance,
-                               std::span<float> workspace) const {
+                               std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                               const Scheduler& scheduler) const {
   assert(initial_exitance.size() == light_count * patch_count());
   assert(indirect_irradiance.size() == light_count * patch_count());
   assert(workspace.size() >= batch_workspace_size(light_count));
@@ -405,22 +411,23 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
                                 const auto* core, float basis_scale) {
     const Phases phases(bases, cores, basis, core, lanes, basis_scale, storage_->moment_scale,
                         work);
-    run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance);
+    run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance, scheduler);
   };
   with_kernels_of(*storage_, *layout_, apply_phases);
 }
 
 void HierarchicalOperator::apply(std::span<const Float3> initial_exitance,
-                                 std::span<Float3> indirect_irradiance,
-                                 std::span<float> workspace) const {
-  run(*plan_, 1, initial_exitance, indirect_irradiance, workspace);
+                                 std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                                 const Scheduler& scheduler) const {
+  run(*plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
 void HierarchicalOperator::apply_batch(std::size_t light_count,
                                        std::span<const Float3> initial_exitance,
                                        std::span<Float3> indirect_irradiance,
-                                       std::span<float> workspace) const {
-  run(*plan_, light_count, initial_exitance, indirect_irradiance, workspace);
+                                       std::span<float> workspace,
+                                       const Scheduler& scheduler) const {
+  run(*plan_, light_count, initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
 HierarchicalOperator::Receivers HierarchicalOperator::receivers(
@@ -439,8 +446,8 @@ HierarchicalOperator::Receivers HierarchicalOperator::receivers(
 void HierarchicalOperator::apply_to(const Receivers& receivers,
                                     std::span<const Float3> initial_exitance,
                                     std::span<Float3> indirect_irradiance,
-                                    std::span<float> workspace) const {
-  run(*receivers.plan_, 1, initial_exitance, indirect_irradiance, workspace);
+                                    std::span<float> workspace, const Scheduler& scheduler) const {
+  run(*receivers.plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
 void HierarchicalOperator::expand(int channel, std::span<float> transfer) const {

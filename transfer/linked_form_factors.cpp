@@ -18,8 +18,8 @@ namespace {
   throw Error("links: " + reason + "; make them again");
 }
 
-// Trees of fewer nodes than this are walked before threads have met at every level.
-constexpr std::size_t kWorthThreads = 16384;
+// Nodes that a task pulls or pushes light through, and nodes that it gathers at.
+constexpr std::size_t kNodesPerTask = 2048, kGatheredPerTask = 128;
 
 /// What gathers along links, many lights with the widest instructions that there are.
 template <typename Columns>
@@ -131,7 +131,8 @@ class LinkedFormFactors::Tree {
   /// Pulls, gathers and pushes; `light` and `arrived` are [m].
   template <typename Columns, typename Lanes>
   void gather(std::span<const Columns> in, std::span<Columns> out, LinkLightOf<Lanes>* light,
-              LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node) const;
+              LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node,
+              const Scheduler& scheduler) const;
 
  private:
   struct Node {
@@ -149,9 +150,10 @@ class LinkedFormFactors::Tree {
   void sort_links(const FormFactorLinks& links);
 
   template <typename Columns, typename Lanes>
-  void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const;
+  void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
+            const Scheduler& scheduler) const;
   template <typename Lanes, typename Columns>
-  void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const;
+  void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out, const Scheduler& scheduler) const;
 
   std::vector<Node> node_;                     ///< level by level
   std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number
@@ -243,23 +245,24 @@ std::size_t LinkedFormFactors::Tree::bytes() const {
 template <typename Columns, typename Lanes>
 void LinkedFormFactors::Tree::gather(std::span<const Columns> in, std::span<Columns> out,
                                      LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived,
-                                     GatherAlongLinks<Lanes> gather_node) const {
+                                     GatherAlongLinks<Lanes> gather_node,
+                                     const Scheduler& scheduler) const {
   assert(in.size() == patch_count() && out.size() == patch_count());
-  pull(in, light);
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t k = 0; k < node_.size(); ++k) {
+  pull(in, light, scheduler);
+  parallel_for_pieces(scheduler, node_.size(), kGatheredPerTask, [&](std::size_t k) {
     arrived[k] = gather_node(incoming_.data() + incoming_begin_[k],
                              incoming_begin_[k + 1] - incoming_begin_[k], light);
-  }
-  push(arrived, out);
+  });
+  push(arrived, out, scheduler);
 }
 
 template <typename Columns, typename Lanes>
-void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lanes>* light) const {
-#pragma omp parallel if (node_.size() >= kWorthThreads)
+void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
+                                   const Scheduler& scheduler) const {
   for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
-#pragma omp for schedule(static)
-    for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
+    const std::uint32_t begin = level_begin_[level], count = level_begin_[level + 1] - begin;
+    parallel_for_pieces(scheduler, count, kNodesPerTask, [&](std::size_t of_level) {
+      const std::size_t k = begin + of_level;
       const Node& node = node_[k];
       LinkLightOf<Lanes> sum{};
       if (node.patch != kNone) {
@@ -276,23 +279,24 @@ void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lane
         }
       }
       light[k] = sum;
-    }
+    });
   }
 }
 
 template <typename Lanes, typename Columns>
-void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out) const {
-#pragma omp parallel if (node_.size() >= kWorthThreads)
+void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out,
+                                   const Scheduler& scheduler) const {
   for (std::size_t level = 0; level + 1 < level_begin_.size(); ++level) {
-#pragma omp for schedule(static)
-    for (std::uint32_t k = level_begin_[level]; k < level_begin_[level + 1]; ++k) {
+    const std::uint32_t begin = level_begin_[level], count = level_begin_[level + 1] - begin;
+    parallel_for_pieces(scheduler, count, kNodesPerTask, [&](std::size_t of_level) {
+      const std::size_t k = begin + of_level;
       const Node& node = node_[k];
       const LinkLightOf<Lanes>& here = arrived[k];
       if (node.patch != kNone) {
         const typename Lanes::value_type scale = scale_[node.patch], factor = scale / node.area;
         Columns& y = out[node.patch];
         for (std::size_t c = 0; c < y.size(); ++c) y[c] = factor * here.mean[c];
-        continue;
+        return;
       }
       for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
         const Node& child = node_[c];
@@ -302,7 +306,7 @@ void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Column
           add_scaled(arrived[c].first[axis], child.part, here.first[axis]);
         }
       }
-    }
+    });
   }
 }
 
@@ -327,16 +331,16 @@ std::size_t LinkedFormFactors::workspace_size() const {
 }
 
 void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
-                               std::span<float> workspace) const {
+                               std::span<float> workspace, const Scheduler& scheduler) const {
   assert(workspace.size() >= workspace_size());
   auto* light = reinterpret_cast<LinkLight*>(workspace.data());
-  tree_->gather(in, out, light, light + node_count(), kernels().link.gather);
+  tree_->gather(in, out, light, light + node_count(), kernels().link.gather, scheduler);
 }
 
 template <typename Columns>
 void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
   std::vector<LinkLightOf<Columns>> light(node_count()), arrived(node_count());
-  tree_->gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>());
+  tree_->gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>(), {});
 }
 
 template void LinkedFormFactors::gather(std::span<const std::array<float, 3>>,

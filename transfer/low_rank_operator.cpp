@@ -16,6 +16,8 @@ constexpr std::size_t kTile = LowRankOperator::kTile;
 // Ranks are padded to whole vectors of the widest instruction set.
 constexpr std::size_t kVector = 16;
 
+constexpr std::size_t kRowsPerTask = 64;  // of cores
+
 [[noreturn]] void refuse(const std::string& reason) {
   throw Error("low-rank operator: " + reason + "; make the file again");
 }
@@ -87,22 +89,22 @@ std::size_t LowRankOperator::workspace_size() const {
   return kChannelCount * stride() + (tile_count(patch_count()) + 2) * coefficient_size();
 }
 
-void LowRankOperator::project(const float* x, float* tile_coefficient, float* coefficient) const {
-  const std::size_t tiles = tile_count(patch_count());
+void LowRankOperator::project_tile(std::size_t tile, const float* x,
+                                   float* tile_coefficient) const {
   const BlockKernels& blocks = kernels().blocks;
-#pragma omp parallel for schedule(static)
-  for (std::size_t t = 0; t < tiles; ++t) {
-    const BasisPart part = basis_of_tile(t, storage_.rank);
-    const PlanarVectors<const float> in{x, stride(), kChannelCount};
-    const Coefficients<float> out{tile_coefficient + t * coefficient_size(), coefficient_size()};
-    if (storage_.precision == Precision::kF16) {
-      blocks.bases_f16.project(storage_.basis_f16.data(), {&part, 1}, in, out);
-    } else {
-      blocks.bases_f32.project(storage_.basis_f32.data(), {&part, 1}, in, out);
-    }
+  const BasisPart part = basis_of_tile(tile, storage_.rank);
+  const PlanarVectors<const float> in{x, stride(), kChannelCount};
+  const Coefficients<float> out{tile_coefficient + tile * coefficient_size(), coefficient_size()};
+  if (storage_.precision == Precision::kF16) {
+    blocks.bases_f16.project(storage_.basis_f16.data(), {&part, 1}, in, out);
+  } else {
+    blocks.bases_f32.project(storage_.basis_f32.data(), {&part, 1}, in, out);
   }
+}
+
+void LowRankOperator::add_up(const float* tile_coefficient, float* coefficient) const {
   std::fill_n(coefficient, coefficient_size(), 0.0F);
-  for (std::size_t t = 0; t < tiles; ++t) {
+  for (std::size_t t = 0; t < tile_count(patch_count()); ++t) {
     const float* const part = tile_coefficient + t * coefficient_size();
     for (int c = 0; c < kChannelCount; ++c) {
       for (std::size_t r = 0; r < storage_.rank; ++r) {
@@ -112,48 +114,40 @@ void LowRankOperator::project(const float* x, float* tile_coefficient, float* co
   }
 }
 
-void LowRankOperator::multiply_cores(const float* in, float* out) const {
+void LowRankOperator::multiply_row(std::size_t channel, std::size_t row, const float* in,
+                                   float* out) const {
   const std::size_t rank = storage_.rank;
-  const auto rows = static_cast<std::int64_t>(kChannelCount * rank);
-#pragma omp parallel for schedule(static)
-  for (std::int64_t k = 0; k < rows; ++k) {
-    const std::size_t channel = k / rank, row = k % rank;
-    const float* const core =
-        storage_.core.data() + (storage_.channel_matrix[channel] * rank + row) * rank;
-    const float* const x = in + channel * rank_stride_;
-    // Sums of their own for neighbouring entries, so that the loop becomes vectors.
-    std::array<float, kVector> sum{};
-    std::size_t j = 0;
-    for (; j + kVector <= rank; j += kVector) {
-      for (std::size_t v = 0; v < kVector; ++v) sum[v] += core[j + v] * x[j + v];
-    }
-    for (std::size_t v = 0; j + v < rank; ++v) sum[v] += core[j + v] * x[j + v];
-    float total = 0;
-    for (const float s : sum) total += s;
-    out[row * kChannelLanes + channel] = total;
+  const float* const core =
+      storage_.core.data() + (storage_.channel_matrix[channel] * rank + row) * rank;
+  const float* const x = in + channel * rank_stride_;
+  // Sums of their own for neighbouring entries, so that the loop becomes vectors.
+  std::array<float, kVector> sum{};
+  std::size_t j = 0;
+  for (; j + kVector <= rank; j += kVector) {
+    for (std::size_t v = 0; v < kVector; ++v) sum[v] += core[j + v] * x[j + v];
   }
+  for (std::size_t v = 0; j + v < rank; ++v) sum[v] += core[j + v] * x[j + v];
+  float total = 0;
+  for (const float s : sum) total += s;
+  out[row * kChannelLanes + channel] = total;
 }
 
-void LowRankOperator::expand_tiles(const float* coefficient, float* y) const {
-  const std::size_t tiles = tile_count(patch_count());
+void LowRankOperator::expand_tile(std::size_t tile, const float* coefficient, float* y) const {
   const BlockKernels& blocks = kernels().blocks;
   const Coefficients<const float> in{coefficient, coefficient_size()};
-#pragma omp parallel for schedule(static)
-  for (std::size_t t = 0; t < tiles; ++t) {
-    for (int c = 0; c < kChannelCount; ++c) std::fill_n(y + c * stride() + t * kTile, kTile, 0.0F);
-    const BasisPart part = basis_of_tile(t, storage_.rank);
-    const PlanarVectors<float> out{y, stride(), kChannelCount};
-    if (storage_.precision == Precision::kF16) {
-      blocks.bases_f16.expand(storage_.basis_f16.data(), {&part, 1}, in, out);
-    } else {
-      blocks.bases_f32.expand(storage_.basis_f32.data(), {&part, 1}, in, out);
-    }
+  for (int c = 0; c < kChannelCount; ++c) std::fill_n(y + c * stride() + tile * kTile, kTile, 0.0F);
+  const BasisPart part = basis_of_tile(tile, storage_.rank);
+  const PlanarVectors<float> out{y, stride(), kChannelCount};
+  if (storage_.precision == Precision::kF16) {
+    blocks.bases_f16.expand(storage_.basis_f16.data(), {&part, 1}, in, out);
+  } else {
+    blocks.bases_f32.expand(storage_.basis_f32.data(), {&part, 1}, in, out);
   }
 }
 
 void LowRankOperator::apply(std::span<const Float3> initial_exitance,
-                            std::span<Float3> indirect_irradiance,
-                            std::span<float> workspace) const {
+                            std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                            const Scheduler& scheduler) const {
   const std::size_t n = patch_count();
   assert(initial_exitance.size() == n && indirect_irradiance.size() == n);
   assert(workspace.size() >= workspace_size());
@@ -165,9 +159,18 @@ void LowRankOperator::apply(std::span<const Float3> initial_exitance,
     for (std::size_t i = 0; i < n; ++i) xc[i] = sqrt_area_[i] * initial_exitance[i][c];
     std::fill(xc + n, xc + stride(), 0.0F);
   }
-  project(x, multiplied + coefficient_size(), coefficient);
-  multiply_cores(coefficient, multiplied);
-  expand_tiles(multiplied, x);
+  float* const tile_coefficient = multiplied + coefficient_size();
+  const std::size_t tiles = tile_count(n), rank = storage_.rank, rows = kChannelCount * rank;
+  const auto project = [&](std::size_t t) { project_tile(t, x, tile_coefficient); };
+  const auto add = [&](std::size_t) { add_up(tile_coefficient, coefficient); };
+  const auto multiply = [&](std::size_t k) {
+    multiply_row(k / rank, k % rank, coefficient, multiplied);
+  };
+  const auto expand = [&](std::size_t t) { expand_tile(t, multiplied, x); };
+  run_in_turn(scheduler, {{tiles, project},
+                          {1, add},
+                          {piece_count(rows, kRowsPerTask), on_piece(rows, kRowsPerTask, multiply)},
+                          {tiles, expand}});
   for (std::size_t i = 0; i < n; ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
       indirect_irradiance[i][c] = x[c * stride() + i] / sqrt_area_[i];

@@ -16,11 +16,11 @@ std::size_t TransferOperator::batch_workspace_size(std::size_t) const {
 void TransferOperator::apply_batch(std::size_t light_count,
                                    std::span<const Float3> initial_exitance,
                                    std::span<Float3> indirect_irradiance,
-                                   std::span<float> workspace) const {
+                                   std::span<float> workspace, const Scheduler& scheduler) const {
   const std::size_t n = patch_count();
   for (std::size_t light = 0; light < light_count; ++light) {
     apply(initial_exitance.subspan(light * n, n), indirect_irradiance.subspan(light * n, n),
-          workspace);
+          workspace, scheduler);
   }
 }
 

@@ -41,11 +41,11 @@ void ConjugateGradientSolver::begin(bool cold) {
   if (cold) {
     std::ranges::fill(unknown_, Float3{0, 0, 0});
   } else {
-    form_factors_.gather(radiosity_, scaled_, gather_workspace_);
+    form_factors_.gather(radiosity_, scaled_, gather_workspace_, scheduler_);
     scale(sqrt_reflectance_, scaled_, unknown_);
     finish();
   }
-  form_factors_.gather(radiosity_, scaled_, gather_workspace_);
+  form_factors_.gather(radiosity_, scaled_, gather_workspace_, scheduler_);
   scale(sqrt_reflectance_, scaled_, rest_);
   add_scaled({-1, -1, -1}, unknown_, rest_);
   direction_ = rest_;
@@ -90,7 +90,7 @@ void ConjugateGradientSolver::finish() {
 
 void ConjugateGradientSolver::multiply_direction() {
   scale(sqrt_reflectance_, direction_, scaled_);
-  form_factors_.gather(scaled_, product_, gather_workspace_);
+  form_factors_.gather(scaled_, product_, gather_workspace_, scheduler_);
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
       product_[i][c] = direction_[i][c] - sqrt_reflectance_[i][c] * product_[i][c];

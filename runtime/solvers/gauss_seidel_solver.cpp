@@ -16,7 +16,7 @@ void GaussSeidelSolver::begin(bool /*cold*/) {
 }
 
 RadiositySolver::SweepReport GaussSeidelSolver::sweep() {
-  const double changed_squared = relaxation_->sweep(next_);
+  const double changed_squared = relaxation_->sweep(next_, scheduler_);
   if (order_ == SweepOrder::kSymmetric) {
     next_ =
         next_ == SweepDirection::kForward ? SweepDirection::kBackward : SweepDirection::kForward;

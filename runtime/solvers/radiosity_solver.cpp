@@ -58,7 +58,7 @@ void RadiositySolver::forget() {
 }
 
 double RadiositySolver::compute_residual() {
-  form_factors_.gather(radiosity_, residual_, gather_workspace_);
+  form_factors_.gather(radiosity_, residual_, gather_workspace_, scheduler_);
   for (std::size_t i = 0; i < residual_.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
       residual_[i][c] =
@@ -85,6 +85,7 @@ SolveResult RadiositySolver::solve(std::span<const Float3> initial_exitance,
   const Clock::time_point start = Clock::now();
   check(initial_exitance, settings);
   initial_exitance_ = initial_exitance;
+  scheduler_ = settings.scheduler;
   deadline_ = Clock::time_point::max();
   if (settings.time_budget_microseconds > 0) {
     const std::chrono::duration<double, std::micro> budget(settings.time_budget_microseconds);

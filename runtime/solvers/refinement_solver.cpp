@@ -42,7 +42,7 @@ void RefinementSolver::begin(bool cold) {
 }
 
 RadiositySolver::SweepReport RefinementSolver::sweep() {
-  transfer_->apply(residual_, correction_, transfer_workspace_);
+  transfer_->apply(residual_, correction_, transfer_workspace_, scheduler_);
   std::ranges::copy(radiosity_, previous_.begin());
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {

@@ -184,7 +184,7 @@ class Multiple final : public TransferOperator {
   std::string kind() const override { return "multiple"; }
   std::size_t workspace_size() const override { return 0; }
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float>) const override {
+             std::span<float>, const Scheduler&) const override {
     for (std::size_t i = 0; i < patch_count_; ++i) {
       for (int c = 0; c < kChannelCount; ++c) {
         indirect_irradiance[i][c] = factor_ * initial_exitance[i][c];

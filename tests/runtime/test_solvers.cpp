@@ -17,6 +17,7 @@
 #include "rebounce/transfer/form_factor_blocks.h"
 #include "rebounce/transfer/reflection.h"
 #include "test_scene_data.h"
+#include "thread_pool.h"
 #include "with_threads.h"
 
 namespace rebounce {
@@ -110,12 +111,12 @@ class SeriesOperator final : public TransferOperator {
     return form_factors_.workspace_size() + kChannelCount * patch_count();
   }
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float> workspace) const override {
+             std::span<float> workspace, const Scheduler& scheduler) const override {
     const std::size_t n = patch_count();
     const std::span<Float3> b(reinterpret_cast<Float3*>(workspace.data()), n);
     std::ranges::copy(initial_exitance, b.begin());
     for (int bounce = 0; bounce < 40; ++bounce) {
-      form_factors_.gather(b, indirect_irradiance, workspace.subspan(kChannelCount * n));
+      form_factors_.gather(b, indirect_irradiance, workspace.subspan(kChannelCount * n), scheduler);
       add_reflected(initial_exitance, reflectance_, indirect_irradiance, b);
     }
     for (Float3& h : indirect_irradiance) {
@@ -307,13 +308,19 @@ TEST_P(EveryMethod, TakesOtherReflectancesExactly) {
 
 TEST_P(EveryMethod, ThreadsDoNotChangeABit) {
   const Case c = make_case(0.8F);
+  Scheduler scheduler;
   const auto solve = [&] {
     const auto solver = c.solver(method());
-    solver->solve(c.system.initial_exitance, {.max_sweeps = 3, .residual = 0});
+    solver->solve(c.system.initial_exitance,
+                  {.max_sweeps = 3, .residual = 0, .scheduler = scheduler});
     return copy(solver->radiosity());
   };
   const std::vector<Float3> one = test::with_threads(1, solve);
   for (const int count : {2, 5}) EXPECT_EQ(one, test::with_threads(count, solve)) << count;
+  test::ThreadPool pool(3);
+  scheduler = pool.scheduler();
+  EXPECT_EQ(one, solve());
+  EXPECT_GT(pool.loop_count(), 0);
 }
 
 TEST_P(EveryMethod, ASolveDoesNotAllocate) {
@@ -415,9 +422,9 @@ class Gatherer final : public FormFactorOperator {
   std::size_t patch_count() const override { return blocks_.patch_count(); }
   std::size_t bytes() const override { return blocks_.bytes(); }
   std::size_t workspace_size() const override { return blocks_.workspace_size(); }
-  void gather(std::span<const Float3> in, std::span<Float3> out,
-              std::span<float> workspace) const override {
-    blocks_.gather(in, out, workspace);
+  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+              const Scheduler& scheduler) const override {
+    blocks_.gather(in, out, workspace, scheduler);
   }
 
  private:

@@ -3,7 +3,6 @@
 #include "rebounce/transfer/patch_roles.h"
 
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include <cmath>
 #include <random>
@@ -14,6 +13,7 @@
 #include "rebounce/transfer/area_norm.h"
 #include "rebounce/transfer/hierarchical_encoding.h"
 #include "rebounce/transfer/hierarchical_operator.h"
+#include "with_threads.h"
 
 namespace rebounce {
 namespace {
@@ -161,13 +161,8 @@ TEST(PatchRoles, ABatchIsAsManyApplies) {
 TEST(PatchRoles, SameBitsForAnyNumberOfThreads) {
   const HierarchicalOperator op(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6)));
   const std::vector<Float3> m0 = random_light(kPatchCount, 2);
-  const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const std::vector<Float3> one = product(op, m0);
-  omp_set_num_threads(5);
-  const std::vector<Float3> five = product(op, m0);
-  omp_set_num_threads(before);
-  EXPECT_EQ(one, five);
+  const auto multiply = [&] { return product(op, m0); };
+  EXPECT_EQ(test::with_threads(1, multiply), test::with_threads(5, multiply));
 }
 
 TEST(PatchRoles, AnApplyAllocatesNothing) {

@@ -10,7 +10,8 @@
 
 namespace rebounce {
 
-/// When an iterative method stops: at whichever comes first. notes/solvers.md tells the methods.
+/// When an iterative method stops, at whichever comes first, and where it runs. notes/solvers.md
+/// tells the methods.
 struct SolveSettings {
   int max_sweeps = 100;  ///< at least 1; more: closer to the solution, longer
   /// Stop once |M0 + rho F B - B| is this part of |M0|, area-weighted L2; 0: only sweeps and time
@@ -20,6 +21,7 @@ struct SolveSettings {
   /// Measure the residual of the result; false saves that gather, and the result then says the
   /// method's own bound.
   bool measure_residual = true;
+  Scheduler scheduler{};  ///< where the loops of the solve run
 };
 
 struct SolveResult {
@@ -39,8 +41,8 @@ struct RadiosityProblem {
 /// An iterative method that keeps its last solution and starts the next solve from it.
 ///
 /// A solver copies areas and reflectances and refers to the form factors, which must outlive it.
-/// It belongs to one thread at a time; its loops use OpenMP and give the same bits for any number
-/// of threads. After construction nothing allocates.
+/// It belongs to one thread at a time and gives the same bits for any scheduler. After construction
+/// nothing allocates.
 class RadiositySolver {
  public:
   virtual ~RadiositySolver() = default;
@@ -98,6 +100,7 @@ class RadiositySolver {
   std::vector<Float3> reflectance_;
   float max_reflectance_ = 0;
   std::span<const Float3> initial_exitance_;  ///< during a solve
+  Scheduler scheduler_;                       ///< likewise
   std::vector<Float3> radiosity_, residual_;
   std::vector<float> gather_workspace_;
 

@@ -20,8 +20,8 @@ class CompressedFormFactors final : public SweepableFormFactors {
   std::size_t bytes() const override { return exchange_->bytes(); }
   std::size_t bytes_per_gather() const override { return exchange_->bytes_per_apply(); }
   std::size_t workspace_size() const override { return exchange_->workspace_size(); }
-  void gather(std::span<const Float3> in, std::span<Float3> out,
-              std::span<float> workspace) const override;
+  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+              const Scheduler& scheduler = {}) const override;
 
   /// Block Gauss-Seidel in the order of the clusters. Dense blocks on the diagonal are relaxed
   /// patch by patch, so that it is sequential Gauss-Seidel but for diagonal blocks of low rank,

@@ -61,7 +61,7 @@ class DenseOperator final : public TransferOperator {
   std::string kind() const override { return "dense"; }
   std::size_t workspace_size() const override;
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float> workspace) const override;
+             std::span<float> workspace, const Scheduler& scheduler = {}) const override;
   void expand(int channel, std::span<float> transfer) const override;
 
   /// Yhat(row, column) of one matrix.

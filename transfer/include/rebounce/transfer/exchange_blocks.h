@@ -33,8 +33,8 @@ class ExchangeBlocks final : public SweepableFormFactors {
   std::size_t workspace_size() const override {
     return (1 + kSlotCount) * kChannelCount * plane_size();
   }
-  void gather(std::span<const Float3> in, std::span<Float3> out,
-              std::span<float> workspace) const override;
+  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+              const Scheduler& scheduler = {}) const override;
 
   /// Sequential Gauss-Seidel in the order of the patches. Sweeps in one direction read S twice,
   /// sweeps in alternating directions once: see CompressedFormFactors::make_relaxation.

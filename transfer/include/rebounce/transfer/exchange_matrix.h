@@ -44,9 +44,9 @@ class FormFactorRows final : public SweepableFormFactors {
   std::size_t bytes() const override;
   std::size_t workspace_size() const override { return 0; }
 
-  /// Rows are summed in double precision and shared out among OpenMP threads; no workspace is used.
-  void gather(std::span<const Float3> in, std::span<Float3> out,
-              std::span<float> workspace) const override;
+  /// Rows are summed in double precision and shared out among threads; no workspace is used.
+  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+              const Scheduler& scheduler = {}) const override;
   void gather(std::span<const Float3> in, std::span<Float3> out) const { gather(in, out, {}); }
 
   /// Gauss-Seidel in the order of the patches, on one thread.

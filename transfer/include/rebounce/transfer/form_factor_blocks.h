@@ -33,8 +33,8 @@ class FormFactorBlocks final : public SweepableFormFactors {
   std::size_t patch_count() const override { return row_begin_.size() - 1; }
   std::size_t bytes() const override;
   std::size_t workspace_size() const override { return kChannelCount * plane_size(); }
-  void gather(std::span<const Float3> in, std::span<Float3> out,
-              std::span<float> workspace) const override;
+  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+              const Scheduler& scheduler = {}) const override;
 
   /// Sequential Gauss-Seidel in the order of the patches, to the letter, on any number of threads:
   /// rows are taken in groups of kGroup; what they gather from outside the group is found in

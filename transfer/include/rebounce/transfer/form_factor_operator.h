@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/transfer/parallel.h"
 #include "rebounce/transfer/types.h"
 
 namespace rebounce {
@@ -30,9 +31,9 @@ class FormFactorOperator {
 
   /// Gathers: out(i) = sum over j of F(i,j) in(j), each of [n][3]. `out` must not overlap `in`;
   /// `workspace` has at least workspace_size() floats and is overwritten. Neither allocates nor
-  /// locks; the same bits for any number of OpenMP threads.
-  virtual void gather(std::span<const Float3> in, std::span<Float3> out,
-                      std::span<float> workspace) const = 0;
+  /// locks; the same bits for any `scheduler`.
+  virtual void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+                      const Scheduler& scheduler = {}) const = 0;
 };
 
 /// What `form_factors` gather of `in` [n], for once: it allocates.

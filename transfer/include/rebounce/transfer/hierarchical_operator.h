@@ -71,11 +71,11 @@ class HierarchicalOperator final : public TransferOperator {
   const PatchRoles& roles() const override;
   std::size_t workspace_size() const override { return batch_workspace_size(1); }
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float> workspace) const override;
+             std::span<float> workspace, const Scheduler& scheduler = {}) const override;
   std::size_t batch_workspace_size(std::size_t light_count) const override;
   void apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
-                   std::span<Float3> indirect_irradiance,
-                   std::span<float> workspace) const override;
+                   std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                   const Scheduler& scheduler = {}) const override;
   void expand(int channel, std::span<float> transfer) const override;
 
   /// Prepares applies to these patches alone, which read only the blocks that reach them or
@@ -86,13 +86,14 @@ class HierarchicalOperator final : public TransferOperator {
   /// Like `apply`, but writes the irradiance [n] of the receivers alone, the same as `apply` would
   /// up to rounding; that of the other patches is left as it is.
   void apply_to(const Receivers& receivers, std::span<const Float3> initial_exitance,
-                std::span<Float3> indirect_irradiance, std::span<float> workspace) const;
+                std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                const Scheduler& scheduler = {}) const;
 
  private:
   std::shared_ptr<const HierarchicalPlan> plan_to(const std::vector<bool>& wanted) const;
   void run(const HierarchicalPlan& plan, std::size_t light_count,
            std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-           std::span<float> workspace) const;
+           std::span<float> workspace, const Scheduler& scheduler) const;
 
   std::shared_ptr<const HierarchicalStorage> storage_;
   /// [n] by position: R A^1/2, 0 of patches that are no sources, and R A^-1/2 times the scale of

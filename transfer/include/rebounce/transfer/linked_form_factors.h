@@ -53,8 +53,8 @@ class LinkedFormFactors final : public FormFactorOperator {
   std::size_t node_count() const;
   std::size_t bytes() const override;
   std::size_t workspace_size() const override;
-  void gather(std::span<const Float3> in, std::span<Float3> out,
-              std::span<float> workspace) const override;
+  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+              const Scheduler& scheduler = {}) const override;
 
   /// The same for several lights at once: `Columns` is an array of 3 or 24 floats or doubles, the
   /// channels of one or of eight lights, and so is what is added up. Allocates its workspace.

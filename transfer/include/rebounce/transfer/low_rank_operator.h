@@ -50,16 +50,18 @@ class LowRankOperator final : public TransferOperator {
   std::string kind() const override { return "low-rank"; }
   std::size_t workspace_size() const override;
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float> workspace) const override;
+             std::span<float> workspace, const Scheduler& scheduler = {}) const override;
 
  private:
   std::size_t stride() const { return tile_count(patch_count()) * kTile; }
   /// Ranks of the three channels, each rounded up to whole vectors.
   std::size_t coefficient_size() const { return (kChannelCount + 1) * rank_stride_; }
-  /// coefficient[c] = core V^T x_c, by way of one set of coefficients for each tile.
-  void project(const float* x, float* tile_coefficient, float* coefficient) const;
-  void multiply_cores(const float* in, float* out) const;
-  void expand_tiles(const float* coefficient, float* y) const;
+  /// V^T x of one tile, and the sum [coefficient_size()] of all tiles'.
+  void project_tile(std::size_t tile, const float* x, float* tile_coefficient) const;
+  void add_up(const float* tile_coefficient, float* coefficient) const;
+  /// One row of the core of a channel.
+  void multiply_row(std::size_t channel, std::size_t row, const float* in, float* out) const;
+  void expand_tile(std::size_t tile, const float* coefficient, float* y) const;
 
   Storage storage_;
   std::vector<float> sqrt_area_;  ///< [n]

@@ -26,7 +26,7 @@ enum class SweepDirection : std::uint8_t { kForward, kBackward };
 /// Gauss-Seidel sweeps over one form of F: B(i) = M0(i) + rho(i) sum over j of F(i,j) B(j), patch
 /// after patch, in an order of that form's own. It keeps what a sweep needs and refers to F, which
 /// must outlive it; it belongs to one thread at a time. Neither begin, sweep nor end allocates, and
-/// the bits do not depend on the number of OpenMP threads.
+/// the bits do not depend on the scheduler.
 class Relaxation {
  public:
   virtual ~Relaxation() = default;
@@ -36,7 +36,7 @@ class Relaxation {
 
   /// One sweep over all patches. Returns the square of what it changed, area-weighted, all
   /// channels: each patch's change was its residual when it was reached.
-  virtual double sweep(SweepDirection direction) = 0;
+  virtual double sweep(SweepDirection direction, const Scheduler& scheduler = {}) = 0;
 
   /// Writes the radiosity [n] in lx after the last sweep.
   virtual void end(std::span<Float3> radiosity) const = 0;

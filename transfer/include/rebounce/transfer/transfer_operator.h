@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "rebounce/transfer/parallel.h"
 #include "rebounce/transfer/patch_roles.h"
 #include "rebounce/transfer/types.h"
 
@@ -40,9 +41,10 @@ class TransferOperator {
   /// Writes the indirect irradiance [n][3] in lx that `initial_exitance` [n][3] in lx gives rise
   /// to: at receivers, of the light of sources; 0 at other patches, and the light of others does
   /// nothing. The two must not overlap; `workspace` has at least workspace_size() floats and is
-  /// overwritten. Neither allocates nor locks; the same bits for any number of OpenMP threads.
+  /// overwritten. Neither allocates nor locks; the same bits for any `scheduler`.
   virtual void apply(std::span<const Float3> initial_exitance,
-                     std::span<Float3> indirect_irradiance, std::span<float> workspace) const = 0;
+                     std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                     const Scheduler& scheduler = {}) const = 0;
 
   /// Floats of workspace that a batch of `light_count` needs.
   virtual std::size_t batch_workspace_size(std::size_t light_count) const;
@@ -51,7 +53,8 @@ class TransferOperator {
   /// [light_count][n][3]; cheaper where the operator can make its values serve several of them.
   /// The same as that many applies up to rounding; by default it is that many.
   virtual void apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
-                           std::span<Float3> indirect_irradiance, std::span<float> workspace) const;
+                           std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                           const Scheduler& scheduler = {}) const;
 
   /// Writes Y itself, row-major [n][n], for one channel: dense, unscaled, for export and tests. By
   /// default n products with unit vectors.

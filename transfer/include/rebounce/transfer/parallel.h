@@ -1,0 +1,75 @@
+#pragma once
+
+// How applies, frames and solves share their loops out among threads.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+
+namespace rebounce {
+
+/// Where loops run: by default on OpenMP's threads if the library is built with them, else on the
+/// calling thread. An engine that has threads of its own gives its own function.
+///
+/// Results have the same bits for any scheduler: loops are cut into tasks that do not depend on the
+/// number of threads, each of which writes to places of its own.
+struct Scheduler {
+  using Task = void (*)(void* context, std::uint32_t index);
+
+  /// Calls task(context, i) once for each i in [0, count), in any order, on any threads, and
+  /// returns when all of these calls have. What the caller wrote before is visible to the tasks,
+  /// and what they wrote to the caller after, as it is where threads start and join. Tasks throw
+  /// nothing, wait for nothing and call no parallel_for. Callers on several threads that share a
+  /// scheduler may call this at the same time. It must throw nothing. Null: the default.
+  void (*parallel_for)(void* user, std::uint32_t count, Task task, void* context) = nullptr;
+  void* user = nullptr;  ///< what parallel_for is called with
+};
+
+/// A loop that calls work(i) for each i in [0, count); it refers to `work`.
+struct ParallelLoop {
+  std::uint32_t count;
+  Scheduler::Task task;
+  void* context;
+
+  template <typename Work>
+  ParallelLoop(std::size_t task_count, const Work& work)
+      : count(static_cast<std::uint32_t>(task_count)),
+        task([](void* of_work, std::uint32_t index) {
+          (*static_cast<const Work*>(of_work))(index);
+        }),
+        context(const_cast<Work*>(&work)) {}
+};
+
+/// Runs the loops one after the other, each when all tasks of the one before are done. Allocates
+/// nothing. A scheduler is not asked for a loop of less than two tasks.
+void run_in_turn(const Scheduler& scheduler, std::initializer_list<ParallelLoop> loops);
+
+/// Calls work(i) for each i in [0, count). A call should take some 10 microseconds or more.
+template <typename Work>
+void parallel_for(const Scheduler& scheduler, std::size_t count, const Work& work) {
+  run_in_turn(scheduler, {{count, work}});
+}
+
+/// The number of pieces of `size` entries, the last of which may be smaller, that `count` make.
+constexpr std::size_t piece_count(std::size_t count, std::size_t size) {
+  return (count + size - 1) / size;
+}
+
+/// What calls work(i) for each entry i of a piece, to be a task.
+template <typename Work>
+auto on_piece(std::size_t count, std::size_t size, const Work& work) {
+  return [=, &work](std::size_t piece) {
+    const std::size_t end = std::min(count, (piece + 1) * size);
+    for (std::size_t i = piece * size; i < end; ++i) work(i);
+  };
+}
+
+/// Calls work(i) for each i in [0, count), for `size` of them in a task.
+template <typename Work>
+void parallel_for_pieces(const Scheduler& scheduler, std::size_t count, std::size_t size,
+                         const Work& work) {
+  parallel_for(scheduler, piece_count(count, size), on_piece(count, size, work));
+}
+
+}  // namespace rebounce
