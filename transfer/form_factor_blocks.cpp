@@ -9,6 +9,8 @@
 namespace rebounce {
 namespace {
 
+constexpr std::size_t kRowsPerTask = 64;
+
 constexpr std::uint32_t position_of(std::size_t column) {
   return static_cast<std::uint32_t>(column / kFormFactorBlock);
 }
@@ -83,13 +85,12 @@ void FormFactorBlocks::from_planes(std::span<const float> planes, std::span<Floa
 }
 
 void FormFactorBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
-                              std::span<float> workspace, const Scheduler& /*scheduler*/) const {
+                              std::span<float> workspace, const Scheduler& scheduler) const {
   assert(out.size() == patch_count() && workspace.size() >= workspace_size());
   const std::span<float> planes = workspace.first(kChannelCount * plane_size());
   to_planes(in, planes);
-  const auto n = static_cast<std::int64_t>(patch_count());
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::int64_t i = 0; i < n; ++i) out[i] = gather_row(i, planes);
+  parallel_for_pieces(scheduler, patch_count(), kRowsPerTask,
+                      [&](std::size_t i) { out[i] = gather_row(i, planes); });
 }
 
 Float3 FormFactorBlocks::gather_range(std::uint64_t begin, std::uint64_t end,

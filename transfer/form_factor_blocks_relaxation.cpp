@@ -6,6 +6,7 @@ namespace rebounce {
 namespace {
 
 constexpr std::size_t kGroup = FormFactorBlocks::kGroup;
+constexpr std::size_t kRowsPerTask = 16;
 
 class BlockRowRelaxation final : public Relaxation {
  public:
@@ -17,35 +18,29 @@ class BlockRowRelaxation final : public Relaxation {
     blocks_.to_planes(radiosity, planes_);
   }
 
-  double sweep(SweepDirection direction, const Scheduler& /*scheduler*/) override {
+  double sweep(SweepDirection direction, const Scheduler& scheduler) override {
     const std::size_t n = blocks_.patch_count(), group_count = (n + kGroup - 1) / kGroup;
     const bool backward = direction == SweepDirection::kBackward;
     double changed_squared = 0;
-#pragma omp parallel
     for (std::size_t k = 0; k < group_count; ++k) {
       const std::size_t group = backward ? group_count - 1 - k : k;
       const std::size_t begin = group * kGroup, end = std::min(begin + kGroup, n);
-      gather_from_outside(begin, end);
-#pragma omp single
+      gather_from_outside(begin, end, scheduler);
       changed_squared += relax_group(begin, end, backward);
     }
     return changed_squared;
   }
 
-  void end(std::span<Float3> radiosity) const override {
-    blocks_.from_planes(planes_, radiosity);
-  }
+  void end(std::span<Float3> radiosity) const override { blocks_.from_planes(planes_, radiosity); }
 
-  int reads_per_sweep(SweepOrder /*order*/) const override {
-    return 1;
-  }
+  int reads_per_sweep(SweepOrder /*order*/) const override { return 1; }
 
  private:
-  void gather_from_outside(std::size_t group_begin, std::size_t group_end) {
-#pragma omp for schedule(dynamic, 16)
-    for (std::size_t i = group_begin; i < group_end; ++i) {
-      outside_[i - group_begin] = blocks_.gather_outside_group(i, planes_);
-    }
+  void gather_from_outside(std::size_t group_begin, std::size_t group_end,
+                           const Scheduler& scheduler) {
+    parallel_for_pieces(scheduler, group_end - group_begin, kRowsPerTask, [&](std::size_t k) {
+      outside_[k] = blocks_.gather_outside_group(group_begin + k, planes_);
+    });
   }
 
   double relax_group(std::size_t group_begin, std::size_t group_end, bool backward) {
