@@ -121,10 +121,15 @@ Struct take(const Struct* given, Struct defaults, std::size_t least_size) {
   return defaults;
 }
 
-// As they were in version 1 of the interface.
-constexpr std::size_t kLightSize1 = sizeof(rebounce_light);
-constexpr std::size_t kSettingsSize1 = sizeof(rebounce_engine_settings);
-constexpr std::size_t kInfoSize1 = offsetof(rebounce_transfer_info, lightmap_width);
+// Sizes of the structures in version 1 of the interface, up to the last member that they had then.
+// They stay when a structure grows: what an older caller does not have takes its default.
+constexpr std::size_t kLightSize1 =
+    offsetof(rebounce_light, tangent) + sizeof(rebounce_light::tangent);
+constexpr std::size_t kSettingsSize1 = offsetof(rebounce_engine_settings, light_capacity) +
+                                       sizeof(rebounce_engine_settings::light_capacity);
+constexpr std::size_t kInfoSize1 = offsetof(rebounce_transfer_info, operator_bytes) +
+                                   sizeof(rebounce_transfer_info::operator_bytes);
+static_assert(kLightSize1 == 84 && kSettingsSize1 == 16 && kInfoSize1 == 48);
 
 #if REBOUNCE_WITH_EMBREE
 /// Light k of an array whose entries are as large as the caller says.
@@ -165,17 +170,15 @@ Sky take_sky(const rebounce_sky* sky, const std::shared_ptr<const SkyDistributio
 #endif
 
 Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_settings& settings) {
-#if REBOUNCE_WITH_EMBREE
-  constexpr std::uint32_t kMost = 1U << 20U;
-  return Engine(
-      transfer.data,
-      {.points_per_patch = static_cast<int>(std::min(settings.points_per_patch, kMost)),
-       .area_light_samples = static_cast<int>(std::min(settings.area_light_samples, kMost)),
-       .light_capacity = static_cast<int>(std::min(settings.light_capacity, kMost))});
-#else
-  static_cast<void>(settings);
-  return Engine(transfer.data);
-#endif
+  const auto number = [](std::uint32_t given) {
+    constexpr std::uint32_t kMost = 1U << 20U;
+    return static_cast<int>(std::min(given, kMost));
+  };
+  return Engine(transfer.data,
+                {.direct_lighting = {.points_per_patch = number(settings.points_per_patch),
+                                     .area_light_samples = number(settings.area_light_samples),
+                                     .light_capacity = number(settings.light_capacity)},
+                 .scheduler = {settings.parallel_for, settings.user}});
 }
 
 /// The light at the probes in the coefficients that `Light` has.
@@ -184,7 +187,8 @@ rebounce_status write_probe_light(const rebounce_engine& engine, float* harmonic
                                   std::size_t probe_count) {
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     apply_probes(engine.engine.data().probes, engine.engine.radiosity(), engine.sky,
-                 std::span(reinterpret_cast<Light*>(harmonics), probe_count));
+                 std::span(reinterpret_cast<Light*>(harmonics), probe_count),
+                 engine.engine.scheduler());
     return REBOUNCE_OK;
   });
 }
@@ -313,7 +317,7 @@ void rebounce_light_init(rebounce_light* light) {
 }
 
 void rebounce_engine_settings_init(rebounce_engine_settings* settings) {
-  if (settings != nullptr) *settings = {sizeof(*settings), 8, 4, 16};
+  if (settings != nullptr) *settings = {sizeof(*settings), 8, 4, 16, nullptr, nullptr};
 }
 
 rebounce_status rebounce_engine_create(rebounce_transfer* transfer,
@@ -434,7 +438,8 @@ rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine,
   }
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     reconstruct_at_vertices(engine->engine.data().mesh, engine->engine.indirect_irradiance(),
-                            {reinterpret_cast<Float3*>(irradiance), vertex_count});
+                            {reinterpret_cast<Float3*>(irradiance), vertex_count},
+                            engine->engine.scheduler());
     return REBOUNCE_OK;
   });
 }
@@ -448,9 +453,10 @@ rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* har
       throw Error("the transfer file has no surface harmonics; make it with --surface-harmonics");
     }
     apply_surface_harmonics(data.surface_harmonics, engine->engine.radiosity(), engine->sky,
-                            engine->patch_light);
+                            engine->patch_light, engine->engine.scheduler());
     reconstruct_at_vertices(data.mesh, engine->patch_light,
-                            {reinterpret_cast<SurfaceLight*>(harmonics), vertex_count});
+                            {reinterpret_cast<SurfaceLight*>(harmonics), vertex_count},
+                            engine->engine.scheduler());
     return REBOUNCE_OK;
   });
 }
@@ -478,9 +484,10 @@ rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, flo
       throw Error("the transfer file has no lightmap; make it with --lightmap");
     }
     reconstruct_at_vertices(data.mesh, engine->engine.indirect_irradiance(),
-                            engine->vertex_irradiance);
+                            engine->vertex_irradiance, engine->engine.scheduler());
     interpolate_at_texels(data.lightmap, data.mesh, engine->vertex_irradiance,
-                          {reinterpret_cast<Float3*>(irradiance), texel_count});
+                          {reinterpret_cast<Float3*>(irradiance), texel_count},
+                          engine->engine.scheduler());
     return REBOUNCE_OK;
   });
 }
@@ -517,7 +524,8 @@ rebounce_status rebounce_engine_probe_irradiance(const rebounce_engine* engine,
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     irradiance_at_probes(engine->engine.data().probes, engine->engine.radiosity(), engine->sky,
                          {reinterpret_cast<const Float3*>(normals), normal_count},
-                         {reinterpret_cast<Float3*>(irradiance), probe_count * normal_count});
+                         {reinterpret_cast<Float3*>(irradiance), probe_count * normal_count},
+                         engine->engine.scheduler());
     return REBOUNCE_OK;
   });
 }

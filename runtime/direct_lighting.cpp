@@ -16,8 +16,9 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kBlock = 64;  // patches that a thread lights at a time
-constexpr std::size_t kBatch = 64;  // shadow rays that are traced together
+constexpr std::size_t kBlock = 64;         // patches that are lit at a time
+constexpr std::size_t kAddedPerTask = 16;  // blocks, where no light is traced
+constexpr std::size_t kBatch = 64;         // shadow rays that are traced together
 constexpr int kMaxAreaLightSamples = 64;
 
 // A shadow ray stops this part of its length before the lamp, which may hang on a surface.
@@ -184,18 +185,18 @@ void DirectLighting::make_room(std::size_t light_count) {
 }
 
 void DirectLighting::compute(std::span<const Light> lights, const Sky& sky,
-                             std::span<Float3> direct_irradiance) {
+                             std::span<Float3> direct_irradiance, const Scheduler& scheduler) {
   assert(direct_irradiance.size() == data_.patches.size());
   check_sky(sky, data_);
   prepare(lights);
+  const std::size_t blocks_per_task = traced_light_count_ > 0 ? 1 : kAddedPerTask;
   const std::size_t block_count = receivers_->block_box.size();
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t block = 0; block < block_count; ++block) {
+  parallel_for_pieces(scheduler, block_count, blocks_per_task, [&](std::size_t block) {
     for (std::size_t k = 0; k < light_count_; ++k) {
       if (responses_[k].stale) respond(responses_[k], block);
     }
     add_up(sky, block, direct_irradiance);
-  }
+  });
 }
 
 void DirectLighting::prepare(std::span<const Light> lights) {

@@ -18,10 +18,11 @@ std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> 
 }  // namespace
 
 #if REBOUNCE_WITH_EMBREE
-Engine::Engine(std::shared_ptr<const TransferData> data, const DirectLightingSettings& settings)
+Engine::Engine(std::shared_ptr<const TransferData> data, const EngineSettings& settings)
     : data_(checked(std::move(data))),
+      scheduler_(settings.scheduler),
       tracer_(std::make_shared<const RayTracer>(make_surface_tracer(data_->mesh))),
-      direct_lighting_(*data_, *tracer_, settings) {
+      direct_lighting_(*data_, *tracer_, settings.direct_lighting) {
   make_room();
 }
 
@@ -33,10 +34,11 @@ void Engine::relight(std::span<const Light> lights, const Sky& sky) {
 }
 
 void Engine::compute_direct(std::span<const Light> lights, const Sky& sky) {
-  direct_lighting_.compute(lights, sky, direct_irradiance_);
+  direct_lighting_.compute(lights, sky, direct_irradiance_, scheduler_);
 }
 #else
-Engine::Engine(std::shared_ptr<const TransferData> data) : data_(checked(std::move(data))) {
+Engine::Engine(std::shared_ptr<const TransferData> data, const EngineSettings& settings)
+    : data_(checked(std::move(data))), scheduler_(settings.scheduler) {
   make_room();
 }
 #endif
@@ -87,7 +89,7 @@ void Engine::compute_initial_exitance() {
 }
 
 void Engine::apply_transfer() {
-  data_->transfer->apply(initial_exitance_, indirect_irradiance_, workspace_);
+  data_->transfer->apply(initial_exitance_, indirect_irradiance_, workspace_, scheduler_);
 }
 
 void Engine::compute_radiosity() {

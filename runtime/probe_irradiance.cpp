@@ -16,6 +16,7 @@ namespace {
 constexpr float kLeastSharpness = 0.85F;
 constexpr float kLeastWidth = 1e-3F;
 constexpr std::size_t kBlock = 64;
+constexpr std::size_t kProbesPerTask = 4;
 
 /// Some of the normals, coordinate by coordinate so that the compiler has rows to work on.
 class NormalBlock {
@@ -116,18 +117,17 @@ void for_each_block(std::span<const Float3> normals, const Visit& visit) {
 
 void irradiance_at_probes(const LightProbes& probes, std::span<const Float3> radiosity,
                           const Sky& sky, std::span<const Float3> normals,
-                          std::span<Float3> irradiance) {
+                          std::span<Float3> irradiance, const Scheduler& scheduler) {
   check_probe_size(irradiance.size(), probes.size() * normals.size(), "the irradiance");
   if (probes.size() == 0) return;
   check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   for_each_block(normals, [&](const NormalBlock& block, std::size_t first) {
-#pragma omp parallel for schedule(static)
-    for (std::size_t p = 0; p < probes.size(); ++p) {
+    parallel_for_pieces(scheduler, probes.size(), kProbesPerTask, [&](std::size_t p) {
       IrradianceSum sum(block);
       add_view(probes, p, radiosity, seen_sky, 1, sum);
       sum.write(1, irradiance.subspan(p * normals.size() + first, block.size()));
-    }
+    });
   });
 }
 

@@ -10,6 +10,8 @@
 namespace rebounce {
 namespace {
 
+constexpr std::size_t kProbesPerTask = 4;
+
 void add_scaled(ProbeLight& sum, const ProbeLight& light, float factor) {
   for (std::size_t k = 0; k < sum.size(); ++k) {
     for (std::size_t c = 0; c < kChannelCount; ++c) sum[k][c] += factor * light[k][c];
@@ -47,27 +49,25 @@ ProbeLight light_of_probe(const LightProbes& probes, std::size_t p,
 /// Writes what light_of finds for each probe.
 template <typename Light, typename LightOf>
 void apply(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
-           const LightOf& light_of, std::span<Light> light) {
+           const LightOf& light_of, std::span<Light> light, const Scheduler& scheduler) {
   check_probe_size(light.size(), probes.size(), "the result");
   if (probes.size() == 0) return;
   check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
-#pragma omp parallel for schedule(static)
-  for (std::size_t p = 0; p < probes.size(); ++p) {
-    light[p] = light_of(probes, p, radiosity, seen_sky);
-  }
+  parallel_for_pieces(scheduler, probes.size(), kProbesPerTask,
+                      [&](std::size_t p) { light[p] = light_of(probes, p, radiosity, seen_sky); });
 }
 
 }  // namespace
 
 void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
-                  std::span<ProbeLight> light) {
-  apply(probes, radiosity, sky, light_of_probe, light);
+                  std::span<ProbeLight> light, const Scheduler& scheduler) {
+  apply(probes, radiosity, sky, light_of_probe, light, scheduler);
 }
 
 void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
-                  std::span<QuadraticProbeLight> light) {
-  apply(probes, radiosity, sky, quadratic_light, light);
+                  std::span<QuadraticProbeLight> light, const Scheduler& scheduler) {
+  apply(probes, radiosity, sky, quadratic_light, light, scheduler);
 }
 
 Float3 probe_irradiance(const ProbeLight& light, const Float3& normal) {

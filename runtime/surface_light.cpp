@@ -10,6 +10,8 @@
 namespace rebounce {
 namespace {
 
+constexpr std::size_t kPatchesPerTask = 64, kVerticesPerTask = 512;
+
 // Beyond this a bent normal would see more light than the series, which may undershoot at the
 // surface's own normal, can answer for.
 constexpr float kLargestGain = 4;
@@ -29,27 +31,26 @@ void add(SurfaceLight& sum, const LinearHarmonics& weight, const Float3& color) 
 }  // namespace
 
 void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const Float3> radiosity,
-                             const Sky& sky, std::span<SurfaceLight> light) {
+                             const Sky& sky, std::span<SurfaceLight> light,
+                             const Scheduler& scheduler) {
   const std::size_t n = harmonics.sky.size();
   check_size(light.size(), n, "the result");
   check_size(radiosity.size(), n, "the radiosity");
   const SeenSky seen_sky(harmonics.sky, harmonics.sky_cells, sky);
-#pragma omp parallel for schedule(static)
-  for (std::size_t i = 0; i < n; ++i) {
+  parallel_for_pieces(scheduler, n, kPatchesPerTask, [&](std::size_t i) {
     SurfaceLight sum{};
     add(sum, seen_sky.coefficients(i), seen_sky.luminance());
     for (std::uint32_t e = harmonics.entry_begin[i]; e < harmonics.entry_begin[i + 1]; ++e) {
       add(sum, harmonics.entry_weight[e], radiosity[harmonics.entry_patch[e]]);
     }
     light[i] = sum;
-  }
+  });
 }
 
 void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const SurfaceLight> patch_light,
-                             std::span<SurfaceLight> vertex_light) {
+                             std::span<SurfaceLight> vertex_light, const Scheduler& scheduler) {
   check_size(vertex_light.size(), mesh.position.size(), "the light at vertices");
-#pragma omp parallel for schedule(static)
-  for (std::size_t v = 0; v < vertex_light.size(); ++v) {
+  parallel_for_pieces(scheduler, vertex_light.size(), kVerticesPerTask, [&](std::size_t v) {
     SurfaceLight sum{};
     if (!mesh.weight_begin.empty()) {
       for (std::uint32_t w = mesh.weight_begin[v]; w < mesh.weight_begin[v + 1]; ++w) {
@@ -62,7 +63,7 @@ void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const SurfaceLig
       }
     }
     vertex_light[v] = sum;
-  }
+  });
 }
 
 Float3 surface_irradiance(const SurfaceLight& light, const Float3& normal) {

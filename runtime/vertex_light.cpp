@@ -5,9 +5,14 @@
 #include "rebounce/transfer/error.h"
 
 namespace rebounce {
+namespace {
+
+constexpr std::size_t kVerticesPerTask = 1024;
+
+}  // namespace
 
 void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_value,
-                             std::span<Float3> vertex_value) {
+                             std::span<Float3> vertex_value, const Scheduler& scheduler) {
   const std::size_t vertex_count = mesh.position.size();
   if (vertex_value.size() != vertex_count) {
     throw Error("the values at vertices have " + std::to_string(vertex_value.size()) +
@@ -17,15 +22,14 @@ void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> pa
     std::ranges::fill(vertex_value, Float3{0, 0, 0});
     return;
   }
-#pragma omp parallel for schedule(static)
-  for (std::size_t v = 0; v < vertex_count; ++v) {
+  parallel_for_pieces(scheduler, vertex_count, kVerticesPerTask, [&](std::size_t v) {
     Float3 sum{0, 0, 0};
     for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
       const Float3& value = patch_value[mesh.weight_patch[k]];
       for (int c = 0; c < kChannelCount; ++c) sum[c] += mesh.weight[k] * value[c];
     }
     vertex_value[v] = sum;
-  }
+  });
 }
 
 }  // namespace rebounce

@@ -20,8 +20,9 @@
  * (cd, lx, cd/m²), lengths metres, space glTF's, colours linear Rec.709.
  *
  * Threads: a transfer is immutable and may be used by any number of threads; an engine belongs to
- * one thread at a time. A frame neither allocates nor locks, but see light_capacity. It runs on
- * OpenMP threads: omp_set_num_threads(1) on the calling thread keeps it there. */
+ * one thread at a time. A frame neither allocates nor locks, but see light_capacity. It runs where
+ * parallel_for of the engine's settings says: by default on OpenMP's threads if the library is
+ * built with them, else on the calling thread. */
 
 #ifndef REBOUNCE_H
 #define REBOUNCE_H
@@ -37,7 +38,7 @@ extern "C" {
 
 /* Raised when a function or structure of this header changes its meaning. Structures that may grow
  * begin with their size, which the _init functions fill in: a program that was compiled with an
- * older header goes on working. */
+ * older header goes on working, and what its structures lack has its default. */
 #define REBOUNCE_ABI_VERSION 1
 
 typedef enum rebounce_status {
@@ -163,12 +164,25 @@ rebounce_status rebounce_cie_sky(int type, const float* sun_direction, float gro
 
 typedef struct rebounce_engine rebounce_engine;
 
+/* Calls task(context, i) once for each i in [0, count), in any order, on any threads, and returns
+ * when all of these calls have. What the caller wrote before is visible to the tasks, and what they
+ * wrote to the caller after. Tasks take some 10 microseconds or more, wait for nothing and call no
+ * parallel_for. Engines that are relit on several threads call it on each of them. Results have the
+ * same bits whatever it does. */
+typedef void (*rebounce_task)(void* context, uint32_t index);
+typedef void (*rebounce_parallel_for)(void* user, uint32_t count, rebounce_task task,
+                                      void* context);
+
 typedef struct rebounce_engine_settings {
   uint32_t struct_size;        /* sizeof(rebounce_engine_settings) */
   uint32_t points_per_patch;   /* at which lamps are looked at; default 8; more: truer shadows */
   uint32_t area_light_samples; /* of spheres and rectangles, for each point; default 4, most 64 */
   uint32_t light_capacity; /* lights for which there is room at once; default 16. The first frame
                               with more makes the room it lacks, the only one that allocates */
+  rebounce_parallel_for parallel_for; /* shares out the loops of the frames and outputs of the
+                                         engine and its clones; NULL, the default: OpenMP's threads,
+                                         or the calling one where the library is built without */
+  void* user;                         /* what parallel_for is called with; default NULL */
 } rebounce_engine_settings;
 
 void rebounce_engine_settings_init(rebounce_engine_settings* settings);

@@ -1,6 +1,7 @@
 /* The C interface from a program in C: the way through, and what failures look like. */
 
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,6 +38,29 @@ static void check_failures(rebounce_engine* engine) {
   rebounce_transfer_release(NULL);
 }
 
+/* Every other task of a loop. */
+struct share {
+  uint32_t first, count;
+  rebounce_task task;
+  void* context;
+};
+
+static void* run_share(void* of) {
+  const struct share* share = of;
+  for (uint32_t k = share->first; k < share->count; k += 2) share->task(share->context, k);
+  return NULL;
+}
+
+/* A parallel_for on two threads, which counts its calls. */
+static void on_two_threads(void* calls, uint32_t count, rebounce_task task, void* context) {
+  struct share even = {0, count, task, context}, odd = {1, count, task, context};
+  pthread_t thread;
+  CHECK(pthread_create(&thread, NULL, run_share, &odd) == 0);
+  run_share(&even);
+  CHECK(pthread_join(thread, NULL) == 0);
+  ++*(int*)calls;
+}
+
 /* The sum of the red channel. */
 static double sum_of(const float* values, size_t count) {
   double sum = 0;
@@ -55,7 +79,13 @@ int main(int argc, char** argv) {
   CHECK(info.patch_count > 0 && info.vertex_count > 0 && info.operator_bytes > 0);
   CHECK(rebounce_transfer_patch_area(transfer)[0] > 0);
 
-  rebounce_engine *engine = NULL, *second = NULL;
+  rebounce_engine *engine = NULL, *second = NULL, *threaded = NULL;
+  rebounce_engine_settings settings;
+  int calls = 0;
+  rebounce_engine_settings_init(&settings);
+  settings.parallel_for = on_two_threads;
+  settings.user = &calls;
+  CHECK(rebounce_engine_create(transfer, &settings, &threaded) == REBOUNCE_OK);
   CHECK(rebounce_engine_create(transfer, NULL, &engine) == REBOUNCE_OK);
   CHECK(rebounce_engine_clone(engine, &second) == REBOUNCE_OK);
   rebounce_transfer_release(transfer); /* the engines keep the data */
@@ -81,6 +111,10 @@ int main(int argc, char** argv) {
   }
   CHECK(rebounce_engine_relight_direct(second, direct, n) == REBOUNCE_OK);
   CHECK(memcmp(rebounce_engine_radiosity(engine), rebounce_engine_radiosity(second),
+               3 * n * sizeof(float)) == 0);
+  CHECK(rebounce_engine_relight_direct(threaded, direct, n) == REBOUNCE_OK);
+  CHECK(calls > 0);
+  CHECK(memcmp(rebounce_engine_radiosity(engine), rebounce_engine_radiosity(threaded),
                3 * n * sizeof(float)) == 0);
   const double indirect = sum_of(rebounce_engine_indirect_irradiance(engine), n);
   CHECK(isfinite(indirect) && indirect > 0);
@@ -117,6 +151,7 @@ int main(int argc, char** argv) {
   printf("%s: %zu patches, sum of indirect irradiance %g\n", rebounce_version(), n, indirect);
   free(vertices);
   free(direct);
+  rebounce_engine_destroy(threaded);
   rebounce_engine_destroy(second);
   rebounce_engine_destroy(engine);
   return 0;

@@ -1,10 +1,12 @@
-// Relights a transfer file twice: by lights, if the library traces them, and by the direct
-// irradiance that those gave.
+// Relights a transfer file: by lights, if the library traces them, by the direct irradiance that
+// those gave, and by that on threads of its own.
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <vector>
 
+#include "../thread_pool.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/vertex_light.h"
 #include "rebounce/transfer/transfer_file.h"
@@ -23,6 +25,13 @@ int main(int argc, char** argv) {
     direct.assign(engine.direct_irradiance().begin(), engine.direct_irradiance().end());
 #endif
     engine.relight(direct);
+    rebounce::test::ThreadPool pool(2);
+    rebounce::Engine pooled(data, {.scheduler = pool.scheduler()});
+    pooled.relight(direct);
+    if (pool.loop_count() == 0 || !std::ranges::equal(pooled.radiosity(), engine.radiosity())) {
+      std::fprintf(stderr, "a frame on threads of the caller is another\n");
+      return 1;
+    }
     std::vector<rebounce::Float3> vertices(data->mesh.position.size());
     rebounce::reconstruct_at_vertices(data->mesh, engine.indirect_irradiance(), vertices);
     double sum = 0;

@@ -11,6 +11,7 @@
 #include "rebounce/transfer/transfer_file.h"
 #include "temporary_folder.h"
 #include "test_scene_data.h"
+#include "thread_pool.h"
 
 namespace rebounce {
 namespace {
@@ -155,6 +156,76 @@ TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {
   ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
   EXPECT_GT(info.patch_count, 0U);
   EXPECT_EQ(info.lightmap_width, 77U);
+}
+
+/// The structures as they were in version 1 of the interface.
+struct LightOfVersion1 {
+  std::uint32_t struct_size, type;
+  std::array<float, 3> position, direction, color;
+  float intensity, range, inner_cone_angle, outer_cone_angle, radius;
+  std::array<float, 2> size;
+  std::array<float, 3> tangent;
+};
+struct SettingsOfVersion1 {
+  std::uint32_t struct_size, points_per_patch, area_light_samples, light_capacity;
+};
+
+TEST_F(FromC, StructuresOfVersion1AreUnderstood) {
+  const SettingsOfVersion1 settings = {sizeof(settings), 8, 4, 16};
+  rebounce_engine* older = nullptr;
+  ASSERT_EQ(rebounce_engine_create(
+                transfer_, reinterpret_cast<const rebounce_engine_settings*>(&settings), &older),
+            REBOUNCE_OK)
+      << rebounce_last_error();
+  std::array<LightOfVersion1, 2> lights{};
+  std::array<rebounce_light, 2> present{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    lamp_.position[0] = 0.3F * static_cast<float>(k);
+    present[k] = lamp_;
+    std::memcpy(&lights[k], &lamp_, sizeof(LightOfVersion1));
+    lights[k].struct_size = sizeof(LightOfVersion1);
+  }
+  const auto* const as_given = reinterpret_cast<const rebounce_light*>(lights.data());
+  ASSERT_EQ(rebounce_engine_relight(older, as_given, 2, nullptr), REBOUNCE_OK)
+      << rebounce_last_error();
+  ASSERT_EQ(rebounce_engine_relight(engine_, present.data(), 2, nullptr), REBOUNCE_OK);
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  const float* const expected = rebounce_engine_radiosity(engine_);
+  EXPECT_GT(expected[0], 0);
+  EXPECT_TRUE(std::equal(expected, expected + 3 * std::size_t{info.patch_count},
+                         rebounce_engine_radiosity(older)));
+  rebounce_engine_destroy(older);
+  lights[0].struct_size -= 4;
+  EXPECT_EQ(rebounce_engine_relight(engine_, as_given, 1, nullptr), REBOUNCE_INVALID_ARGUMENT);
+}
+
+TEST_F(FromC, AFrameRunsOnTheThreadsOfTheCaller) {
+  test::ThreadPool pool(3);
+  rebounce_engine_settings settings;
+  rebounce_engine_settings_init(&settings);
+  EXPECT_EQ(settings.parallel_for, nullptr);
+  settings.parallel_for = pool.scheduler().parallel_for;
+  settings.user = pool.scheduler().user;
+  rebounce_engine *pooled = nullptr, *clone = nullptr;
+  ASSERT_EQ(rebounce_engine_create(transfer_, &settings, &pooled), REBOUNCE_OK);
+  ASSERT_EQ(rebounce_engine_clone(pooled, &clone), REBOUNCE_OK);
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  const float* const expected = rebounce_engine_radiosity(engine_);
+  rebounce_transfer_info info{};
+  info.struct_size = sizeof(info);
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+  int loops = 0;
+  for (rebounce_engine* const engine : {pooled, clone}) {
+    EXPECT_EQ(test::count_allocations([&] { rebounce_engine_relight(engine, &lamp_, 1, nullptr); }),
+              0);
+    EXPECT_TRUE(std::equal(expected, expected + 3 * std::size_t{info.patch_count},
+                           rebounce_engine_radiosity(engine)));
+    EXPECT_GT(pool.loop_count(), loops);
+    loops = pool.loop_count();
+    rebounce_engine_destroy(engine);
+  }
 }
 
 TEST_F(FromC, StructuresOfALaterVersionAreUnderstood) {

@@ -5,22 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/runtime/direct_lighting_settings.h"
 #include "rebounce/runtime/ray_tracer.h"
+#include "rebounce/transfer/parallel.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
-
-struct DirectLightingSettings {
-  /// Points of a patch at which lamps are looked at. More: softer, truer shadow borders; time grows
-  /// in proportion. At least 1.
-  int points_per_patch = 8;
-  /// Places of a lamp with a surface that each point looks at, from 1 to 64. More: smoother half
-  /// shadows; time of such lamps grows in proportion.
-  int area_light_samples = 4;
-  /// Lights for which room is made at once: 5 bytes per patch and light. A frame that has more
-  /// makes the room it lacks, the only time that one allocates. At least 0.
-  int light_capacity = 16;
-};
 
 /// Direct irradiance of the patches of one scene, with shadows.
 ///
@@ -42,9 +32,10 @@ class DirectLighting {
   DirectLighting& operator=(const DirectLighting&) = delete;
 
   /// Writes the irradiance [n] in lx that arrives straight from `lights` and `sky`. Does not
-  /// allocate, but see light_capacity. The same bits for any number of OpenMP threads. Throws Error
-  /// as check_sky does.
-  void compute(std::span<const Light> lights, const Sky& sky, std::span<Float3> direct_irradiance);
+  /// allocate, but see light_capacity. The same bits for any `scheduler`. Throws Error as check_sky
+  /// does.
+  void compute(std::span<const Light> lights, const Sky& sky, std::span<Float3> direct_irradiance,
+               const Scheduler& scheduler = {});
 
   /// Lights that the last compute() traced: those that were new or had changed.
   int traced_light_count() const { return traced_light_count_; }

@@ -4,13 +4,20 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/runtime/direct_lighting_settings.h"
 #if REBOUNCE_WITH_EMBREE
 #include "rebounce/runtime/direct_lighting.h"
 #include "rebounce/runtime/ray_tracer.h"
 #endif
+#include "rebounce/transfer/parallel.h"
 #include "rebounce/transfer/transfer_data.h"
 
 namespace rebounce {
+
+struct EngineSettings {
+  DirectLightingSettings direct_lighting{};  ///< of no use where the caller brings the direct light
+  Scheduler scheduler{};                     ///< where frames run; copies of the engine use it too
+};
 
 /// Relights one scene: direct light, then one product with the stored operator.
 ///
@@ -28,12 +35,11 @@ namespace rebounce {
 /// direct irradiance.
 class Engine {
  public:
-#if REBOUNCE_WITH_EMBREE
   /// Makes room for everything a frame needs. Throws Error if `data` has no operator or a setting
   /// is out of range.
-  explicit Engine(std::shared_ptr<const TransferData> data,
-                  const DirectLightingSettings& settings = {});
+  explicit Engine(std::shared_ptr<const TransferData> data, const EngineSettings& settings = {});
 
+#if REBOUNCE_WITH_EMBREE
   /// One frame: finds the direct irradiance of the patches under `lights` and `sky`, and with it
   /// all that follows. Lights are known by their number: keep their order (direct_lighting.h).
   void relight(std::span<const Light> lights, const Sky& sky);
@@ -47,9 +53,6 @@ class Engine {
   const DirectLighting& direct_lighting() const {
     return direct_lighting_;
   }
-#else
-  /// Makes room for everything a frame needs. Throws Error if `data` has no operator.
-  explicit Engine(std::shared_ptr<const TransferData> data);
 #endif
 
   /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for
@@ -91,11 +94,16 @@ class Engine {
   const std::shared_ptr<const TransferData>& shared_data() const {
     return data_;
   }
+  /// Where frames run, for the outputs too.
+  const Scheduler& scheduler() const {
+    return scheduler_;
+  }
 
  private:
   void make_room();
 
   std::shared_ptr<const TransferData> data_;
+  Scheduler scheduler_;
 #if REBOUNCE_WITH_EMBREE
   std::shared_ptr<const RayTracer> tracer_;
   DirectLighting direct_lighting_;

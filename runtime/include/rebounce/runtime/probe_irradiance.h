@@ -3,6 +3,7 @@
 #include <span>
 
 #include "rebounce/transfer/light_probes.h"
+#include "rebounce/transfer/parallel.h"
 #include "rebounce/transfer/scene_description.h"
 
 namespace rebounce {
@@ -13,10 +14,10 @@ namespace rebounce {
 /// sharp as they are, which spherical harmonics of a low degree cannot be; only what spans more
 /// than a cone of 45 degrees to each side is taken to degree 2. Arguments, light and errors are
 /// those of apply_probes; probes that are not valid get none. Neither allocates nor locks; the
-/// same bits for any number of OpenMP threads.
+/// same bits for any `scheduler`.
 void irradiance_at_probes(const LightProbes& probes, std::span<const Float3> radiosity,
                           const Sky& sky, std::span<const Float3> normals,
-                          std::span<Float3> irradiance);
+                          std::span<Float3> irradiance, const Scheduler& scheduler = {});
 
 /// The same at a point in the air, as a mean of the probes around it as gather_probe_light has it:
 /// irradiance [K]. In time it is as many probes as are around the point, eight at most.

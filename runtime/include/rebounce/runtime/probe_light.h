@@ -5,6 +5,7 @@
 
 #include "rebounce/runtime/spherical_harmonics.h"
 #include "rebounce/transfer/light_probes.h"
+#include "rebounce/transfer/parallel.h"
 #include "rebounce/transfer/scene_description.h"
 
 namespace rebounce {
@@ -19,14 +20,14 @@ using QuadraticProbeLight = std::array<Float3, kHarmonicCount>;
 /// Writes the light that arrives at each probe [p] from patches of `radiosity` [n] in lx and from
 /// `sky`, by its cells where the probes know them, else as its mean; that of lamps is not in it.
 /// Degree 4 is that of the sky alone, whose light is sharp, and zero where the cells are not known.
-/// Probes that are not valid get none. Neither allocates nor locks; the same bits for any number of
-/// OpenMP threads. Throws Error if a size is wrong.
+/// Probes that are not valid get none. Neither allocates nor locks; the same bits for any
+/// `scheduler`. Throws Error if a size is wrong.
 void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
-                  std::span<ProbeLight> light);
+                  std::span<ProbeLight> light, const Scheduler& scheduler = {});
 
 /// The same without degree 4.
 void apply_probes(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
-                  std::span<QuadraticProbeLight> light);
+                  std::span<QuadraticProbeLight> light, const Scheduler& scheduler = {});
 
 /// The irradiance in lx on a surface with unit `normal`, at least 0: R. Ramamoorthi, P. Hanrahan,
 /// "An efficient representation for irradiance environment maps", SIGGRAPH 2001.

@@ -3,6 +3,7 @@
 #include <array>
 #include <span>
 
+#include "rebounce/transfer/parallel.h"
 #include "rebounce/transfer/scene_description.h"
 #include "rebounce/transfer/transfer_data.h"
 
@@ -14,15 +15,15 @@ using SurfaceLight = std::array<Float3, kLinearHarmonicCount>;
 
 /// Writes the light that arrives at each patch [n] from patches of `radiosity` [n] in lx and from
 /// `sky`, by its cells where the harmonics know them, else as its mean; that of lamps is not in it.
-/// Neither allocates nor locks; the same bits for any number of OpenMP threads. Throws Error if a
-/// size is wrong.
+/// Neither allocates nor locks; the same bits for any `scheduler`. Throws Error if a size is wrong.
 void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const Float3> radiosity,
-                             const Sky& sky, std::span<SurfaceLight> light);
+                             const Sky& sky, std::span<SurfaceLight> light,
+                             const Scheduler& scheduler = {});
 
 /// Writes at each vertex [v] of `mesh` the light that its reconstruction weights give to
 /// `patch_light` [n], as reconstruct_at_vertices does for single values.
 void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const SurfaceLight> patch_light,
-                             std::span<SurfaceLight> vertex_light);
+                             std::span<SurfaceLight> vertex_light, const Scheduler& scheduler = {});
 
 /// The irradiance in lx on a surface with unit `normal` of the light alone, at least 0.
 Float3 surface_irradiance(const SurfaceLight& light, const Float3& normal);
