@@ -1,7 +1,7 @@
 # Installs the runtime, builds the consumers against it, by CMake and by pkg-config, and runs them.
 # Takes BUILD (of Rebounce), WORK (a folder of its own), SOURCE (this one), PROGRAM (rebounce),
 # SCENE, GENERATOR, C_COMPILER and CXX_COMPILER; with ROOT (Rebounce's) the runtime is first built
-# without Embree, and BUILD is not used.
+# without Embree and OpenMP, and BUILD is not used.
 function(run)
   execute_process(COMMAND ${ARGN} RESULT_VARIABLE status OUTPUT_VARIABLE text ERROR_VARIABLE text)
   if(NOT status EQUAL 0)
@@ -17,7 +17,8 @@ set(file ${WORK}/box.safetensors)
 if(ROOT)
   set(BUILD ${WORK}/rebounce)
   run(${CMAKE_COMMAND} -S ${ROOT} -B ${BUILD} -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${CXX_COMPILER}
-      -DCMAKE_BUILD_TYPE=Release -DREBOUNCE_WITH_EMBREE=OFF -DREBOUNCE_BUILD_PRECOMPUTE=OFF
+      -DCMAKE_BUILD_TYPE=Release -DREBOUNCE_WITH_EMBREE=OFF -DREBOUNCE_WITH_OPENMP=OFF
+      -DREBOUNCE_BUILD_PRECOMPUTE=OFF
       -DREBOUNCE_BUILD_DEMO=OFF -DREBOUNCE_BUILD_TESTS=OFF -DREBOUNCE_BUILD_BENCH=OFF)
   run(${CMAKE_COMMAND} --build ${BUILD} --target rebounce_runtime)
 endif()
@@ -37,5 +38,5 @@ set(ENV{PKG_CONFIG_PATH} ${pc_dir})
 execute_process(COMMAND pkg-config --cflags --libs rebounce OUTPUT_VARIABLE flags
                 OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 separate_arguments(flags UNIX_COMMAND "${flags}")
-run(${C_COMPILER} -std=c99 ${SOURCE}/consumer.c ${flags} -o ${WORK}/consumer_pc)
+run(${C_COMPILER} -std=c99 -pthread ${SOURCE}/consumer.c ${flags} -o ${WORK}/consumer_pc)
 run(${WORK}/consumer_pc ${file})
