@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "lights/lamp_kind.h"
 #include "rebounce/runtime/engine.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/octahedral_map.h"
@@ -144,7 +145,7 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
     throw Error("light " + std::to_string(k) + " has another struct_size than the first");
   }
   const rebounce_light given = take(entry, defaults, kLightSize1);
-  if (given.type > REBOUNCE_LIGHT_DISC) {
+  if (given.type >= lamp_kinds().size()) {
     throw Error("light " + std::to_string(k) + " is of type " + std::to_string(given.type) +
                 ", which there is not");
   }

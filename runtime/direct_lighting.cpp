@@ -5,7 +5,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "prepared_light.h"
+#include "lights/lamp_shadows.h"
 #include "rebounce/runtime/box.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/patch_points.h"
@@ -18,85 +18,6 @@ namespace {
 
 constexpr std::size_t kBlock = 64;         // patches that are lit at a time
 constexpr std::size_t kAddedPerTask = 16;  // blocks, where no light is traced
-constexpr std::size_t kBatch = 64;         // shadow rays that are traced together
-constexpr int kMaxAreaLightSamples = 64;
-
-// A shadow ray stops this part of its length before the lamp, which may hang on a surface.
-constexpr float kLampGap = 1e-4F;
-
-/// A point where light is looked for, in the vectors of the inside.
-struct Receiver {
-  glm::vec3 position;  ///< moved off the surface
-  glm::vec3 normal;    ///< unit
-};
-
-/// Collects shadow rays and adds the light of those that get through to their patches, in turn.
-class ShadowBatch {
- public:
-  ShadowBatch(const RayTracer& tracer, std::span<float> irradiance)
-      : tracer_(tracer), irradiance_(irradiance) {}
-
-  /// A ray to where `light` comes from, which carries `irradiance`.
-  void add(std::size_t patch, const Receiver& point, const UnitLight& light, float irradiance) {
-    if (count_ == kBatch) flush();
-    Ray& ray = rays_[count_];
-    ray.origin = to_float3(point.position);
-    ray.t_near = 0;
-    ray.direction = to_float3(light.direction);
-    ray.time = 0;
-    ray.t_far = light.distance * (1 - kLampGap);
-    ray.mask = 0xFFFFFFFFU;
-    ray.id = 0;
-    ray.flags = 0;
-    patch_[count_] = static_cast<std::uint32_t>(patch);
-    carried_[count_++] = irradiance;
-  }
-
-  void flush() {
-    // Single holes are finer than patches.
-    tracer_.transmittance({rays_.data(), count_}, PassageDetail::kTriangle,
-                          {transmitted_.data(), count_});
-    for (std::size_t k = 0; k < count_; ++k)
-      irradiance_[patch_[k]] += transmitted_[k] * carried_[k];
-    count_ = 0;
-  }
-
- private:
-  const RayTracer& tracer_;
-  std::span<float> irradiance_;
-  std::size_t count_ = 0;
-  std::array<Ray, kBatch> rays_;
-  std::array<float, kBatch> transmitted_;
-  std::array<std::uint32_t, kBatch> patch_;
-  std::array<float, kBatch> carried_;
-};
-
-/// Shadow rays to `places` of a lamp with a surface: what would arrive is known exactly, and the
-/// rays find which part of it does, each counting by what its place contributes (E. Heitz, S. Hill,
-/// M. McGuire, "Combining analytic direct illumination and stochastic shadows", 2018).
-void add_area_rays(const PreparedLight& light, std::size_t patch, const Receiver& point,
-                   std::span<const glm::vec2> places, float weight, ShadowBatch& batch) {
-  const float unoccluded = light.unoccluded_irradiance(point.position, point.normal);
-  if (unoccluded <= 0) return;
-  std::array<UnitLight, kMaxAreaLightSamples> sample;
-  std::array<float, kMaxAreaLightSamples> part;
-  light.evaluate_places(point.position, places, std::span(sample).first(places.size()));
-  float sum = 0;
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    part[k] = sample[k].illuminance * std::max(0.0F, glm::dot(sample[k].direction, point.normal));
-    sum += part[k];
-  }
-  if (sum <= 0) {  // but for a sliver, the lamp is below the horizon
-    const glm::vec3 path = light.highest_point(point.normal) - point.position;
-    const float distance = glm::length(path);
-    batch.add(patch, point, {path / distance, distance, 0}, weight * unoccluded);
-    return;
-  }
-  const float scale = weight * unoccluded / sum;
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    if (part[k] > 0) batch.add(patch, point, sample[k], scale * part[k]);
-  }
-}
 
 /// Moves `places` of the unit square by `shift`, around its edges.
 void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
@@ -115,10 +36,10 @@ struct DirectLighting::Receivers {
   std::size_t points_per_patch = 0;
   std::size_t area_light_samples = 0;
   std::vector<glm::vec2> places;  ///< [points_per_patch][area_light_samples] of every lamp
-  std::vector<Receiver> points;   ///< [n][points_per_patch]
+  std::vector<LitPoint> points;   ///< [n][points_per_patch]
   std::vector<Box> block_box;     ///< [blocks] around their points
 
-  std::span<const Receiver> points_of(std::size_t patch) const {
+  std::span<const LitPoint> points_of(std::size_t patch) const {
     return std::span(points).subspan(patch * points_per_patch, points_per_patch);
   }
 };
@@ -225,28 +146,22 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
   const PreparedLight& light = response.light;
   const Box& box = receivers_->block_box[block];
   response.lit[block] = 0;
-  if (box.distance_squared(light.position()) >= light.reach_squared()) return;
+  if (box.distance_squared(light.position) >= light.reach_squared) return;
 
   const float weight = 1 / static_cast<float>(receivers_->points_per_patch);
   const std::size_t samples = receivers_->area_light_samples;
   std::array<glm::vec2, kMaxAreaLightSamples> places;
-  ShadowBatch batch(tracer_, irradiance);
+  LampShadows shadows(tracer_, irradiance);
   for (std::size_t patch = begin; patch < end; ++patch) {
-    const std::span<const Receiver> points = receivers_->points_of(patch);
+    const std::span<const LitPoint> points = receivers_->points_of(patch);
     const glm::vec2 shift(unit_square(mix_bits(~static_cast<std::uint64_t>(patch))));
     for (std::size_t k = 0; k < points.size(); ++k) {
-      if (light.has_area()) {
-        const std::span<glm::vec2> here = std::span(places).first(samples);
-        shift_places(std::span(receivers_->places).subspan(k * samples, samples), shift, here);
-        add_area_rays(light, patch, points[k], here, weight, batch);
-        continue;
-      }
-      const UnitLight unit = light.evaluate(points[k].position);
-      const float arriving = unit.illuminance * glm::dot(unit.direction, points[k].normal);
-      if (arriving > 0) batch.add(patch, points[k], unit, weight * arriving);
+      const std::span<glm::vec2> here = std::span(places).first(light.has_area() ? samples : 0);
+      shift_places(std::span(receivers_->places).subspan(k * samples, here.size()), shift, here);
+      shadows.add(light, points[k], here, weight, patch);
     }
   }
-  batch.flush();
+  shadows.flush();
   const auto lit = [](float e) { return e > 0; };
   response.lit[block] = std::ranges::any_of(irradiance.subspan(begin, end - begin), lit) ? 1 : 0;
 }

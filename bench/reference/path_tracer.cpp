@@ -32,10 +32,6 @@ constexpr int kSureVertices = 4;
 // Below this throughput, chance decides: those that survive have it again.
 constexpr double kRouletteThroughput = 0.25;
 
-// A shadow ray stops this part of its length before the lamp, which may hang on a surface: as
-// DirectLighting has it.
-constexpr float kLampGap = 1e-4F;
-
 struct Path {
   std::uint64_t random;      // state of its random numbers
   VertexNumbers numbers;     // of the vertex where it is
@@ -138,7 +134,7 @@ class PathTracer {
     ray.origin = path.origin;
     ray.direction = chosen.direction;
     ray.t_near = 0;
-    ray.t_far = chosen.distance * (1 - kLampGap);
+    ray.t_far = shadow_ray_length(chosen.distance);
     scratch.shadow_rays.push_back(ray);
     scratch.shadow_queries.push_back({k, path.throughput * irradiance * (total / chosen_weight)});
   }

@@ -23,7 +23,7 @@ void Field::fail(const std::string& name, const std::string& wanted) const {
   throw Error(fmt::format("{}: \"{}\" must be {}", where, name, wanted));
 }
 
-void Field::check_names(std::initializer_list<const char*> known) const {
+void Field::check_names(const std::vector<std::string_view>& known) const {
   for (const auto& [name, value] : object.items()) {
     if (std::ranges::find(known, name) == known.end()) {
       throw Error(fmt::format("{}: unknown field \"{}\"; known are {}", where, name,

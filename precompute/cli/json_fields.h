@@ -1,10 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <initializer_list>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "rebounce/transfer/types.h"
 
@@ -21,7 +22,7 @@ struct Field {
   [[noreturn]] void fail(const std::string& name, const std::string& wanted) const;
 
   /// Refuses fields that are not `known`.
-  void check_names(std::initializer_list<const char*> known) const;
+  void check_names(const std::vector<std::string_view>& known) const;
 
   float number(const std::string& name, float lowest, float fallback) const;
   float required_length(const std::string& name) const;  ///< metres, more than 0

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "json_fields.h"
+#include "lights/lamp_kind.h"
 #include "rebounce/precompute/import_gltf.h"
 #include "rebounce/runtime/emitting_material.h"
 #include "rebounce/runtime/ies_profile.h"
@@ -27,15 +28,52 @@ float length_of(const Float3& v) {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-LightType light_type(const Field& field) {
+/// `words` as in "a, b and c".
+template <typename Words>
+std::string listed(const Words& words, const char* last) {
+  std::string text;
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    if (k > 0) text += k + 1 < words.size() ? std::string(", ") : fmt::format(" {} ", last);
+    text += words[k];
+  }
+  return text;
+}
+
+const LampKind& read_kind(const Field& field) {
   const json type = field.object.value("type", json("point"));
-  if (type == "point") return LightType::kPoint;
-  if (type == "spot") return LightType::kSpot;
-  if (type == "directional") return LightType::kDirectional;
-  if (type == "sphere") return LightType::kSphere;
-  if (type == "rectangle") return LightType::kRectangle;
-  if (type == "disc") return LightType::kDisc;
-  field.fail("type", "\"point\", \"spot\", \"directional\", \"sphere\", \"rectangle\" or \"disc\"");
+  std::vector<std::string> names;
+  for (const LampKind* kind : lamp_kinds()) {
+    if (type == kind->name) return *kind;
+    names.push_back(fmt::format("\"{}\"", kind->name));
+  }
+  field.fail("type", listed(names, "or"));
+}
+
+/// The fields of all kinds in the order in which they are read: a profile comes last.
+std::vector<const LampField*> all_fields() {
+  std::vector<const LampField*> fields(kCommonFields.begin(), kCommonFields.end());
+  for (const LampKind* kind : lamp_kinds()) {
+    for (const LampField* field : kind->fields) {
+      const bool known = std::ranges::find(fields, field) != fields.end();
+      if (!known && field != &kProfile) fields.push_back(field);
+    }
+  }
+  fields.push_back(&kProfile);
+  return fields;
+}
+
+/// Refuses a field of a light that its kind does not use.
+void refuse_other(const Field& light, const LampField& field) {
+  std::vector<std::string> users;
+  for (const LampKind* kind : lamp_kinds()) {
+    if (kind->uses(field)) users.emplace_back(kind->plural);
+  }
+  if (&field == &kTangent) users.emplace_back("lights with \"ies\"");
+  for (std::size_t k = 0; k < field.json_count(); ++k) {
+    if (!light.object.contains(field.json[k])) continue;
+    throw Error(
+        fmt::format("{}: \"{}\" is for {} only", light.where, field.json[k], listed(users, "and")));
+  }
 }
 
 void read_cone(const Field& light_field, Light& light) {
@@ -86,52 +124,65 @@ std::shared_ptr<const IntensityProfile> read_profile(const Field& field,
   return parse_ies_profile(text, fmt::format("{}: {}", field.where, path.string()));
 }
 
-/// The fields that belong to some types only, refused elsewhere.
-void check_fields_of_type(const Field& field, LightType type) {
-  const bool profiled = field.object.contains("ies");
-  const auto only = [&](const char* name, bool allowed, const char* where) {
-    if (field.object.contains(name) && !allowed) {
-      throw Error(fmt::format("{}: \"{}\" is for {} only", field.where, name, where));
-    }
-  };
-  const bool round = type == LightType::kSphere || type == LightType::kDisc;
-  only("radius", round, "spheres and discs");
-  only("width", type == LightType::kRectangle, "rectangles");
-  only("height", type == LightType::kRectangle, "rectangles");
-  only("tangent", type == LightType::kRectangle || profiled, "rectangles and lights with \"ies\"");
-  only("ies", type == LightType::kPoint || type == LightType::kSpot, "points and spots");
-}
-
-void read_shape(const Field& field, const std::filesystem::path& folder, Light& light) {
-  check_fields_of_type(field, light.type);
-  if (light.type == LightType::kSphere || light.type == LightType::kDisc)
-    light.radius = field.required_length("radius");
-  if (light.type == LightType::kRectangle) {
-    light.size = {field.required_length("width"), field.required_length("height")};
-  }
-  if (field.object.contains("ies")) light.profile = read_profile(field, folder);
-  if (light.type == LightType::kRectangle || light.profile) {
-    light.tangent = read_tangent(field, light.direction);
+void read_field(const Field& field, const LampField& read, const std::filesystem::path& folder,
+                Light& light) {
+  const std::string name(read.json[0]);
+  const std::span<float> values = read.values(light);
+  const auto vector = [&] { return Float3{values[0], values[1], values[2]}; };
+  switch (read.rule) {
+    case FieldRule::kFinite:
+      std::ranges::copy(field.triple(name, kAnyNumber, vector()), values.begin());
+      break;
+    case FieldRule::kNotNegative:
+      if (values.size() == 1) {
+        values[0] = field.number(name, 0, values[0]);
+      } else {
+        std::ranges::copy(field.triple(name, 0, vector()), values.begin());
+      }
+      break;
+    case FieldRule::kLength:
+      for (std::size_t k = 0; k < values.size(); ++k) {
+        values[k] = field.required_length(std::string(read.json[k]));
+      }
+      break;
+    case FieldRule::kUnitVector:
+      std::ranges::copy(field.unit_vector(name, vector()), values.begin());
+      break;
+    case FieldRule::kAcross:
+      std::ranges::copy(read_tangent(field, light.direction), values.begin());
+      break;
+    case FieldRule::kCone:
+      read_cone(field, light);
+      break;
+    case FieldRule::kProfile:
+      if (field.object.contains(name)) light.profile = read_profile(field, folder);
+      break;
   }
 }
 
 Light read_light(const Field& field, const std::filesystem::path& folder) {
   if (!field.object.is_object()) throw Error(field.where + ": must be an object");
-  field.check_names({"type", "name", "position", "direction", "color", "intensity", "range", "spot",
-                     "radius", "width", "height", "tangent", "ies"});
+  const std::vector<const LampField*> fields = all_fields();
+  std::vector<std::string_view> names = {"type", "name"};
+  for (const LampField* known : fields) {
+    names.insert(names.end(), known->json.begin(), known->json.begin() + known->json_count());
+  }
+  field.check_names(names);
+  const LampKind& kind = read_kind(field);
   Light light;
-  light.type = light_type(field);
+  light.type = kind.type;
   if (field.object.contains("name")) {
     if (!field.object.at("name").is_string()) field.fail("name", "a string");
     light.name = field.object.at("name").get<std::string>();
   }
-  light.position = field.triple("position", kAnyNumber, light.position);
-  light.direction = field.unit_vector("direction", light.direction);
-  light.color = field.triple("color", 0, light.color);
-  light.intensity = field.number("intensity", 0, light.intensity);
-  light.range = field.number("range", 0, light.range);
-  read_cone(field, light);
-  read_shape(field, folder, light);
+  const bool profiled = field.object.contains("ies");
+  for (const LampField* known : fields) {
+    if (known->is_common || kind.uses(*known) || (known == &kTangent && profiled)) {
+      read_field(field, *known, folder, light);
+    } else {
+      refuse_other(field, *known);
+    }
+  }
   return light;
 }
 

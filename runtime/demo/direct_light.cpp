@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "lights/lamp_kind.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/polygon_form_factor.h"
@@ -51,15 +52,13 @@ Float3 above(const SurfacePoint& point, const RayTracer& tracer) {
   return tracer.offset_point(to_float3(point.position), to_float3(point.geometric_normal));
 }
 
-// A lamp with a surface may lie on another: rays end a little before it.
-constexpr float kLampGap = 1e-4F;
-
 Ray ray_to_lamp(const Light& light, const IncidentLight& incident, const Float3& origin) {
-  if (light.type == LightType::kDirectional || is_area_light(light.type)) {
+  const LampKind& kind = lamp_kind(light.type);
+  if (kind.surface != nullptr || !kind.has_place()) {
     return {.origin = origin,
             .t_near = 0,
             .direction = incident.direction,
-            .t_far = incident.distance * (1 - kLampGap)};
+            .t_far = shadow_ray_length(incident.distance)};
   }
   return {.origin = origin,
           .t_near = 0,

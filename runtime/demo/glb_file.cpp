@@ -13,6 +13,7 @@
 #include <optional>
 #include <string>
 
+#include "lights/lamp_kind.h"
 #include "rebounce/demo/punctual_light.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "rebounce/runtime/sampling.h"
@@ -106,11 +107,6 @@ int wrap_code(TextureWrap wrap) {
   return wrap == TextureWrap::kMirroredRepeat ? kMirroredRepeat : kRepeat;
 }
 
-const char* type_name(LightType type) {
-  if (type == LightType::kDirectional) return "directional";
-  return type == LightType::kSpot ? "spot" : "point";
-}
-
 // Rotation as glTF's quaternion x, y, z, w.
 json rotation(const glm::dmat3& axes) {
   const glm::dquat q = glm::normalize(glm::quat_cast(axes));
@@ -183,7 +179,7 @@ class GlbBuilder {
     json entry = {{"color", {light.color[0] / peak, light.color[1] / peak, light.color[2] / peak}},
                   {"intensity", light.intensity * peak}};
     name(entry, light.name);
-    entry["type"] = type_name(light.type);
+    entry["type"] = lamp_kind(light.type).name;
     if (light.range > 0 && light.type != LightType::kDirectional) entry["range"] = light.range;
     if (light.type == LightType::kSpot) {
       entry["spot"] = {{"innerConeAngle", light.inner_cone_angle},

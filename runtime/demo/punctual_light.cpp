@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "lights/lamp_kind.h"
 #include "rebounce/transfer/intensity_profile.h"
 
 namespace rebounce {
@@ -29,20 +30,13 @@ float mean_intensity(const IntensityProfile& profile) {
 
 Light punctual_equivalent(const Light& light) {
   Light result = light;
-  if (light.type == LightType::kSphere) {
-    result.type = LightType::kPoint;
-    result.intensity *= kPi * light.radius * light.radius;
-  } else if (light.type == LightType::kRectangle) {
-    result.type = LightType::kSpot;
-    result.intensity *= light.size[0] * light.size[1];
-    result.inner_cone_angle = 0;
-    result.outer_cone_angle = kPi / 2;
-  }
-  if (light.type == LightType::kDisc) {
-    result.type = LightType::kSpot;
-    result.intensity *= kPi * light.radius * light.radius;
-    result.inner_cone_angle = 0;
-    result.outer_cone_angle = kPi / 2;
+  if (const LampSurface* const surface = lamp_kind(light.type).surface) {
+    result.type = surface->punctual;
+    result.intensity *= surface->candela(PreparedLight(light));
+    if (result.type == LightType::kSpot) {
+      result.inner_cone_angle = 0;
+      result.outer_cone_angle = kPi / 2;
+    }
   }
   if (light.profile) {
     result.intensity *= mean_intensity(*light.profile);

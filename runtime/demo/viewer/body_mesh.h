@@ -41,15 +41,4 @@ void add_sphere(const Float3& center, float radius,
 /// Adds the surface of `lamp` as something that shines; nothing if it has none.
 void add_lamp_surface(const Light& lamp, BodyMesh& mesh);
 
-/// The middle of a rectangle's first side and of its other one, or two perpendicular radii of a
-/// disc, from its middle.
-std::array<Float3, 2> flat_lamp_axes(const Light& lamp);
-
-/// Places spread evenly over the surface of `lamp`, from its middle.
-inline constexpr std::size_t kLampPlaceCount = 16;
-std::array<glm::vec3, kLampPlaceCount> places_on_lamp(const Light& lamp);
-
-/// m², of what shines.
-float area_of_lamp(const Light& lamp);
-
 }  // namespace rebounce

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "lights/lamp_kind.h"
 #include "rebounce/runtime/float3_glm.h"
 #include "srgb.h"
 
@@ -26,7 +27,7 @@ glm::vec2 screen_size() {
 }
 
 bool has_place(const Light& light) {
-  return light.type != LightType::kDirectional;
+  return lamp_kind(light.type).has_place();
 }
 
 // Metres along the view of one pixel at `depth` metres.
@@ -60,8 +61,7 @@ Light light_now(const ViewerState& state, const ViewerLight& lamp) {
 }
 
 bool shines_one_way(const Light& light) {
-  return light.type == LightType::kSpot || light.type == LightType::kRectangle ||
-         light.type == LightType::kDisc;
+  return has_place(light) && lamp_kind(light.type).uses(kDirection);
 }
 
 void shift_all(Float3& position, LightMotion& motion, const glm::vec3& shift) {

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "controls.h"
+#include "lights/lamp_kind.h"
 #include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/light_sampling.h"
 
 namespace rebounce {
 namespace {
@@ -80,40 +80,53 @@ void time_row(const char* stage, double microseconds) {
 
 // Candela of a lamp of intensity 1, straight ahead.
 float candela_of_unit(const Light& light) {
-  const float disc = std::numbers::pi_v<float> * light.radius * light.radius;
-  if (light.type == LightType::kRectangle) return light.size[0] * light.size[1];
-  return is_area_light(light.type) ? disc : 1;
+  const LampSurface* const surface = lamp_kind(light.type).surface;
+  return surface != nullptr ? surface->candela(PreparedLight(light)) : 1;
 }
 
-const char* unit_of_intensity(const Light& light) {
-  if (is_area_light(light.type)) return "%.1f cd/m2";
-  return light.type == LightType::kDirectional ? "%.1f lx" : "%.1f cd";
+// Gives lengths of the kind that have none a value that suits a scene of `size` metres.
+void complete_lengths(Light& light, float size) {
+  for (const LampField* field : lamp_kind(light.type).fields) {
+    if (field->rule != FieldRule::kLength) continue;
+    const std::span<float> values = field->values(light);
+    float length = (values.size() == 1 ? 0.02F : 0.06F) * size;
+    for (float& value : values) {
+      if (value <= 0) value = length;
+      length *= 2.0F / 3;
+    }
+  }
 }
 
 // `size` is that of the scene, metres.
 void edit_type(Light& light, float size) {
-  int type = static_cast<int>(light.type);
-  if (!ImGui::Combo("type", &type, "point\0spot\0directional\0sphere\0rectangle\0disc\0")) return;
-  const bool was_far = light.type == LightType::kDirectional;
+  LightType type = light.type;
+  if (!ImGui::BeginCombo("type", std::string(lamp_kind(type).name).c_str())) return;
+  for (const LampKind* kind : lamp_kinds()) {
+    if (ImGui::Selectable(std::string(kind->name).c_str(), kind->type == type)) type = kind->type;
+  }
+  ImGui::EndCombo();
+  if (type == light.type) return;
+  const bool was_far = !lamp_kind(light.type).has_place();
   const float candela = light.intensity * candela_of_unit(light);
-  light.type = static_cast<LightType>(type);
-  if (light.radius <= 0) light.radius = 0.02F * size;
-  if (light.size[0] <= 0 || light.size[1] <= 0) light.size = {0.06F * size, 0.04F * size};
+  light.type = type;
+  complete_lengths(light, size);
   light.intensity = candela / candela_of_unit(light);
-  const bool is_far = light.type == LightType::kDirectional;
+  const bool is_far = !lamp_kind(light.type).has_place();
   // Candela are not lux: begin with what is bright indoors.
   if (was_far != is_far) light.intensity = is_far ? 1000 : 100 / candela_of_unit(light);
 }
 
 void edit_size(Light& light, float step) {
   constexpr float kSmallest = 1e-3F, kLargest = 1e4F;
-  if (light.type == LightType::kRectangle) {
-    ImGui::DragFloat2("size", light.size.data(), step, kSmallest, kLargest, "%.2f m",
-                      ImGuiSliderFlags_AlwaysClamp);
-    ImGui::DragFloat3("first side", light.tangent.data(), 0.01F, -1, 1, "%.2f");
-  } else if (is_area_light(light.type)) {
-    ImGui::DragFloat("radius", &light.radius, step, kSmallest, kLargest, "%.2f m",
-                     ImGuiSliderFlags_AlwaysClamp);
+  for (const LampField* field : lamp_kind(light.type).fields) {
+    const std::span<float> values = field->values(light);
+    if (field->rule == FieldRule::kLength) {
+      ImGui::DragScalarN(field->label, ImGuiDataType_Float, values.data(),
+                         static_cast<int>(values.size()), step, &kSmallest, &kLargest, "%.2f m",
+                         ImGuiSliderFlags_AlwaysClamp);
+    } else if (field->rule == FieldRule::kAcross) {
+      ImGui::DragFloat3(field->label, values.data(), 0.01F, -1, 1, "%.2f");
+    }
   }
 }
 
@@ -181,22 +194,22 @@ void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size) {
   const float step = kStepPart * size;
   ImGui::Checkbox("on", &lamp.on);
   edit_type(light, size);
-  const bool is_far = light.type == LightType::kDirectional;
+  const LampKind& kind = lamp_kind(light.type);
   ImGui::ColorEdit3("colour", light.color.data(), ImGuiColorEditFlags_Float);
   ImGui::DragFloat("intensity", &light.intensity, 0.01F * std::max(light.intensity, 0.1F), 0, 1e9F,
-                   unit_of_intensity(light),
+                   ("%.1f " + std::string(kind.unit)).c_str(),
                    ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoRoundToFormat);
   edit_size(light, 0.2F * step);
-  if (!is_far && lamp.motion.kind == LightMotion::Kind::kStill) {
+  if (kind.has_place() && lamp.motion.kind == LightMotion::Kind::kStill) {
     ImGui::DragFloat3("position", light.position.data(), step, 0, 0, "%.2f");
   }
-  if (light.type != LightType::kPoint && light.type != LightType::kSphere) {
+  if (kind.uses(kDirection)) {
     edit_direction(light);
     if (ImGui::Button("Shine where I look")) light.direction = to_float3(camera.forward());
   }
   keep_first_side_across(light);
-  if (light.type == LightType::kSpot) edit_cone(light);
-  if (!is_far) edit_motion(light.position, lamp.motion, step);
+  if (kind.uses(kCone)) edit_cone(light);
+  if (kind.has_place()) edit_motion(light.position, lamp.motion, step);
 }
 
 void edit_sphere(ViewerSphere& sphere, float size) {

@@ -1,6 +1,6 @@
 #include "scene_renderer.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "lamp_shader.h"
+#include "lights/lamp_kind.h"
 #include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/sky_light.h"
 #include "rebounce/transfer/error.h"
 #include "shaders.h"
@@ -19,9 +19,7 @@
 namespace rebounce {
 namespace {
 
-constexpr int kSamples = 4;   // per pixel
-constexpr int kFlatLamp = 4;  // lamp_type of rectangles and discs, the first of them
-constexpr int kDiscCorners = 24;
+constexpr int kSamples = 4;         // per pixel
 constexpr float kNearPart = 2e-4F;  // of the scene's diagonal
 
 void check_complete() {
@@ -65,7 +63,7 @@ SceneRenderer::SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh)
       spheres_(scene),
       lamp_surfaces_(scene),
       ambient_(shaders::kSceneVertex, shaders::kAmbientFragment),
-      lamp_(shaders::kSceneVertex, shaders::kLampFragment),
+      lamp_(shaders::kSceneVertex, shaders::lamp_fragment().c_str()),
       patch_(shaders::kSceneVertex, shaders::kPatchFragment),
       shadow_(shaders::kShadowVertex, shaders::kShadowFragment),
       screen_(shaders::kScreenVertex, shaders::kScreenFragment),
@@ -244,32 +242,32 @@ void SceneRenderer::draw_lamp_surfaces() const {
 
 void SceneRenderer::draw_lamp(const Light& light, const ShadowMap& shadow) {
   shadow.bind(lamp_);
-  lamp_.set("lamp_type", std::min(static_cast<int>(light.type), kFlatLamp));
+  lamp_.set("lamp_type", static_cast<int>(light.type));
+  lamp_.set("shadow_map", static_cast<int>(lamp_kind(light.type).shadow_map));
   lamp_.set("lamp_position", to_glm(light.position));
   lamp_.set("lamp_direction", to_glm(light.direction));
   lamp_.set("lamp_color", to_glm(light.color) * light.intensity);
   lamp_.set("lamp_range", light.range);
   lamp_.set("cos_inner", std::cos(light.inner_cone_angle));
   lamp_.set("cos_outer", std::cos(light.outer_cone_angle));
-  if (is_area_light(light.type)) set_lamp_surface(light);
+  if (lamp_kind(light.type).surface != nullptr) set_lamp_surface(PreparedLight(light));
   scene_.draw_materials(lamp_, Side::kFirst);
   spheres_.draw(lamp_, Side::kFirst);
 }
 
-void SceneRenderer::set_lamp_surface(const Light& light) const {
-  lamp_.set("lamp_radius", light.radius);
-  const auto places = places_on_lamp(light);
+void SceneRenderer::set_lamp_surface(const PreparedLight& lamp) const {
+  lamp_.set("lamp_radius", lamp.radius);
+  lamp_.set("lamp_side", lamp.side);
+  lamp_.set("lamp_other_side", lamp.other_side);
+  std::array<glm::vec3, kLampPlaceCount> places;
+  for (std::uint32_t k = 0; k < kLampPlaceCount; ++k) {
+    places[k] = lamp.kind->surface->place(lamp, k, kLampPlaceCount);
+  }
   lamp_.set("lamp_places", std::span<const glm::vec3>(places));
   // Parts overlap, so that the edges of their shadows run into one another.
   constexpr float kOverlap = 1.5F;
-  lamp_.set("place_reach",
-            kOverlap * std::sqrt(area_of_lamp(light) /
-                                 (std::numbers::pi_v<float> * static_cast<float>(places.size()))));
-  if (light.type == LightType::kSphere) return;
-  const auto [side, other_side] = flat_lamp_axes(light);
-  lamp_.set("lamp_side", to_glm(side));
-  lamp_.set("lamp_other_side", to_glm(other_side));
-  lamp_.set("lamp_corners", light.type == LightType::kRectangle ? 4 : kDiscCorners);
+  lamp_.set("place_reach", kOverlap * std::sqrt(lamp.area / (std::numbers::pi_v<float> *
+                                                             static_cast<float>(places.size()))));
 }
 
 void SceneRenderer::draw_patches(const FrameSettings& frame, const glm::mat4& view) {

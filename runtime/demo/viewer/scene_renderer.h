@@ -10,6 +10,7 @@
 #include "gl_program.h"
 #include "gpu_bodies.h"
 #include "gpu_scene.h"
+#include "lights/prepared_light.h"
 #include "rebounce/demo/image_file.h"
 #include "rebounce/demo/picture.h"
 #include "shadow_map.h"
@@ -53,7 +54,7 @@ class SceneRenderer {
   void draw_light(const FrameSettings& frame, const glm::mat4& view);
   void draw_lamp_surfaces() const;
   void draw_lamp(const Light& light, const ShadowMap& shadow);
-  void set_lamp_surface(const Light& light) const;
+  void set_lamp_surface(const PreparedLight& lamp) const;
   void draw_patches(const FrameSettings& frame, const glm::mat4& view);
   int split_column(const FrameSettings& frame) const;
   void draw_divider(int column) const;

@@ -5,9 +5,9 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 
-#include "body_mesh.h"
+#include "lamp_shader.h"
+#include "lights/lamp_kind.h"
 #include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/light_sampling.h"
 #include "rebounce/runtime/sampling.h"
 
 namespace rebounce {
@@ -54,12 +54,10 @@ void allocate_layers(int side, int count) {
                GL_DEPTH_COMPONENT, GL_FLOAT, nullptr);
 }
 
-/// Which of the maps a light takes.
-enum class MapKind : std::uint8_t { kCube, kPlane, kPlaces };
+using MapKind = ShadowMapKind;
 
 MapKind kind_of(const Light& light) {
-  if (is_area_light(light.type)) return MapKind::kPlaces;
-  return light.type == LightType::kDirectional ? MapKind::kPlane : MapKind::kCube;
+  return lamp_kind(light.type).shadow_map;
 }
 
 bool casts_alike(const Light& a, const Light& b) {
@@ -173,7 +171,9 @@ void ShadowMap::draw_places(const Light& light, const ShadowCasters& casters,
   }
   set_reach(to_glm(light.position), casters.bounds);
   int layer = 0;
-  for (const glm::vec3& place : places_on_lamp(light)) {
+  const PreparedLight lamp(light);
+  for (std::uint32_t k = 0; k < kLampPlaceCount; ++k) {
+    const glm::vec3 place = lamp.kind->surface->place(lamp, k, kLampPlaceCount);
     draw_faces(to_glm(light.position) + place, kPlaceSide, casters, program, [&](const CubeFace&) {
       glFramebufferTextureLayer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, places_.name(), 0, layer++);
     });

@@ -30,7 +30,7 @@ struct ShadowCasters {
 };
 
 /// What one lamp sees: a cube of depths around a point or spot light, one plane for a directional
-/// one, cubes around all of its places (body_mesh.h) for one with a surface. Drawn anew only when
+/// one, cubes around all of its places for one with a surface. Drawn anew only when
 /// the lamp or a caster has moved.
 class ShadowMap {
  public:
@@ -38,7 +38,7 @@ class ShadowMap {
   void update(const Light& light, const ShadowCasters& casters, const GlProgram& program);
 
   /// Binds the map to texture units 2 (cube), 3 (plane), 4 and 5 (places) and sets the
-  /// uniforms of shaders::kLampFragment that say how to look it up.
+  /// uniforms of shaders::lamp_fragment() that say how to look it up.
   void bind(const GlProgram& program) const;
 
   ShadowMap();

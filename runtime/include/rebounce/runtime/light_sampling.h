@@ -12,17 +12,21 @@ struct IncidentLight {
 };
 
 /// True for lamps that have a surface, whose light comes from many directions.
-inline bool is_area_light(LightType type) {
-  return type == LightType::kSphere || type == LightType::kRectangle || type == LightType::kDisc;
+bool is_area_light(LightType type);
+
+/// How far along the way to a lamp at `distance` a shadow ray goes: it ends a little before the
+/// lamp, which may hang on a surface or lie on one. Infinite if `distance` is.
+inline float shadow_ray_length(float distance) {
+  constexpr float kLampGap = 1e-4F;
+  return distance * (1 - kLampGap);
 }
 
 /// Evaluates `light` at `point`: inverse-square fall-off, range window and spot cone as
 /// KHR_lights_punctual defines them, times the candelas of its profile if it has one.
 ///
 /// Of a lamp with a surface, `place` in [0, 1)² is where the light comes from; the mean over all
-/// places of illuminance times cosine is its irradiance. Spheres are sampled by the cone in which
-/// they are seen (C. Wang, "Direct lighting models for ray tracing with cylindrical lamps", 1992),
-/// rectangles and discs by their area. The range window is then that of the lamp's middle.
+/// places of illuminance times cosine is its irradiance. The range window is then that of the
+/// lamp's middle.
 IncidentLight evaluate_light(const Light& light, const Float3& point,
                              const Float2& place = {0.5F, 0.5F});
 

@@ -1,0 +1,42 @@
+#include <limits>
+
+#include "lights/lamp_kind.h"
+#include "rebounce.h"
+#include "rebounce/runtime/float3_glm.h"
+
+namespace rebounce {
+namespace {
+
+static_assert(static_cast<int>(LightType::kDirectional) == REBOUNCE_LIGHT_DIRECTIONAL);
+
+constexpr const LampField* kFields[] = {&kDirection, &kColor, &kIntensity};
+
+void prepare(const Light& light, PreparedLight& lamp) {
+  lamp.direction = to_glm(light.direction);
+}
+
+UnitLight evaluate(const PreparedLight& lamp, const glm::vec3&) {
+  return {-lamp.direction, std::numeric_limits<float>::infinity(), 1};
+}
+
+constexpr const char* kGlsl = R"(
+float directional_irradiance(vec3 to_lamp, vec3 direction, vec3 normal) {
+  return max(0.0, dot(normal, direction));
+}
+)";
+
+}  // namespace
+
+extern const LampKind kDirectionalLamp;
+constinit const LampKind kDirectionalLamp{.type = LightType::kDirectional,
+                                          .name = "directional",
+                                          .plural = "directional lights",
+                                          .unit = "lx",
+                                          .fields = kFields,
+                                          .shadow_map = ShadowMapKind::kPlane,
+                                          .prepare = prepare,
+                                          .evaluate = evaluate,
+                                          .surface = nullptr,
+                                          .glsl = kGlsl};
+
+}  // namespace rebounce

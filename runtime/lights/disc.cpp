@@ -1,0 +1,185 @@
+// One-sided, of uniform luminance; sampled by its area. The form factor is an integral around the
+// rim (Stokes: E. Sparrow, "A new and simpler formulation for radiative angle factors", 1963),
+// which is elementary for an arc of a circle; the chord where a horizon cuts the disc is Lambert's
+// term for an edge.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "lights/lamp_geometry.h"
+#include "lights/lamp_kind.h"
+#include "rebounce.h"
+#include "rebounce/runtime/float3_glm.h"
+#include "rebounce/runtime/sampling.h"
+
+namespace rebounce {
+namespace {
+
+static_assert(static_cast<int>(LightType::kDisc) == REBOUNCE_LIGHT_DISC);
+
+constexpr const LampField* kFields[] = {&kPosition,  &kDirection, &kColor,
+                                        &kIntensity, &kRange,     &kRadius};
+
+void prepare(const Light& light, PreparedLight& lamp) {
+  lamp.direction = to_glm(light.direction);
+  lamp.radius = light.radius;
+  const auto [side, other_side] = sides_around(lamp.direction, least_axis(lamp.direction));
+  lamp.side = lamp.radius * side;
+  lamp.other_side = lamp.radius * other_side;
+  lamp.area = std::numbers::pi_v<float> * lamp.radius * lamp.radius;
+}
+
+void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
+                     std::span<const glm::vec2> places, std::span<UnitLight> light) {
+  const glm::vec3 to_center = lamp.position - point;
+  const float area = lamp.area * lamp.range_window(glm::dot(to_center, to_center));
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    // From the unit square to the unit disc (Shirley and Chiu 1997).
+    const glm::vec2 at(square_to_cosine_hemisphere(places[k]));
+    light[k] = from_flat_place(lamp, to_center, area, at);
+  }
+}
+
+constexpr double kPi = std::numbers::pi;
+
+// Below this the distance to the rim is as good as constant: the formula for that is exact to its
+// square, the other loses its reciprocal in roundings.
+constexpr double kSmallEccentricity = 1e-7;
+
+/// The rim center + radius (cos(t) u + sin(t) v), as seen from the origin.
+class Rim {
+ public:
+  Rim(const glm::dvec3& center, const glm::dvec3& normal, const glm::dvec3& axis, double radius)
+      : center_(center), radius_(radius) {
+    const glm::dvec3 off_axis = center - glm::dot(center, axis) * axis;
+    const double distance = glm::length(off_axis);
+    const glm::dvec3 least = std::abs(axis.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
+    u_ = distance > 0 ? off_axis / distance : glm::normalize(glm::cross(axis, least));
+    v_ = glm::cross(axis, u_);
+    // normal . (r x dr/dt) = a + b cos t + c sin t,  |r|² = d + e cos t
+    a_ = radius * radius * glm::dot(normal, axis);
+    b_ = radius * glm::dot(normal, glm::cross(center, v_));
+    c_ = -radius * glm::dot(normal, glm::cross(center, u_));
+    d_ = glm::dot(center, center) + radius * radius;
+    e_ = 2 * radius * glm::dot(center, u_);
+  }
+
+  glm::dvec3 at(double t) const {
+    return center_ + radius_ * (std::cos(t) * u_ + std::sin(t) * v_);
+  }
+
+  /// Height above a horizon through the origin is height(t) = h + amplitude cos(t - turn).
+  double amplitude(const glm::dvec3& normal) const {
+    return radius_ * std::hypot(glm::dot(normal, u_), glm::dot(normal, v_));
+  }
+  double turn(const glm::dvec3& normal) const {
+    return std::atan2(glm::dot(normal, v_), glm::dot(normal, u_));
+  }
+
+  /// The integral of normal . (r x dr) / |r|² from `begin` to `end`, by at most a whole turn.
+  double integral(double begin, double end) const {
+    const double shift = 2 * kPi * std::floor((begin + kPi) / (2 * kPi));
+    begin -= shift;
+    end -= shift;
+    if (end <= kPi) return primitive(end) - primitive(begin);
+    return primitive(kPi) - primitive(begin) + primitive(end - 2 * kPi) - primitive(-kPi);
+  }
+
+ private:
+  /// For t in [-pi, pi].
+  double primitive(double t) const {
+    if (e_ < kSmallEccentricity * d_) return (a_ * t + b_ * std::sin(t) - c_ * std::cos(t)) / d_;
+    const double angle =
+        std::atan2(std::sqrt(d_ - e_) * std::sin(t / 2), std::sqrt(d_ + e_) * std::cos(t / 2));
+    return b_ / e_ * t + (a_ - b_ * d_ / e_) * 2 * angle / std::sqrt(d_ * d_ - e_ * e_) -
+           c_ / e_ * std::log(d_ + e_ * std::cos(t));
+  }
+
+  glm::dvec3 center_, u_, v_;
+  double radius_, a_, b_, c_, d_, e_;
+};
+
+/// Lambert's term for the edge from `a` to `b`.
+double edge_integral(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& normal) {
+  const glm::dvec3 axis = glm::cross(a, b);
+  const double sine = glm::length(axis);
+  return sine > 0 ? std::atan2(sine, glm::dot(a, b)) * glm::dot(axis, normal) / sine : 0.0;
+}
+
+float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal) {
+  const glm::vec3 to_center = lamp.position - point;
+  if (glm::dot(to_center, lamp.direction) >= 0) return 0;  // behind it, or in its plane
+  const glm::dvec3 center(to_center), up(normal);
+  const Rim rim(center, up, glm::dvec3(lamp.direction), lamp.radius);
+  const double height = glm::dot(center, up), amplitude = rim.amplitude(up);
+  if (height <= -amplitude) return 0;
+  double sum = 0;
+  if (height >= amplitude) {
+    sum = rim.integral(-kPi, kPi);
+  } else {
+    const double turn = rim.turn(up), half = std::acos(-height / amplitude);
+    sum = rim.integral(turn - half, turn + half) +
+          edge_integral(rim.at(turn + half), rim.at(turn - half), up);
+  }
+  return static_cast<float>(std::clamp(std::abs(sum) / (2 * kPi), 0.0, 1.0));
+}
+
+glm::vec3 highest_point(const PreparedLight& lamp, const glm::vec3& normal) {
+  const glm::vec3 up = normal - glm::dot(normal, lamp.direction) * lamp.direction;
+  const float length = glm::length(up);
+  return length > 0 ? lamp.position + lamp.radius / length * up : lamp.position;
+}
+
+glm::vec3 place(const PreparedLight& lamp, std::uint32_t k, std::uint32_t count) {
+  const float part = (static_cast<float>(k) + 0.5F) / static_cast<float>(count);
+  return from_middle(lamp, std::sqrt(part) * golden_turn(k));
+}
+
+LampMesh mesh(const PreparedLight& lamp) {
+  std::array<glm::vec2, 96> rim;
+  for (std::size_t k = 0; k < rim.size(); ++k) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k) / rim.size();
+    rim[k] = {std::cos(angle), std::sin(angle)};
+  }
+  return flat_mesh(lamp, rim);
+}
+
+float candela(const PreparedLight& lamp) {
+  return lamp.area;
+}
+
+// A polygon of many corners.
+constexpr const char* kGlsl = R"(
+float disc_irradiance(vec3 to_center, vec3 direction, vec3 normal) {
+  return flat_irradiance(to_center, normal, 24);
+}
+
+vec3 disc_normal(vec3 place) { return lamp_direction; }
+)";
+
+constexpr LampSurface kSurface{.evaluate_places = evaluate_places,
+                               .form_factor = form_factor,
+                               .highest_point = highest_point,
+                               .place = place,
+                               .mesh = mesh,
+                               .candela = candela,
+                               .punctual = LightType::kSpot};
+
+}  // namespace
+
+extern const LampKind kDiscLamp;
+constinit const LampKind kDiscLamp{.type = LightType::kDisc,
+                                   .name = "disc",
+                                   .plural = "discs",
+                                   .unit = "cd/m2",
+                                   .fields = kFields,
+                                   .shadow_map = ShadowMapKind::kPlaces,
+                                   .prepare = prepare,
+                                   .evaluate = nullptr,
+                                   .surface = &kSurface,
+                                   .glsl = kGlsl,
+                                   .shared_glsl = kFlatGlsl};
+
+}  // namespace rebounce

@@ -1,0 +1,105 @@
+#pragma once
+
+// The fields of Light, once each: what LIGHTS.json calls them and which values they may have. Kinds
+// of lamps (lamp_kind.h) list those that they use; a field that only one kind has may stand in its
+// file.
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string_view>
+
+#include "rebounce/transfer/scene_description.h"
+
+namespace rebounce {
+
+enum class FieldRule : std::uint8_t {
+  kFinite,       ///< any numbers
+  kNotNegative,  ///< each at least 0
+  kLength,       ///< metres, each above 0; has no default
+  kUnitVector,
+  kAcross,   ///< a vector that is not along the light's direction
+  kCone,     ///< inner and outer angle, radians: 0 <= inner <= outer <= pi / 2
+  kProfile,  ///< an IntensityProfile, or none
+};
+
+struct LampField {
+  std::string_view name;   ///< in messages
+  const char* label = "";  ///< of its control in the viewer; of lengths and vectors across
+  /// In LIGHTS.json: one for all of its values, or one for each.
+  std::array<std::string_view, 2> json;
+  FieldRule rule;
+  std::span<float> (*values)(Light& light);
+  /// LIGHTS.json may give it to kinds that do not use it.
+  bool is_common = false;
+
+  std::size_t json_count() const { return json[1].empty() ? 1 : 2; }
+};
+
+inline constexpr LampField kPosition{
+    .name = "position",
+    .json = {"position"},
+    .rule = FieldRule::kFinite,
+    .values = [](Light& light) { return std::span<float>(light.position); },
+    .is_common = true};
+inline constexpr LampField kDirection{
+    .name = "direction",
+    .json = {"direction"},
+    .rule = FieldRule::kUnitVector,
+    .values = [](Light& light) { return std::span<float>(light.direction); },
+    .is_common = true};
+inline constexpr LampField kColor{
+    .name = "color",
+    .json = {"color"},
+    .rule = FieldRule::kNotNegative,
+    .values = [](Light& light) { return std::span<float>(light.color); },
+    .is_common = true};
+inline constexpr LampField kIntensity{
+    .name = "intensity",
+    .json = {"intensity"},
+    .rule = FieldRule::kNotNegative,
+    .values = [](Light& light) { return std::span<float>(&light.intensity, 1); },
+    .is_common = true};
+inline constexpr LampField kRange{
+    .name = "range",
+    .json = {"range"},
+    .rule = FieldRule::kNotNegative,
+    .values = [](Light& light) { return std::span<float>(&light.range, 1); },
+    .is_common = true};
+inline constexpr LampField kCone{.name = "cone angle",
+                                 .json = {"spot"},
+                                 .rule = FieldRule::kCone,
+                                 .values = [](Light&) { return std::span<float>(); },
+                                 .is_common = true};
+inline constexpr LampField kRadius{
+    .name = "radius",
+    .label = "radius",
+    .json = {"radius"},
+    .rule = FieldRule::kLength,
+    .values = [](Light& light) { return std::span<float>(&light.radius, 1); }};
+inline constexpr LampField kSize{
+    .name = "size",
+    .label = "size",
+    .json = {"width", "height"},
+    .rule = FieldRule::kLength,
+    .values = [](Light& light) { return std::span<float>(light.size); }};
+/// Of kinds that need one; a profile brings its own.
+inline constexpr LampField kTangent{
+    .name = "tangent",
+    .label = "first side",
+    .json = {"tangent"},
+    .rule = FieldRule::kAcross,
+    .values = [](Light& light) { return std::span<float>(light.tangent); }};
+inline constexpr LampField kProfile{
+    .name = "profile", .json = {"ies"}, .rule = FieldRule::kProfile, .values = [](Light&) {
+      return std::span<float>();
+    }};
+
+/// Those of every kind, and those that LIGHTS.json may give to every kind.
+inline constexpr std::array kCommonFields = {&kPosition,  &kDirection, &kColor,
+                                             &kIntensity, &kRange,     &kCone};
+
+/// Throws Error that names the field if `light` breaks its rule.
+void check_field(const Light& light, const LampField& field);
+
+}  // namespace rebounce

@@ -1,0 +1,75 @@
+#pragma once
+
+// All that differs from one kind of lamp to another, in one record each. To add a kind: a
+// LightType, a file beside this one that defines its record, and a case in lamp_kind.cpp.
+
+#include <glm/glm.hpp>
+#include <span>
+#include <string_view>
+
+#include "lights/lamp_field.h"
+#include "lights/lamp_mesh.h"
+#include "lights/prepared_light.h"
+
+namespace rebounce {
+
+/// The depths that a rasteriser keeps to find what a lamp sees.
+enum class ShadowMapKind : std::uint8_t {
+  kCube,    ///< around the lamp's position
+  kPlane,   ///< seen from infinitely far, along its direction
+  kPlaces,  ///< cubes around places all over its surface
+};
+
+/// What only lamps with a surface have.
+struct LampSurface {
+  /// As PreparedLight::evaluate_places.
+  void (*evaluate_places)(const PreparedLight& lamp, const glm::vec3& point,
+                          std::span<const glm::vec2> places, std::span<UnitLight> light);
+  /// From a differential element to what shines on it, cut at the element's horizon.
+  float (*form_factor)(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal);
+  /// As PreparedLight::highest_point.
+  glm::vec3 (*highest_point)(const PreparedLight& lamp, const glm::vec3& normal);
+
+  /// From its middle to place k of `count` that are spread evenly over it.
+  glm::vec3 (*place)(const PreparedLight& lamp, std::uint32_t k, std::uint32_t count);
+  /// Triangles, seen from where it shines.
+  LampMesh (*mesh)(const PreparedLight& lamp);
+  /// Candela straight ahead at intensity 1, seen from afar.
+  float (*candela)(const PreparedLight& lamp);
+  /// Of KHR_lights_punctual, a point or a spot over its half-space: what comes nearest to it.
+  LightType punctual;
+};
+
+struct LampKind {
+  LightType type;
+  std::string_view name;                     ///< in LIGHTS.json and in the viewer
+  std::string_view plural;                   ///< in messages
+  std::string_view unit;                     ///< of its intensity
+  std::span<const LampField* const> fields;  ///< that it uses
+  ShadowMapKind shadow_map;
+
+  /// Fills in what `lamp`, which has its place and range, needs besides.
+  void (*prepare)(const Light& light, PreparedLight& lamp);
+  /// As PreparedLight::evaluate; null if there is a surface.
+  UnitLight (*evaluate)(const PreparedLight& lamp, const glm::vec3& point);
+  const LampSurface* surface;  ///< null if there is none
+
+  /// GLSL 3.30 of the viewer: `float NAME_irradiance(vec3 to_lamp, vec3 direction, vec3 normal)`,
+  /// what arrives at intensity 1 where nothing is in between, but for the range; of lamps with a
+  /// surface also `vec3 NAME_normal(vec3 place)`, its normal at a place seen from its middle.
+  /// Uniforms: lamp_direction, lamp_radius, lamp_side, lamp_other_side (as PreparedLight has them),
+  /// cos_inner, cos_outer; constant kPi.
+  const char* glsl;
+  const char* shared_glsl = "";  ///< comes before it, once for all kinds that name the same
+
+  bool uses(const LampField& field) const;
+  bool has_place() const { return uses(kPosition); }
+};
+
+/// The record of `type`, which must be one of LightType.
+const LampKind& lamp_kind(LightType type);
+
+/// All of them, in the order of LightType.
+std::span<const LampKind* const> lamp_kinds();
+
+}  // namespace rebounce

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <vector>
+
+#include "rebounce/transfer/types.h"
+
+namespace rebounce {
+
+/// Triangles of a lamp's surface, counter-clockwise seen from where it shines.
+struct LampMesh {
+  std::vector<Float3> position, normal;  ///< [v] metres in the world; unit
+  std::vector<Uint3> triangle;
+};
+
+/// The unit sphere around the origin, in circles of latitude.
+const LampMesh& unit_sphere();
+
+}  // namespace rebounce

@@ -1,0 +1,38 @@
+#include "lights/lamp_geometry.h"
+#include "lights/lamp_kind.h"
+#include "rebounce.h"
+
+namespace rebounce {
+namespace {
+
+static_assert(static_cast<int>(LightType::kPoint) == REBOUNCE_LIGHT_POINT);
+
+constexpr const LampField* kFields[] = {&kPosition, &kColor, &kIntensity, &kRange, &kProfile};
+
+UnitLight evaluate(const PreparedLight& lamp, const glm::vec3& point) {
+  UnitLight light = inverse_square(lamp, point);
+  apply_profile(lamp, light);
+  return light;
+}
+
+constexpr const char* kGlsl = R"(
+float point_irradiance(vec3 to_lamp, vec3 direction, vec3 normal) {
+  return max(0.0, dot(normal, direction)) / max(dot(to_lamp, to_lamp), 1e-12);
+}
+)";
+
+}  // namespace
+
+extern const LampKind kPointLamp;
+constinit const LampKind kPointLamp{.type = LightType::kPoint,
+                                    .name = "point",
+                                    .plural = "points",
+                                    .unit = "cd",
+                                    .fields = kFields,
+                                    .shadow_map = ShadowMapKind::kCube,
+                                    .prepare = prepare_profile,
+                                    .evaluate = evaluate,
+                                    .surface = nullptr,
+                                    .glsl = kGlsl};
+
+}  // namespace rebounce
