@@ -176,7 +176,7 @@ typedef void (*rebounce_parallel_for)(void* user, uint32_t count, rebounce_task 
 typedef struct rebounce_engine_settings {
   uint32_t struct_size;        /* sizeof(rebounce_engine_settings) */
   uint32_t points_per_patch;   /* at which lamps are looked at; default 8; more: truer shadows */
-  uint32_t area_light_samples; /* of spheres and rectangles, for each point; default 4, most 64 */
+  uint32_t area_light_samples; /* of lamps with a surface, for each point; default 4, most 64 */
   uint32_t light_capacity; /* lights for which there is room at once; default 16. The first frame
                               with more makes the room it lacks, the only one that allocates */
   rebounce_parallel_for parallel_for; /* shares out the loops of the frames and outputs of the

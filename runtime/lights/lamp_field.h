@@ -25,7 +25,7 @@ enum class FieldRule : std::uint8_t {
 
 struct LampField {
   std::string_view name;   ///< in messages
-  const char* label = "";  ///< of its control in the viewer; of lengths and vectors across
+  const char* label = "";  ///< of its control in the viewer; of lengths and directions
   /// In LIGHTS.json: one for all of its values, or one for each.
   std::array<std::string_view, 2> json;
   FieldRule rule;
@@ -44,6 +44,7 @@ inline constexpr LampField kPosition{
     .is_common = true};
 inline constexpr LampField kDirection{
     .name = "direction",
+    .label = "direction",
     .json = {"direction"},
     .rule = FieldRule::kUnitVector,
     .values = [](Light& light) { return std::span<float>(light.direction); },

@@ -116,7 +116,15 @@ void edit_type(Light& light, float size) {
   if (was_far != is_far) light.intensity = is_far ? 1000 : 100 / candela_of_unit(light);
 }
 
-void edit_size(Light& light, float step) {
+void edit_unit_vector(const LampField& field, Light& light) {
+  const std::span<float> v = field.values(light);
+  if (!ImGui::DragFloat3(field.label, v.data(), 0.01F, -1, 1, "%.2f")) return;
+  const glm::vec3 given(v[0], v[1], v[2]);
+  const float length = glm::length(given);
+  std::ranges::copy(length > 1e-3F ? to_float3(given / length) : Float3{0, -1, 0}, v.begin());
+}
+
+void edit_shape(Light& light, float step) {
   constexpr float kSmallest = 1e-3F, kLargest = 1e4F;
   for (const LampField* field : lamp_kind(light.type).fields) {
     const std::span<float> values = field->values(light);
@@ -126,6 +134,8 @@ void edit_size(Light& light, float step) {
                          ImGuiSliderFlags_AlwaysClamp);
     } else if (field->rule == FieldRule::kAcross) {
       ImGui::DragFloat3(field->label, values.data(), 0.01F, -1, 1, "%.2f");
+    } else if (field->rule == FieldRule::kUnitVector && field != &kDirection) {
+      edit_unit_vector(*field, light);
     }
   }
 }
@@ -135,17 +145,6 @@ void keep_first_side_across(Light& light) {
   const glm::vec3 direction = to_glm(light.direction), tangent = to_glm(light.tangent);
   if (glm::length(glm::cross(direction, tangent)) > 1e-2F * glm::length(tangent)) return;
   light.tangent = std::abs(direction.x) < 0.9F ? Float3{1, 0, 0} : Float3{0, 0, 1};
-}
-
-void edit_direction(Light& light) {
-  if (ImGui::DragFloat3("direction", light.direction.data(), 0.01F, -1, 1, "%.2f")) {
-    const float length = glm::length(to_glm(light.direction));
-    if (length > 1e-3F) {
-      light.direction = to_float3(to_glm(light.direction) / length);
-    } else {
-      light.direction = {0, -1, 0};
-    }
-  }
 }
 
 void edit_cone(Light& light) {
@@ -199,15 +198,15 @@ void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size) {
   ImGui::DragFloat("intensity", &light.intensity, 0.01F * std::max(light.intensity, 0.1F), 0, 1e9F,
                    ("%.1f " + std::string(kind.unit)).c_str(),
                    ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoRoundToFormat);
-  edit_size(light, 0.2F * step);
+  edit_shape(light, 0.2F * step);
   if (kind.has_place() && lamp.motion.kind == LightMotion::Kind::kStill) {
     ImGui::DragFloat3("position", light.position.data(), step, 0, 0, "%.2f");
   }
   if (kind.uses(kDirection)) {
-    edit_direction(light);
+    edit_unit_vector(kDirection, light);
     if (ImGui::Button("Shine where I look")) light.direction = to_float3(camera.forward());
   }
-  keep_first_side_across(light);
+  if (kind.uses(kTangent) || light.profile) keep_first_side_across(light);
   if (kind.uses(kCone)) edit_cone(light);
   if (kind.has_place()) edit_motion(light.position, lamp.motion, step);
 }
