@@ -1,4 +1,4 @@
-#include "asked_table.h"
+#include "bench/asked_table.h"
 
 namespace rebounce::bench {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "table.h"
+#include "bench/table.h"
 
 namespace rebounce::bench {
 

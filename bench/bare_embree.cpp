@@ -1,13 +1,13 @@
 // With runtime/ray_tracer.cpp, the only file that knows Embree.
 
-#include "bare_embree.h"
+#include "bench/bare_embree.h"
 
 #include <embree3/rtcore.h>
 
 #include <algorithm>
 #include <bit>
 
-#include "rebounce/transfer/error.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

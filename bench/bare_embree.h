@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "rebounce/transfer/transfer_data.h"
-#include "stage_rays.h"
+#include "bench/stage_rays.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::bench {
 

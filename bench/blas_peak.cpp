@@ -1,10 +1,10 @@
-#include "blas_peak.h"
+#include "bench/blas_peak.h"
 
 #include <omp.h>
 
 #include <Eigen/Core>
 
-#include "blas.h"
+#include "precompute/base/blas.h"
 
 namespace rebounce::bench {
 

@@ -1,8 +1,8 @@
-#include "bounced_light.h"
+#include "bench/bounced_light.h"
 
 #include <vector>
 
-#include "rebounce/transfer/reflection.h"
+#include "transfer/base/reflection.h"
 
 namespace rebounce::bench {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "rebounce/precompute/fitting_lights.h"
-#include "rebounce/transfer/form_factor_operator.h"
-#include "rebounce/transfer/transfer_data.h"
+#include "precompute/lights/fitting_lights.h"
+#include "transfer/exchange/form_factor_operator.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::bench {
 

@@ -1,13 +1,13 @@
-#include "closed_forms.h"
+#include "bench/closed_forms.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "exchange_error.h"
-#include "form_factor_sums.h"
-#include "known_form_factors.h"
-#include "named_quality.h"
-#include "rebounce/precompute/patch_geometry.h"
+#include "bench/exchange_error.h"
+#include "bench/known_form_factors.h"
+#include "bench/named_quality.h"
+#include "precompute/exchange/pairs/patch_geometry.h"
+#include "tests/support/form_factor_sums.h"
 
 namespace rebounce::bench {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "asked_table.h"
+#include "bench/asked_table.h"
 
 namespace rebounce::bench {
 

@@ -1,11 +1,11 @@
-#include "exchange_error.h"
+#include "bench/exchange_error.h"
 
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
-#include "cluster_tree.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "precompute/patches/cluster_tree.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce::bench {
 namespace {

@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/precompute/patch_model.h"
-#include "rebounce/transfer/exchange_matrix.h"
+#include "precompute/patches/patch_model.h"
+#include "transfer/exchange/exchange_matrix.h"
 
 namespace rebounce::bench {
 

@@ -1,11 +1,11 @@
-#include "exchange_reference.h"
+#include "bench/exchange_reference.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "escape.h"
-#include "hemisphere_exchange.h"
-#include "shadow_rays.h"
+#include "precompute/exchange/pairs/escape.h"
+#include "precompute/exchange/pairs/hemisphere_exchange.h"
+#include "precompute/exchange/pairs/shadow_rays.h"
 
 namespace rebounce::bench {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "rebounce/precompute/form_factors.h"
+#include "precompute/exchange/pairs/form_factors.h"
 
 namespace rebounce::bench {
 

@@ -1,12 +1,12 @@
-#include "form_factor_scaling.h"
+#include "bench/form_factor_scaling.h"
 
 #include <cmath>
 
-#include "input.h"
-#include "process_cost.h"
-#include "rebounce/precompute/form_factors.h"
-#include "rebounce/precompute/links.h"
-#include "timing.h"
+#include "bench/input.h"
+#include "bench/process_cost.h"
+#include "bench/timing.h"
+#include "precompute/exchange/links/links.h"
+#include "precompute/exchange/pairs/form_factors.h"
 
 namespace rebounce::bench {
 namespace {

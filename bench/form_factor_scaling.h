@@ -4,7 +4,7 @@
 #include <span>
 #include <string>
 
-#include "asked_table.h"
+#include "bench/asked_table.h"
 
 namespace rebounce::bench {
 

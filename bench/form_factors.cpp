@@ -1,11 +1,11 @@
 // How exact form factors are: against closed forms and against a hundred times the rays; how fast
 // beside bare Embree; and how what they take grows with the number of patches.
 
-#include "closed_forms.h"
-#include "form_factor_scaling.h"
-#include "program.h"
-#include "rebounce/precompute/links.h"
-#include "scene_form_factors.h"
+#include "bench/closed_forms.h"
+#include "bench/form_factor_scaling.h"
+#include "bench/program.h"
+#include "bench/scene_form_factors.h"
+#include "precompute/exchange/links/links.h"
 
 namespace rebounce::bench {
 namespace {

@@ -5,17 +5,17 @@
 #include <algorithm>
 #include <memory>
 
-#include "input.h"
-#include "program.h"
-#include "rebounce/precompute/random_lights.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/runtime/octahedral_map.h"
-#include "rebounce/runtime/probe_irradiance.h"
-#include "rebounce/runtime/probe_light.h"
-#include "rebounce/runtime/surface_light.h"
-#include "rebounce/runtime/texel_light.h"
-#include "rebounce/runtime/vertex_light.h"
-#include "timing.h"
+#include "bench/input.h"
+#include "bench/program.h"
+#include "bench/timing.h"
+#include "precompute/lights/random_lights.h"
+#include "runtime/frame/engine.h"
+#include "runtime/outputs/octahedral_map.h"
+#include "runtime/outputs/probe_irradiance.h"
+#include "runtime/outputs/probe_light.h"
+#include "runtime/outputs/surface_light.h"
+#include "runtime/outputs/texel_light.h"
+#include "runtime/outputs/vertex_light.h"
 
 namespace rebounce::bench {
 namespace {

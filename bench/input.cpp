@@ -1,6 +1,6 @@
-#include "input.h"
+#include "bench/input.h"
 
-#include "rebounce/transfer/transfer_file.h"
+#include "transfer/file/transfer_file.h"
 
 namespace rebounce::bench {
 

@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <string>
 
-#include "rebounce/precompute/build.h"
-#include "rebounce/precompute/patch_model.h"
-#include "rebounce/transfer/transfer_data.h"
+#include "precompute/build/build.h"
+#include "precompute/patches/patch_model.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::bench {
 

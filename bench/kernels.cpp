@@ -6,11 +6,11 @@
 #include <random>
 #include <string>
 
-#include "half_float.h"
-#include "kernels.h"
-#include "machine.h"
-#include "rebounce/precompute/form_factor_kernel.h"
-#include "rebounce/transfer/dense_operator.h"
+#include "bench/machine.h"
+#include "precompute/exchange/pairs/form_factor_kernel.h"
+#include "transfer/base/half_float.h"
+#include "transfer/kernels/kernels.h"
+#include "transfer/operator/dense_operator.h"
 
 namespace rebounce::bench {
 namespace {

@@ -1,13 +1,13 @@
-#include "known_form_factors.h"
+#include "bench/known_form_factors.h"
 
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include "form_factor_sums.h"
-#include "rebounce/precompute/form_factor_kernel.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "view_factor_table.h"
+#include "precompute/exchange/pairs/form_factor_kernel.h"
+#include "runtime/rays/float3_glm.h"
+#include "tests/support/form_factor_sums.h"
+#include "tests/support/view_factor_table.h"
 
 namespace rebounce::bench {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "rebounce/precompute/scene.h"
+#include "precompute/import/scene.h"
 
 namespace rebounce::bench {
 

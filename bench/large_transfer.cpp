@@ -1,27 +1,27 @@
 // Operators without any matrix of all pairs: processor seconds of the stages, bytes and errors,
 // beside the way over the dense inverse of the same form factors where that is not too large.
 
-#include "rebounce/precompute/large_transfer.h"
+#include "precompute/compression/large_transfer.h"
 
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <numeric>
 
-#include "bounced_light.h"
-#include "hierarchical_matrix.h"
-#include "input.h"
-#include "linked_matrix.h"
-#include "process_cost.h"
-#include "program.h"
-#include "rebounce/precompute/dense_transfer.h"
-#include "rebounce/precompute/fitting_lights.h"
-#include "rebounce/precompute/form_factor_compression.h"
-#include "rebounce/precompute/links.h"
-#include "rebounce/precompute/random_lights.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/hierarchical_storage.h"
-#include "rebounce/transfer/reflection.h"
-#include "solved_transfer.h"
+#include "bench/bounced_light.h"
+#include "bench/input.h"
+#include "bench/process_cost.h"
+#include "bench/program.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/exchange/links/linked_matrix.h"
+#include "precompute/exchange/links/links.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "precompute/inverse/hierarchical_matrix.h"
+#include "precompute/inverse/solved_transfer.h"
+#include "precompute/lights/fitting_lights.h"
+#include "precompute/lights/random_lights.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/reflection.h"
+#include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce::bench {
 namespace {

@@ -1,16 +1,16 @@
-#include "light_changes.h"
+#include "bench/light_changes.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <glm/glm.hpp>
 
-#include "rebounce/precompute/random_lights.h"
-#include "rebounce/runtime/box.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/reflection.h"
+#include "precompute/lights/random_lights.h"
+#include "runtime/rays/box.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
+#include "transfer/base/reflection.h"
 
 namespace rebounce::bench {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "rebounce/runtime/direct_lighting.h"
-#include "rebounce/runtime/ray_tracer.h"
-#include "rebounce/transfer/transfer_data.h"
+#include "runtime/frame/direct_lighting.h"
+#include "runtime/rays/ray_tracer.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::bench {
 

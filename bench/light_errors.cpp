@@ -6,16 +6,16 @@
 #include <functional>
 #include <optional>
 
-#include "input.h"
-#include "lit_truth.h"
-#include "program.h"
-#include "rebounce/precompute/dense_transfer.h"
-#include "rebounce/precompute/measured_error.h"
-#include "rebounce/precompute/random_lights.h"
-#include "rebounce/precompute/reference_solution.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
-#include "symmetric_matrix.h"
+#include "bench/input.h"
+#include "bench/program.h"
+#include "precompute/base/symmetric_matrix.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "precompute/lights/lit_truth.h"
+#include "precompute/lights/measured_error.h"
+#include "precompute/lights/random_lights.h"
+#include "precompute/lights/reference_solution.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

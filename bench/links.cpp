@@ -6,15 +6,15 @@
 #include <cmath>
 #include <numeric>
 
-#include "escape.h"
-#include "input.h"
-#include "program.h"
-#include "rebounce/precompute/links.h"
-#include "rebounce/precompute/patch_geometry.h"
-#include "rebounce/runtime/box.h"
-#include "row_targets.h"
-#include "shadow_rays.h"
-#include "timing.h"
+#include "bench/input.h"
+#include "bench/program.h"
+#include "bench/timing.h"
+#include "precompute/exchange/links/links.h"
+#include "precompute/exchange/pairs/escape.h"
+#include "precompute/exchange/pairs/patch_geometry.h"
+#include "precompute/exchange/pairs/row_targets.h"
+#include "precompute/exchange/pairs/shadow_rays.h"
+#include "runtime/rays/box.h"
 
 namespace rebounce::bench {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "rebounce/precompute/form_factors.h"
+#include "precompute/exchange/pairs/form_factors.h"
 
 namespace rebounce::bench {
 

@@ -4,14 +4,14 @@
 #include <map>
 #include <optional>
 
-#include "blas_peak.h"
-#include "input.h"
-#include "program.h"
-#include "rebounce/precompute/build.h"
-#include "rebounce/transfer/error.h"
-#include "stage_speed.h"
-#include "tiled_cholesky.h"
-#include "timing.h"
+#include "bench/blas_peak.h"
+#include "bench/input.h"
+#include "bench/program.h"
+#include "bench/stage_speed.h"
+#include "bench/timing.h"
+#include "precompute/build/build.h"
+#include "precompute/inverse/tiled_cholesky.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

@@ -1,4 +1,4 @@
-#include "process_cost.h"
+#include "bench/process_cost.h"
 
 #include <ctime>
 #include <fstream>

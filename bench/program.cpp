@@ -1,12 +1,12 @@
-#include "program.h"
+#include "bench/program.h"
 
 #include <fmt/format.h>
 #include <omp.h>
 
 #include <exception>
 
-#include "machine.h"
-#include "rebounce/transfer/atomic_file.h"
+#include "bench/machine.h"
+#include "transfer/file/atomic_file.h"
 
 namespace rebounce::bench {
 namespace {

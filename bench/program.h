@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "table.h"
+#include "bench/table.h"
 
 namespace rebounce::bench {
 

@@ -1,11 +1,11 @@
-#include "read_buffer.h"
+#include "bench/read_buffer.h"
 
 #include <unistd.h>
 
 #include <algorithm>
 #include <vector>
 
-#include "timing.h"
+#include "bench/timing.h"
 
 namespace rebounce::bench {
 namespace {

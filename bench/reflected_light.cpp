@@ -1,4 +1,4 @@
-#include "reflected_light.h"
+#include "bench/reflected_light.h"
 
 #include <cmath>
 #include <cstddef>

@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "rebounce/transfer/types.h"
+#include "transfer/base/types.h"
 
 namespace rebounce::bench {
 

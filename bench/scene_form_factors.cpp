@@ -1,15 +1,15 @@
-#include "scene_form_factors.h"
+#include "bench/scene_form_factors.h"
 
 #include <cmath>
 #include <numbers>
 
-#include "exchange_error.h"
-#include "exchange_reference.h"
-#include "input.h"
-#include "named_quality.h"
-#include "rebounce/runtime/box.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "stage_speed.h"
+#include "bench/exchange_error.h"
+#include "bench/exchange_reference.h"
+#include "bench/input.h"
+#include "bench/named_quality.h"
+#include "bench/stage_speed.h"
+#include "runtime/rays/box.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce::bench {
 

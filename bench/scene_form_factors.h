@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "asked_table.h"
-#include "rebounce/precompute/patch_model.h"
-#include "rebounce/runtime/ray_tracer.h"
+#include "bench/asked_table.h"
+#include "precompute/patches/patch_model.h"
+#include "runtime/rays/ray_tracer.h"
 
 namespace rebounce::bench {
 

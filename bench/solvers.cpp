@@ -8,19 +8,19 @@
 #include <limits>
 #include <optional>
 
-#include "input.h"
-#include "light_changes.h"
-#include "program.h"
-#include "read_buffer.h"
-#include "rebounce/precompute/fitting_lights.h"
-#include "rebounce/precompute/form_factor_compression.h"
-#include "rebounce/runtime/solve_radiosity.h"
-#include "rebounce/transfer/compressed_form_factors.h"
-#include "rebounce/transfer/exchange_blocks.h"
-#include "rebounce/transfer/form_factor_blocks.h"
-#include "rebounce/transfer/linked_form_factors.h"
-#include "reflected_light.h"
-#include "timing.h"
+#include "bench/input.h"
+#include "bench/light_changes.h"
+#include "bench/program.h"
+#include "bench/read_buffer.h"
+#include "bench/reflected_light.h"
+#include "bench/timing.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/lights/fitting_lights.h"
+#include "runtime/solvers/solve_radiosity.h"
+#include "transfer/exchange/compressed_form_factors.h"
+#include "transfer/exchange/exchange_blocks.h"
+#include "transfer/exchange/form_factor_blocks.h"
+#include "transfer/exchange/linked_form_factors.h"
 
 namespace rebounce::bench {
 namespace {

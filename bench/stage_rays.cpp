@@ -1,11 +1,11 @@
-#include "stage_rays.h"
+#include "bench/stage_rays.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "escape.h"
-#include "raw_exchange.h"
-#include "shadow_rays.h"
+#include "precompute/exchange/pairs/escape.h"
+#include "precompute/exchange/pairs/raw_exchange.h"
+#include "precompute/exchange/pairs/shadow_rays.h"
 
 namespace rebounce::bench {
 namespace {

@@ -1,11 +1,11 @@
-#include "stage_speed.h"
+#include "bench/stage_speed.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "rebounce/transfer/error.h"
-#include "shadow_rays.h"
+#include "precompute/exchange/pairs/shadow_rays.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

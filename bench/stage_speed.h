@@ -4,9 +4,9 @@
 #include <memory>
 #include <string>
 
-#include "bare_embree.h"
-#include "rebounce/precompute/form_factors.h"
-#include "timing.h"
+#include "bench/bare_embree.h"
+#include "bench/timing.h"
+#include "precompute/exchange/pairs/form_factors.h"
 
 namespace rebounce::bench {
 

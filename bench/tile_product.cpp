@@ -1,4 +1,4 @@
-#include "tile_product.h"
+#include "bench/tile_product.h"
 
 #include <omp.h>
 

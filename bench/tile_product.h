@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "dense_kernels.h"
-#include "rebounce/transfer/dense_operator.h"
+#include "transfer/kernels/dense_kernels.h"
+#include "transfer/operator/dense_operator.h"
 
 namespace rebounce::bench {
 

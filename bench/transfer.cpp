@@ -8,15 +8,15 @@
 #include <numeric>
 #include <optional>
 
-#include "contenders.h"
-#include "method.h"
-#include "program.h"
-#include "read_buffer.h"
-#include "rebounce/precompute/random_lights.h"
-#include "rebounce/precompute/reference_solution.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
-#include "timing.h"
+#include "bench/program.h"
+#include "bench/read_buffer.h"
+#include "bench/report/contenders.h"
+#include "bench/report/method.h"
+#include "bench/timing.h"
+#include "precompute/lights/random_lights.h"
+#include "precompute/lights/reference_solution.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

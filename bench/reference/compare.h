@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/precompute/progress.h"
-#include "rebounce/transfer/transfer_data.h"
-#include "reference/path_tracer.h"
+#include "bench/reference/path_tracer.h"
+#include "precompute/base/progress.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::reference {
 

@@ -1,13 +1,13 @@
 #include <array>
 
-#include "rebounce/runtime/cumulative_choice.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/patch_points.h"
-#include "rebounce/runtime/sampling.h"
-#include "rebounce/transfer/error.h"
-#include "reference/compare.h"
-#include "reference/error_sum.h"
-#include "reference/scene_surface.h"
+#include "bench/reference/compare.h"
+#include "bench/reference/error_sum.h"
+#include "bench/reference/scene_surface.h"
+#include "runtime/rays/cumulative_choice.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/patch_points.h"
+#include "runtime/rays/sampling.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

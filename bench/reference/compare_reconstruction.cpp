@@ -1,11 +1,11 @@
 #include <optional>
 
-#include "rebounce/precompute/lit_sides.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/transfer/error.h"
-#include "reference/compare.h"
-#include "reference/error_sum.h"
-#include "reference/scene_surface.h"
+#include "bench/reference/compare.h"
+#include "bench/reference/error_sum.h"
+#include "bench/reference/scene_surface.h"
+#include "precompute/patches/lit_sides.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

@@ -1,8 +1,8 @@
-#include "reference/emitter_sampler.h"
+#include "bench/reference/emitter_sampler.h"
 
-#include "rebounce/precompute/texture_sampling.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/sampling.h"
+#include "precompute/patches/texture_sampling.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sampling.h"
 
 namespace rebounce::reference {
 namespace {

@@ -4,8 +4,8 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "rebounce/runtime/cumulative_choice.h"
-#include "reference/scene_surface.h"
+#include "bench/reference/scene_surface.h"
+#include "runtime/rays/cumulative_choice.h"
 
 namespace rebounce::reference {
 

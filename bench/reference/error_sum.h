@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "rebounce/transfer/types.h"
-#include "reference/compare.h"
+#include "bench/reference/compare.h"
+#include "transfer/base/types.h"
 
 namespace rebounce::reference {
 

@@ -1,13 +1,13 @@
-#include "reference/key_light.h"
+#include "bench/reference/key_light.h"
 
 #include <algorithm>
 #include <limits>
 #include <numbers>
 
-#include "rebounce/runtime/box.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/sampling.h"
-#include "reference/scene_surface.h"
+#include "bench/reference/scene_surface.h"
+#include "runtime/rays/box.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sampling.h"
 
 namespace rebounce::reference {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "reference/path_tracer.h"
+#include "bench/reference/path_tracer.h"
 
 namespace rebounce::reference {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 
-#include "rebounce/runtime/sampling.h"
+#include "runtime/rays/sampling.h"
 
 namespace rebounce::reference {
 

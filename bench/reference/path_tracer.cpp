@@ -3,7 +3,7 @@
 // sampling techniques for Monte Carlo rendering", 1995. Paths advance together, a batch at a time,
 // so that rays are traced in streams.
 
-#include "reference/path_tracer.h"
+#include "bench/reference/path_tracer.h"
 
 #include <algorithm>
 #include <array>
@@ -11,15 +11,15 @@
 #include <limits>
 #include <numbers>
 
-#include "rebounce/precompute/opacity_sampling.h"
-#include "rebounce/precompute/parallel_progress.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/light_sampling.h"
-#include "rebounce/runtime/sky_light.h"
-#include "rebounce/transfer/error.h"
-#include "reference/emitter_sampler.h"
-#include "reference/path_sampling.h"
-#include "reference/scene_surface.h"
+#include "bench/reference/emitter_sampler.h"
+#include "bench/reference/path_sampling.h"
+#include "bench/reference/scene_surface.h"
+#include "precompute/base/parallel_progress.h"
+#include "precompute/patches/opacity_sampling.h"
+#include "runtime/lights/light_sampling.h"
+#include "runtime/lights/sky_light.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

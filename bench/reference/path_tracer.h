@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/precompute/progress.h"
-#include "rebounce/precompute/scene.h"
-#include "rebounce/runtime/ray_tracer.h"
-#include "reference/surface_points.h"
+#include "bench/reference/surface_points.h"
+#include "precompute/base/progress.h"
+#include "precompute/import/scene.h"
+#include "runtime/rays/ray_tracer.h"
 
 namespace rebounce::reference {
 

@@ -1,10 +1,10 @@
-#include "reference/scene_surface.h"
+#include "bench/reference/scene_surface.h"
 
 #include <numbers>
 
-#include "rebounce/precompute/patch_model.h"
-#include "rebounce/precompute/texture_sampling.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "precompute/patches/patch_model.h"
+#include "precompute/patches/texture_sampling.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce::reference {
 namespace {

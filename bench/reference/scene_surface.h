@@ -4,8 +4,8 @@
 #include <glm/glm.hpp>
 #include <span>
 
-#include "rebounce/precompute/scene.h"
-#include "rebounce/runtime/triangle.h"
+#include "precompute/import/scene.h"
+#include "runtime/rays/triangle.h"
 
 namespace rebounce::reference {
 

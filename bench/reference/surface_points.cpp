@@ -1,10 +1,10 @@
-#include "reference/surface_points.h"
+#include "bench/reference/surface_points.h"
 
-#include "rebounce/runtime/cumulative_choice.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/sampling.h"
-#include "rebounce/transfer/error.h"
-#include "reference/scene_surface.h"
+#include "bench/reference/scene_surface.h"
+#include "runtime/rays/cumulative_choice.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sampling.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "rebounce/precompute/lit_sides.h"
-#include "rebounce/precompute/scene.h"
+#include "precompute/import/scene.h"
+#include "precompute/patches/lit_sides.h"
 
 namespace rebounce::reference {
 

@@ -1,4 +1,4 @@
-#include "accuracy.h"
+#include "bench/report/accuracy.h"
 
 #include <omp.h>
 
@@ -7,10 +7,10 @@
 #include <map>
 #include <memory>
 
-#include "in_parallel.h"
-#include "read_buffer.h"
-#include "rebounce/transfer/error.h"
-#include "reflected_light.h"
+#include "bench/read_buffer.h"
+#include "bench/reflected_light.h"
+#include "bench/report/in_parallel.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

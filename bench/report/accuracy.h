@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "light_cases.h"
-#include "method.h"
-#include "timing.h"
+#include "bench/report/light_cases.h"
+#include "bench/report/method.h"
+#include "bench/timing.h"
 
 namespace rebounce::bench {
 

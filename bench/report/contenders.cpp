@@ -1,4 +1,4 @@
-#include "contenders.h"
+#include "bench/report/contenders.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -6,20 +6,20 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "process_cost.h"
-#include "rebounce/precompute/dense_transfer.h"
-#include "rebounce/precompute/fitting_lights.h"
-#include "rebounce/precompute/form_factor_compression.h"
-#include "rebounce/precompute/hierarchical_transfer.h"
-#include "rebounce/precompute/low_rank_transfer.h"
-#include "rebounce/transfer/compressed_form_factors.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/exchange_blocks.h"
-#include "rebounce/transfer/form_factor_blocks.h"
-#include "rebounce/transfer/hierarchical_storage.h"
-#include "rebounce/transfer/linked_form_factors.h"
-#include "rebounce/transfer/transfer_file.h"
-#include "timing.h"
+#include "bench/process_cost.h"
+#include "bench/timing.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/compression/hierarchical_transfer.h"
+#include "precompute/compression/low_rank_transfer.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "precompute/lights/fitting_lights.h"
+#include "transfer/base/error.h"
+#include "transfer/exchange/compressed_form_factors.h"
+#include "transfer/exchange/exchange_blocks.h"
+#include "transfer/exchange/form_factor_blocks.h"
+#include "transfer/exchange/linked_form_factors.h"
+#include "transfer/file/transfer_file.h"
+#include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce::bench {
 namespace {

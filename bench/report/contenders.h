@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
-#include "rebounce/precompute/build.h"
-#include "rebounce/runtime/ray_tracer.h"
-#include "rebounce/transfer/form_factor_operator.h"
-#include "report_settings.h"
+#include "bench/report/report_settings.h"
+#include "precompute/build/build.h"
+#include "runtime/rays/ray_tracer.h"
+#include "transfer/exchange/form_factor_operator.h"
 
 namespace rebounce::bench {
 

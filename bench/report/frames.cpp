@@ -1,15 +1,15 @@
-#include "frames.h"
+#include "bench/report/frames.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <set>
 
-#include "in_parallel.h"
-#include "rebounce/runtime/direct_lighting.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/reflection.h"
-#include "reflected_light.h"
+#include "bench/reflected_light.h"
+#include "bench/report/in_parallel.h"
+#include "runtime/frame/direct_lighting.h"
+#include "transfer/base/error.h"
+#include "transfer/base/reflection.h"
 
 namespace rebounce::bench {
 namespace {

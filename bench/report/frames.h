@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "accuracy.h"
-#include "light_paths.h"
+#include "bench/report/accuracy.h"
+#include "bench/report/light_paths.h"
 
 namespace rebounce::bench {
 

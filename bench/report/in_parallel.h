@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <exception>
 
-#include "rebounce/precompute/parallel_progress.h"
+#include "precompute/base/parallel_progress.h"
 
 namespace rebounce::bench {
 

@@ -1,12 +1,12 @@
-#include "light_cases.h"
+#include "bench/report/light_cases.h"
 
 #include <algorithm>
 
-#include "in_parallel.h"
-#include "light_changes.h"
-#include "rebounce/precompute/reference_solution.h"
-#include "rebounce/runtime/solve_radiosity.h"
-#include "rebounce/transfer/error.h"
+#include "bench/light_changes.h"
+#include "bench/report/in_parallel.h"
+#include "precompute/lights/reference_solution.h"
+#include "runtime/solvers/solve_radiosity.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "contenders.h"
+#include "bench/report/contenders.h"
 
 namespace rebounce::bench {
 

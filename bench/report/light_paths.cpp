@@ -1,14 +1,14 @@
-#include "light_paths.h"
+#include "bench/report/light_paths.h"
 
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <numbers>
 
-#include "light_changes.h"
-#include "rebounce/demo/light_motion.h"
-#include "rebounce/runtime/box.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "bench/light_changes.h"
+#include "runtime/demo/motion/light_motion.h"
+#include "runtime/rays/box.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce::bench {
 namespace {

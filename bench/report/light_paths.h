@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "rebounce/runtime/ray_tracer.h"
-#include "rebounce/transfer/transfer_data.h"
+#include "runtime/rays/ray_tracer.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::bench {
 

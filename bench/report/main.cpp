@@ -5,12 +5,12 @@
 
 #include <filesystem>
 
-#include "console.h"
-#include "input.h"
-#include "phase_seconds.h"
-#include "program.h"
-#include "report.h"
-#include "timing.h"
+#include "bench/input.h"
+#include "bench/program.h"
+#include "bench/report/phase_seconds.h"
+#include "bench/report/report.h"
+#include "bench/timing.h"
+#include "precompute/cli/console.h"
 
 namespace rebounce::bench {
 namespace {

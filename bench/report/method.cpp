@@ -1,10 +1,10 @@
-#include "method.h"
+#include "bench/report/method.h"
 
 #include <algorithm>
 #include <array>
 
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/reflection.h"
+#include "transfer/base/error.h"
+#include "transfer/base/reflection.h"
 
 namespace rebounce::bench {
 namespace {

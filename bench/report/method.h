@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "contenders.h"
-#include "rebounce/runtime/solve_radiosity.h"
+#include "bench/report/contenders.h"
+#include "runtime/solvers/solve_radiosity.h"
 
 namespace rebounce::bench {
 

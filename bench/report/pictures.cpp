@@ -1,17 +1,17 @@
-#include "pictures.h"
+#include "bench/report/pictures.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "rebounce/demo/camera.h"
-#include "rebounce/demo/image_file.h"
-#include "rebounce/demo/key_light.h"
-#include "rebounce/demo/picture.h"
-#include "rebounce/precompute/reference_solution.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
+#include "precompute/lights/reference_solution.h"
+#include "runtime/demo/image/image_file.h"
+#include "runtime/demo/picture/camera.h"
+#include "runtime/demo/picture/key_light.h"
+#include "runtime/demo/picture/picture.h"
+#include "runtime/frame/engine.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

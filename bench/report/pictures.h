@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "accuracy.h"
+#include "bench/report/accuracy.h"
 
 namespace rebounce::bench {
 

@@ -1,13 +1,13 @@
-#include "report.h"
+#include "bench/report/report.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "accuracy.h"
-#include "frames.h"
-#include "method.h"
-#include "pictures.h"
-#include "truth.h"
+#include "bench/report/accuracy.h"
+#include "bench/report/frames.h"
+#include "bench/report/method.h"
+#include "bench/report/pictures.h"
+#include "bench/report/truth.h"
 
 namespace rebounce::bench {
 namespace {

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "contenders.h"
+#include "bench/report/contenders.h"
 
 namespace rebounce::bench {
 

@@ -1,4 +1,4 @@
-#include "report_settings.h"
+#include "bench/report/report_settings.h"
 
 namespace rebounce::bench {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "rebounce/transfer/precision.h"
-#include "reference/compare.h"
+#include "bench/reference/compare.h"
+#include "transfer/base/precision.h"
 
 namespace rebounce::bench {
 

@@ -1,4 +1,4 @@
-#include "truth.h"
+#include "bench/report/truth.h"
 
 #include <fmt/format.h>
 
@@ -6,13 +6,13 @@
 #include <cmath>
 #include <numeric>
 
-#include "rebounce/precompute/build.h"
-#include "rebounce/precompute/lit_sides.h"
-#include "rebounce/precompute/reference_solution.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
-#include "reference/key_light.h"
+#include "bench/reference/key_light.h"
+#include "precompute/build/build.h"
+#include "precompute/lights/reference_solution.h"
+#include "precompute/patches/lit_sides.h"
+#include "runtime/frame/engine.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "contenders.h"
+#include "bench/report/contenders.h"
 
 namespace rebounce::bench {
 

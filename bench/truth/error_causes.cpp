@@ -1,13 +1,13 @@
-#include "error_causes.h"
+#include "bench/truth/error_causes.h"
 
 #include <glm/glm.hpp>
 
-#include "hemisphere_rays.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/patch_points.h"
-#include "rebounce/runtime/solve_radiosity.h"
-#include "rebounce/transfer/error.h"
-#include "seen_patch.h"
+#include "precompute/patches/seen_patch.h"
+#include "precompute/sampling/hemisphere_rays.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/patch_points.h"
+#include "runtime/solvers/solve_radiosity.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

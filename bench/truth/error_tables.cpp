@@ -1,10 +1,10 @@
-#include "error_tables.h"
+#include "bench/truth/error_tables.h"
 
 #include <initializer_list>
 #include <string>
 #include <vector>
 
-#include "rebounce/precompute/csv_writer.h"
+#include "precompute/base/csv_writer.h"
 
 namespace rebounce::reference {
 namespace {

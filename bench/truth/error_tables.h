@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <span>
 
-#include "error_causes.h"
-#include "rebounce/transfer/transfer_data.h"
-#include "reference/compare.h"
+#include "bench/reference/compare.h"
+#include "bench/truth/error_causes.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::reference {
 

@@ -3,14 +3,14 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "commands.h"
-#include "light_file.h"
-#include "output_check.h"
-#include "picture_options.h"
-#include "rebounce/demo/glb_file.h"
-#include "rebounce/demo/lit_mesh.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/transfer/transfer_file.h"
+#include "precompute/cli/commands.h"
+#include "precompute/cli/light_file.h"
+#include "precompute/cli/output_check.h"
+#include "precompute/cli/picture_options.h"
+#include "runtime/demo/bake/glb_file.h"
+#include "runtime/demo/bake/lit_mesh.h"
+#include "runtime/frame/engine.h"
+#include "transfer/file/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "console.h"
+#include "precompute/cli/console.h"
 
 namespace rebounce::cli {
 

@@ -1,4 +1,4 @@
-#include "console.h"
+#include "precompute/cli/console.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

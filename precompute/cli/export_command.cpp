@@ -2,10 +2,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "commands.h"
-#include "rebounce/precompute/npz_writer.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/transfer_file.h"
+#include "precompute/base/npz_writer.h"
+#include "precompute/cli/commands.h"
+#include "transfer/base/error.h"
+#include "transfer/file/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "commands.h"
-#include "info_json.h"
-#include "rebounce/precompute/patch_selection.h"
-#include "rebounce/transfer/hierarchical_operator.h"
-#include "rebounce/transfer/transfer_file.h"
+#include "precompute/cli/commands.h"
+#include "precompute/cli/info_json.h"
+#include "precompute/patches/patch_selection.h"
+#include "transfer/file/transfer_file.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "rebounce/transfer/transfer_data.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::cli {
 

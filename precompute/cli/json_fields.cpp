@@ -1,4 +1,4 @@
-#include "json_fields.h"
+#include "precompute/cli/json_fields.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "rebounce/transfer/error.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::cli {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "rebounce/transfer/types.h"
+#include "transfer/base/types.h"
 
 namespace rebounce::cli {
 

@@ -1,4 +1,4 @@
-#include "light_file.h"
+#include "precompute/cli/light_file.h"
 
 #include <fmt/format.h>
 
@@ -8,14 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "json_fields.h"
-#include "lights/lamp_kind.h"
-#include "rebounce/precompute/import_gltf.h"
-#include "rebounce/runtime/emitting_material.h"
-#include "rebounce/runtime/ies_profile.h"
-#include "rebounce/runtime/sky_model.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/transfer_file.h"
+#include "precompute/cli/json_fields.h"
+#include "precompute/import/import_gltf.h"
+#include "runtime/lights/emitting_material.h"
+#include "runtime/lights/ies_profile.h"
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/lights/sky_model.h"
+#include "transfer/base/error.h"
+#include "transfer/file/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {

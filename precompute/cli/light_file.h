@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "rebounce/transfer/scene_description.h"
-#include "rebounce/transfer/transfer_data.h"
+#include "transfer/data/scene_description.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::cli {
 

@@ -1,12 +1,12 @@
-#include "light_path_file.h"
+#include "precompute/cli/light_path_file.h"
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "json_fields.h"
-#include "rebounce/transfer/error.h"
+#include "precompute/cli/json_fields.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "rebounce/demo/viewer.h"
+#include "runtime/demo/viewer/window/viewer.h"
 
 namespace rebounce::cli {
 

@@ -5,10 +5,10 @@
 #include <exception>
 #include <new>
 
-#include "commands.h"
-#include "console.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/version.h"
+#include "precompute/cli/commands.h"
+#include "precompute/cli/console.h"
+#include "transfer/base/error.h"
+#include "transfer/base/version.h"
 
 namespace {
 

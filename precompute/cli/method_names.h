@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "rebounce/runtime/solve_radiosity.h"
+#include "runtime/solvers/solve_radiosity.h"
 
 namespace rebounce::cli {
 

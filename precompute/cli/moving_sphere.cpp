@@ -1,11 +1,11 @@
-#include "moving_sphere.h"
+#include "precompute/cli/moving_sphere.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "rebounce/precompute/light_probes.h"
-#include "rebounce/runtime/box.h"
+#include "precompute/outputs/light_probes.h"
+#include "runtime/rays/box.h"
 
 namespace rebounce::cli {
 namespace {

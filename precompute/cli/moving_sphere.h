@@ -1,8 +1,8 @@
 #pragma once
 
-#include "rebounce/demo/viewer.h"
-#include "rebounce/runtime/ray_tracer.h"
-#include "rebounce/transfer/transfer_data.h"
+#include "runtime/demo/viewer/window/viewer.h"
+#include "runtime/rays/ray_tracer.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::cli {
 

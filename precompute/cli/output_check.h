@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "rebounce/transfer/atomic_file.h"
+#include "transfer/file/atomic_file.h"
 
 namespace rebounce::cli {
 

@@ -1,4 +1,4 @@
-#include "picture_options.h"
+#include "precompute/cli/picture_options.h"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "rebounce/demo/camera.h"
-#include "rebounce/transfer/error.h"
+#include "runtime/demo/picture/camera.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::cli {
 namespace {

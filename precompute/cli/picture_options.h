@@ -4,9 +4,9 @@
 #include <utility>
 #include <vector>
 
-#include "rebounce/demo/picture.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/transfer/scene_description.h"
+#include "runtime/demo/picture/picture.h"
+#include "runtime/frame/engine.h"
+#include "transfer/data/scene_description.h"
 
 namespace rebounce::cli {
 

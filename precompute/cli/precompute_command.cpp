@@ -6,15 +6,15 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "commands.h"
-#include "info_json.h"
-#include "output_check.h"
-#include "rebounce/precompute/build.h"
-#include "rebounce/precompute/patch_selection.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/hierarchical_operator.h"
-#include "rebounce/transfer/precision.h"
-#include "rebounce/transfer/transfer_file.h"
+#include "precompute/build/build.h"
+#include "precompute/cli/commands.h"
+#include "precompute/cli/info_json.h"
+#include "precompute/cli/output_check.h"
+#include "precompute/patches/patch_selection.h"
+#include "transfer/base/error.h"
+#include "transfer/base/precision.h"
+#include "transfer/file/transfer_file.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::cli {
 namespace {

@@ -6,17 +6,17 @@
 #include <string>
 #include <vector>
 
-#include "commands.h"
-#include "light_file.h"
-#include "method_names.h"
-#include "rebounce/precompute/csv_writer.h"
-#include "rebounce/precompute/npz_writer.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/runtime/solve_radiosity.h"
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/compressed_form_factors.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/linked_form_factors.h"
+#include "precompute/base/csv_writer.h"
+#include "precompute/base/npz_writer.h"
+#include "precompute/cli/commands.h"
+#include "precompute/cli/light_file.h"
+#include "precompute/cli/method_names.h"
+#include "runtime/frame/engine.h"
+#include "runtime/solvers/solve_radiosity.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
+#include "transfer/exchange/compressed_form_factors.h"
+#include "transfer/exchange/linked_form_factors.h"
 
 namespace rebounce::cli {
 namespace {

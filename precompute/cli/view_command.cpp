@@ -5,19 +5,19 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "commands.h"
-#include "light_file.h"
-#include "light_path_file.h"
-#include "method_names.h"
-#include "moving_sphere.h"
-#include "output_check.h"
-#include "picture_options.h"
-#include "rebounce/demo/key_light.h"
-#include "rebounce/demo/viewer.h"
-#include "rebounce/precompute/reference_solution.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/transfer_file.h"
+#include "precompute/cli/commands.h"
+#include "precompute/cli/light_file.h"
+#include "precompute/cli/light_path_file.h"
+#include "precompute/cli/method_names.h"
+#include "precompute/cli/moving_sphere.h"
+#include "precompute/cli/output_check.h"
+#include "precompute/cli/picture_options.h"
+#include "precompute/lights/reference_solution.h"
+#include "runtime/demo/picture/key_light.h"
+#include "runtime/demo/viewer/window/viewer.h"
+#include "runtime/frame/engine.h"
+#include "transfer/base/error.h"
+#include "transfer/file/transfer_file.h"
 
 namespace rebounce::cli {
 namespace {

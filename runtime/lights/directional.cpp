@@ -1,8 +1,8 @@
 #include <limits>
 
-#include "lights/lamp_kind.h"
 #include "rebounce.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 namespace {

@@ -1,12 +1,12 @@
-#include "lights/lamp_field.h"
+#include "runtime/lights/lamp_field.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/transfer/error.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -9,7 +9,7 @@
 #include <span>
 #include <string_view>
 
-#include "rebounce/transfer/scene_description.h"
+#include "transfer/data/scene_description.h"
 
 namespace rebounce {
 

@@ -1,9 +1,9 @@
-#include "lights/lamp_geometry.h"
+#include "runtime/lights/lamp_geometry.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "rebounce/runtime/float3_glm.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 

@@ -1,4 +1,4 @@
-#include "lights/lamp_kind.h"
+#include "runtime/lights/lamp_kind.h"
 
 #include <algorithm>
 #include <array>

@@ -7,9 +7,9 @@
 #include <span>
 #include <string_view>
 
-#include "lights/lamp_field.h"
-#include "lights/lamp_mesh.h"
-#include "lights/prepared_light.h"
+#include "runtime/lights/lamp_field.h"
+#include "runtime/lights/lamp_mesh.h"
+#include "runtime/lights/prepared_light.h"
 
 namespace rebounce {
 

@@ -1,4 +1,4 @@
-#include "lights/lamp_mesh.h"
+#include "runtime/lights/lamp_mesh.h"
 
 #include <cmath>
 #include <numbers>

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "rebounce/transfer/types.h"
+#include "transfer/base/types.h"
 
 namespace rebounce {
 

@@ -1,8 +1,8 @@
-#include "lights/lamp_shadows.h"
+#include "runtime/lights/lamp_shadows.h"
 
 #include <algorithm>
 
-#include "rebounce/runtime/float3_glm.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 

@@ -7,8 +7,8 @@
 #include <glm/glm.hpp>
 #include <span>
 
-#include "lights/prepared_light.h"
-#include "rebounce/runtime/ray_tracer.h"
+#include "runtime/lights/prepared_light.h"
+#include "runtime/rays/ray_tracer.h"
 
 namespace rebounce {
 

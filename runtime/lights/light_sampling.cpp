@@ -1,9 +1,9 @@
-#include "rebounce/runtime/light_sampling.h"
+#include "runtime/lights/light_sampling.h"
 
 #include <algorithm>
 
-#include "lights/lamp_kind.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 

@@ -1,6 +1,6 @@
-#include "lights/lamp_geometry.h"
-#include "lights/lamp_kind.h"
 #include "rebounce.h"
+#include "runtime/lights/lamp_geometry.h"
+#include "runtime/lights/lamp_kind.h"
 
 namespace rebounce {
 namespace {

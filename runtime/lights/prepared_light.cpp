@@ -1,11 +1,11 @@
-#include "lights/prepared_light.h"
+#include "runtime/lights/prepared_light.h"
 
 #include <algorithm>
 #include <limits>
 #include <numbers>
 
-#include "lights/lamp_kind.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 

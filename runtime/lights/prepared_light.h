@@ -4,7 +4,7 @@
 #include <memory>
 #include <span>
 
-#include "rebounce/runtime/light_sampling.h"
+#include "runtime/lights/light_sampling.h"
 
 namespace rebounce {
 

@@ -3,11 +3,11 @@
 #include <array>
 #include <cmath>
 
-#include "lights/lamp_geometry.h"
-#include "lights/lamp_kind.h"
 #include "rebounce.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/runtime/polygon_form_factor.h"
+#include "runtime/lights/lamp_geometry.h"
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/polygon_form_factor.h"
 
 namespace rebounce {
 namespace {

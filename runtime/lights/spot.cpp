@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lights/lamp_geometry.h"
-#include "lights/lamp_kind.h"
 #include "rebounce.h"
-#include "rebounce/runtime/float3_glm.h"
+#include "runtime/lights/lamp_geometry.h"
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 namespace {

@@ -1,4 +1,4 @@
-#include "rebounce/runtime/conjugate_gradient_solver.h"
+#include "runtime/solvers/conjugate_gradient_solver.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "rebounce/runtime/gathering_solver.h"
+#include "runtime/solvers/gathering_solver.h"
 
 namespace rebounce {
 

@@ -1,4 +1,4 @@
-#include "rebounce/runtime/gauss_seidel_solver.h"
+#include "runtime/solvers/gauss_seidel_solver.h"
 
 #include <cmath>
 

@@ -1,11 +1,11 @@
-#include "rebounce/runtime/radiosity_solver.h"
+#include "runtime/solvers/radiosity_solver.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -1,9 +1,9 @@
-#include "rebounce/runtime/refinement_solver.h"
+#include "runtime/solvers/refinement_solver.h"
 
 #include <algorithm>
 
-#include "rebounce/transfer/area_norm.h"
-#include "rebounce/transfer/error.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -1,13 +1,13 @@
-#include "rebounce/runtime/solve_radiosity.h"
+#include "runtime/solvers/solve_radiosity.h"
 
-#include "rebounce/runtime/conjugate_gradient_solver.h"
-#include "rebounce/runtime/gathering_solver.h"
-#include "rebounce/runtime/gauss_seidel_solver.h"
-#include "rebounce/runtime/refinement_solver.h"
-#include "rebounce/transfer/compressed_form_factors.h"
-#include "rebounce/transfer/error.h"
-#include "rebounce/transfer/exchange_blocks.h"
-#include "rebounce/transfer/form_factor_blocks.h"
+#include "runtime/solvers/conjugate_gradient_solver.h"
+#include "runtime/solvers/gathering_solver.h"
+#include "runtime/solvers/gauss_seidel_solver.h"
+#include "runtime/solvers/refinement_solver.h"
+#include "transfer/base/error.h"
+#include "transfer/exchange/compressed_form_factors.h"
+#include "transfer/exchange/exchange_blocks.h"
+#include "transfer/exchange/form_factor_blocks.h"
 
 namespace rebounce {
 namespace {

@@ -2,12 +2,12 @@
 
 #include <vector>
 
-#include "precompute/scene_data.h"
-#include "precompute/test_scenes.h"
-#include "rebounce/precompute/lit_sides.h"
-#include "rebounce/precompute/reconstruction_weights.h"
-#include "rebounce/transfer/error.h"
-#include "reference/compare.h"
+#include "bench/reference/compare.h"
+#include "precompute/outputs/reconstruction_weights.h"
+#include "precompute/patches/lit_sides.h"
+#include "tests/support/scene_data.h"
+#include "tests/support/test_scenes.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

@@ -8,14 +8,14 @@
 #include <numbers>
 #include <vector>
 
-#include "precompute/test_scenes.h"
-#include "rebounce/precompute/lit_sides.h"
-#include "rebounce/precompute/texture_sampling.h"
-#include "rebounce/runtime/float3_glm.h"
-#include "rebounce/transfer/error.h"
-#include "reference/path_tracer.h"
-#include "reference/scene_surface.h"
-#include "with_threads.h"
+#include "bench/reference/path_tracer.h"
+#include "bench/reference/scene_surface.h"
+#include "precompute/patches/lit_sides.h"
+#include "precompute/patches/texture_sampling.h"
+#include "runtime/rays/float3_glm.h"
+#include "tests/support/test_scenes.h"
+#include "tests/support/with_threads.h"
+#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

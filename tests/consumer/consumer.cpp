@@ -6,10 +6,10 @@
 #include <exception>
 #include <vector>
 
-#include "../thread_pool.h"
-#include "rebounce/runtime/engine.h"
-#include "rebounce/runtime/vertex_light.h"
-#include "rebounce/transfer/transfer_file.h"
+#include "runtime/frame/engine.h"
+#include "runtime/outputs/vertex_light.h"
+#include "tests/support/thread_pool.h"
+#include "transfer/file/transfer_file.h"
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;

@@ -1,0 +1,134 @@
+#include "precompute/base/blas.h"
+
+#include <dlfcn.h>
+
+#include <cstdlib>
+#include <memory>
+
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr const char* kKernelVariable = "OPENBLAS_CORETYPE";
+
+// What OpenBLAS falls back to.
+constexpr std::string_view kOfUnknown = "Prescott";
+
+struct Close {
+  void operator()(void* library) const { dlclose(library); }
+};
+using Handle = std::unique_ptr<void, Close>;
+
+Handle open(Lmid_t space, const char* name) {
+  Handle library(dlmopen(space, name, RTLD_NOW | RTLD_LOCAL));
+  if (library == nullptr) {
+    throw Error(std::string("cannot load ") + dlerror() + "; install OpenBLAS (libopenblas0)");
+  }
+  return library;
+}
+
+template <typename Function>
+Function* find(const Handle& library, const char* name) {
+  void* const address = dlsym(library.get(), name);
+  if (address == nullptr) throw Error(std::string("not a usable OpenBLAS: ") + dlerror());
+  return reinterpret_cast<Function*>(address);
+}
+
+/// An OpenBLAS of our own, beside any that the process has, with a C library of its own. It chooses
+/// its kernels as it is loaded, by an environment that is that C library's: the process's stays as
+/// it is. One thread, so that products are the same on any machine and stay on the thread that
+/// asks.
+class Blas {
+ public:
+  Blas() {
+    const Handle c_library = open(LM_ID_NEWLM, "libc.so.6");
+    Lmid_t space = LM_ID_BASE;
+    if (dlinfo(c_library.get(), RTLD_DI_LMID, &space) != 0) throw Error(dlerror());
+    const auto set = find<int(const char*, const char*, int)>(c_library, "setenv");
+    find<int()>(c_library, "clearenv")();
+    set("OPENBLAS_NUM_THREADS", "1", 1);
+    set("OMP_NUM_THREADS", "1", 1);
+    const char* const asked = std::getenv(kKernelVariable);
+    if (asked != nullptr) set(kKernelVariable, asked, 1);
+    library_ = open(space, "libopenblas.so.0");
+    if (asked != nullptr) return;
+    const std::string better = better_blas_kernels(kernels(), processor_features());
+    if (better.empty()) return;
+    library_.reset();
+    set(kKernelVariable, better.c_str(), 1);
+    library_ = open(space, "libopenblas.so.0");
+  }
+
+  std::string kernels() const { return function<char*()>("openblas_get_corename")(); }
+
+  template <typename Function>
+  Function* function(const char* name) const {
+    return find<Function>(library_, name);
+  }
+
+ private:
+  Handle library_;
+};
+
+const Blas& blas() {
+  // Never closed: other objects may multiply as the program ends.
+  static const Blas& blas = *new Blas;
+  return blas;
+}
+
+}  // namespace
+
+void load_blas() {
+  blas();
+}
+
+std::string blas_kernels() {
+  return blas().kernels();
+}
+
+ProcessorFeatures processor_features() {
+#if defined(__x86_64__)
+  return {.avx2_and_fma = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"),
+          .avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")};
+#else
+  return {};
+#endif
+}
+
+std::string better_blas_kernels(std::string_view chosen, const ProcessorFeatures& features) {
+  if (chosen != kOfUnknown || !features.avx2_and_fma) return {};
+  return features.avx512 ? "SkylakeX" : "Haswell";
+}
+
+}  // namespace rebounce
+
+// What Eigen calls with EIGEN_USE_BLAS, in single and double precision, under the names of Fortran,
+// which passes addresses only. Hidden: a shared library keeps them to itself.
+using P = const void*;
+#define REBOUNCE_FORWARD_AS(name, parameters, ...)                                   \
+  extern "C" __attribute__((visibility("hidden"))) void name parameters {            \
+    static auto* const function = rebounce::blas().function<void parameters>(#name); \
+    function(__VA_ARGS__);                                                           \
+  }
+#define REBOUNCE_FORWARD(name, parameters, ...)            \
+  REBOUNCE_FORWARD_AS(s##name##_, parameters, __VA_ARGS__) \
+  REBOUNCE_FORWARD_AS(d##name##_, parameters, __VA_ARGS__)
+
+REBOUNCE_FORWARD(axpy, (P a, P b, P c, P d, P e, P f), a, b, c, d, e, f)
+REBOUNCE_FORWARD(gemv, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k), a, b, c, d, e, f, g,
+                 h, i, j, k)
+REBOUNCE_FORWARD(symv, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j), a, b, c, d, e, f, g, h,
+                 i, j)
+REBOUNCE_FORWARD(trmv, (P a, P b, P c, P d, P e, P f, P g, P h), a, b, c, d, e, f, g, h)
+REBOUNCE_FORWARD(gemm, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k, P l, P m), a, b, c,
+                 d, e, f, g, h, i, j, k, l, m)
+REBOUNCE_FORWARD(symm, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k, P l), a, b, c, d, e,
+                 f, g, h, i, j, k, l)
+REBOUNCE_FORWARD(syrk, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j), a, b, c, d, e, f, g, h,
+                 i, j)
+REBOUNCE_FORWARD(trmm, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k), a, b, c, d, e, f, g,
+                 h, i, j, k)
+REBOUNCE_FORWARD(trsm, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k), a, b, c, d, e, f, g,
+                 h, i, j, k)

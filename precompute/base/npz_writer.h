@@ -1,0 +1,59 @@
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "transfer/base/types.h"
+
+namespace rebounce {
+
+enum class NumpyType : std::uint8_t { kF4, kF8, kU4, kU8 };
+
+/// The NumPy type that stores a C++ type as it is.
+template <typename T>
+constexpr NumpyType numpy_type() {
+  if constexpr (std::same_as<T, float>)
+    return NumpyType::kF4;
+  else if constexpr (std::same_as<T, double>)
+    return NumpyType::kF8;
+  else if constexpr (std::same_as<T, std::uint32_t>)
+    return NumpyType::kU4;
+  else {
+    static_assert(std::same_as<T, std::uint64_t>, "no NumPy type stores this C++ type");
+    return NumpyType::kU8;
+  }
+}
+
+/// An array to be written; its bytes are borrowed until they are.
+struct NumpyArray {
+  std::string name;  ///< unique in the file; NumPy's key
+  NumpyType type = NumpyType::kF4;
+  std::vector<std::size_t> shape;    ///< outermost dimension first; empty for a single number
+  std::span<const std::byte> bytes;  ///< element size x the product of `shape`, row-major
+};
+
+/// Names `values`, row-major in `shape`.
+template <typename T>
+NumpyArray numpy_array(std::string name, std::vector<std::size_t> shape,
+                       std::span<const T> values) {
+  return {std::move(name), numpy_type<T>(), std::move(shape), std::as_bytes(values)};
+}
+
+/// Names per-patch or per-vertex triples: [n, 3].
+inline NumpyArray numpy_array(std::string name, std::span<const Float3> values) {
+  return {std::move(name), NumpyType::kF4, {values.size(), 3}, std::as_bytes(values)};
+}
+
+/// Writes a NumPy .npz: an uncompressed zip of .npy files (zip64 where 4 GiB do not suffice), whole
+/// or not at all (see AtomicFile). The arrays are not copied, and the same arrays give the same
+/// bytes. Throws Error when the file cannot be written, two names are the same, or an array's bytes
+/// do not agree with its shape.
+void write_npz(const std::filesystem::path& path, std::span<const NumpyArray> arrays);
+
+}  // namespace rebounce

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <omp.h>
+
+#include <atomic>
+#include <cstddef>
+
+#include "precompute/base/progress.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+
+/// Progress of a loop that OpenMP threads share: counts what is finished, tells so on the thread
+/// that began the loop, and remembers whether it is to stop. An OpenMP loop cannot be left, so
+/// iterations that find stopped() do nothing.
+class ParallelProgress {
+ public:
+  /// `count` iterations; `progress` must outlive it.
+  ParallelProgress(const Progress& progress, std::size_t count)
+      : progress_(progress), count_(count) {}
+
+  bool stopped() const { return stop_; }
+
+  /// One more iteration is finished.
+  void advance() {
+    const double done = static_cast<double>(++done_);
+    if (progress_ && omp_get_thread_num() == 0 && !progress_(done / static_cast<double>(count_))) {
+      stop_ = true;
+    }
+  }
+
+  /// To be called behind the loop: throws Cancelled if it was stopped.
+  void finish() const {
+    if (stop_) throw Cancelled();
+  }
+
+ private:
+  const Progress& progress_;
+  std::size_t count_;
+  std::atomic<std::size_t> done_ = 0;
+  std::atomic<bool> stop_ = false;
+};
+
+}  // namespace rebounce

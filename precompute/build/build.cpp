@@ -1,0 +1,292 @@
+#include "precompute/build/build.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "precompute/build/build_estimate.h"
+#include "precompute/build/operator_stage.h"
+#include "precompute/build/phase_clock.h"
+#include "precompute/exchange/links/link_fitting.h"
+#include "precompute/exchange/links/links.h"
+#include "precompute/exchange/pairs/form_factors.h"
+#include "precompute/import/import_gltf.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "precompute/outputs/reconstruction_weights.h"
+#include "precompute/patches/patch_model.h"
+#include "precompute/patches/patch_selection.h"
+#include "precompute/patches/winding.h"
+#include "transfer/base/error.h"
+#include "transfer/base/version.h"
+
+namespace rebounce {
+namespace {
+
+void describe_patches(const PatchModel& model, BuildReport& report) {
+  report.display_triangle_count = model.mesh.triangle.size();
+  report.patch_count = model.patches.size();
+  report.sliver_count = model.sliver_count;
+  report.unlit_side_count = model.unlit_side_count;
+  report.covered_side_count = model.covered_side_count;
+  report.opening_side_count = model.opening_side_count;
+  report.buried_side_count = model.buried_side_count;
+  std::vector<float> size(model.patches.area);
+  for (float& s : size) s = std::sqrt(s);
+  std::ranges::sort(size);
+  report.patch_size_min = size.front();
+  report.patch_size_median = size[size.size() / 2];
+  report.patch_size_max = size.back();
+  report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
+}
+
+/// The kind of an operator from pairs, if that was left open.
+OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& model) {
+  if (settings.operator_kind != OperatorKind::kAutomatic) return settings.operator_kind;
+  const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
+  return of_some || model.patches.size() > kDensePatchCount ? OperatorKind::kHierarchical
+                                                            : OperatorKind::kDense;
+}
+
+/// What the operator is to be made from, if that was left open.
+FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
+  const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
+                          settings.operator_kind == OperatorKind::kHierarchical;
+  if (settings.form_factor_kind == FormFactorKind::kLinks && !from_links &&
+      settings.operator_kind != OperatorKind::kNoOperator) {
+    throw Error("from links only a hierarchical operator is made; ask for that, or for pairs");
+  }
+  if (settings.form_factor_kind != FormFactorKind::kAutomatic) return settings.form_factor_kind;
+  const std::size_t n = model.patches.size();
+  const bool too_many =
+      n > kPairsPatchCount ||
+      peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
+                          kind_from_pairs(settings, model)) > memory_limit_bytes(settings);
+  return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
+}
+
+/// The settings with what was left open decided.
+BuildSettings decide(BuildSettings settings, const PatchModel& model) {
+  settings.memory_limit_bytes = memory_limit_bytes(settings);
+  settings.form_factor_kind = choose_form_factors(settings, model);
+  const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
+  const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
+  if (settings.operator_kind == OperatorKind::kAutomatic) {
+    settings.operator_kind = links ? OperatorKind::kHierarchical : kind_from_pairs(settings, model);
+  }
+  const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
+  if (of_some && !hierarchical) {
+    throw Error("receivers and sources are for hierarchical operators alone; ask for one");
+  }
+  if (!settings.precision) {
+    const bool dense = settings.operator_kind == OperatorKind::kDense;
+    settings.precision = hierarchical ? Precision::kQ8 : dense ? Precision::kF32 : Precision::kF16;
+  }
+  if (has_integer_bases(*settings.precision) && !hierarchical) {
+    throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
+  }
+  if (!hierarchical) settings.tolerance = 0;
+  double& link_epsilon = settings.form_factors.link_epsilon;
+  if (!links && link_epsilon > 0) {
+    throw Error("the error of a link is for form factors from links; ask for these");
+  }
+  if (links && link_epsilon == 0) link_epsilon = kLinkEpsilon;
+  if (links && settings.form_factor_tolerance == 0 && !of_some) {
+    settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
+  }
+  return settings;
+}
+
+Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
+                       BuildReport& report) {
+  PlacedLightmap placed = place_lightmap(model, settings.lightmap);
+  for (const std::string& warning : placed.warnings) {
+    report.warnings.push_back(warning + ": it is left out of the lightmap");
+  }
+  return std::move(placed.lightmap);
+}
+
+/// The offline stage, a step at a time, each with what the steps before have left.
+class TransferBuild {
+ public:
+  TransferBuild(const BuildSettings& settings, BuildReport& report, const BuildProgress& progress,
+                const EstimateListener& on_estimate)
+      : settings_(settings), report_(report), on_estimate_(on_estimate), clock_(report, progress) {}
+
+  Scene import_scene(const std::filesystem::path& path) {
+    Scene scene =
+        clock_.run("import", [&](const Progress&) { return import_usable(path, settings_.scale); });
+    report_.triangle_count = scene.triangle.size();
+    report_.degenerate_triangle_count = scene.degenerate_triangle_count;
+    report_.warnings = scene.warnings;
+    receivers_ = PatchSelection(settings_.receivers, scene, "receivers");
+    sources_ = PatchSelection(settings_.sources, scene, "sources");
+    data_.materials = scene.materials;
+    data_.textures = scene.textures;
+    data_.cameras = scene.cameras;
+    data_.lights = scene.lights;
+    data_.record.generator = std::string("rebounce ") + version();
+    data_.record.scene_name = scene.name;
+    data_.record.scene_hash = scene.hash;
+    return scene;
+  }
+
+  /// Throws Error if the rest would need more memory than it may take, or cannot be made as asked.
+  void make_patches(Scene scene) {
+    model_ = clock_.run("patches", [&](const Progress& part) {
+      return make_patch_model(std::move(scene), settings_.subdivision, part);
+    });
+    describe_patches(model_, report_);
+    roles_ = choose_roles(model_, receivers_, sources_);
+    if (settings_.lightmap.size > 0) {
+      data_.lightmap = clock_.run(
+          "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
+    }
+    decided_ = decide(settings_, model_);
+    report_.estimate = estimate_cost(model_, roles_, decided_);
+    const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
+    if (fits && decided_.form_factor_kind == FormFactorKind::kPairs) forecast_pairs();
+    announce(report_.estimate);
+  }
+
+  /// Finds what patches exchange; afterwards the patches and the mesh are the data's.
+  void find_exchange() {
+    if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
+    EscapedLight escaped =
+        decided_.form_factor_kind == FormFactorKind::kLinks ? find_links_alone() : find_pairs();
+    data_.patches = std::move(model_.patches);
+    data_.patches.sky_visibility = std::move(escaped.sky_visibility);
+    data_.patches.absorbed = std::move(escaped.absorbed);
+    data_.sky_cells = std::move(escaped.sky_cells);
+    data_.mesh = std::move(model_.mesh);
+  }
+
+  /// What takes the light of patches to where it is shown.
+  void make_outputs() {
+    clock_.run("weights", [&](const Progress& part) {
+      compute_reconstruction_weights(model_.shown_patch, data_.patches.absorbed, *tracer_,
+                                     data_.mesh, part);
+      return true;
+    });
+    const bool probes = settings_.probes.grid[0] > 0 || settings_.probes.spacing > 0;
+    if ((probes || settings_.surface_harmonics.ray_count > 0) && !receivers_.empty()) {
+      report_.warnings.push_back(
+          "light probes and surface harmonics see patches that are no receivers without their "
+          "indirect light");
+    }
+    if (probes) {
+      data_.probes = clock_.run("probes", [&](const Progress& part) {
+        LightProbes placed = place_probes(data_.mesh, settings_.probes);
+        trace_probes(data_, model_.shown_patch, *tracer_, settings_.probes, placed, part);
+        return placed;
+      });
+    }
+    if (settings_.surface_harmonics.ray_count > 0) {
+      data_.surface_harmonics = clock_.run("surface harmonics", [&](const Progress& part) {
+        return trace_surface_harmonics(data_, model_.shown_patch, *tracer_,
+                                       settings_.surface_harmonics, part);
+      });
+    }
+  }
+
+  /// Makes the operator, and measures how far off it is.
+  void make_operator() {
+    if (decided_.operator_kind == OperatorKind::kNoOperator) return;
+    const bool links = decided_.form_factor_kind == FormFactorKind::kLinks;
+    const auto make = links ? make_operator_from_links : make_operator_from_pairs;
+    make(*tracer_, decided_, roles_, data_, report_, clock_);
+  }
+
+  TransferData take() { return std::move(data_); }
+
+ private:
+  /// Says by short samples how long a build from pairs takes.
+  void forecast_pairs() {
+    tracer_.emplace(make_surface_tracer(model_.mesh));
+    clock_.run("estimate", [&](const Progress& part) {
+      CostEstimate& estimate = report_.estimate;
+      estimate.form_factor_seconds =
+          forecast_form_factors(model_, *tracer_, decided_.form_factors, part).seconds;
+      if (decided_.operator_kind == OperatorKind::kNoOperator) return true;
+      estimate.inverse_seconds = forecast_dense_transfer(
+          estimate.patch_count, distinct_channels(model_.patches.reflectance),
+          arithmetic_of(decided_.operator_kind));
+      return true;
+    });
+  }
+
+  /// Throws Error if what is left needs more memory than it may take.
+  void announce(const CostEstimate& estimate) {
+    if (on_estimate_) on_estimate_(estimate);
+    refuse_if_too_large(estimate, decided_.memory_limit_bytes, report_.triangle_count);
+  }
+
+  EscapedLight find_pairs() {
+    FormFactors form_factors = clock_.run("form factors", [&](const Progress& part) {
+      return compute_form_factors(model_, *tracer_, settings_.form_factors, part);
+    });
+    report_.ray_count = form_factors.ray_count;
+    report_.pair_count = form_factors.pair_count;
+    report_.form_factor_count = form_factors.exchange.column.size();
+    report_.closure = form_factors.closure;
+    if (settings_.store_links) {
+      data_.links = clock_.run("links", [&](const Progress& part) {
+        return fit_links(form_factors.exchange, model_.patches, kLinkWorth, part);
+      });
+      report_.link_count = data_.links.pair.size();
+    }
+    data_.exchange = std::move(form_factors.exchange);
+    return form_factors;
+  }
+
+  EscapedLight find_links_alone() {
+    LinkBuild build = clock_.run("form factors", [&](const Progress& part) {
+      return build_links(model_, *tracer_, decided_.form_factors, {}, part);
+    });
+    report_.ray_count = build.ray_count;
+    report_.pair_count = build.candidate_count;
+    report_.link_count = build.links.pair.size();
+    report_.closure = build.closure;
+    if (decided_.operator_kind != OperatorKind::kNoOperator) {
+      const LinkedBuild known{model_.patches.size(), report_.link_count,
+                              distinct_channels(model_.patches.reflectance), roles_,
+                              decided_.tolerance};
+      announce(report_.estimate_after_links.emplace(
+          estimate_after_links(known, decided_.memory_limit_bytes)));
+    }
+    data_.links = std::move(build.links);
+    return build;
+  }
+
+  const BuildSettings& settings_;
+  BuildSettings decided_;  ///< settings_ with what was left open decided
+  BuildReport& report_;
+  const EstimateListener& on_estimate_;
+  PhaseClock clock_;
+  TransferData data_;
+  PatchModel model_;
+  PatchSelection receivers_, sources_;
+  PatchRoles roles_;
+  std::optional<RayTracer> tracer_;
+};
+
+}  // namespace
+
+Scene import_usable(const std::filesystem::path& path, double scale) {
+  Scene scene = import_gltf(path, scale);
+  make_double_sided(scene, find_inside_out(scene));
+  return scene;
+}
+
+TransferData build_transfer_data(const std::filesystem::path& scene_path,
+                                 const BuildSettings& settings, BuildReport& report,
+                                 const BuildProgress& progress,
+                                 const EstimateListener& on_estimate) {
+  TransferBuild build(settings, report, progress, on_estimate);
+  build.make_patches(build.import_scene(scene_path));
+  build.find_exchange();
+  build.make_outputs();
+  build.make_operator();
+  return build.take();
+}
+
+}  // namespace rebounce

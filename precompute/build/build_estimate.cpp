@@ -1,0 +1,142 @@
+#include "precompute/build/build_estimate.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/build/operator_stage.h"
+#include "precompute/compression/large_transfer.h"
+#include "precompute/exchange/links/link_refinement.h"
+#include "precompute/exchange/pairs/closure.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "transfer/base/error.h"
+#include "transfer/exchange/linked_form_factors.h"
+
+namespace rebounce {
+namespace {
+
+// What each stage holds at its peak. Arrays that grow by doubling are counted with what they may
+// have to spare, and while they are copied to a larger place with both.
+
+// An entry of an ExchangeMatrix: a column and an exchange area.
+constexpr std::size_t kEntryBytes = sizeof(std::uint32_t) + sizeof(float);
+
+// A pair while form factors are made: in rows, and in the matrix that they are copied to.
+constexpr std::size_t kPairBytesMade = sizeof(ExchangeEntry) + 3 * kEntryBytes;
+
+// A pair beside a dense inverse: in the matrix, and expanded to rows that hold it both ways.
+constexpr std::size_t kPairBytesKept = 2 * kEntryBytes + 2 * kEntryBytes;
+
+// A link while links are found: as it was refined, its copy, and the flat arrays.
+constexpr std::size_t kLinkBytesFound = 4 * sizeof(Link);
+
+// A link afterwards: the flat arrays, and by both nodes as they gather.
+constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
+                                       sizeof(FormFactorLinks{}.exchange_area[0]) +
+                                       sizeof(FormFactorLinks{}.gradient[0]);
+constexpr std::size_t kLinkBytesKept = 2 * kFlatLinkBytes + 2 * sizeof(IncomingLink);
+
+// A patch beside links, an upper estimate: its triangles, in the mesh and in the ray tracer;
+// radiosities under 274 lights; compressed form factors, which are only known later.
+constexpr std::size_t kPatchBytes = 8000;
+
+// Links of a patch over the cube root of the number of patches, an upper estimate until they are
+// known: a furnished room has 10.5 with 4,000 patches and 10.0 with 64,000, a bare one a quarter.
+constexpr double kFurnishedLinks = 11;
+
+std::uint64_t machine_memory_bytes() {
+  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
+         static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
+}
+
+std::string in_gib(std::uint64_t bytes) {
+  return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
+}
+
+CostEstimate estimate_of(std::size_t patch_count, const PatchRoles& roles) {
+  CostEstimate estimate;
+  estimate.patch_count = patch_count;
+  estimate.receiver_count = roles.count(PatchRoles::kReceiver, patch_count);
+  estimate.source_count = roles.count(PatchRoles::kSource, patch_count);
+  return estimate;
+}
+
+std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
+  return kPatchBytes * build.patch_count + kLinkBytesKept * build.link_count;
+}
+
+std::size_t links_of_furnished_room(std::size_t patch_count) {
+  const auto n = static_cast<double>(patch_count);
+  return static_cast<std::size_t>(kFurnishedLinks * std::cbrt(n) * n);
+}
+
+}  // namespace
+
+std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
+  return settings.memory_limit_bytes > 0 ? settings.memory_limit_bytes : machine_memory_bytes() / 2;
+}
+
+std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_count,
+                                  OperatorKind kind) {
+  const std::uint64_t pairs = static_cast<std::uint64_t>(patch_count) * patch_count / 4;
+  const std::uint64_t inverses =
+      kind == OperatorKind::kNoOperator
+          ? 0
+          : dense_transfer_peak_bytes(patch_count, matrix_count, arithmetic_of(kind));
+  return std::max(kPairBytesMade * pairs, kPairBytesKept * pairs + inverses);
+}
+
+std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
+  return kPatchBytes * build.patch_count + kLinkBytesFound * build.link_count;
+}
+
+std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  LargeTransferSettings settings{.compression = {.tolerance = build.tolerance},
+                                 .roles = build.roles};
+  settings.memory_limit_bytes = memory_of_large_transfer(build, limit_bytes);
+  return bytes_beside_transfer(build) +
+         plan_large_transfer(build.patch_count, build.matrix_count, settings).peak_bytes;
+}
+
+std::uint64_t memory_of_large_transfer(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  const std::uint64_t beside = bytes_beside_transfer(build);
+  return limit_bytes > beside ? limit_bytes - beside : 1;
+}
+
+CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
+                           const BuildSettings& decided) {
+  const std::size_t n = model.patches.size();
+  const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
+  CostEstimate estimate = estimate_of(n, roles);
+  if (decided.form_factor_kind == FormFactorKind::kPairs) {
+    estimate.peak_bytes = peak_bytes_of_pairs(n, matrices, decided.operator_kind);
+    return estimate;
+  }
+  const LinkedBuild build{n, links_of_furnished_room(n), matrices, roles, decided.tolerance};
+  estimate.peak_bytes = peak_bytes_of_links(build);
+  if (decided.operator_kind != OperatorKind::kNoOperator) {
+    estimate.peak_bytes =
+        std::max(estimate.peak_bytes, peak_bytes_after_links(build, decided.memory_limit_bytes));
+  }
+  return estimate;
+}
+
+CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  CostEstimate estimate = estimate_of(build.patch_count, build.roles);
+  estimate.link_count = build.link_count;
+  estimate.peak_bytes = peak_bytes_after_links(build, limit_bytes);
+  return estimate;
+}
+
+void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
+                         std::size_t triangle_count) {
+  if (estimate.peak_bytes <= limit_bytes) return;
+  throw Error(fmt::format(
+      "{} patches (from {} triangles) need about {} and the limit is {}; ask for "
+      "fewer patches, simplify the scene or raise --memory-limit",
+      estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes), in_gib(limit_bytes)));
+}
+
+}  // namespace rebounce

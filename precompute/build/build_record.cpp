@@ -1,0 +1,111 @@
+#include "precompute/build/build_record.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace rebounce {
+namespace {
+
+const char* name(OperatorKind kind) {
+  switch (kind) {
+    case OperatorKind::kHierarchical:
+      return "hierarchical";
+    case OperatorKind::kLowRank:
+      return "low-rank";
+    case OperatorKind::kNoOperator:
+      return "none";
+    case OperatorKind::kAutomatic:
+    case OperatorKind::kDense:
+      break;
+  }
+  return "dense";
+}
+
+const char* name(FormFactorKind kind) {
+  return kind == FormFactorKind::kLinks ? "links" : "pairs";
+}
+
+std::string settings_json(const BuildSettings& settings) {
+  const FormFactorSettings& f = settings.form_factors;
+  return nlohmann::json{{"operator", name(settings.operator_kind)},
+                        {"form_factors", name(settings.form_factor_kind)},
+                        {"tolerance", settings.tolerance},
+                        {"form_factor_tolerance", settings.form_factor_tolerance},
+                        {"rank", settings.rank},
+                        {"receivers", settings.receivers},
+                        {"sources", settings.sources},
+                        {"scale", settings.scale},
+                        {"precision", precision_name(*settings.precision)},
+                        {"patches", settings.subdivision.patch_count},
+                        {"patch_size", settings.subdivision.patch_size},
+                        {"seed", f.seed},
+                        {"probe_rays", f.probe_rays},
+                        {"full_rays", f.full_rays},
+                        {"hemisphere_rays", f.hemisphere_rays},
+                        {"link_epsilon", f.link_epsilon},
+                        {"store_links", settings.store_links},
+                        {"kernel_tolerance", f.kernel_tolerance},
+                        {"probe_grid", settings.probes.grid},
+                        {"probe_spacing", settings.probes.spacing},
+                        {"probe_rays_each", settings.probes.ray_count},
+                        {"surface_harmonic_rays", settings.surface_harmonics.ray_count},
+                        {"lightmap_size", settings.lightmap.size},
+                        {"lightmap_padding", settings.lightmap.padding}}
+      .dump();
+}
+
+/// Times differ from run to run and do not go into the file.
+std::string report_json(const BuildReport& report, const std::vector<KindError>& errors) {
+  nlohmann::json by_kind = nlohmann::json::object();
+  for (const KindError& e : errors) {
+    by_kind[std::string(name(e.kind))] = {{"lights", e.light_count},
+                                          {"dark_lights", e.dark_count},
+                                          {"mean", e.mean},
+                                          {"max", e.max},
+                                          {"bound", e.bound}};
+  }
+  nlohmann::json json{{"triangles", report.triangle_count},
+                      {"degenerate_triangles", report.degenerate_triangle_count},
+                      {"display_triangles", report.display_triangle_count},
+                      {"slivers", report.sliver_count},
+                      {"unlit_sides", report.unlit_side_count},
+                      {"covered_sides", report.covered_side_count},
+                      {"opening_sides", report.opening_side_count},
+                      {"buried_sides", report.buried_side_count},
+                      {"patch_size_min", report.patch_size_min},
+                      {"patch_size_median", report.patch_size_median},
+                      {"patch_size_max", report.patch_size_max},
+                      {"rays", report.ray_count},
+                      {"pairs", report.pair_count},
+                      {"form_factors", report.form_factor_count},
+                      {"links", report.link_count},
+                      {"row_sum_error_before", report.closure.row_sum_error_before},
+                      {"row_sum_error_after", report.closure.row_sum_error_after},
+                      {"closure_change", report.closure.relative_change},
+                      {"errors", by_kind},
+                      {"warnings", report.warnings}};
+  if (report.form_factor_error) {
+    json["form_factor_error_mean"] = report.form_factor_error->mean;
+    json["form_factor_error_max"] = report.form_factor_error->max;
+    json["form_factor_error_lights"] = report.form_factor_error->light_count;
+    json["form_factor_error_dark_lights"] = report.form_factor_error->dark_count;
+  }
+  return json.dump();
+}
+
+}  // namespace
+
+void record_build(const BuildSettings& decided, const BuildReport& report,
+                  const std::vector<KindError>& errors, BuildRecord& record) {
+  for (const KindError& e : errors) {
+    record.error_bound = std::max(record.error_bound, e.bound);
+    if (e.kind != LightKind::kPoint) continue;
+    record.error_mean = e.mean;
+    record.error_max = e.max;
+  }
+  record.tolerance = decided.tolerance;
+  record.settings_json = settings_json(decided);
+  record.report_json = report_json(report, errors);
+}
+
+}  // namespace rebounce

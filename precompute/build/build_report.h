@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/exchange/pairs/exchange_results.h"
+
+namespace rebounce {
+
+/// What the expensive part, or what is left of it, will take.
+struct CostEstimate {
+  std::size_t patch_count = 0;
+  std::size_t receiver_count = 0, source_count = 0;
+  std::size_t link_count = 0;  ///< 0: not known yet, or there are none
+  /// As long as links are not known, they are taken to be as many as in a furnished room.
+  std::uint64_t peak_bytes = 0;
+  /// With pairs, what form factors and the dense inverse will take with the threads that there are,
+  /// by short samples of either: rough. 0: no sample was taken.
+  double form_factor_seconds = 0, inverse_seconds = 0;
+};
+
+struct BuildReport {
+  std::size_t triangle_count = 0;  ///< of the scene, without degenerate ones
+  std::size_t degenerate_triangle_count = 0;
+  std::size_t display_triangle_count = 0;
+  std::size_t patch_count = 0;
+  std::size_t sliver_count = 0;
+  std::size_t unlit_side_count = 0, covered_side_count = 0, opening_side_count = 0,
+              buried_side_count = 0;
+  float patch_size_min = 0, patch_size_median = 0, patch_size_max = 0;  ///< sqrt(area), metres
+  std::vector<std::string> warnings;
+  std::vector<std::pair<std::string, double>> seconds;  ///< by phase, in order
+  std::uint64_t ray_count = 0, pair_count = 0, form_factor_count = 0;
+  std::size_t link_count = 0;  ///< that are stored
+  ClosureReport closure;
+  /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
+  /// were not fitted to.
+  std::optional<FormFactorError> form_factor_error;
+  double form_factor_tolerance = 0;  ///< that they were compressed to
+  CostEstimate estimate;
+  std::optional<CostEstimate> estimate_after_links;  ///< of what is left then
+};
+
+/// Called when a phase begins, during it and at its end; returning false stops the build.
+using BuildProgress = std::function<bool(std::string_view phase, double fraction)>;
+
+/// Called once patches are known and before form factors are begun, and where an operator is made
+/// from links again when these are found, with what is left.
+using EstimateListener = std::function<void(const CostEstimate&)>;
+
+}  // namespace rebounce

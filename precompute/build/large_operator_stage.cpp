@@ -1,0 +1,164 @@
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "precompute/build/build_estimate.h"
+#include "precompute/build/build_record.h"
+#include "precompute/build/operator_stage.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/compression/large_transfer.h"
+#include "precompute/exchange/links/link_fitting.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "precompute/lights/fitting_lights.h"
+#include "precompute/lights/measured_error.h"
+#include "precompute/lights/received_light.h"
+#include "precompute/lights/reference_solution.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+// Lights that compressed form factors are measured under, and judging points of the operator's that
+// judge them too.
+constexpr int kTestLightCount = 16;
+constexpr std::size_t kFormFactorJudgingCount = 64;
+
+// Residual of the radiosities that form factors are fitted to and measured with: what light patches
+// give off matters there, not its third digit.
+constexpr double kFittingResidual = 1e-2;
+
+// Of form factors in half precision, whose rounding is not far below.
+constexpr double kLeastTolerance = 1e-4;
+
+using Lights = std::vector<std::vector<Float3>>;
+using Exitances = std::span<const std::vector<Float3>>;
+
+/// The radiosities that initial exitances give rise to. Throws Cancelled if asked to stop.
+Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
+                      const Progress& progress) {
+  Lights radiosities;
+  while (radiosities.size() < exitances.size()) {
+    if (progress && !progress(static_cast<double>(radiosities.size()) / exitances.size())) {
+      throw Cancelled();
+    }
+    const Exitances left = exitances.subspan(radiosities.size());
+    const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kTogether));
+    for (const auto& solution : solver.radiosities(some, kFittingResidual)) {
+      std::vector<Float3>& radiosity = radiosities.emplace_back();
+      for (const auto& [r, g, b] : solution) {
+        radiosity.push_back({static_cast<float>(r), static_cast<float>(g), static_cast<float>(b)});
+      }
+    }
+  }
+  return radiosities;
+}
+
+/// What the compressions are fitted to and measured by.
+struct FittedLights {
+  DrawnLights exitances, radiosities;
+  Lights test_radiosities;
+};
+
+FittedLights find_lights(const RayTracer& tracer, const TransferData& data, const PatchRoles& roles,
+                         std::uint64_t seed, const ReferenceSolver& solver,
+                         const Progress& progress) {
+  FittedLights lights;
+  lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
+  const Lights tests =
+      random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
+  const Exitances shaping = lights.exitances.shaping, judging = lights.exitances.judging;
+  const Exitances few = judging.first(std::min(judging.size(), 1 + kFormFactorJudgingCount));
+  const auto all = static_cast<double>(shaping.size() + few.size() + tests.size());
+  std::size_t before = 0;
+  const auto solve = [&](Exitances some) {
+    const double begin = before / all, part = some.size() / all;
+    before += some.size();
+    return radiosities_of(solver, some,
+                          [&](double done) { return !progress || progress(begin + part * done); });
+  };
+  lights.radiosities.shaping = solve(shaping);
+  lights.radiosities.judging = solve(few);
+  lights.test_radiosities = solve(tests);
+  return lights;
+}
+
+/// The part that errors at receivers are relative to of all light that patches give off after the
+/// first time.
+double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
+                     const PatchRoles& roles, std::span<const float> area) {
+  ReceivedLight received;
+  for (std::size_t k = 0; k < exitances.shaping.size(); ++k) {
+    std::vector<Float3> reflected = radiosities.shaping[k];
+    for (std::size_t i = 0; i < reflected.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) reflected[i][c] -= exitances.shaping[k][i][c];
+    }
+    const double all = area_norm(reflected, area);
+    roles.keep(PatchRoles::kReceiver, reflected);
+    received.add(area_norm(reflected, area), all);
+  }
+  return received.part();
+}
+
+/// What was asked for, or a part of the operator's tolerance: errors of F spread everywhere, and
+/// those of the operator are relative to what arrives at receivers.
+double form_factor_tolerance(const BuildSettings& decided, const FittedLights& lights,
+                             const PatchRoles& roles, std::span<const float> area) {
+  if (decided.form_factor_tolerance > 0) return decided.form_factor_tolerance;
+  const double part = received_part(lights.exitances, lights.radiosities, roles, area);
+  return std::max(kLeastTolerance, decided.tolerance / kToleranceOverFormFactors * part);
+}
+
+}  // namespace
+
+void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
+                              const PatchRoles& roles, TransferData& data, BuildReport& report,
+                              PhaseClock& clock) {
+  const PatchTable& patches = data.patches;
+  const std::uint64_t seed = decided.form_factors.seed;
+  // Gathered along from the first light to the last check: made once.
+  const auto links =
+      std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
+  const ReferenceSolver reference(links, patches);
+  FormFactorLinks fewer = clock.run("fewer links", [&](const Progress& part) {
+    return fit_links(data.links, patches, kLinkWorth, part);
+  });
+  const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
+    // What light patches give off matters here, not its third digit.
+    const ReferenceSolver solver(
+        std::make_shared<const LinkedFormFactors>(fewer, patches.area, patches.centroid), patches);
+    return find_lights(tracer, data, roles, seed, solver, part);
+  });
+  report.form_factor_tolerance = form_factor_tolerance(decided, lights, roles, patches.area);
+  data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
+    return compress_form_factors(data.links, links, patches, lights.radiosities.view(),
+                                 {report.form_factor_tolerance, Precision::kF16}, part);
+  });
+  data.transfer = clock.run("operator", [&](const Progress& part) {
+    LargeTransferSettings settings;
+    settings.compression = {decided.tolerance, *decided.precision};
+    settings.roles = roles;
+    settings.memory_limit_bytes =
+        memory_of_large_transfer({patches.size(), data.links.pair.size(),
+                                  distinct_channels(patches.reflectance), roles, decided.tolerance},
+                                 decided.memory_limit_bytes);
+    settings.checkpoint = decided.checkpoint;
+    return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
+                                settings, part);
+  });
+  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
+    report.form_factor_error =
+        form_factor_error(*data.compressed_form_factors, *links, patches, lights.test_radiosities);
+    if (roles.all_are_both()) {
+      data.record.solve_residual = transfer_residual(*data.transfer, *links, patches);
+    }
+    return measure_error(data, tracer, reference.preconditioned(data.transfer), decided.tolerance,
+                         seed, part);
+  });
+  // The check is the last that needs them all.
+  data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
+  if (decided.store_links) report.link_count = data.links.pair.size();
+  record_build(decided, report, errors, data.record);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,105 @@
+#include "precompute/build/operator_stage.h"
+
+#include <fmt/format.h>
+
+#include "precompute/build/build_record.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/compression/hierarchical_transfer.h"
+#include "precompute/compression/low_rank_transfer.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "precompute/lights/fitting_lights.h"
+#include "precompute/lights/measured_error.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+// Lights that compressed form factors are measured under.
+constexpr int kTestLightCount = 16;
+
+// A residual above this is not rounding but a mistake; f32 and f16 entries.
+constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
+
+void check_residual(double residual, Precision precision) {
+  const double largest = precision == Precision::kF16 ? kLargestResidualF16 : kLargestResidualF32;
+  if (residual <= largest) return;
+  throw Error(
+      fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
+                  "please report this scene",
+                  residual, largest));
+}
+
+std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
+                                                 const TransferData& data, const RayTracer& tracer,
+                                                 const BuildSettings& settings,
+                                                 const PatchRoles& roles,
+                                                 const Progress& progress) {
+  if (settings.operator_kind != OperatorKind::kHierarchical) {
+    return build_low_rank_transfer(dense, {settings.rank, *settings.precision}, progress);
+  }
+  const DrawnLights lights = draw_fitting_lights(data, tracer, settings.form_factors.seed, roles);
+  return build_hierarchical_transfer(dense, data.patches, lights.view(),
+                                     {settings.tolerance, *settings.precision}, progress, roles);
+}
+
+/// Compresses the form factors of `data` and measures how well, with an operator of all patches.
+void compress_form_factors_of(TransferData& data, const TransferOperator& transfer,
+                              const RayTracer& tracer, const BuildSettings& settings,
+                              BuildReport& report, const Progress& progress) {
+  const std::uint64_t seed = settings.form_factors.seed;
+  report.form_factor_tolerance = settings.form_factor_tolerance;
+  const std::vector<Float3>& reflectance = data.patches.reflectance;
+  const DrawnLights drawn = draw_fitting_lights(data, tracer, seed);
+  const DrawnLights fitting{radiosities_of(transfer, reflectance, drawn.shaping),
+                            radiosities_of(transfer, reflectance, drawn.judging)};
+  data.compressed_form_factors =
+      compress_form_factors(data.exchange, data.patches, fitting.view(),
+                            {settings.form_factor_tolerance, Precision::kF16}, progress);
+  report.form_factor_error = form_factor_error(
+      *data.compressed_form_factors, FormFactorRows(data.exchange, data.patches.area), data.patches,
+      radiosities_of(
+          transfer, reflectance,
+          random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed)));
+}
+
+/// Measures the operator against `exact`, or if that is null against an iterative solution.
+void check_operator(TransferData& data, const RayTracer& tracer, const DenseOperator* exact,
+                    const BuildSettings& decided, const BuildReport& report, PhaseClock& clock) {
+  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
+    if (data.transfer->roles().all_are_both()) {
+      data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
+    }
+    return measure_error(data, tracer, exact, decided.form_factors.seed, part);
+  });
+  record_build(decided, report, errors, data.record);
+}
+
+}  // namespace
+
+void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
+                              const PatchRoles& roles, TransferData& data, BuildReport& report,
+                              PhaseClock& clock) {
+  const bool compressed = decided.operator_kind != OperatorKind::kDense;
+  const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
+  const auto dense = clock.run("operator", [&](const Progress& part) {
+    return build_dense_transfer(data.exchange, data.patches, dense_precision, part,
+                                arithmetic_of(decided.operator_kind));
+  });
+  check_residual(transfer_residual(*dense, data.exchange, data.patches), dense_precision);
+  data.transfer = dense;
+  if (compressed) {
+    data.transfer = clock.run("compression", [&](const Progress& part) {
+      return compress(*dense, data, tracer, decided, roles, part);
+    });
+  }
+  if (decided.form_factor_tolerance > 0) {
+    clock.run("form factor compression", [&](const Progress& part) {
+      const TransferOperator& whole = roles.all_are_both() ? *data.transfer : *dense;
+      compress_form_factors_of(data, whole, tracer, decided, report, part);
+      return true;
+    });
+  }
+  check_operator(data, tracer, compressed ? dense.get() : nullptr, decided, report, clock);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <chrono>
+
+#include "precompute/build/build_report.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+
+/// Times the phases of a build and passes their progress on.
+class PhaseClock {
+ public:
+  PhaseClock(BuildReport& report, const BuildProgress& progress)
+      : report_(report), progress_(progress) {}
+
+  /// What `work` returns, given a Progress. Throws Cancelled if asked to stop.
+  template <typename Work>
+  auto run(const char* phase, const Work& work) {
+    const Progress progress = [this, phase](double fraction) {
+      return !progress_ || progress_(phase, fraction);
+    };
+    if (!progress(0)) throw Cancelled();
+    const auto begin = std::chrono::steady_clock::now();
+    auto result = work(progress);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    report_.seconds.emplace_back(phase, seconds.count());
+    if (!progress(1)) throw Cancelled();
+    return result;
+  }
+
+ private:
+  BuildReport& report_;
+  const BuildProgress& progress_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,33 @@
+#include "precompute/compression/balanced_matrix.h"
+
+#include <cmath>
+
+namespace rebounce {
+
+BalancedMatrix::BalancedMatrix(const SymmetricMatrix& matrix, std::span<const std::int8_t> exponent)
+    : SymmetricMatrix(matrix.roles()),
+      matrix_(matrix),
+      inverse_(static_cast<Eigen::Index>(exponent.size())) {
+  for (std::size_t p = 0; p < exponent.size(); ++p) {
+    inverse_[static_cast<Eigen::Index>(p)] = std::ldexp(1.0F, -exponent[p]);
+  }
+}
+
+void BalancedMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                             std::span<const std::uint32_t> columns,
+                             Eigen::Ref<Eigen::MatrixXf> entries) const {
+  matrix_.entries(matrix, rows, columns, entries);
+  for (std::size_t j = 0; j < columns.size(); ++j) {
+    const float of_column = inverse_[columns[j]];
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      entries(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) *=
+          inverse_[rows[i]] * of_column;
+    }
+  }
+}
+
+Eigen::MatrixXf BalancedMatrix::multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const {
+  return inverse_.asDiagonal() * matrix_.multiply(matrix, inverse_.asDiagonal() * x);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,212 @@
+#include "precompute/compression/block_compression.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <utility>
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+// Columns of a sketch beyond the rank that is wanted; Halko et al. advise 5 to 10.
+constexpr Index kOversampling = 8;
+
+// Of a block with more rows than this, ranks above a quarter of them are not tried.
+constexpr Index kLargeBlock = 128;
+
+/// Orthonormal directions in descending order of the energy that they carry.
+struct Spectrum {
+  MatrixXd directions;          ///< one to a column
+  std::vector<double> missing;  ///< [k] energy of the whole less that of the first k
+};
+
+/// From eigenvectors in ascending order; `lost` is energy outside of their span.
+Spectrum descending(MatrixXd vectors, const Eigen::VectorXd& energies, double lost) {
+  Spectrum spectrum;
+  const Index count = energies.size();
+  spectrum.directions = vectors.rowwise().reverse();
+  spectrum.missing.assign(static_cast<std::size_t>(count) + 1, lost);
+  for (Index k = count; k-- > 0;) {
+    spectrum.missing[k] = spectrum.missing[k + 1] + std::max(0.0, energies[count - 1 - k]);
+  }
+  return spectrum;
+}
+
+Spectrum gram_spectrum(const MatrixXd& a) {
+  MatrixXd gram = MatrixXd::Zero(a.rows(), a.rows());
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(a);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
+  return descending(solver.eigenvectors(), solver.eigenvalues(), 0);
+}
+
+MatrixXd random_signs(Index rows, Index columns, std::uint64_t seed) {
+  constexpr Index kBits = 64;
+  std::mt19937_64 engine(seed);
+  MatrixXd signs(rows, columns);
+  double* const value = signs.data();
+  for (Index k = 0; k < signs.size(); k += kBits) {
+    const std::uint64_t bits = engine();
+    const Index count = std::min(kBits, signs.size() - k);
+    for (Index b = 0; b < count; ++b) value[k + b] = (bits >> b & 1) != 0 ? 1 : -1;
+  }
+  return signs;
+}
+
+Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t seed) {
+  const MatrixXd sample = a * random_signs(a.cols(), sketch_size, seed);
+  const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
+                         MatrixXd::Identity(a.rows(), sketch_size);
+  const MatrixXd projected = range.transpose() * a;
+  Spectrum inner = gram_spectrum(projected);
+  const double lost = std::max(0.0, a.squaredNorm() - projected.squaredNorm());
+  for (double& missing : inner.missing) missing += lost;
+  inner.directions = range * inner.directions;
+  return inner;
+}
+
+/// Leading left singular vectors of `a`, of which no more than `largest_rank` are wanted.
+Spectrum left_spectrum(const MatrixXd& a, Index largest_rank, std::uint64_t seed) {
+  const Index sketch_size = largest_rank + kOversampling;
+  return 2 * sketch_size < a.rows() ? sketched_spectrum(a, sketch_size, seed) : gram_spectrum(a);
+}
+
+/// The same of the rows of `a`: right singular vectors, exact.
+Spectrum right_spectrum(const MatrixXd& a) {
+  if (a.cols() <= a.rows()) return gram_spectrum(a.transpose());
+  Spectrum left = gram_spectrum(a);
+  MatrixXd right = a.transpose() * left.directions;
+  right.colwise().normalize();
+  left.directions = std::move(right);
+  return left;
+}
+
+/// The number of directions, at most `largest`, with the least total cost if rank k takes
+/// `size(k)` and each unit of missing energy counts `weight` times.
+template <typename Size>
+Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCost& cost,
+                    double weight, const Size& size) {
+  Index best = 0;
+  double least = cost.total(weight * spectrum.missing[0], 0);
+  const Index end = std::min<Index>(largest, spectrum.directions.cols());
+  for (Index k = 1; k <= end; ++k) {
+    const double total = cost.total(weight * spectrum.missing[k], size(k));
+    if (total < least) {
+      least = total;
+      best = k;
+    }
+  }
+  return best;
+}
+
+/// Of the bases, for each rank.
+double size_per_rank(const WideBlock& block, const CompressionCost& cost) {
+  return block.on_diagonal ? cost.size(block.rows(), 1, 0)
+                           : cost.size(block.rows() + block.columns(), 2, 0);
+}
+
+/// Ranks above are not tried.
+Index largest_rank_of(const WideBlock& block) {
+  return block.rows() > kLargeBlock ? block.rows() / 4 : block.rows();
+}
+
+Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cost, double limit) {
+  const double affordable = limit / (cost.price * size_per_rank(block, cost));
+  const Index largest = largest_rank_of(block);
+  return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
+}
+
+/// The least cost of ranks above `seen`, as far as energies of the rows' directions tell: those of
+/// the columns' and cores are left out. 0 for blocks that do not take long to try.
+double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index seen,
+                         const CompressionCost& cost) {
+  constexpr Index kFewest = 8;
+  if (block.rows() <= kLargeBlock || seen < kFewest) return 0;
+  const auto energy = [&](Index first, Index last) {
+    return (rows.missing[first] - rows.missing[last]) / static_cast<double>(last - first);
+  };
+  // Of the later directions of a sketch the energies are too low, and what is missing from the
+  // first is too much, by no more than this in the mean: Halko et al., theorem 10.5.
+  const Index half = seen / 2, quarter = half / 2;
+  const double excess =
+      1 + static_cast<double>(half) / static_cast<double>(seen + kOversampling - half - 1);
+  const double middle = energy(half - quarter / 2, half + quarter / 2);
+  const double early = energy(quarter - quarter / 2, quarter + quarter / 2);
+  const double power = middle > 0 ? std::log2(std::max(1.0, early / middle)) : 0;
+  const double per_rank = size_per_rank(block, cost);
+  double missing = rows.missing[half] / excess, least = std::numeric_limits<double>::max();
+  for (Index k = half + 1; k <= largest_rank_of(block); ++k) {
+    missing -= middle * std::pow(static_cast<double>(half) / static_cast<double>(k), power);
+    if (k <= seen) continue;
+    least = std::min(least, cost.total(std::max(0.0, missing), per_rank * static_cast<double>(k)));
+    if (missing <= 0) break;
+  }
+  return least;
+}
+
+void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index largest,
+                       const CompressionCost& cost, LowRankBlock& result) {
+  const Index m = block.rows(), matrices = block.matrix_count;
+  // What is missing from the rows is missing from the columns too.
+  const Index rank = cheapest_rank(rows, largest, cost, 2,
+                                   [&](Index k) { return cost.size(m * k, k, matrices * k * k); });
+  result.row_basis = rows.directions.leftCols(rank);
+  double kept = 0;
+  for (Index c = 0; c < matrices; ++c) {
+    result.cores.push_back(result.row_basis.transpose() * block.matrix(c) * result.row_basis);
+    kept += result.cores.back().squaredNorm();
+  }
+  result.error_squared = std::max(0.0, block.entries.squaredNorm() - kept);
+}
+
+void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
+              const CompressionCost& cost, LowRankBlock& result) {
+  const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
+  // Half of a core for the rows and half for the columns.
+  const Index row_rank = cheapest_rank(
+      rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, k, matrices * k * k / 2); });
+  result.row_basis = rows.directions.leftCols(row_rank);
+  result.error_squared = rows.missing[row_rank];
+  MatrixXd projected(matrices * row_rank, n);
+  for (Index c = 0; c < matrices; ++c) {
+    projected.middleRows(c * row_rank, row_rank) = result.row_basis.transpose() * block.matrix(c);
+  }
+  Index column_rank = 0;
+  if (row_rank > 0) {
+    const Spectrum columns = right_spectrum(projected);
+    column_rank = cheapest_rank(columns, largest, cost, 1, [&](Index k) {
+      return cost.size(n * k, k, matrices * row_rank * k / 2);
+    });
+    result.column_basis = columns.directions.leftCols(column_rank);
+    result.error_squared += columns.missing[column_rank];
+  } else {
+    result.column_basis.resize(n, 0);
+  }
+  for (Index c = 0; c < matrices; ++c) {
+    result.cores.push_back(projected.middleRows(c * row_rank, row_rank) * result.column_basis);
+  }
+}
+
+}  // namespace
+
+BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
+                            Index largest_rank, std::uint64_t seed) {
+  const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
+  const Spectrum rows = left_spectrum(block.entries, largest, seed);
+  LowRankBlock result;
+  if (block.on_diagonal) {
+    truncate_diagonal(block, rows, largest, cost, result);
+  } else {
+    truncate(block, rows, largest, cost, result);
+  }
+  BlockAttempt attempt{{}, least_cost_beyond(block, rows, largest, cost)};
+  if (cost.of(result) < limit) attempt.block = std::move(result);
+  return attempt;
+}
+
+}  // namespace rebounce

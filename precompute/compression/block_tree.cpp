@@ -1,0 +1,296 @@
+#include "precompute/compression/block_tree.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <optional>
+
+#include "precompute/base/blas.h"
+#include "precompute/base/parallel_progress.h"
+#include "precompute/compression/basis_remainders.h"
+#include "precompute/compression/block_compression.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+
+// Rows of the squares that the matrix is gathered and compressed in.
+constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
+
+// A block whose best ranks stay below this part of its sides is smooth: cutting it would only store
+// the same few functions several times over. Measured: notes/operator.md.
+constexpr Index kSmoothPart = 16;
+
+void append_columns(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
+  for (Index k = 0; k < matrix.size(); ++k) values.push_back(static_cast<float>(matrix.data()[k]));
+}
+
+void append_rows(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
+  append_columns(matrix.transpose(), values);
+}
+
+/// Makes the columns of `basis` orthonormal, by Householder QR; returns R, basis before = after R.
+Eigen::MatrixXd make_orthonormal(Eigen::MatrixXd& basis) {
+  const Index rank = basis.cols();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
+  const Eigen::MatrixXd factor =
+      qr.matrixQR().topRows(rank).template triangularView<Eigen::Upper>();
+  basis = qr.householderQ() * Eigen::MatrixXd::Identity(basis.rows(), rank);
+  return factor;
+}
+
+/// Compresses one square of the matrix, below or on the diagonal.
+class PieceCompressor {
+ public:
+  PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
+                  const std::vector<ClusterWeight>& weights, const WantedBlocks& wanted,
+                  const PartSizes& sizes, double price, const BlockPiece& piece)
+      : tree_(tree),
+        weights_(weights),
+        wanted_(wanted),
+        sizes_(sizes),
+        price_(price),
+        row_(piece.row),
+        column_(piece.column),
+        row_begin_(tree.clusters[piece.row].begin),
+        column_begin_(tree.clusters[piece.column].begin) {
+    for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) gather(matrix, m);
+  }
+
+  BlockPart compress() const { return compress(row_, column_); }
+
+ private:
+  void gather(const SymmetricMatrix& matrix, std::uint32_t m) {
+    const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
+    const auto rows = patches_of(tree_, row), columns = patches_of(tree_, column);
+    Eigen::MatrixXf& entries =
+        matrices_.emplace_back(Eigen::MatrixXf::Zero(row.count, column.count));
+    auto held =
+        entries.topLeftCorner(static_cast<Index>(rows.size()), static_cast<Index>(columns.size()));
+    matrix.entries(m, rows, columns, held);
+    wanted_.clear_unwanted(rows, columns, held);
+  }
+
+  Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
+
+  WideBlock wide_block(const TransferBlock& place) const {
+    WideBlock block;
+    block.matrix_count = matrix_count();
+    block.on_diagonal = place.on_diagonal();
+    block.entries.resize(place.row_count, matrix_count() * place.column_count);
+    for (Index m = 0; m < matrix_count(); ++m) {
+      block.entries.middleCols(m * place.column_count, place.column_count) =
+          matrices_[m]
+              .block(place.row_begin - row_begin_, place.column_begin - column_begin_,
+                     place.row_count, place.column_count)
+              .cast<double>();
+    }
+    return block;
+  }
+
+  WideBlock weighted_block(const TransferBlock& place, std::uint32_t row,
+                           std::uint32_t column) const {
+    WideBlock block = wide_block(place);
+    if (const auto* weight = weight_of(row, column)) weight->put_left(block.entries);
+    const ClusterWeight* const column_weight = weight_of(column, row);
+    if (column_weight == nullptr) return block;
+    for (Index m = 0; m < matrix_count(); ++m) {
+      column_weight->put_right(
+          block.entries.middleCols(m * place.column_count, place.column_count));
+    }
+    return block;
+  }
+
+  /// In how many directions light goes through a block.
+  double multiplicity(std::uint32_t row, std::uint32_t column) const {
+    return row != column && wanted_.leads(row, column) && wanted_.leads(column, row) ? 2 : 1;
+  }
+
+  BlockPart compress(std::uint32_t row, std::uint32_t column) const {
+    if (!wanted_.wanted(row, column)) return {};
+    if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return compress_children(row, column);
+    const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
+    const TransferBlock place{.row_begin = rows.begin,
+                              .row_count = rows.count,
+                              .column_begin = columns.begin,
+                              .column_count = columns.count};
+    const WideBlock block = weighted_block(place, row, column);
+    const CompressionCost cost{
+        .price = price_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
+    const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
+    const double overhead = price_ * sizes_.block;
+    if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
+    const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
+    const bool leaves = rows.is_leaf() && columns.is_leaf();
+    const Index smooth = std::min(block.rows(), block.columns()) / kSmoothPart;
+    BlockAttempt attempt;
+    if (!leaves && smooth > 0) {
+      attempt = compress_block(block, cost, zero_cost - overhead, smooth, seed);
+      if (attempt.block && attempt.block->row_basis.cols() < smooth &&
+          attempt.block->column_basis.cols() < smooth) {
+        return low_rank_part(place, *attempt.block, row, column, cost);
+      }
+    }
+    BlockPart best = leaves ? dense_part(place) : compress_children(row, column);
+    if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
+    const double limit = best.cost - overhead;
+    if (attempt.least_beyond < limit) {
+      attempt = compress_block(block, cost, limit, block.rows(), seed);
+    } else if (attempt.block && cost.of(*attempt.block) >= limit) {
+      return best;
+    }
+    return attempt.block ? low_rank_part(place, *attempt.block, row, column, cost) : best;
+  }
+
+  BlockPart compress_children(std::uint32_t row, std::uint32_t column) const {
+    BlockPart part;
+    const auto child = [&](std::uint32_t cluster, std::uint32_t k) {
+      const Cluster& c = tree_.clusters[cluster];
+      return c.is_leaf() ? cluster : c.first_child + k;
+    };
+    const std::uint32_t row_children = tree_.clusters[row].is_leaf() ? 1 : 2;
+    const std::uint32_t column_children = tree_.clusters[column].is_leaf() ? 1 : 2;
+    for (std::uint32_t r = 0; r < row_children; ++r) {
+      for (std::uint32_t c = 0; c < column_children; ++c) {
+        if (row == column && c > r) continue;
+        part.append(compress(child(row, r), child(column, c)));
+      }
+    }
+    return part;
+  }
+
+  static BlockPart zero_part(TransferBlock place, double cost) {
+    place.kind = TransferBlock::Kind::kLowRank;
+    return {{place}, {}, cost};
+  }
+
+  BlockPart dense_part(const TransferBlock& place) const {
+    const WideBlock block = wide_block(place);
+    BlockPart part{{place}, {}, 0};
+    for (Index m = 0; m < block.matrix_count; ++m) append_rows(block.matrix(m), part.values);
+    part.cost = price_ * (sizes_.block + static_cast<double>(part.values.size()));
+    return part;
+  }
+
+  /// The weight of the light that goes from one cluster to another; none if it is not wanted.
+  const ClusterWeight* weight_of(std::uint32_t from, std::uint32_t to) const {
+    return wanted_.leads(from, to) ? &weights_[from] : nullptr;
+  }
+
+  /// Of the weighted block's factors those of the block itself. Bases are made orthonormal again,
+  /// so that neither they nor the cores leave the range of half precision.
+  void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
+    if (const auto* weight = weight_of(row, column)) weight->take_away(block.row_basis);
+    const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);
+    Eigen::MatrixXd column_factor = row_factor;
+    if (row != column) {
+      if (const auto* weight = weight_of(column, row)) weight->take_away(block.column_basis);
+      column_factor = make_orthonormal(block.column_basis);
+    }
+    for (Eigen::MatrixXd& core : block.cores) core = row_factor * core * column_factor.transpose();
+  }
+
+  BlockPart low_rank_part(TransferBlock place, LowRankBlock block, std::uint32_t row,
+                          std::uint32_t column, const CompressionCost& cost) const {
+    take_weights_away(block, row, column);
+    place.kind = TransferBlock::Kind::kLowRank;
+    place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
+    place.column_rank = place.on_diagonal() ? place.row_rank
+                                            : static_cast<std::uint32_t>(block.column_basis.cols());
+    const BasisRemainders remainders =
+        find_remainders(block, {weight_of(row, column), weight_of(column, row)}, cost);
+    place.row_remainders = static_cast<std::uint32_t>(remainders.row);
+    place.column_remainders = static_cast<std::uint32_t>(remainders.column);
+    BlockPart part{{place}, {}, 0};
+    append_columns(block.row_basis, part.values);
+    append_columns(block.column_basis, part.values);
+    for (const Eigen::MatrixXd& core : block.cores) append_rows(core, part.values);
+    part.cost = cost.of(block) + price_ * sizes_.block;
+    return part;
+  }
+
+  const ClusterTree& tree_;
+  const std::vector<ClusterWeight>& weights_;
+  const WantedBlocks& wanted_;
+  const PartSizes& sizes_;
+  double price_;
+  std::uint32_t row_, column_, row_begin_, column_begin_;
+  std::vector<Eigen::MatrixXf> matrices_;
+};
+
+void add_pieces(const ClusterTree& tree, BlockPiece piece, std::uint32_t largest,
+                std::vector<BlockPiece>& pieces) {
+  const Cluster &rows = tree.clusters[piece.row], &columns = tree.clusters[piece.column];
+  const bool split_row = rows.count > largest && !rows.is_leaf();
+  const bool split_column = columns.count > largest && !columns.is_leaf();
+  if (!split_row && !split_column) {
+    pieces.push_back(piece);
+    return;
+  }
+  for (std::uint32_t r = 0; r < (split_row ? 2U : 1U); ++r) {
+    for (std::uint32_t c = 0; c < (split_column ? 2U : 1U); ++c) {
+      if (piece.row == piece.column && c > r) continue;
+      add_pieces(tree,
+                 {split_row ? rows.first_child + r : piece.row,
+                  split_column ? columns.first_child + c : piece.column},
+                 largest, pieces);
+    }
+  }
+}
+
+}  // namespace
+
+void BlockPart::append(BlockPart&& other) {
+  blocks.insert(blocks.end(), other.blocks.begin(), other.blocks.end());
+  values.insert(values.end(), other.values.begin(), other.values.end());
+  cost += other.cost;
+}
+
+std::uint32_t largest_piece(std::uint32_t position_count) {
+  return std::clamp(position_count / 8, kSmallestPiece, kLargestPiece);
+}
+
+std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t largest) {
+  std::vector<BlockPiece> pieces;
+  add_pieces(tree, {0, 0}, largest, pieces);
+  return pieces;
+}
+
+std::vector<BlockPiece> BlockTreeCompressor::pieces() const {
+  return block_pieces(tree_, largest_piece(tree_.clusters.front().count));
+}
+
+BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double price,
+                                        const Progress& progress) const {
+  load_blas();
+  std::vector<BlockPart> parts(pieces.size());
+  ParallelProgress loop(progress, pieces.size());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (std::size_t k = 0; k < pieces.size(); ++k) {
+    if (loop.stopped()) continue;
+    if (wants(pieces[k])) {
+      parts[k] =
+          PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, price, pieces[k]).compress();
+    }
+    loop.advance();
+  }
+  loop.finish();
+  BlockPart whole;
+  for (BlockPart& part : parts) whole.append(std::move(part));
+  return whole;
+}
+
+HierarchicalStorage BlockTreeCompressor::assemble(BlockPart whole) const {
+  whole.values.resize(whole.values.size() + HierarchicalFormat::kPadding, 0.0F);
+  HierarchicalStorage storage;
+  storage.area.assign(matrix_.area().begin(), matrix_.area().end());
+  storage.patch = tree_.patch;
+  storage.channel_matrix = matrix_.channel_matrix();
+  storage.matrix_count = matrix_.matrix_count();
+  storage.roles = matrix_.roles();
+  storage.blocks = std::move(whole.blocks);
+  storage.values_f32 = SharedArray(std::move(whole.values));
+  return storage;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,99 @@
+#include "precompute/compression/first_stage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "precompute/base/progress.h"
+
+namespace rebounce {
+namespace {
+
+// What it takes to compress all panels, in columns that are solved for. Measured:
+// notes/operator.md.
+constexpr double kCompression = 5500;
+
+}  // namespace
+
+FirstStage::FirstStage(PanelMatrix& matrix, const PatchTable& patches,
+                       std::span<const std::vector<Float3>> shaping, double price,
+                       std::size_t panels_together, const BlockCheckpoint& checkpoint)
+    : matrix_(matrix),
+      price_(price),
+      panels_together_(panels_together),
+      checkpoint_(checkpoint),
+      frame_(compression_frame(matrix, patches, shaping)),
+      weights_(frame_.weights()),
+      compressor_(matrix, frame_.tree, weights_) {
+  price_ = frame_.price_of(price);
+  make_panels();
+  for (Panel& panel : panels_) panel.part = checkpoint_.find(panel.name);
+}
+
+void FirstStage::make_panels() {
+  const std::vector<BlockPiece> pieces = block_pieces(frame_.tree, kPanelWidth);
+  all_pieces_ = pieces.size();
+  for (const BlockPiece& piece : pieces) {
+    if (!compressor_.wants(piece)) continue;
+    const auto found = std::ranges::find(panels_, piece.column, &Panel::column);
+    Panel& panel =
+        found == panels_.end() ? panels_.emplace_back(Panel{piece.column, {}, {}, {}}) : *found;
+    panel.pieces.push_back(piece);
+  }
+  std::ranges::sort(panels_, {},
+                    [&](const Panel& panel) { return frame_.tree.clusters[panel.column].begin; });
+  for (std::size_t k = 0; k < panels_.size(); ++k) {
+    panels_[k].name = fmt::format("panel_{:04}", k);
+  }
+}
+
+double FirstStage::compression_work(const Panel& panel) const {
+  return kCompression * static_cast<double>(panel.pieces.size()) / static_cast<double>(all_pieces_);
+}
+
+double FirstStage::work_of(std::span<const Panel> panels) const {
+  double work = 0;
+  for (const Panel& panel : panels) {
+    if (panel.part) continue;
+    work += frame_.tree.clusters[panel.column].count + compression_work(panel);
+  }
+  return work;
+}
+
+HierarchicalStorage FirstStage::run(const Progress& progress) {
+  const double all = work();
+  for (std::size_t first = 0; first < panels_.size(); ++first) {
+    std::size_t end = first;
+    while (end < panels_.size() && end - first < panels_together_ && !panels_[end].part) ++end;
+    if (end == first) continue;
+    const auto some = std::span(panels_).subspan(first, end - first);
+    const double before = all - work();
+    run(some, part_of(progress, before / all, (before + work_of(some)) / all));
+  }
+  BlockPart whole;
+  for (Panel& panel : panels_) {
+    whole.append(std::move(*panel.part));
+    panel.part.reset();
+  }
+  return compressor_.assemble(std::move(whole));
+}
+
+void FirstStage::run(std::span<Panel> panels, const Progress& progress) {
+  const double all = work_of(panels);
+  std::vector<Cluster> columns;
+  double done = 0;
+  for (const Panel& panel : panels) {
+    columns.push_back(frame_.tree.clusters[panel.column]);
+    done += columns.back().count / all;
+  }
+  matrix_.solve(frame_.tree, columns, part_of(progress, 0, done));
+  for (Panel& panel : panels) {
+    const double end = done + compression_work(panel) / all;
+    panel.part = compressor_.compress(panel.pieces, price_, part_of(progress, done, end));
+    checkpoint_.keep(panel.name, *panel.part);
+    report_progress(progress, end);
+    done = end;
+  }
+}
+
+}  // namespace rebounce

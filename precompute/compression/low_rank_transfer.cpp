@@ -1,0 +1,130 @@
+#include "precompute/compression/low_rank_transfer.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <random>
+
+#include "precompute/base/blas.h"
+#include "precompute/base/symmetric_matrix.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::MatrixXf;
+
+// Up to this many patches all eigenvectors are found: seconds at most.
+constexpr Index kDenseSize = 700;
+
+// Columns beyond the rank, a half of it and some, and multiplications by sum Yhat². The spectrum
+// falls slowly (corners): with fewer of either the subspace is some per cent off the best.
+constexpr Index kOversamplingPart = 2, kOversampling = 8;
+constexpr int kIterations = 4;
+
+MatrixXf orthonormal(const MatrixXf& a) {
+  return Eigen::HouseholderQR<MatrixXf>(a).householderQ() *
+         MatrixXf::Identity(a.rows(), std::min(a.rows(), a.cols()));
+}
+
+MatrixXf random_start(Index rows, Index columns) {
+  std::mt19937 engine(1);
+  MatrixXf random(rows, columns);
+  for (Index k = 0; k < random.size(); ++k) {
+    random.data()[k] = static_cast<float>(engine() * 0x1p-31) - 1.0F;
+  }
+  return random;
+}
+
+/// Turns a subspace towards the leading eigenvectors of sum Yhat².
+MatrixXf iterate(const DenseMatrix& dense, const MatrixXf& basis) {
+  MatrixXf sum = MatrixXf::Zero(basis.rows(), basis.cols());
+  for (std::uint32_t m = 0; m < dense.matrix_count(); ++m) {
+    sum += dense.multiply(m, dense.multiply(m, basis));
+  }
+  return orthonormal(sum);
+}
+
+/// Yhat V of each matrix, for the leading eigenvectors V of sum Yhat² within the span of `basis`.
+struct RitzVectors {
+  MatrixXf basis;
+  std::vector<MatrixXf> images;
+};
+
+RitzVectors ritz_vectors(const DenseMatrix& dense, const MatrixXf& basis, Index rank) {
+  RitzVectors result;
+  MatrixXd gram = MatrixXd::Zero(basis.cols(), basis.cols());
+  for (std::uint32_t m = 0; m < dense.matrix_count(); ++m) {
+    result.images.push_back(dense.multiply(m, basis));
+    const MatrixXd image = result.images.back().cast<double>();
+    gram += image.transpose() * image;
+  }
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
+  const MatrixXf leading = solver.eigenvectors().rightCols(rank).rowwise().reverse().cast<float>();
+  result.basis = basis * leading;
+  for (MatrixXf& image : result.images) image = image * leading;
+  return result;
+}
+
+SharedArray<float> tile_basis(const MatrixXf& basis) {
+  constexpr std::size_t kTile = LowRankOperator::kTile;
+  const auto n = static_cast<std::size_t>(basis.rows()),
+             rank = static_cast<std::size_t>(basis.cols());
+  std::vector<float> values(LowRankOperator::tile_count(n) * rank * kTile, 0.0F);
+  for (std::size_t r = 0; r < rank; ++r) {
+    for (std::size_t i = 0; i < n; ++i) {
+      values[(i / kTile * rank + r) * kTile + i % kTile] = basis(i, r);
+    }
+  }
+  return SharedArray(std::move(values));
+}
+
+SharedArray<float> make_cores(const RitzVectors& vectors) {
+  std::vector<float> values;
+  for (const MatrixXf& image : vectors.images) {
+    const MatrixXf core = vectors.basis.transpose() * image;
+    const MatrixXf symmetric = 0.5F * (core + core.transpose());
+    values.insert(values.end(), symmetric.data(), symmetric.data() + symmetric.size());
+  }
+  return SharedArray(std::move(values));
+}
+
+}  // namespace
+
+std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperator& dense,
+                                                               const LowRankSettings& settings,
+                                                               const Progress& progress) {
+  load_blas();
+  const DenseMatrix matrix(dense);
+  const auto n = static_cast<Index>(matrix.area().size());
+  const Index rank = std::min(n, static_cast<Index>(settings.rank));
+  const auto report = [&](double done) {
+    if (progress && !progress(done)) throw Cancelled();
+  };
+  report(0);
+  const Index columns = rank + rank / kOversamplingPart + kOversampling;
+  MatrixXf basis = MatrixXf::Identity(n, n);
+  if (n > kDenseSize && columns < n) {
+    basis = orthonormal(random_start(n, columns));
+    for (int k = 0; k < kIterations; ++k) {
+      basis = iterate(matrix, basis);
+      report((k + 1.0) / (kIterations + 1));
+    }
+  }
+  const RitzVectors vectors = ritz_vectors(matrix, basis, rank);
+  report(1);
+
+  LowRankOperator::Storage storage;
+  storage.area = dense.storage().area;
+  storage.channel_matrix = dense.storage().channel_matrix;
+  storage.matrix_count = dense.storage().matrix_count;
+  storage.rank = static_cast<std::size_t>(rank);
+  storage.basis_f32 = tile_basis(vectors.basis);
+  storage.core = make_cores(vectors);
+  if (settings.precision == Precision::kF16) storage = LowRankOperator::encode_half(storage);
+  return std::make_shared<const LowRankOperator>(std::move(storage));
+}
+
+}  // namespace rebounce

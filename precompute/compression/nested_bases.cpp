@@ -1,0 +1,507 @@
+#include "precompute/compression/nested_bases.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "precompute/base/blas.h"
+#include "precompute/compression/basis_remainders.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using Storage = HierarchicalStorage;
+using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// Cells have so many positions at most; a side of a block has moments if it is made of whole
+// groups, clusters of so many positions at most. Measured: notes/operator.md.
+constexpr std::uint32_t kCell = 128, kGroup = 256;
+
+// The largest entry of a core between moments: half of what half precision has room for.
+constexpr double kLargestCore = 32768 / HierarchicalFormat::kHalfScale;
+
+// A cell's description, in values.
+constexpr double kCellOverhead = 32;
+
+constexpr auto kAlignment = static_cast<Index>(HierarchicalFormat::kAlignment);
+
+/// Clusters that the rows and columns of large blocks are made of, in the order of positions.
+struct Cells {
+  std::vector<std::uint32_t> cluster;
+  std::vector<std::size_t> group_first;       ///< the first cell of each group, and their end
+  std::vector<std::uint32_t> group_position;  ///< where each group begins, and where the last ends
+
+  explicit Cells(const ClusterTree& tree) {
+    add(tree, 0, false);
+    group_first.push_back(cluster.size());
+    group_position.push_back(tree.clusters.front().begin + tree.clusters.front().count);
+  }
+
+ private:
+  void add(const ClusterTree& tree, std::uint32_t index, bool in_group) {
+    const Cluster& c = tree.clusters[index];
+    if (!in_group && (c.count <= kGroup || c.is_leaf())) {
+      group_first.push_back(cluster.size());
+      group_position.push_back(c.begin);
+      in_group = true;
+    }
+    if (c.count <= kCell || c.is_leaf()) {
+      cluster.push_back(index);
+      return;
+    }
+    for (std::uint32_t child : {c.first_child, c.first_child + 1}) add(tree, child, in_group);
+  }
+};
+
+/// A side of a large block.
+struct NestedEnd {
+  std::size_t block = 0;
+  bool is_row = true;
+  std::uint32_t cluster = 0, other = 0;       ///< of the tree, and that of the other side
+  std::size_t first_cell = 0, last_cell = 0;  ///< [first, last)
+  double multiplicity = 1;
+  bool sends = false, receives = false;  ///< light that is wanted at the other side, or from there
+  /// [rank][rank]: an error E of the basis is one of the block whose square is the trace of
+  /// E weighted E^T, and of E plain E^T where light at the other side is not weighed.
+  MatrixXd weighted = {}, plain = {};
+  RowMajor moments = {};  ///< [rank][moments] in place of the basis
+  MatrixXd folded = {};   ///< [rank][vectors before]: what the vectors were combined of
+
+  Index rank() const { return plain.rows(); }
+};
+
+/// Those of a block; null where it has its own basis.
+struct NestedSides {
+  const NestedEnd *row = nullptr, *column = nullptr;
+};
+
+/// What all large blocks over a cell share.
+struct CellBasis {
+  std::vector<std::size_t> ends;  ///< that lie over it
+  bool weighed = false;           ///< whether light that comes from here counts
+  VectorXd energies;              ///< of directions, falling
+  MatrixXd directions;            ///< [positions][positions], then [positions][rank]
+  Index stacked = 0, rank = 0;    ///< vectors of all blocks; of the basis
+  Index first_moment = 0;
+  MatrixXd vectors;       ///< [positions][rank], columns of norm 1
+  VectorXd norm, length;  ///< [rank] of the vectors before; what coefficients are divided by
+  Index remainders = 0;
+};
+
+class Nesting {
+ public:
+  Nesting(const Storage& storage, const NestingFrame& frame)
+      : storage_(storage), frame_(frame), tree_(frame.tree), cells_(frame.tree) {
+    std::uint64_t begin = 0;
+    for (const TransferBlock& block : storage_.blocks) {
+      values_of_.push_back(begin);
+      begin += block.value_count(storage_.matrix_count);
+    }
+    find_ends();
+  }
+
+  /// Whether it takes less error and bytes together.
+  bool pays() {
+    if (ends_.empty()) return false;
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t k = 0; k < ends_.size(); ++k) weigh(ends_[k]);
+    bases_.resize(cells_.cluster.size());
+    for (std::size_t e = 0; e < ends_.size(); ++e) {
+      for (std::size_t c = ends_[e].first_cell; c < ends_[e].last_cell; ++c) {
+        bases_[c].ends.push_back(e);
+      }
+    }
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t c = 0; c < bases_.size(); ++c) find_directions(c);
+    fill_groups();
+    double gain = 0;
+    for (std::size_t c = 0; c < bases_.size(); ++c) gain += gain_of(c);
+    return gain > 0;
+  }
+
+  Storage nested() {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t c = 0; c < bases_.size(); ++c) make_basis(c);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t e = 0; e < ends_.size(); ++e) take_moments(ends_[e]);
+    for (NestedEnd& end : ends_) fold(end);
+    fit_cores();
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t c = 0; c < bases_.size(); ++c) find_remainders(c);
+    return assemble();
+  }
+
+ private:
+  using Vectors = Eigen::Map<const RowMajor>;
+
+  const Cluster& cell(std::size_t c) const {
+    return tree_.clusters[cells_.cluster[c]];
+  }
+  const ClusterWeight& weight_of_cell(std::size_t c) const {
+    return frame_.weights[cells_.cluster[c]];
+  }
+  double price() const {
+    return frame_.cost.price;
+  }
+
+  /// The basis of one side of a block, [rank][positions].
+  Vectors basis(std::size_t b, bool is_row) const {
+    const TransferBlock& block = storage_.blocks[b];
+    const float* const rows = storage_.values_f32.data() + values_of_[b];
+    if (is_row || block.on_diagonal()) return {rows, block.row_rank, block.row_count};
+    return {rows + std::size_t{block.row_rank} * block.row_count, block.column_rank,
+            block.column_count};
+  }
+
+  /// Its core for one matrix, [row rank][column rank].
+  Vectors core(std::size_t b, std::uint32_t matrix) const {
+    const TransferBlock& block = storage_.blocks[b];
+    const Index size = Index{block.row_rank} * block.column_rank;
+    const float* const end =
+        storage_.values_f32.data() + values_of_[b] + block.value_count(storage_.matrix_count);
+    return {end - (storage_.matrix_count - matrix) * size, block.row_rank, block.column_rank};
+  }
+
+  void find_ends() {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> cluster_at;
+    for (std::uint32_t c = 0; c < tree_.clusters.size(); ++c) {
+      cluster_at[{tree_.clusters[c].begin, tree_.clusters[c].count}] = c;
+    }
+    for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
+      const TransferBlock& block = storage_.blocks[b];
+      if (block.kind != TransferBlock::Kind::kLowRank) continue;
+      if (block.row_rank == 0 || block.column_rank == 0) continue;
+      const std::uint32_t row = cluster_at.at({block.row_begin, block.row_count});
+      const std::uint32_t column = cluster_at.at({block.column_begin, block.column_count});
+      add_end(b, true, row, column);
+      if (!block.on_diagonal()) add_end(b, false, column, row);
+    }
+  }
+
+  void add_end(std::size_t b, bool is_row, std::uint32_t cluster, std::uint32_t other) {
+    const Cluster& range = tree_.clusters[cluster];
+    const auto& begins = cells_.group_position;
+    const auto first = std::ranges::lower_bound(begins, range.begin);
+    const auto last = std::ranges::lower_bound(begins, range.begin + range.count);
+    if (first == last || *first != range.begin || *last != range.begin + range.count) return;
+    NestedEnd end{.block = b, .is_row = is_row, .cluster = cluster, .other = other};
+    end.first_cell = cells_.group_first[static_cast<std::size_t>(first - begins.begin())];
+    end.last_cell = cells_.group_first[static_cast<std::size_t>(last - begins.begin())];
+    end.sends = frame_.wanted.leads(cluster, other);
+    end.receives = frame_.wanted.leads(other, cluster);
+    end.multiplicity = cluster != other && end.sends && end.receives ? 2 : 1;
+    ends_.push_back(std::move(end));
+  }
+
+  void weigh(NestedEnd& end) const {
+    MatrixXd other = basis(end.block, !end.is_row).transpose().cast<double>();
+    if (end.receives) frame_.weights[end.other].put_left(other);
+    const MatrixXd gram = other.transpose() * other;
+    for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
+      MatrixXd s = core(end.block, m).cast<double>();
+      if (!end.is_row) s.transposeInPlace();
+      if (m == 0) end.weighted = end.plain = MatrixXd::Zero(s.rows(), s.rows());
+      end.weighted += s * gram * s.transpose();
+      end.plain += s * s.transpose();
+    }
+  }
+
+  /// What a block has of a cell, [positions][rank], under the weight of light from there.
+  MatrixXd weighted_part(const NestedEnd& end, std::size_t c) const {
+    const Cluster& range = cell(c);
+    const Index first = range.begin - tree_.clusters[end.cluster].begin;
+    MatrixXd part =
+        basis(end.block, end.is_row).middleCols(first, range.count).transpose().cast<double>();
+    if (bases_[c].weighed) weight_of_cell(c).put_left(part);
+    return part;
+  }
+
+  void find_directions(std::size_t c) {
+    CellBasis& own = bases_[c];
+    for (const std::size_t e : own.ends) {
+      own.stacked += ends_[e].rank();
+      own.weighed |= ends_[e].sends;
+    }
+    const Index size = cell(c).count;
+    MatrixXd gram = MatrixXd::Zero(size, size);
+    for (const std::size_t e : own.ends) {
+      const MatrixXd part = weighted_part(ends_[e], c);
+      gram.noalias() += ends_[e].multiplicity * (part * ends_[e].weighted) * part.transpose();
+    }
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
+    own.directions = solver.eigenvectors().rowwise().reverse();
+    own.energies = solver.eigenvalues().reverse().cwiseMax(0);
+    const double worth = price() * frame_.cost.size(size + own.stacked, 1, 0);
+    own.rank = (own.energies.array() > worth).count();
+  }
+
+  /// Groups begin at multiples of the alignment, and so do their moments: the ranks of their cells
+  /// are filled up with the best directions that are left.
+  void fill_groups() {
+    for (std::size_t g = 0; g + 1 < cells_.group_first.size(); ++g) {
+      const std::span group = std::span(bases_).subspan(
+          cells_.group_first[g], cells_.group_first[g + 1] - cells_.group_first[g]);
+      Index total = 0;
+      for (const CellBasis& own : group) total += own.rank;
+      if (group.front().ends.empty()) continue;
+      while (total == 0 || total % kAlignment != 0) {
+        const auto next = [](const CellBasis& own) {
+          return own.rank < own.energies.size() ? own.energies[own.rank] : -1;
+        };
+        ++std::ranges::max_element(group, {}, next)->rank;
+        ++total;
+      }
+    }
+    Index moment = 0;
+    for (CellBasis& own : bases_) {
+      own.first_moment = moment;
+      moment += own.rank;
+    }
+  }
+
+  double gain_of(std::size_t c) const {
+    const CellBasis& own = bases_[c];
+    const auto size = static_cast<Index>(cell(c).count);
+    const double before = frame_.cost.size(size * own.stacked, 0, 0);
+    const double after =
+        frame_.cost.size((size + own.stacked) * own.rank, own.rank, 0) + kCellOverhead;
+    return price() * (before - after) - own.energies.tail(size - own.rank).sum();
+  }
+
+  /// Vectors of norm 1, and lengths of the moments between those of coefficients (all alike as
+  /// they are rounded) and of energies: rounding does the least there. notes/operator.md.
+  void make_basis(std::size_t c) {
+    CellBasis& own = bases_[c];
+    own.directions.conservativeResize(Eigen::NoChange, own.rank);
+    own.vectors = own.directions;
+    if (own.weighed) weight_of_cell(c).take_away(own.vectors);
+    own.norm = own.vectors.colwise().norm();
+    for (Index k = 0; k < own.rank; ++k) own.vectors.col(k) /= own.norm[k];
+    constexpr double kLeast = 1e-3;
+    const double most = own.rank > 0 ? own.energies[0] : 1;
+    own.length =
+        (own.energies.head(own.rank) / std::max(most, 1e-300)).array().pow(0.125).max(kLeast);
+  }
+
+  void take_moments(NestedEnd& end) {
+    const CellBasis &first = bases_[end.first_cell], &last = bases_[end.last_cell - 1];
+    end.moments.resize(end.rank(), last.first_moment + last.rank - first.first_moment);
+    for (std::size_t c = end.first_cell; c < end.last_cell; ++c) {
+      const CellBasis& own = bases_[c];
+      const MatrixXd coefficients = own.directions.transpose() * weighted_part(end, c);
+      end.moments.middleCols(own.first_moment - first.first_moment, own.rank) =
+          (own.length.cwiseInverse().asDiagonal() * coefficients).transpose().cast<float>();
+    }
+  }
+
+  /// Vectors of moments get norm 1, as those of bases, and cores what they were longer by. Of a
+  /// side with more vectors than moments as many do, and the rest goes into the core.
+  static void fold(NestedEnd& end) {
+    if (end.rank() > end.moments.cols()) {
+      const MatrixXd vectors = end.moments.transpose().cast<double>();
+      const Eigen::HouseholderQR<MatrixXd> qr(vectors);
+      end.folded = qr.matrixQR().triangularView<Eigen::Upper>();
+      end.moments = MatrixXd(qr.householderQ()).transpose().cast<float>();
+    } else {
+      const VectorXd norm = end.moments.rowwise().norm().cast<double>();
+      end.folded = (norm.array() > 0).select(norm, 1).asDiagonal();
+      end.moments.rowwise().normalize();
+    }
+    scale_errors(end, end.folded);
+  }
+
+  static void scale_errors(NestedEnd& end, const MatrixXd& by) {
+    end.weighted = by * end.weighted * by.transpose();
+    end.plain = by * end.plain * by.transpose();
+  }
+
+  /// Moments get longer, and cores smaller, until the largest entry of all cores fits half
+  /// precision well. By as much for all: small cores are not to fall below its normal numbers.
+  void fit_cores() {
+    double one_side = 0, both_sides = 0;
+    for (const auto& [b, sides] : sides_of_blocks()) {
+      double& largest = sides.row != nullptr && sides.column != nullptr ? both_sides : one_side;
+      for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
+        largest = std::max<double>(largest, folded_core(b, m, sides).cwiseAbs().maxCoeff());
+      }
+    }
+    const double length = std::max(one_side / kLargestCore, std::sqrt(both_sides / kLargestCore));
+    if (length == 0) return;
+    for (NestedEnd& end : ends_) {
+      end.folded /= length;
+      end.weighted /= length * length;
+      end.plain /= length * length;
+    }
+    for (CellBasis& own : bases_) own.length *= length;
+  }
+
+  /// Of all blocks that have any; those on the diagonal have the same twice.
+  std::map<std::size_t, NestedSides> sides_of_blocks() const {
+    std::map<std::size_t, NestedSides> sides;
+    for (const NestedEnd& end : ends_) {
+      NestedSides& of_block = sides[end.block];
+      if (end.is_row) of_block.row = &end;
+      if (!end.is_row || storage_.blocks[end.block].on_diagonal()) of_block.column = &end;
+    }
+    return sides;
+  }
+
+  /// A core with what its sides have folded into it.
+  MatrixXd folded_core(std::size_t b, std::uint32_t matrix, const NestedSides& sides) const {
+    MatrixXd s = core(b, matrix).cast<double>();
+    if (sides.row != nullptr) s = sides.row->folded * s;
+    if (sides.column != nullptr) s *= sides.column->folded.transpose();
+    return s;
+  }
+
+  void find_remainders(std::size_t c) {
+    CellBasis& own = bases_[c];
+    VectorXd arriving = VectorXd::Zero(own.rank), leaving = arriving;
+    for (const std::size_t e : own.ends) {
+      const NestedEnd& end = ends_[e];
+      const Index first = own.first_moment - bases_[end.first_cell].first_moment;
+      const MatrixXd t = own.length.asDiagonal() *
+                         end.moments.middleCols(first, own.rank).transpose().cast<double>();
+      if (end.receives) arriving += (t * end.weighted).cwiseProduct(t).rowwise().sum();
+      if (end.sends) leaving += (t * end.plain).cwiseProduct(t).rowwise().sum();
+    }
+    const double size = cell(c).count, weight = weight_of_cell(c).squared_norm();
+    own.remainders = worthwhile_remainders(own.vectors, price(), [&](Index k) {
+      return own.norm[k] * own.norm[k] * (size * arriving[k] + weight * leaving[k]);
+    });
+  }
+
+  /// Of the vectors of moments of an end.
+  Index remainder_count(const NestedEnd& end) const {
+    double arriving = 0, leaving = 0;
+    for (std::size_t c = end.first_cell; c < end.last_cell; ++c) {
+      const CellBasis& own = bases_[c];
+      if (end.receives) arriving += own.norm.cwiseProduct(own.length).squaredNorm();
+      if (end.sends) leaving += own.length.squaredNorm();
+    }
+    return worthwhile_remainders(end.moments.transpose().cast<double>(), price(), [&](Index r) {
+      return arriving * end.weighted(r, r) + leaving * end.plain(r, r);
+    });
+  }
+
+  Storage assemble() const {
+    Storage result = storage_;
+    result.blocks.clear();
+    std::vector<float> values;
+    const auto positions =
+        static_cast<std::uint32_t>(HierarchicalFormat::position_count(tree_.patch.size()));
+    add_moments(positions, result, values);
+    const std::map<std::size_t, NestedSides> sides = sides_of_blocks();
+    for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
+      const auto found = sides.find(b);
+      if (found == sides.end()) {
+        const float* const from = storage_.values_f32.data() + values_of_[b];
+        result.blocks.push_back(storage_.blocks[b]);
+        values.insert(values.end(), from,
+                      from + storage_.blocks[b].value_count(storage_.matrix_count));
+      } else {
+        add_block(b, found->second, positions, result, values);
+      }
+    }
+    values.resize(values.size() + HierarchicalFormat::kPadding, 0.0F);
+    result.values_f32 = SharedArray(std::move(values));
+    return result;
+  }
+
+  void add_moments(std::uint32_t positions, Storage& result, std::vector<float>& values) const {
+    for (std::size_t c = 0; c < bases_.size(); ++c) {
+      const CellBasis& own = bases_[c];
+      if (own.rank == 0) continue;
+      const auto rank = static_cast<std::uint32_t>(own.rank);
+      result.blocks.push_back(
+          {.row_begin = cell(c).begin,
+           .row_count = cell(c).count,
+           .column_begin = positions + static_cast<std::uint32_t>(own.first_moment),
+           .column_count = rank,
+           .kind = TransferBlock::Kind::kMoments,
+           .row_rank = rank,
+           .row_remainders = static_cast<std::uint32_t>(own.remainders)});
+      for (Index k = 0; k < own.vectors.size(); ++k) {
+        values.push_back(static_cast<float>(own.vectors.data()[k]));
+      }
+      for (Index k = 0; k < own.rank; ++k) {
+        result.moment_scale.push_back(static_cast<float>(own.norm[k] * own.length[k]));
+      }
+    }
+  }
+
+  /// One side of a block as it will be.
+  struct Side {
+    std::uint32_t begin, count, rank, remainders;
+    RowMajor vectors;
+  };
+
+  Side side_of(std::size_t b, bool is_row, const NestedEnd* end, std::uint32_t positions) const {
+    const TransferBlock& block = storage_.blocks[b];
+    const std::uint32_t rank = is_row ? block.row_rank : block.column_rank;
+    if (end != nullptr) {
+      const Index first = bases_[end->first_cell].first_moment;
+      return {positions + static_cast<std::uint32_t>(first),
+              static_cast<std::uint32_t>(end->moments.cols()),
+              static_cast<std::uint32_t>(end->rank()),
+              static_cast<std::uint32_t>(remainder_count(*end)), end->moments};
+    }
+    if (is_row) {
+      return {block.row_begin, block.row_count, rank, block.row_remainders, basis(b, true)};
+    }
+    return {block.column_begin, block.column_count, rank, block.column_remainders, basis(b, false)};
+  }
+
+  /// Rows come after columns: the sides change places if only the columns have moments.
+  void add_block(std::size_t b, const NestedSides& sides, std::uint32_t positions, Storage& result,
+                 std::vector<float>& values) const {
+    const bool diagonal = storage_.blocks[b].on_diagonal();
+    Side row = side_of(b, true, sides.row, positions);
+    Side column = diagonal ? row : side_of(b, false, sides.column, positions);
+    const bool swapped = row.begin < column.begin;
+    if (swapped) std::swap(row, column);
+    result.blocks.push_back({.row_begin = row.begin,
+                             .row_count = row.count,
+                             .column_begin = column.begin,
+                             .column_count = column.count,
+                             .kind = TransferBlock::Kind::kLowRank,
+                             .row_rank = row.rank,
+                             .column_rank = column.rank,
+                             .row_remainders = row.remainders,
+                             .column_remainders = column.remainders});
+    const auto add = [&](const RowMajor& matrix) {
+      values.insert(values.end(), matrix.data(), matrix.data() + matrix.size());
+    };
+    add(row.vectors);
+    if (!diagonal) add(column.vectors);
+    for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
+      RowMajor s = folded_core(b, m, sides).cast<float>();
+      if (swapped) s.transposeInPlace();
+      add(s);
+    }
+  }
+
+  const Storage& storage_;
+  const NestingFrame& frame_;
+  const ClusterTree& tree_;
+  Cells cells_;
+  std::vector<std::uint64_t> values_of_;  ///< where those of each block begin
+  std::vector<NestedEnd> ends_;
+  std::vector<CellBasis> bases_;  ///< of each cell
+};
+
+}  // namespace
+
+Storage nest_bases(Storage storage, const NestingFrame& frame) {
+  load_blas();
+  Nesting nesting(storage, frame);
+  return nesting.pays() ? nesting.nested() : storage;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,121 @@
+#include "precompute/exchange/links/affine_links.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace rebounce {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// Directions in which a node extends by less than this part of its size have no gradient. It would
+// be as large as the direction is thin; and gradients are kept as bfloat16, axis by axis, so that
+// what is rounded off it points anywhere, along the node's whole length too: by 2^-9 / 0.03 of what
+// the gradient stands for at most. With 1e-6 gathering diverged, by 6 a sweep.
+constexpr double kFlat = 0.03;
+constexpr int kScalingRounds = 4;
+
+// Factors stay within these. A patch that sees next to nothing may have lost most of it, and what
+// would make up for that would amplify the light between two of them without end.
+constexpr float kLeastScale = 0.5F, kMostScale = 2;
+
+Matrix3d inverse_without_flat(const Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance);
+  const double least = kFlat * kFlat * eigen.eigenvalues()[2];
+  Matrix3d inverse = Matrix3d::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const double value = eigen.eigenvalues()[k];
+    if (!(value > least)) continue;
+    const Vector3d axis = eigen.eigenvectors().col(k);
+    inverse += axis * axis.transpose() / value;
+  }
+  return inverse;
+}
+
+}  // namespace
+
+std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<const float> area,
+                                     std::span<const Float3> centroid) {
+  const std::size_t m = links.first_child.size();
+  std::vector<NodeSpread> nodes(m);
+  const std::vector<std::uint32_t> begin = first_positions(links);
+  for (std::size_t k = m; k-- > 0;) {
+    NodeSpread& node = nodes[k];
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) {
+      const std::uint32_t patch = links.patch[begin[k]];
+      node.area = area[patch];
+      for (int axis = 0; axis < 3; ++axis) {
+        node.center[axis] = centroid[patch][static_cast<std::size_t>(axis)];
+      }
+      continue;
+    }
+    const NodeSpread &a = nodes[child], &b = nodes[child + 1];
+    node.area = a.area + b.area;
+    node.center = (a.area * a.center + b.area * b.center) / node.area;
+    for (const NodeSpread* part : {&a, &b}) {
+      const Vector3d d = part->center - node.center;
+      node.covariance += part->area / node.area * (part->covariance + d * d.transpose());
+    }
+    node.inverse = inverse_without_flat(node.covariance);
+  }
+  return nodes;
+}
+
+double squared_norm(const AffineLink& link, const NodeSpread& a, const NodeSpread& b) {
+  return (link.exchange * link.exchange + link.gradient_a.dot(a.covariance * link.gradient_a) +
+          link.gradient_b.dot(b.covariance * link.gradient_b)) /
+         (a.area * b.area);
+}
+
+void append_link(const AffineLink& link, FormFactorLinks& links) {
+  links.pair.push_back({link.a, link.b});
+  links.exchange_area.push_back(static_cast<float>(link.exchange));
+  std::array<float, 6>& gradient = links.gradient.emplace_back();
+  for (int axis = 0; axis < 3; ++axis) {
+    gradient[static_cast<std::size_t>(axis)] = static_cast<float>(link.gradient_a[axis]);
+    gradient[static_cast<std::size_t>(axis) + 3] = static_cast<float>(link.gradient_b[axis]);
+  }
+}
+
+AffineLink affine_link(const FormFactorLinks& links, std::size_t l) {
+  const auto& g = links.gradient[l];
+  return {.a = links.pair[l][0],
+          .b = links.pair[l][1],
+          .exchange = links.exchange_area[l],
+          .gradient_a = {g[0], g[1], g[2]},
+          .gradient_b = {g[3], g[4], g[5]}};
+}
+
+std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,
+                            std::span<const Float3> centroid) {
+  std::vector<float> sums;
+  sums.reserve(area.size());
+  for (const Float3& sum : gather(LinkedFormFactors(links, area, centroid),
+                                  std::vector<Float3>(area.size(), {1, 1, 1}))) {
+    sums.push_back(sum[0]);
+  }
+  return sums;
+}
+
+void scale_rows(std::span<const float> target, std::span<const float> area,
+                std::span<const Float3> centroid, FormFactorLinks& links) {
+  for (std::size_t i = 0; i < target.size(); ++i) {
+    if (target[i] == 0) links.scale[i] = 0;
+  }
+  std::vector<float> scaled(target.size(), 1);  // by this function
+  for (int round = 0; round < kScalingRounds; ++round) {
+    const std::vector<float> sum = row_sums(links, area, centroid);
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+      if (!(sum[i] > 0 && target[i] > 0)) continue;
+      const float wanted = scaled[i] * std::sqrt(target[i] / sum[i]);
+      const float allowed = std::clamp(wanted, kLeastScale, kMostScale);
+      links.scale[i] *= allowed / std::exchange(scaled[i], allowed);
+    }
+  }
+}
+
+}  // namespace rebounce

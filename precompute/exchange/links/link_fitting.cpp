@@ -1,0 +1,197 @@
+#include "precompute/exchange/links/link_fitting.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "precompute/base/disjoint_sets.h"
+#include "precompute/exchange/links/affine_links.h"
+#include "precompute/exchange/links/link_choice.h"
+#include "precompute/exchange/links/pair_sums.h"
+#include "precompute/patches/cluster_tree.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+// Rooms with groups of their own in the tree; smaller ones share the last.
+constexpr std::size_t kRoomGroups = 255;
+
+std::vector<std::uint32_t> numbers_of(DisjointSets& sets, std::size_t count) {
+  std::vector<std::uint32_t> number(count);
+  for (std::uint32_t i = 0; i < count; ++i) number[i] = sets.find(i);
+  return number;
+}
+
+/// [n] A number for each room: the patches that light can go between, on however long a way.
+std::vector<std::uint32_t> find_rooms(const ExchangeMatrix& exchange) {
+  const auto n = static_cast<std::uint32_t>(exchange.patch_count());
+  DisjointSets sets(n);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    for (std::uint64_t k = exchange.row_begin[i]; k < exchange.row_begin[i + 1]; ++k) {
+      sets.join(i, exchange.column[k]);
+    }
+  }
+  return numbers_of(sets, n);
+}
+
+/// The same where links say what light goes between.
+std::vector<std::uint32_t> find_rooms(const FormFactorLinks& links) {
+  const std::size_t m = links.first_child.size(), n = links.patch.size();
+  const std::vector<std::uint32_t> begin = first_positions(links);
+  std::vector<std::uint8_t> is_linked(m, 0);
+  for (const auto& [a, b] : links.pair) is_linked[a] = is_linked[b] = 1;
+  DisjointSets sets(static_cast<std::uint32_t>(n));
+  const auto first_patch = [&](std::uint32_t node) { return links.patch[begin[node]]; };
+  for (std::uint32_t node = 0; node < m; ++node) {
+    if (is_linked[node] == 0) continue;
+    for (std::uint32_t k = 1; k < links.count[node]; ++k) {
+      sets.join(first_patch(node), links.patch[begin[node] + k]);
+    }
+  }
+  for (const auto& [a, b] : links.pair) sets.join(first_patch(a), first_patch(b));
+  return numbers_of(sets, n);
+}
+
+/// [n] Groups for the tree, so that its nodes are of one room as far as may be: the largest rooms
+/// have one each.
+std::vector<std::uint8_t> room_groups(std::span<const std::uint32_t> room) {
+  std::vector<std::uint32_t> size(room.size(), 0), rooms;
+  for (const std::uint32_t r : room) {
+    if (size[r]++ == 0) rooms.push_back(r);
+  }
+  std::ranges::sort(rooms, [&](std::uint32_t a, std::uint32_t b) {
+    return size[a] != size[b] ? size[a] > size[b] : a < b;
+  });
+  std::vector<std::uint8_t> group_of_room(room.size(), kRoomGroups), group(room.size());
+  for (std::size_t k = 0; k < std::min(kRoomGroups, rooms.size()); ++k) {
+    group_of_room[rooms[k]] = static_cast<std::uint8_t>(k);
+  }
+  for (std::size_t i = 0; i < room.size(); ++i) group[i] = group_of_room[room[i]];
+  return group;
+}
+
+/// For each node the room that all of its patches are in, or kNone.
+std::vector<std::uint32_t> rooms_of_nodes(const ClusterTree& tree,
+                                          std::span<const std::uint32_t> room) {
+  std::vector<std::uint32_t> of_node(tree.clusters.size());
+  for (std::size_t k = of_node.size(); k-- > 0;) {
+    const Cluster& cluster = tree.clusters[k];
+    if (cluster.is_leaf()) {
+      of_node[k] = room[tree.patch[cluster.begin]];
+    } else {
+      const std::uint32_t first = of_node[cluster.first_child];
+      of_node[k] = first == of_node[cluster.first_child + 1] ? first : kNone;
+    }
+  }
+  return of_node;
+}
+
+/// The sums of the rows of F and the square of the Frobenius norm of A^1/2 F A^-1/2.
+struct Totals {
+  std::vector<float> row_sum;
+  double squared = 0;
+};
+
+Totals totals_of(const ExchangeMatrix& exchange, const std::vector<float>& area) {
+  std::vector<double> sum(area.size());
+  Totals totals;
+  for (std::uint32_t i = 0; i < area.size(); ++i) {
+    for (std::uint64_t k = exchange.row_begin[i]; k < exchange.row_begin[i + 1]; ++k) {
+      const std::uint32_t j = exchange.column[k];
+      const double value = exchange.exchange_area[k];
+      sum[i] += value / area[i];
+      if (j != i) sum[j] += value / area[j];
+      totals.squared += (i == j ? 1 : 2) * value * value / (static_cast<double>(area[i]) * area[j]);
+    }
+  }
+  totals.row_sum.assign(sum.begin(), sum.end());
+  return totals;
+}
+
+/// The same of links, with what patches lose by their scales left out of the norm.
+Totals totals_of(const FormFactorLinks& links, const PatchTable& patches) {
+  const std::vector<NodeSpread> nodes = spread_nodes(links, patches.area, patches.centroid);
+  Totals totals{row_sums(links, patches.area, patches.centroid), 0};
+  for (std::size_t l = 0; l < links.pair.size(); ++l) {
+    const AffineLink link = affine_link(links, l);
+    totals.squared += (link.a == link.b ? 1 : 2) * squared_norm(link, nodes[link.a], nodes[link.b]);
+  }
+  return totals;
+}
+
+FormFactorLinks without_links(const ClusterTree& tree) {
+  FormFactorLinks links;
+  links.patch = tree.patch;
+  for (const Cluster& cluster : tree.clusters) {
+    links.first_child.push_back(cluster.first_child);
+    links.count.push_back(cluster.count);
+  }
+  links.scale.assign(tree.patch.size(), 1);
+  return links;
+}
+
+void check_worth(double worth) {
+  if (!(worth > 0) || !std::isfinite(worth)) {
+    throw Error("links: what each must be worth is to be above 0 and finite");
+  }
+}
+
+ClusterTree tree_of(const FormFactorLinks& links) {
+  ClusterTree tree;
+  tree.patch = links.patch;
+  const std::vector<std::uint32_t> begin = first_positions(links);
+  for (std::size_t k = 0; k < begin.size(); ++k) {
+    tree.clusters.push_back(
+        {.begin = begin[k], .count = links.count[k], .first_child = links.first_child[k]});
+  }
+  return tree;
+}
+
+/// The tree whose nodes links are chosen for; `room` [n].
+SpreadTree spread_tree(ClusterTree clusters, const PatchTable& patches,
+                       const std::vector<std::uint32_t>& room) {
+  SpreadTree tree{std::move(clusters), {}, {}};
+  tree.room = rooms_of_nodes(tree.tree, room);
+  tree.spread = spread_nodes(without_links(tree.tree), patches.area, patches.centroid);
+  return tree;
+}
+
+FormFactorLinks fit(const SpreadTree& tree, const PairSource& pairs, const Totals& totals,
+                    const PatchTable& patches, double worth, const Progress& progress) {
+  const double price = worth * worth * totals.squared / static_cast<double>(patches.size());
+  FormFactorLinks links = without_links(tree.tree);
+  for (const auto& of_block : choose_links(tree, pairs, patches, price, progress)) {
+    for (const AffineLink& link : of_block) append_link(link, links);
+  }
+  scale_rows(totals.row_sum, patches.area, patches.centroid, links);
+  return links;
+}
+
+}  // namespace
+
+FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patches, double worth,
+                          const Progress& progress) {
+  if (exchange.patch_count() != patches.size() || patches.size() == 0) {
+    throw Error("links: form factors and patches differ in number");
+  }
+  check_worth(worth);
+  const std::vector<std::uint32_t> room = find_rooms(exchange);
+  const SpreadTree tree =
+      spread_tree(build_cluster_tree(patches, 1, 1, room_groups(room)), patches, room);
+  return fit(tree, SortedPairs(exchange, tree.tree.patch), totals_of(exchange, patches.area),
+             patches, worth, progress);
+}
+
+FormFactorLinks fit_links(const FormFactorLinks& links, const PatchTable& patches, double worth,
+                          const Progress& progress) {
+  check_worth(worth);
+  check_links(links, patches.size());
+  // In a tree of its own a link would be cut where another's nodes end.
+  const SpreadTree tree = spread_tree(tree_of(links), patches, find_rooms(links));
+  return fit(tree, LinkedPairs(links, patches, tree.tree.patch), totals_of(links, patches), patches,
+             worth, progress);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/exchange/links/link_tree.h"
+#include "precompute/exchange/pairs/shadow_rays.h"
+#include "runtime/rays/ray_tracer.h"
+
+namespace rebounce {
+
+/// Shadow rays between the nodes of a tree. Immutable, usable from any number of threads, each with
+/// scratch of its own.
+class LinkRays {
+ public:
+  static constexpr int kMostRays = static_cast<int>(ShadowRays::kMostRays);
+
+  struct Scratch {
+    std::vector<Ray> rays;
+    std::vector<float> transmitted;  ///< of each ray
+    std::vector<FacingPatch> facing;
+  };
+
+  LinkRays(const LinkTree& tree, const ShadowRays& shadow_rays, const RayTracer& tracer,
+           std::uint64_t seed)
+      : tree_(tree), shadow_rays_(shadow_rays), tracer_(tracer), seed_(seed) {}
+
+  struct Visibility {
+    double part = 0;       ///< of the pair's light that gets through, [0, 1]
+    double variance = 0;   ///< of `part`
+    double spread = 0;     ///< variance of what single rays find
+    bool mixed = false;    ///< not all of either sees all of the other, or nothing
+    bool divided = false;  ///< mixed, and two of the nodes' children see nothing of each other
+  };
+
+  /// What `count` <= kMostRays rays between points spread over two nodes say. Two patches have the
+  /// rays that ShadowRays gives them.
+  Visibility trace(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
+
+ private:
+  Visibility trace_patches(std::uint32_t i, std::uint32_t j, int count, Scratch& scratch) const;
+  Visibility trace_nodes(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
+  double first_part(const LinkNode& node) const;
+  void trace(Scratch& scratch) const;
+  static Visibility judge(const Scratch& scratch, std::span<const double> weight,
+                          std::span<const int> children);
+  static bool is_divided(const Scratch& scratch, std::span<const int> children);
+
+  const LinkTree& tree_;
+  const ShadowRays& shadow_rays_;
+  const RayTracer& tracer_;
+  std::uint64_t seed_;
+};
+
+}  // namespace rebounce

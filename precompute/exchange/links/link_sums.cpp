@@ -1,0 +1,176 @@
+#include "precompute/exchange/links/link_sums.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/rays/float3_glm.h"
+
+namespace rebounce {
+namespace {
+
+constexpr int kScalingSteps = 30;  // each about halves what is left
+constexpr double kScaled = 1e-6;   // row sums nearer to their targets than this are there
+constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
+
+// What patches exchange that see next to nothing has leaked through nodes on both sides of a wall:
+// it may go.
+constexpr double kLeastFactorUnseeing = 1e-6;
+
+// Relative deviation of a row sum that links amount to, from penumbrae that they average; measured.
+constexpr double kSumDeviation = 0.01;
+
+/// A sum over a node, and its first moment about the node's centre.
+struct Moments {
+  double sum = 0;
+  glm::dvec3 first{0};
+};
+
+double least_factor(const RowTarget& target) {
+  return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
+}
+
+/// The mean of `x` over each node.
+std::vector<Moments> pull(const LinkTree& tree, std::span<const double> x) {
+  const auto nodes = tree.nodes();
+  std::vector<Moments> mean(nodes.size());
+  for (std::size_t k = nodes.size(); k-- > 0;) {
+    const LinkNode& node = nodes[k];
+    if (node.is_leaf()) {
+      mean[k].sum = x[tree.leaf_patch(node)];
+      continue;
+    }
+    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+      const double part = nodes[c].area / node.area;
+      mean[k].sum += part * mean[c].sum;
+      mean[k].first += part * (mean[c].first + mean[c].sum * (nodes[c].center - node.center));
+    }
+  }
+  return mean;
+}
+
+/// What arrives at each node along its links.
+std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<const Link> links) {
+  std::vector<Moments> arrived(mean.size());
+  const auto add = [&](std::uint32_t to, std::uint32_t from, double exchange,
+                       const Float3& gradient_to, const Float3& gradient_from) {
+    arrived[to].sum +=
+        exchange * mean[from].sum + glm::dot(to_dvec3(gradient_from), mean[from].first);
+    arrived[to].first += mean[from].sum * to_dvec3(gradient_to);
+  };
+  for (const Link& link : links) {
+    add(link.a, link.b, link.exchange_area, link.gradient_a, link.gradient_b);
+    if (link.a == link.b) continue;
+    add(link.b, link.a, link.exchange_area, link.gradient_b, link.gradient_a);
+  }
+  return arrived;
+}
+
+/// What arrives at each of `patch_count` patches, with all nodes that it is part of.
+std::vector<double> push(const LinkTree& tree, std::vector<Moments> arrived,
+                         std::size_t patch_count) {
+  const auto nodes = tree.nodes();
+  std::vector<double> out(patch_count);
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    const LinkNode& node = nodes[k];
+    if (node.is_leaf()) {
+      out[tree.leaf_patch(node)] = arrived[k].sum / node.area;
+      continue;
+    }
+    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+      const double part = nodes[c].area / node.area;
+      arrived[c].sum +=
+          part * (arrived[k].sum + glm::dot(arrived[k].first, nodes[c].center - node.center));
+      arrived[c].first += part * arrived[k].first;
+    }
+  }
+  return out;
+}
+
+/// The targets, drawn to the sums that are there by as much as they are uncertain.
+std::vector<double> wanted_sums(std::span<const double> sum, std::span<const RowTarget> target) {
+  std::vector<double> wanted(sum.size());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const double variance = kSumDeviation * kSumDeviation,
+                 uncertain = target[i].deviation * target[i].deviation;
+    wanted[i] = sum[i] + variance / (variance + uncertain) * (target[i].sum - sum[i]);
+  }
+  return wanted;
+}
+
+/// What patches that see nothing exchange has leaked alone, and of either sign, which scaling by
+/// sums could not take away: it goes.
+std::vector<double> first_factors(std::span<const RowTarget> target) {
+  std::vector<double> factor;
+  for (const RowTarget& t : target) factor.push_back(t.sum > 0 ? 1 : 0);
+  return factor;
+}
+
+std::vector<double> scaled_row_sums(const LinkTree& tree, std::span<const Link> links,
+                                    const std::vector<double>& factor) {
+  std::vector<double> sum = gather_links(tree, links, factor);
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] *= factor[i];
+  return sum;
+}
+
+/// How much factors change what is exchanged, Frobenius, each link taken as the same for all of its
+/// pairs.
+double relative_change(const LinkTree& tree, std::span<const Link> links,
+                       std::span<const double> factor) {
+  const auto nodes = tree.nodes();
+  std::vector<double> mean(nodes.size(), 0.0);
+  for (std::size_t k = nodes.size(); k-- > 0;) {
+    const LinkNode& node = nodes[k];
+    if (node.is_leaf()) {
+      mean[k] = factor[tree.leaf_patch(node)];
+      continue;
+    }
+    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+      mean[k] += nodes[c].count * mean[c] / node.count;
+    }
+  }
+  double change = 0, norm = 0;
+  for (const Link& link : links) {
+    const double pairs = static_cast<double>(nodes[link.a].count) * nodes[link.b].count;
+    const double squared = static_cast<double>(link.exchange_area) * link.exchange_area / pairs;
+    const double part = mean[link.a] * mean[link.b] - 1;
+    change += squared * part * part;
+    norm += squared;
+  }
+  return norm > 0 ? std::sqrt(change / norm) : 0;
+}
+
+}  // namespace
+
+std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> links,
+                                 std::span<const double> x) {
+  return push(tree, gather_nodes(pull(tree, x), links), x.size());
+}
+
+LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
+                        std::span<const RowTarget> target) {
+  LinkScaling result;
+  std::vector<double>&factor = result.factor, &row = result.row_sum;
+  row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));
+  result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
+  factor = first_factors(target);
+  row = scaled_row_sums(tree, links, factor);
+  const std::vector<double> wanted = wanted_sums(row, target);
+  for (int step = 0; step < kScalingSteps; ++step) {
+    double worst = 0;
+    for (std::size_t i = 0; i < factor.size(); ++i) {
+      if (factor[i] == 0) continue;
+      worst = std::max(worst, std::abs(row[i] - wanted[i]));
+      if (row[i] <= 0 || wanted[i] <= 0) continue;
+      factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row[i]), least_factor(target[i]),
+                             kGreatestFactor);
+    }
+    if (worst < kScaled) break;
+    row = scaled_row_sums(tree, links, factor);
+  }
+  row = scaled_row_sums(tree, links, factor);
+  result.closure.row_sum_error_after = largest_row_error(row, target, /*certain=*/true);
+  result.closure.relative_change = relative_change(tree, links, factor);
+  return result;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "precompute/base/symmetric_matrix.h"
+#include "transfer/exchange/linked_form_factors.h"
+#include "transfer/exchange/links_by_node.h"
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// G = A^1/2 F A^-1/2 from links between sets of patches: one matrix for all channels. Entries are
+/// those that the links stand for; the pairs themselves are nowhere kept.
+class LinkedMatrix final : public SymmetricMatrix {
+ public:
+  /// Links and patches must outlive it. Throws Error if the links are not of these patches.
+  LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches);
+
+  /// `product`: the same links as they gather, which others use too.
+  LinkedMatrix(const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
+               const PatchTable& patches);
+
+  std::span<const float> area() const override { return patches_.area; }
+  void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+               std::span<const std::uint32_t> columns,
+               Eigen::Ref<Eigen::MatrixXf> entries) const override;
+  Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
+
+ private:
+  struct Node {
+    std::uint32_t begin = 0, count = 0;  ///< positions in the order of the links
+    double area = 0;                     ///< m²
+    Float3 center{};                     ///< area-weighted, metres
+  };
+  class Filler;
+
+  void measure_nodes();
+
+  const FormFactorLinks& links_;
+  const PatchTable& patches_;
+  std::shared_ptr<const LinkedFormFactors> product_;
+  std::vector<std::uint32_t> position_;  ///< [n] of each patch
+  std::vector<Node> nodes_;              ///< [m]
+  LinksByNode links_of_node_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,65 @@
+#include "precompute/exchange/links/links.h"
+
+#include "precompute/exchange/links/link_sums.h"
+#include "precompute/exchange/links/refined_links.h"
+#include "transfer/base/bfloat16.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+void copy_tree(const LinkTree& tree, FormFactorLinks& links) {
+  links.patch.assign(tree.patches().begin(), tree.patches().end());
+  for (const LinkNode& node : tree.nodes()) {
+    links.first_child.push_back(node.first_child);
+    links.count.push_back(node.count);
+  }
+}
+
+/// Without pairs that are hidden from each other.
+void copy_links(std::span<const Link> from, FormFactorLinks& links) {
+  for (const Link& link : from) {
+    if (link.exchange_area <= 0) continue;
+    const Float3 &g = link.gradient_a, &h = link.gradient_b;
+    links.pair.push_back({link.a, link.b});
+    links.exchange_area.push_back(link.exchange_area);
+    links.gradient.push_back({g[0], g[1], g[2], h[0], h[1], h[2]});
+  }
+}
+
+/// To what LinkedFormFactors keep, before rows are added up: everything that is made of the links
+/// is of the same F.
+void round_gradients(std::span<Link> links) {
+  for (Link& link : links) {
+    for (float& g : link.gradient_a) g = round_to_bfloat16(g);
+    for (float& g : link.gradient_b) g = round_to_bfloat16(g);
+  }
+}
+
+}  // namespace
+
+LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
+                      const FormFactorSettings& settings, std::span<const float> weight,
+                      const Progress& progress) {
+  check_form_factor_settings(settings);
+  if (!(settings.link_epsilon > 0)) throw Error("links: their error must be above 0");
+  if (!weight.empty() && weight.size() != model.patches.size()) {
+    throw Error("links: weights and patches differ in number");
+  }
+  const PatchGeometry geometry(model, tracer);
+  const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
+  RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
+  round_gradients(refined.links);
+  LinkBuild build;
+  copy_tree(refined.tree, build.links);
+  copy_links(refined.links, build.links);
+  const LinkScaling scaling = scale_links(refined.tree, refined.links, refined.target);
+  build.links.scale.assign(scaling.factor.begin(), scaling.factor.end());
+  build.closure = scaling.closure;
+  static_cast<EscapedLight&>(build) = share_escape(scaling.row_sum, refined.escape);
+  build.ray_count = refined.ray_count + model.patches.size() * settings.hemisphere_rays;
+  build.candidate_count = refined.candidate_count;
+  return build;
+}
+
+}  // namespace rebounce

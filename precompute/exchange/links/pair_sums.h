@@ -1,0 +1,116 @@
+#pragma once
+
+// Sums over blocks of pairs of patches, for links that are fitted to them.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/exchange/links/linked_matrix.h"
+#include "transfer/exchange/exchange_matrix.h"
+#include "transfer/exchange/linked_form_factors.h"
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// A range of positions.
+struct PositionRange {
+  std::uint32_t begin = 0, count = 0;
+
+  std::uint32_t end() const { return begin + count; }
+};
+
+/// Exchange areas of pairs of patches by positions in the order of a tree.
+class PairSource {
+ public:
+  virtual ~PairSource() = default;
+
+  /// Those of `rows` with `columns`, which are the same or come after, row by row, m²; 0 for pairs
+  /// without light. Of the same positions only those with columns from the row on count.
+  virtual void block(PositionRange rows, PositionRange columns,
+                     std::span<float> exchange) const = 0;
+};
+
+/// All pairs that exchange light.
+class SortedPairs final : public PairSource {
+ public:
+  /// `patch` [n] is the patch at each position.
+  SortedPairs(const ExchangeMatrix& exchange, std::span<const std::uint32_t> patch);
+
+  void block(PositionRange rows, PositionRange columns, std::span<float> exchange) const override;
+
+ private:
+  struct Pair {
+    std::uint32_t column;
+    float exchange;  ///< m²
+  };
+
+  /// Those of a row whose columns are in a range, ascending.
+  std::span<const Pair> of_row(std::uint32_t row, PositionRange columns) const;
+
+  std::vector<std::uint64_t> begin_;  ///< [n + 1]
+  std::vector<Pair> pairs_;
+};
+
+/// The pairs that links stand for; nowhere kept.
+class LinkedPairs final : public PairSource {
+ public:
+  /// Refers to all; `patch` [n] is the patch at each position, in any order.
+  LinkedPairs(const FormFactorLinks& links, const PatchTable& patches,
+              std::span<const std::uint32_t> patch)
+      : matrix_(links, patches), patches_(patches), patch_(patch) {}
+
+  void block(PositionRange rows, PositionRange columns, std::span<float> exchange) const override;
+
+ private:
+  LinkedMatrix matrix_;
+  const PatchTable& patches_;
+  std::span<const std::uint32_t> patch_;
+};
+
+/// Sums over the pairs of a block of positions.
+struct PairSums {
+  double count = 0;     ///< of the pairs
+  double squared = 0;   ///< of A^1/2 F A^-1/2: its entries' squares
+  double exchange = 0;  ///< m²
+  /// Of the exchange area times the centroid on either side, m³.
+  Eigen::Vector3d of_rows = Eigen::Vector3d::Zero(), of_columns = Eigen::Vector3d::Zero();
+
+  PairSums& operator+=(const PairSums& other);
+  PairSums& operator-=(const PairSums& other);
+};
+
+/// Sums over any part of a block of pairs, each from four of a table (F. C. Crow, "Summed-area
+/// tables for texture mapping", SIGGRAPH 1984). Keeps its storage from block to block.
+class SummedPairs {
+ public:
+  /// Refers to both; `patch` [n] is the patch at each position.
+  SummedPairs(const PairSource& pairs, const PatchTable& patches,
+              std::span<const std::uint32_t> patch)
+      : pairs_(pairs), patches_(patches), patch_(patch) {}
+
+  /// Adds up the pairs of `rows`, all before `columns`.
+  void add_up(PositionRange rows, PositionRange columns);
+
+  /// Those of some of the rows and some of the columns.
+  PairSums of(PositionRange rows, PositionRange columns) const;
+
+ private:
+  PairSums& at(std::uint32_t row, std::uint32_t column) {
+    return table_[std::size_t{row} * (columns_.count + 1) + column];
+  }
+  const PairSums& at(std::uint32_t row, std::uint32_t column) const {
+    return table_[std::size_t{row} * (columns_.count + 1) + column];
+  }
+  PairSums sums_of(std::uint32_t row, std::uint32_t column, float exchange) const;
+
+  const PairSource& pairs_;
+  const PatchTable& patches_;
+  std::span<const std::uint32_t> patch_;
+  PositionRange rows_, columns_;
+  std::vector<float> exchange_;  ///< [rows][columns]
+  std::vector<PairSums> table_;  ///< [rows + 1][columns + 1] all before a row and a column
+};
+
+}  // namespace rebounce

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/base/progress.h"
+#include "precompute/exchange/links/link_refinement.h"
+#include "precompute/exchange/links/link_tree.h"
+#include "precompute/exchange/pairs/escape.h"
+#include "precompute/exchange/pairs/form_factor_settings.h"
+#include "precompute/exchange/pairs/row_targets.h"
+#include "precompute/exchange/pairs/shadow_rays.h"
+
+namespace rebounce {
+
+/// Links of a whole scene, once refined and once revised where rows do not add up.
+struct RefinedLinks {
+  LinkTree tree;
+  std::vector<Link> links;
+  std::vector<Escape> escape;     ///< [n]
+  std::vector<RowTarget> target;  ///< [n]
+  std::uint64_t ray_count = 0;    ///< without those of the escape
+  std::uint64_t candidate_count = 0;
+};
+
+/// Refines links to settings.link_epsilon, measures what escapes, and revises the links of
+/// patches whose row sum disagrees with that. `weight` as for LinkTree. Throws Cancelled.
+RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
+                          const RayTracer& tracer, const FormFactorSettings& settings,
+                          std::span<const float> weight, const Progress& progress);
+
+}  // namespace rebounce

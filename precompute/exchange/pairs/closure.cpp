@@ -1,0 +1,167 @@
+#include "precompute/exchange/pairs/closure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace rebounce {
+namespace {
+
+using Vector = std::vector<double>;
+
+constexpr int kPassCount = 8;        // entries at their bounds leave a rest for the next pass
+constexpr int kMaxIterations = 500;  // of conjugate gradients; some 20 to 60 are usual
+constexpr double kClosed = 1e-6;     // row sums nearer to their targets than this are there
+constexpr double kResidual = 1e-11;  // relative, for that
+constexpr float kLeastPart = 0.5F, kGreatestPart = 1.5F;
+
+double dot(const Vector& a, const Vector& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+/// The normal equations of the constraints: (diagonal + V) multiplier = rest, V the variances.
+class NormalEquations {
+ public:
+  NormalEquations(const ExchangeRows& rows, std::span<const double> area,
+                  std::span<const RowTarget> target)
+      : rows_(rows), diagonal_(rows.size(), 0.0) {
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      for (const ExchangeEntry& entry : rows[i]) {
+        diagonal_[i] += entry.variance();
+        if (entry.column != i) diagonal_[entry.column] += entry.variance();
+      }
+    }
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double deviation = area[i] * target[i].deviation;
+      diagonal_[i] += deviation * deviation;
+      // Keeps the system definite for rows without entries and for two groups that only see each
+      // other, and is far below what is resolved.
+      diagonal_[i] += 1e-12 * (diagonal_[i] + area[i] * area[i] * 1e-12);
+    }
+  }
+
+  Vector solve(const Vector& rest) const {
+    Vector x(rest.size(), 0.0), r = rest, z(rest.size()), product(rest.size());
+    const auto precondition = [&] {
+      for (std::size_t i = 0; i < r.size(); ++i) z[i] = r[i] / diagonal_[i];
+    };
+    precondition();
+    Vector direction = z;
+    double rz = dot(r, z);
+    const double stop = rz * kResidual * kResidual;
+    for (int k = 0; k < kMaxIterations && rz > stop && rz > 0; ++k) {
+      multiply(direction, product);
+      const double step = rz / dot(direction, product);
+      for (std::size_t i = 0; i < x.size(); ++i) {
+        x[i] += step * direction[i];
+        r[i] -= step * product[i];
+      }
+      precondition();
+      const double next = dot(r, z);
+      for (std::size_t i = 0; i < x.size(); ++i) direction[i] = z[i] + next / rz * direction[i];
+      rz = next;
+    }
+    return x;
+  }
+
+ private:
+  void multiply(const Vector& x, Vector& y) const {
+    for (std::size_t i = 0; i < x.size(); ++i) y[i] = diagonal_[i] * x[i];
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      double sum = 0;
+      for (const ExchangeEntry& entry : rows_[i]) {
+        const double v = entry.variance();
+        if (entry.column == i) continue;  // all of it is in the diagonal
+        sum += v * x[entry.column];
+        y[entry.column] += v * x[i];
+      }
+      y[i] += sum;
+    }
+  }
+
+  const ExchangeRows& rows_;
+  Vector diagonal_;
+};
+
+using Areas = std::vector<std::vector<float>>;
+
+Areas exchange_areas(const ExchangeRows& rows) {
+  Areas areas(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (const ExchangeEntry& entry : rows[i]) areas[i].push_back(entry.exchange_area);
+  }
+  return areas;
+}
+
+/// Changes each entry by its variance times the multipliers of its row and column, as far as its
+/// bounds let it.
+void give_way(const Vector& multiplier, const Areas& original, ExchangeRows& rows) {
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t k = 0; k < rows[i].size(); ++k) {
+      ExchangeEntry& entry = rows[i][k];
+      const double both = multiplier[i] + (entry.column == i ? 0 : multiplier[entry.column]);
+      const double wanted = entry.exchange_area + entry.variance() * both;
+      const float least = kLeastPart * original[i][k];
+      const float most = std::max(kGreatestPart * original[i][k], entry.unoccluded_area);
+      entry.exchange_area = std::clamp(static_cast<float>(wanted), least, most);
+      if (wanted < least || wanted > most) entry.visibility_variance = 0;  // gives way no further
+    }
+  }
+}
+
+/// |S' - S| / |S|, Frobenius, of the upper triangle.
+double relative_change(const ExchangeRows& rows, const Areas& original) {
+  double change = 0, norm = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t k = 0; k < rows[i].size(); ++k) {
+      const double s = original[i][k], d = rows[i][k].exchange_area - s;
+      change += d * d;
+      norm += s * s;
+    }
+  }
+  return norm > 0 ? std::sqrt(change / norm) : 0;
+}
+
+}  // namespace
+
+std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> area) {
+  std::vector<double> sum(rows.size(), 0.0);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (const ExchangeEntry& entry : rows[i]) {
+      sum[i] += entry.exchange_area;
+      if (entry.column != i) sum[entry.column] += entry.exchange_area;
+    }
+  }
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] /= area[i];
+  return sum;
+}
+
+double largest_row_error(std::span<const double> sum, std::span<const RowTarget> target,
+                         bool certain) {
+  double largest = 0;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    if (certain && target[i].deviation > 0) continue;
+    largest = std::max(largest, std::abs(sum[i] - target[i].sum));
+  }
+  return largest;
+}
+
+ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
+                              std::span<const RowTarget> target) {
+  const Areas original = exchange_areas(rows);
+  ClosureReport report;
+  Vector sum = row_sums(rows, area);
+  report.row_sum_error_before = largest_row_error(sum, target, /*certain=*/false);
+  Vector rest(rows.size());
+  for (int pass = 0; pass < kPassCount; ++pass) {
+    for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = area[i] * (target[i].sum - sum[i]);
+    give_way(NormalEquations(rows, area, target).solve(rest), original, rows);
+    sum = row_sums(rows, area);
+    if (largest_row_error(sum, target, /*certain=*/true) < kClosed) break;
+  }
+  report.row_sum_error_after = largest_row_error(sum, target, /*certain=*/true);
+  report.relative_change = relative_change(rows, original);
+  return report;
+}
+
+}  // namespace rebounce

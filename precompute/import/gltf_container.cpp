@@ -1,0 +1,124 @@
+#include "precompute/import/gltf_container.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "transfer/base/error.h"
+
+namespace rebounce::gltf {
+namespace {
+
+constexpr std::uint32_t kMagic = 0x46546C67;        // "glTF"
+constexpr std::uint32_t kJsonChunk = 0x4E4F534A;    // "JSON"
+constexpr std::uint32_t kBinaryChunk = 0x004E4942;  // "BIN"
+constexpr std::size_t kHeaderBytes = 12;
+constexpr std::size_t kChunkHeaderBytes = 8;
+
+// tinygltf takes the length as 32 bits and its base64 decoder counts in int.
+constexpr std::size_t kMaxJsonBytes = std::size_t{1} << 30;
+// Real files reach about 15 levels.
+constexpr int kMaxJsonDepth = 100;
+
+std::uint32_t read_u32(Bytes bytes, std::size_t offset) {
+  return static_cast<std::uint32_t>(bytes[offset]) |
+         static_cast<std::uint32_t>(bytes[offset + 1]) << 8 |
+         static_cast<std::uint32_t>(bytes[offset + 2]) << 16 |
+         static_cast<std::uint32_t>(bytes[offset + 3]) << 24;
+}
+
+struct Chunk {
+  std::uint32_t type;
+  Bytes data;
+};
+
+// Takes the next chunk off the front of `rest`.
+Chunk take_chunk(Bytes& rest) {
+  if (rest.size() < kChunkHeaderBytes) {
+    throw Error("the .glb is truncated in a chunk header; get a complete copy");
+  }
+  const std::size_t length = read_u32(rest, 0);
+  if (length > rest.size() - kChunkHeaderBytes) {
+    throw Error(
+        fmt::format("the .glb is truncated: a chunk of {} bytes has only {}; get a complete copy",
+                    length, rest.size() - kChunkHeaderBytes));
+  }
+  const Chunk chunk{read_u32(rest, 4), rest.subspan(kChunkHeaderBytes, length)};
+  rest = rest.subspan(kChunkHeaderBytes + length);
+  return chunk;
+}
+
+// How deeply brackets are nested outside strings. Counted beforehand: the parser's own callback
+// makes it quadratic in the length of an array.
+int nesting_depth(Bytes text) {
+  int depth = 0;
+  int deepest = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char character = static_cast<char>(text[i]);
+    if (in_string && character == '\\') {
+      ++i;
+    } else if (character == '"') {
+      in_string = !in_string;
+    } else if (!in_string && (character == '[' || character == '{')) {
+      deepest = std::max(deepest, ++depth);
+    } else if (!in_string && (character == ']' || character == '}')) {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> read_file(const std::filesystem::path& path) {
+  std::error_code failure;
+  if (!std::filesystem::is_regular_file(path, failure)) throw Error("there is no such file");
+  const std::uintmax_t size = std::filesystem::file_size(path, failure);
+  std::ifstream stream(path, std::ios::binary);
+  if (failure || !stream) throw Error("the file cannot be opened for reading");
+  std::vector<std::uint8_t> bytes(size);
+  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  if (!stream) throw Error("the file could not be read to its end");
+  return bytes;
+}
+
+Container split_container(Bytes file) {
+  if (file.size() < 4 || read_u32(file, 0) != kMagic) return {file, std::nullopt};
+  if (file.size() < kHeaderBytes) throw Error("the .glb is truncated in its header");
+  if (const auto version = read_u32(file, 4); version != 2) {
+    throw Error(fmt::format("the .glb container has version {}; only version 2 is read", version));
+  }
+  const std::size_t length = read_u32(file, 8);
+  if (length < kHeaderBytes || length > file.size()) {
+    throw Error(fmt::format("the .glb is truncated: its header says {} bytes and {} are there",
+                            length, file.size()));
+  }
+  Bytes rest = file.subspan(kHeaderBytes, length - kHeaderBytes);
+  const Chunk json = take_chunk(rest);
+  if (json.type != kJsonChunk) throw Error("the first chunk of the .glb is not JSON");
+  Container container{json.data, std::nullopt};
+  if (!rest.empty()) {
+    const Chunk second = take_chunk(rest);
+    if (second.type == kBinaryChunk) container.binary = second.data;
+  }
+  return container;
+}
+
+nlohmann::json parse_json(Bytes text) {
+  if (text.size() > kMaxJsonBytes) throw Error("the JSON part is larger than 1 GiB");
+  if (nesting_depth(text) > kMaxJsonDepth) {
+    throw Error(fmt::format("the JSON is nested more than {} levels deep", kMaxJsonDepth));
+  }
+  try {
+    auto root = nlohmann::json::parse(text.begin(), text.end());
+    if (!root.is_object()) throw Error("this is not glTF: the JSON is not an object");
+    return root;
+  } catch (const nlohmann::json::exception& failure) {
+    throw Error(fmt::format("this is not glTF: {}", failure.what()));
+  }
+}
+
+}  // namespace rebounce::gltf

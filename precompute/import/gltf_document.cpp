@@ -1,0 +1,235 @@
+#include "precompute/import/gltf_document.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "precompute/import/gltf_meshopt.h"
+#include "precompute/import/gltf_resources.h"
+#include "precompute/import/gltf_validation.h"
+#include "transfer/base/error.h"
+
+namespace rebounce::gltf {
+namespace {
+
+using nlohmann::json;
+
+class Hash {
+ public:
+  Hash() : state_(XXH3_createState(), XXH3_freeState) {
+    if (!state_) throw std::bad_alloc();
+    XXH3_128bits_reset(state_.get());
+  }
+
+  void add(Bytes bytes) { XXH3_128bits_update(state_.get(), bytes.data(), bytes.size()); }
+
+  std::string text() const {
+    const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
+    return fmt::format("xxh3:{:016x}{:016x}", hash.high64, hash.low64);
+  }
+
+ private:
+  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_;
+};
+
+// The objects of the array `key`, none where there is no such array.
+json& elements(json& parent, const char* key) {
+  static json none = json::array();
+  return parent.contains(key) ? parent[key] : none;
+}
+
+// Keeps what `uri` names for as long as the document lives.
+Bytes store_resource(Document& document, Hash& hash, const std::filesystem::path& folder,
+                     const std::string& uri) {
+  Resource resource = read_resource(folder, uri);
+  if (resource.external) hash.add(resource.bytes);
+  return document.storage.emplace_back(std::move(resource.bytes));
+}
+
+Bytes first_bytes(Bytes bytes, std::size_t length) {
+  if (bytes.size() >= length) return bytes.first(length);
+  throw Error(fmt::format("byteLength is {}, but only {} bytes are there; get a complete copy",
+                          length, bytes.size()));
+}
+
+Bytes read_buffer(Document& document, Hash& hash, const json& buffer,
+                  const std::filesystem::path& folder) {
+  const auto length = buffer.at("byteLength").get<std::size_t>();
+  const Bytes bytes =
+      store_resource(document, hash, folder, buffer.at("uri").get_ref<const std::string&>());
+  return first_bytes(bytes, length);
+}
+
+void read_buffers(Document& document, Hash& hash, const json& root, const Container& container,
+                  const std::filesystem::path& folder) {
+  if (!root.contains("buffers")) return;
+  const json& buffers = root.at("buffers");
+  for (std::size_t i = 0; i < buffers.size(); ++i) {
+    Bytes bytes;
+    try {
+      if (buffers[i].contains("uri")) {
+        bytes = read_buffer(document, hash, buffers[i], folder);
+      } else if (i == 0 && container.binary) {
+        bytes = first_bytes(*container.binary, buffers[i].at("byteLength").get<std::size_t>());
+      }
+    } catch (const Error& failure) {
+      if (!is_meshopt_fallback(buffers[i])) {
+        throw Error(fmt::format("buffers[{}]: {}", i, failure.what()));
+      }
+    }
+    document.buffers.push_back(bytes);
+  }
+}
+
+const json* draco_extension(const json& primitive) {
+  const auto extensions = primitive.find("extensions");
+  if (extensions == primitive.end() || !extensions->is_object()) return nullptr;
+  const auto found = extensions->find("KHR_draco_mesh_compression");
+  return found != extensions->end() && found->is_object() ? &*found : nullptr;
+}
+
+// The accessor that `holder` names as `key`, null where it names none.
+const json* accessor_of(const json& root, const json& holder, const char* key) {
+  const auto index = holder.find(key);
+  if (index == holder.end()) return nullptr;
+  return &root.at("accessors").at(index->get<std::size_t>());
+}
+
+bool lacks_data(const json* accessor) {
+  return accessor && !accessor->contains("bufferView");
+}
+
+DracoSource draco_source(const json& root, const json& primitive, const json& extension) {
+  DracoSource source;
+  source.buffer_view = extension.at("bufferView").get<int>();
+  source.unique_id = extension.at("attributes").get<std::map<std::string, std::uint32_t>>();
+  const json* indices = accessor_of(root, primitive, "indices");
+  if (indices) source.index_count = indices->at("count").get<std::size_t>();
+  source.has_fallback = !lacks_data(indices) &&
+                        !lacks_data(accessor_of(root, primitive.at("attributes"), "POSITION"));
+  return source;
+}
+
+std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco_sources(json& root) {
+  std::map<std::pair<std::size_t, std::size_t>, DracoSource> sources;
+  const json& meshes = elements(root, "meshes");
+  for (std::size_t mesh = 0; mesh < meshes.size(); ++mesh) {
+    const json primitives = meshes[mesh].value("primitives", json::array());
+    for (std::size_t i = 0; i < primitives.size(); ++i) {
+      const json* extension = draco_extension(primitives[i]);
+      if (extension) sources[{mesh, i}] = draco_source(root, primitives[i], *extension);
+    }
+  }
+  return sources;
+}
+
+// What the asset's structure is read from: without the data, which was read above, without what a
+// static diffuse scene has no use for, and without Draco's extension, which is taken separately:
+// tinygltf's decoder (where it was built with it) would look for the data, and its check of indices
+// refuses those that are nowhere else.
+std::string structure_text(json root) {
+  for (const char* key : {"buffers", "images", "animations", "skins", "extras"}) root.erase(key);
+  for (json& material : elements(root, "materials")) {
+    material.erase("normalTexture");
+    material.erase("occlusionTexture");
+    if (material.contains("pbrMetallicRoughness")) {
+      material["pbrMetallicRoughness"].erase("metallicRoughnessTexture");
+    }
+  }
+  for (json& mesh : elements(root, "meshes")) {
+    for (json& primitive : elements(mesh, "primitives")) {
+      if (draco_extension(primitive) && lacks_data(accessor_of(root, primitive, "indices"))) {
+        primitive.erase("indices");
+      }
+      primitive.erase("extensions");
+    }
+  }
+  return root.dump();
+}
+
+tinygltf::Model parse_structure(const json& root) {
+  const std::string text = structure_text(root);
+  tinygltf::TinyGLTF loader;
+  tinygltf::Model model;
+  std::string error;
+  std::string warning;
+  const bool loaded = loader.LoadASCIIFromString(&model, &error, &warning, text.data(),
+                                                 static_cast<unsigned>(text.size()), "");
+  // tinygltf reports some faults and goes on without the object that has them: indices would
+  // then point at something else.
+  if (!loaded || !error.empty()) {
+    throw Error(error.empty() ? "tinygltf could not read it" : error);
+  }
+  return model;
+}
+
+EncodedImage read_image(Document& document, Hash& hash, const json& image,
+                        const std::filesystem::path& folder) {
+  if (image.contains("bufferView")) {
+    return {view_bytes(document, image.at("bufferView").get<int>()), ""};
+  }
+  if (!image.contains("uri")) return {{}, "it has neither a URI nor a buffer view"};
+  const std::string& uri = image.at("uri").get_ref<const std::string&>();
+  check_uri(folder, uri);
+  try {
+    return {store_resource(document, hash, folder, uri), ""};
+  } catch (const Error& failure) {
+    return {{}, failure.what()};
+  }
+}
+
+void read_images(Document& document, Hash& hash, const json& root,
+                 const std::filesystem::path& folder) {
+  if (!root.contains("images")) return;
+  const json& images = root.at("images");
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    try {
+      document.images.push_back(read_image(document, hash, images[i], folder));
+    } catch (const Error& failure) {
+      throw Error(fmt::format("images[{}]: {}", i, failure.what()));
+    }
+  }
+}
+
+}  // namespace
+
+Document read_document(const std::filesystem::path& path, Warnings& warnings) {
+  const auto folder = std::filesystem::absolute(path).parent_path();
+  Document document;
+  const Bytes file = document.storage.emplace_back(read_file(path));
+  Hash hash;
+  hash.add(file);
+
+  const Container container = split_container(file);
+  json root = parse_json(container.json);
+  check_version_and_extensions(root);
+  check_structure(root);
+  document.model = parse_structure(root);
+  document.draco = draco_sources(root);
+  read_buffers(document, hash, root, container, folder);
+  decode_meshopt_views(root, document, warnings);
+  read_images(document, hash, root, folder);
+  document.hash = hash.text();
+  return document;
+}
+
+Bytes view_bytes(const Document& document, int buffer_view) {
+  const auto index = static_cast<std::size_t>(buffer_view);
+  if (index < document.decoded_views.size() && !document.decoded_views[index].empty()) {
+    return document.decoded_views[index];
+  }
+  const auto& view = document.model.bufferViews.at(index);
+  const Bytes buffer = document.buffers.at(static_cast<std::size_t>(view.buffer));
+  if (view.byteOffset > buffer.size() || view.byteLength > buffer.size() - view.byteOffset) {
+    throw Error(
+        fmt::format("bufferViews[{}] (bytes {} to {}) is not inside buffers[{}], which has {} "
+                    "bytes",
+                    buffer_view, view.byteOffset, view.byteOffset + view.byteLength, view.buffer,
+                    buffer.size()));
+  }
+  return buffer.subspan(view.byteOffset, view.byteLength);
+}
+
+}  // namespace rebounce::gltf

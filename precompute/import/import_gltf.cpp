@@ -1,0 +1,102 @@
+#include "precompute/import/import_gltf.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+#include "precompute/import/gltf_document.h"
+#include "precompute/import/gltf_lights.h"
+#include "precompute/import/gltf_materials.h"
+#include "precompute/import/gltf_meshes.h"
+#include "precompute/import/gltf_nodes.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+// The default material comes last, for the primitives that name none.
+void drop_unused_default_material(Scene& scene) {
+  const auto last = static_cast<std::uint32_t>(scene.materials.size() - 1);
+  const auto& used = scene.triangle_material;
+  if (last > 0 && std::find(used.begin(), used.end(), last) == used.end()) {
+    scene.materials.pop_back();
+  }
+}
+
+// Beyond these a scene is hardly what its file says it is: in millimetres, inches, a miniature.
+constexpr float kLargestLikelySize = 500;
+constexpr float kSmallestLikelySize = 0.2F;
+
+// The longest side of the box around all vertices, in metres.
+float largest_side(const Scene& scene) {
+  Float3 low = scene.position.front();
+  Float3 high = low;
+  for (const Float3& position : scene.position) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], position[axis]);
+      high[axis] = std::max(high[axis], position[axis]);
+    }
+  }
+  return std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+}
+
+void warn_of_unlikely_size(const Scene& scene, gltf::Warnings& warnings) {
+  const float size = largest_side(scene);
+  if (size >= kSmallestLikelySize && size <= kLargestLikelySize) return;
+  warnings.add(fmt::format("the scene is {} m wide; if it is not in metres use --scale",
+                           size > 1 ? fmt::format("{:.0f}", size) : fmt::format("{:.3g}", size)));
+}
+
+Scene import_document(const gltf::Document& document, double scale, gltf::Warnings& warnings) {
+  Scene scene;
+  const auto nodes = gltf::place_nodes(document.model, scale);
+  const auto texcoords = gltf::import_materials(document, scene, warnings);
+  gltf::import_meshes(document, nodes, texcoords, scene, warnings);
+  if (scene.triangle.empty()) {
+    throw Error(scene.degenerate_triangle_count == 0
+                    ? std::string("no triangles: the scene is empty")
+                    : fmt::format("no triangles: all {} of them have no area",
+                                  scene.degenerate_triangle_count));
+  }
+  gltf::import_lights_and_cameras(document, nodes, scale, scene, warnings);
+  drop_unused_default_material(scene);
+  warn_of_unlikely_size(scene, warnings);
+  warnings.count("{} triangles without area were dropped", scene.degenerate_triangle_count);
+  scene.warnings = warnings.lines();
+  scene.hash = document.hash;
+  return scene;
+}
+
+// Messages quote names from the file, and some of tinygltf's have several lines.
+std::string one_line(const std::string& text) {
+  std::string line;
+  for (const char character : text) {
+    const bool is_control = static_cast<unsigned char>(character) < 0x20 || character == 0x7F;
+    line += is_control ? ' ' : character;
+  }
+  line.erase(line.find_last_not_of(' ') + 1);
+  return line;
+}
+
+}  // namespace
+
+Scene import_gltf(const std::filesystem::path& path, double scale) {
+  if (!(scale > 0) || !std::isfinite(scale)) {
+    throw Error(fmt::format("the scale {} is not a positive number", scale));
+  }
+  try {
+    gltf::Warnings warnings;
+    Scene scene = import_document(gltf::read_document(path, warnings), scale, warnings);
+    scene.name = path.filename().string();
+    for (std::string& warning : scene.warnings) warning = one_line(warning);
+    return scene;
+  } catch (const std::bad_alloc&) {
+    throw Error(one_line(fmt::format("{}: not enough memory to import it", path.string())));
+  } catch (const std::exception& failure) {
+    throw Error(one_line(fmt::format("{}: {}", path.string(), failure.what())));
+  }
+}
+
+}  // namespace rebounce

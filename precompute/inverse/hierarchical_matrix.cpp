@@ -1,0 +1,262 @@
+#include "precompute/inverse/hierarchical_matrix.h"
+
+#include <algorithm>
+
+#include "precompute/base/blas.h"
+#include "transfer/base/error.h"
+#include "transfer/format/hierarchical_values.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXf;
+using Vectors = HierarchicalMatrix::Vectors;
+using ConstMap = Eigen::Map<const Vectors>;
+
+// Positions of a strip: blocks are found by the strips that they meet.
+constexpr std::uint32_t kStrip = 512;
+
+// Vectors that one thread multiplies with at a time.
+constexpr Index kTogether = 32;
+
+/// to = matrix from, or with kAdd to += matrix from; matrix [rows][columns], the others with
+/// `width` columns, all of them row after row.
+enum class Write { kSet, kAdd };
+void product(bool transposed, Index rows, Index columns, const float* matrix, const float* from,
+             float* to, Index width, Write write) {
+  // The BLAS's matrices are column after column: these, transposed.
+  const auto m = static_cast<int>(width), n = static_cast<int>(rows), k = static_cast<int>(columns),
+             stride = transposed ? n : k;
+  const float one = 1, kept = write == Write::kAdd ? 1 : 0;
+  sgemm_("N", transposed ? "T" : "N", &m, &n, &k, &one, from, &m, matrix, &stride, &kept, to, &m);
+}
+
+}  // namespace
+
+struct HierarchicalMatrix::Places {
+  std::vector<Place> place;  ///< by position
+
+  Places(std::span<const std::uint32_t> patches, std::span<const std::uint32_t> position) {
+    place.reserve(patches.size());
+    for (std::uint32_t k = 0; k < patches.size(); ++k) place.push_back({position[patches[k]], k});
+    std::ranges::sort(place, {}, &Place::position);
+  }
+
+  std::span<const Place> within(std::uint32_t begin, std::uint32_t count) const {
+    const auto first = std::ranges::lower_bound(place, begin, {}, &Place::position);
+    const auto last =
+        std::ranges::lower_bound(first, place.end(), begin + count, {}, &Place::position);
+    return {first, last};
+  }
+};
+
+HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage)
+    : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
+  if (layout_.moment_count > 0) throw Error("hierarchical matrix: its blocks have moments");
+  const SharedArray<float> values = std::exchange(storage_.values_f32, {});
+  bases_.assign(values.begin(), values.begin() + layout_.basis_value_count);
+  const std::uint64_t count = layout_.core_value_count / matrix_count();
+  const float* const cores = values.data() + layout_.basis_value_count;
+  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
+    std::vector<float>& own = cores_.emplace_back(count);
+    for (std::uint64_t k = 0; k < count; ++k) own[k] = cores[k * matrix_count() + m];
+  }
+  for (std::uint32_t k = 0; k < position_.size(); ++k) position_[storage_.patch[k]] = k;
+  for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
+    low_rank_count_ = std::max<Index>(low_rank_count_, Index{cluster.coefficient} + cluster.rank);
+  }
+  if (!storage_.scale_exponent.empty()) take_scales();
+  sort_blocks();
+}
+
+/// R K R instead of K; in powers of two, so that nothing is rounded.
+void HierarchicalMatrix::take_scales() {
+  std::vector<float> scale(static_cast<std::size_t>(position_count()), 1.0F);
+  for (std::size_t k = 0; k < position_.size(); ++k) scale[k] = storage_.position_scale(k);
+  storage_.scale_exponent.clear();
+  const auto at = [&](std::uint32_t begin, std::uint32_t count) {
+    return Eigen::Map<const Eigen::VectorXf>(scale.data() + begin, count).asDiagonal();
+  };
+  for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
+    Eigen::Map<Vectors> bases(bases_.data() + cluster.values, cluster.rank, cluster.size);
+    bases = (bases * at(cluster.begin, cluster.size)).eval();
+  }
+  for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
+    const TransferBlock& block = storage_.blocks[b];
+    if (block.kind != TransferBlock::Kind::kDense) continue;
+    const std::uint64_t begin = layout_.places[b].values / matrix_count();
+    for (std::vector<float>& own : cores_) {
+      Eigen::Map<Vectors> entries(own.data() + begin, block.row_count, block.column_count);
+      entries = (at(block.row_begin, block.row_count) * entries *
+                 at(block.column_begin, block.column_count))
+                    .eval();
+    }
+  }
+}
+
+Index HierarchicalMatrix::position_count() const {
+  return static_cast<Index>(HierarchicalFormat::position_count(storage_.patch.size()));
+}
+
+void HierarchicalMatrix::sort_blocks() {
+  touching_.resize((static_cast<std::size_t>(position_count()) + kStrip - 1) / kStrip);
+  for (std::uint32_t b = 0; b < storage_.blocks.size(); ++b) {
+    const TransferBlock& block = storage_.blocks[b];
+    if (!has_values(block)) continue;
+    const std::uint32_t row_end = (block.row_begin + block.row_count - 1) / kStrip;
+    const std::uint32_t column_end = (block.column_begin + block.column_count - 1) / kStrip;
+    for (std::uint32_t s = block.column_begin / kStrip; s <= column_end; ++s) {
+      touching_[s].push_back(b);
+    }
+    if (block.on_diagonal()) continue;
+    for (std::uint32_t s = std::max(block.row_begin / kStrip, column_end + 1); s <= row_end; ++s) {
+      touching_[s].push_back(b);
+    }
+  }
+}
+
+const float* HierarchicalMatrix::basis(const HierarchicalLayout::End& end) const {
+  return bases_.data() + layout_.basis_index(end, 0, 0);
+}
+
+const float* HierarchicalMatrix::core(std::uint32_t matrix, std::size_t block) const {
+  return cores_[matrix].data() + layout_.places[block].values / matrix_count();
+}
+
+void HierarchicalMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                                 std::span<const std::uint32_t> columns,
+                                 Eigen::Ref<MatrixXf> entries) const {
+  entries.setZero();
+  const Places row_places(rows, position_), column_places(columns, position_);
+  std::vector<std::uint32_t> blocks;
+  std::uint32_t before = kNone;
+  for (const auto& place : column_places.place) {
+    const std::uint32_t strip = place.position / kStrip;
+    if (strip == std::exchange(before, strip)) continue;
+    blocks.insert(blocks.end(), touching_[strip].begin(), touching_[strip].end());
+  }
+  std::ranges::sort(blocks);
+  const auto rest = std::ranges::unique(blocks);
+  blocks.erase(rest.begin(), rest.end());
+  for (const std::uint32_t b : blocks) add_block(matrix, b, row_places, column_places, entries);
+}
+
+MatrixXf HierarchicalMatrix::block_entries(std::uint32_t matrix, std::size_t index,
+                                           std::span<const Place> rows,
+                                           std::span<const Place> columns) const {
+  const TransferBlock& block = storage_.blocks[index];
+  MatrixXf entries(rows.size(), columns.size());
+  if (block.kind == TransferBlock::Kind::kDense) {
+    const ConstMap whole(core(matrix, index), block.row_count, block.column_count);
+    for (Index j = 0; j < entries.cols(); ++j) {
+      for (Index i = 0; i < entries.rows(); ++i) {
+        entries(i, j) =
+            whole(rows[i].position - block.row_begin, columns[j].position - block.column_begin);
+      }
+    }
+    return entries;
+  }
+  // Rows [rank][size] of a basis at some of its positions.
+  const auto some = [&](const HierarchicalLayout::End& end, std::uint32_t rank, std::uint32_t begin,
+                        std::uint32_t size, std::span<const Place> where) {
+    const ConstMap whole(basis(end), rank, size);
+    Vectors part(rank, static_cast<Index>(where.size()));
+    for (Index k = 0; k < part.cols(); ++k) part.col(k) = whole.col(where[k].position - begin);
+    return part;
+  };
+  const HierarchicalLayout::Place& place = layout_.places[index];
+  const Vectors u = some(place.row, block.row_rank, block.row_begin, block.row_count, rows);
+  const Vectors v =
+      some(place.column, block.column_rank, block.column_begin, block.column_count, columns);
+  const MatrixXf right = ConstMap(core(matrix, index), block.row_rank, block.column_rank) * v;
+  entries.noalias() = u.transpose() * right;
+  return entries;
+}
+
+void HierarchicalMatrix::add_block(std::uint32_t matrix, std::size_t index, const Places& rows,
+                                   const Places& columns, Eigen::Ref<MatrixXf> entries) const {
+  const TransferBlock& block = storage_.blocks[index];
+  const auto add = [&](bool mirrored) {
+    const auto at_rows = mirrored ? rows.within(block.column_begin, block.column_count)
+                                  : rows.within(block.row_begin, block.row_count);
+    const auto at_columns = mirrored ? columns.within(block.row_begin, block.row_count)
+                                     : columns.within(block.column_begin, block.column_count);
+    if (at_rows.empty() || at_columns.empty()) return;
+    const MatrixXf part = mirrored ? block_entries(matrix, index, at_columns, at_rows)
+                                   : block_entries(matrix, index, at_rows, at_columns);
+    for (std::size_t j = 0; j < at_columns.size(); ++j) {
+      for (std::size_t i = 0; i < at_rows.size(); ++i) {
+        const auto r = static_cast<Index>(i), c = static_cast<Index>(j);
+        entries(at_rows[i].index, at_columns[j].index) = mirrored ? part(c, r) : part(r, c);
+      }
+    }
+  };
+  add(false);
+  if (!block.on_diagonal()) add(true);
+}
+
+void HierarchicalMatrix::multiply(std::uint32_t matrix, const Vectors& x, Vectors& y,
+                                  Workspace& workspace) const {
+  const Index width = x.cols();
+  workspace.sent.resize(low_rank_count_, width);
+  workspace.received.resize(low_rank_count_, width);
+  y.setZero(x.rows(), width);
+  for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
+    product(false, cluster.rank, cluster.size, bases_.data() + cluster.values,
+            x.row(cluster.begin).data(), workspace.sent.row(cluster.coefficient).data(), width,
+            Write::kSet);
+  }
+  multiply_blocks(matrix, x, y, workspace);
+  for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
+    product(true, cluster.size, cluster.rank, bases_.data() + cluster.values,
+            workspace.received.row(cluster.coefficient).data(), y.row(cluster.begin).data(), width,
+            Write::kAdd);
+  }
+}
+
+/// The cores, and all of dense blocks.
+void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
+                                         Workspace& workspace) const {
+  for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
+    const TransferBlock& block = storage_.blocks[b];
+    if (!has_values(block)) continue;
+    const bool dense = block.kind == TransferBlock::Kind::kDense;
+    const HierarchicalLayout::Place& place = layout_.places[b];
+    const Index row = dense ? block.row_begin : place.row.coefficient;
+    const Index column = dense ? block.column_begin : place.column.coefficient;
+    const Index rows = dense ? block.row_count : block.row_rank;
+    const Index columns = dense ? block.column_count : block.column_rank;
+    const Vectors& from = dense ? x : workspace.sent;
+    Vectors& to = dense ? y : workspace.received;
+    // Coefficients have one block that writes them, positions several.
+    const Write write = dense ? Write::kAdd : Write::kSet;
+    const float* const entries = core(matrix, b);
+    product(false, rows, columns, entries, from.row(column).data(), to.row(row).data(), x.cols(),
+            write);
+    if (block.on_diagonal()) continue;
+    product(true, columns, rows, entries, from.row(row).data(), to.row(column).data(), x.cols(),
+            write);
+  }
+}
+
+MatrixXf HierarchicalMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) const {
+  load_blas();
+  MatrixXf result(x.rows(), x.cols());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Index begin = 0; begin < x.cols(); begin += kTogether) {
+    const Index width = std::min(kTogether, x.cols() - begin);
+    Vectors in = Vectors::Zero(position_count(), width), out;
+    for (std::size_t k = 0; k < position_.size(); ++k) {
+      in.row(static_cast<Index>(k)) = x.row(storage_.patch[k]).segment(begin, width);
+    }
+    Workspace workspace;
+    multiply(matrix, in, out, workspace);
+    for (std::size_t k = 0; k < position_.size(); ++k) {
+      result.row(storage_.patch[k]).segment(begin, width) = out.row(static_cast<Index>(k));
+    }
+  }
+  return result;
+}
+
+}  // namespace rebounce

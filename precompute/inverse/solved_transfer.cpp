@@ -1,0 +1,229 @@
+#include "precompute/inverse/solved_transfer.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <random>
+#include <utility>
+
+#include "precompute/base/blas.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXf;
+using Vectors = HierarchicalMatrix::Vectors;
+using Sums = Eigen::Array<double, 1, Eigen::Dynamic>;  ///< of each right-hand side
+using Factors = Eigen::Array<float, 1, Eigen::Dynamic>;
+
+// Residuals fall by half or more in a step even at a reflectance of 0.9.
+constexpr int kMostSteps = 500;
+
+// Eigenvectors that are told from the rest, no more than a part of all, and multiplications that
+// find them. Measured: notes/operator.md.
+constexpr Index kLeadingCount = 256, kLeadingPart = 8;
+constexpr int kLeadingSteps = 6;
+
+// Rows whose products are summed in single precision before they go into the double.
+constexpr Index kSummedRows = 128;
+
+// Vectors that are multiplied side by side: fewer than columns are, so that threads share even the
+// few that lights are.
+constexpr Index kSmallGroup = 16;
+
+// Random vectors for the energies: their errors are sqrt(2 / 128), 13 %, and of their roots, which
+// count (light_weights.cpp), 6 %.
+constexpr Index kProbeCount = 128;
+
+/// Sums over the rows of `term(first, count)`, an expression [count][k].
+template <typename Term>
+Sums column_sums(Index rows, Index width, const Term& term) {
+  Sums sums = Sums::Zero(width);
+  for (Index first = 0; first < rows; first += kSummedRows) {
+    const Index count = std::min(kSummedRows, rows - first);
+    Factors part = Factors::Zero(width);
+    for (Index row = first; row < first + count; ++row) part += term(row);
+    sums += part.cast<double>();
+  }
+  return sums;
+}
+
+float sign(std::mt19937_64& engine) {
+  return (engine() >> 63) != 0 ? 1.0F : -1.0F;
+}
+
+[[noreturn]] void refuse() {
+  throw Error(
+      "columns of the operator do not converge: the form factors give off more light than they "
+      "take; compress them less");
+}
+
+Factors quotient(const Sums& a, const Sums& b) {
+  return (b > 0).select(a / b, 0).cast<float>();
+}
+
+}  // namespace
+
+SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
+                               double residual)
+    : form_factors_(form_factors.storage()), residual_(residual) {
+  const std::uint32_t count = distinct_channels(patches.reflectance, channel_matrix_);
+  for (std::uint32_t m = 0; m < count; ++m) {
+    const auto channel = std::ranges::find(channel_matrix_, m) - channel_matrix_.begin();
+    Eigen::VectorXf& root = root_.emplace_back(Eigen::VectorXf::Zero(position_count()));
+    for (std::size_t k = 0; k < patches.size(); ++k) {
+      root[static_cast<Index>(k)] = std::sqrt(patches.reflectance[patch()[k]][channel]);
+    }
+    leading_.push_back(find_leading(root));
+  }
+}
+
+SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
+                               const HierarchicalStorage& coarse, const PatchTable& patches,
+                               double residual)
+    : SolvedTransfer(form_factors, patches, residual) {
+  coarse_.emplace(coarse);
+}
+
+Vectors SolvedTransfer::gather(const Vectors& x) const {
+  load_blas();
+  Vectors result(x.rows(), x.cols());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
+    const Index width = std::min(kSmallGroup, x.cols() - begin);
+    Vectors out;
+    HierarchicalMatrix::Workspace workspace;
+    form_factors_.multiply(0, x.middleCols(begin, width), out, workspace);
+    result.middleCols(begin, width) = out;
+  }
+  return result;
+}
+
+/// By subspace iteration.
+SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root) const {
+  load_blas();
+  const auto n = static_cast<Index>(patch().size());
+  const Index count = std::clamp<Index>(n / kLeadingPart, 1, kLeadingCount);
+  Leading leading;
+  std::mt19937_64 engine(2);
+  leading.vectors = Vectors::NullaryExpr(position_count(), count, [&] { return sign(engine); });
+  for (int step = 0;; ++step) {
+    const Eigen::HouseholderQR<MatrixXf> qr(root.asDiagonal() * leading.vectors);
+    leading.vectors = qr.householderQ() * MatrixXf::Identity(position_count(), count);
+    leading.gathered = gather(root.asDiagonal() * leading.vectors);
+    if (step == kLeadingSteps) break;
+    leading.vectors = leading.gathered;
+  }
+  const MatrixXf kept =
+      leading.vectors.transpose() * (leading.vectors - root.asDiagonal() * leading.gathered);
+  leading.system.compute(kept.cast<double>());
+  if (leading.system.info() != Eigen::Success) refuse();
+  return leading;
+}
+
+void SolvedTransfer::solve_leading(std::uint32_t matrix, Workspace& workspace) const {
+  const Leading& leading = leading_[matrix];
+  Vectors& r = workspace.residual;
+  const MatrixXf seen = leading.vectors.transpose() * r;
+  const Vectors part = leading.system.solve(seen.cast<double>()).cast<float>();
+  Vectors& gathered = workspace.arrived;
+  gathered.noalias() = leading.gathered * part;
+  workspace.solution += gathered;
+  r += root_[matrix].asDiagonal() * gathered;
+  r.noalias() -= leading.vectors * part;
+}
+
+void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_factors,
+                           Workspace& workspace) const {
+  const Eigen::VectorXf& root = root_[matrix];
+  Vectors &y = workspace.solution, &r = workspace.residual, &p = workspace.direction;
+  Vectors &sent = workspace.sent, &arrived = workspace.arrived;
+  const Index rows = y.rows(), width = y.cols();
+  const auto squares = [&](const Vectors& v) {
+    return column_sums(rows, width, [&](Index i) { return v.row(i).array().square(); });
+  };
+  r.noalias() = root.asDiagonal() * y;
+  const Sums allowed = residual_ * residual_ * squares(r);
+  solve_leading(matrix, workspace);
+  p = r;
+  sent.noalias() = root.asDiagonal() * p;
+  Sums rr = squares(r);
+  for (int step = 0; (rr > allowed).any(); ++step) {
+    if (step == kMostSteps) refuse();
+    form_factors.multiply(0, sent, arrived, workspace.products);
+    const Sums pq = column_sums(rows, width, [&](Index i) {
+      return p.row(i).array().square() - sent.row(i).array() * arrived.row(i).array();
+    });
+    // Solutions that are good enough stay as they are.
+    const Factors alpha = (rr > allowed).select(quotient(rr, pq), 0);
+    const Sums before = rr;
+    rr = column_sums(rows, width, [&](Index i) {
+      y.row(i).array() += alpha * arrived.row(i).array();
+      r.row(i).array() -= alpha * (p.row(i) - root[i] * arrived.row(i)).array();
+      return r.row(i).array().square();
+    });
+    const Factors beta = quotient(rr, before);
+    for (Index i = 0; i < rows; ++i) {
+      p.row(i) = r.row(i).array() + beta * p.row(i).array();
+      sent.row(i) = root[i] * p.row(i);
+    }
+  }
+}
+
+const Vectors& SolvedTransfer::columns(std::uint32_t matrix, std::span<const std::uint32_t> patches,
+                                       Workspace& workspace) const {
+  MatrixXf& seen = workspace.seen;
+  seen.resize(static_cast<Index>(patch().size()), static_cast<Index>(patches.size()));
+  form_factors_.entries(0, patch(), patches, seen);
+  workspace.solution.setZero(position_count(), seen.cols());
+  workspace.solution.topRows(seen.rows()) = seen;
+  solve(matrix, coarse_ ? *coarse_ : form_factors_, workspace);
+  return workspace.solution;
+}
+
+MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const {
+  load_blas();
+  MatrixXf result(x.rows(), x.cols());
+  std::exception_ptr failure;
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
+    const Index width = std::min(kSmallGroup, x.cols() - begin);
+    Vectors in = Vectors::Zero(position_count(), width);
+    Workspace workspace;
+    for (std::size_t k = 0; k < patch().size(); ++k) {
+      in.row(static_cast<Index>(k)) = x.row(patch()[k]).segment(begin, width);
+    }
+    form_factors_.multiply(0, in, workspace.solution, workspace.products);
+    try {
+      solve(matrix, form_factors_, workspace);
+    } catch (...) {
+#pragma omp critical
+      failure = std::current_exception();
+    }
+    for (std::size_t k = 0; k < patch().size(); ++k) {
+      result.row(patch()[k]).segment(begin, width) = workspace.solution.row(static_cast<Index>(k));
+    }
+  }
+  if (failure) std::rethrow_exception(failure);
+  return result;
+}
+
+Eigen::VectorXd SolvedTransfer::estimated_energies(const PatchRoles& roles) const {
+  const auto n = static_cast<Index>(patch().size());
+  std::mt19937_64 engine(1);
+  Eigen::VectorXd energies = Eigen::VectorXd::Zero(n);
+  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
+    MatrixXf signs = MatrixXf::NullaryExpr(n, kProbeCount, [&] { return sign(engine); });
+    for (Index i = 0; i < n; ++i) {
+      if (!roles.is_receiver(static_cast<std::size_t>(i))) signs.row(i).setZero();
+    }
+    energies += multiply(m, signs).cast<double>().rowwise().squaredNorm() / kProbeCount;
+  }
+  return energies;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,43 @@
+#include "precompute/lights/judged_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <vector>
+
+namespace rebounce {
+namespace {
+
+constexpr double kGroup = 64, kConfidence = 0.95;
+
+// Times the mean that the largest error of a group may be.
+constexpr double kLargestOverMean = 3;
+
+// The tail is this part of the sample, and no fewer than kLeastTail; fewer errors than kLeastSample
+// say nothing of one.
+constexpr std::size_t kTailPart = 16, kLeastTail = 8, kLeastSample = 32;
+
+/// What the largest of kGroup errors stays below with kConfidence; `falling`, largest first.
+double largest_of_group(std::span<const double> falling) {
+  if (falling.size() < kLeastSample) return falling.front();
+  const std::size_t tail = std::max(kLeastTail, falling.size() / kTailPart);
+  const double threshold = falling[tail];
+  const auto count = static_cast<double>(tail), size = static_cast<double>(falling.size());
+  const double all = std::accumulate(falling.begin(), falling.begin() + tail, 0.0);
+  const double excess = all / count - threshold;
+  const double beyond = 1 - std::pow(kConfidence, 1 / kGroup);
+  return threshold + excess * std::log(count / (size * beyond));
+}
+
+}  // namespace
+
+double judged_error(std::span<const double> errors) {
+  std::vector<double> falling(errors.begin(), errors.end());
+  std::ranges::sort(falling, std::greater<>());
+  const double mean =
+      std::accumulate(falling.begin(), falling.end(), 0.0) / static_cast<double>(falling.size());
+  return std::max(mean, largest_of_group(falling) / kLargestOverMean);
+}
+
+}  // namespace rebounce

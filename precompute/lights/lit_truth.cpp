@@ -1,0 +1,108 @@
+#include "precompute/lights/lit_truth.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/lights/random_lights.h"
+#include "transfer/base/area_norm.h"
+
+namespace rebounce {
+namespace {
+
+// Lights that the matrix is read for at a time.
+constexpr std::size_t kBatch = 64;
+
+using Lights = std::span<const std::vector<Float3>>;
+
+/// One channel of the products with some lights.
+void multiply_channel(const SymmetricMatrix& matrix, int channel, Lights lights,
+                      std::span<std::vector<Float3>> results) {
+  const std::span<const float> area = matrix.area();
+  Eigen::MatrixXf x(area.size(), lights.size());
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    for (std::size_t i = 0; i < area.size(); ++i) {
+      x(i, k) = std::sqrt(area[i]) * lights[k][i][channel];
+    }
+  }
+  const Eigen::MatrixXf y = matrix.multiply(matrix.channel_matrix()[channel], x);
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    for (std::size_t i = 0; i < area.size(); ++i) {
+      results[k][i][channel] = y(i, k) / std::sqrt(area[i]);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::vector<Float3>> products(const SymmetricMatrix& matrix, Lights lights) {
+  std::vector<std::vector<Float3>> results(lights.size(),
+                                           std::vector<Float3>(matrix.area().size()));
+  for (std::size_t begin = 0; begin < lights.size(); begin += kBatch) {
+    const std::size_t count = std::min(kBatch, lights.size() - begin);
+    for (int channel = 0; channel < kChannelCount; ++channel) {
+      multiply_channel(matrix, channel, lights.subspan(begin, count),
+                       std::span(results).subspan(begin, count));
+    }
+  }
+  return results;
+}
+
+LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights)
+    : area_(matrix.area().begin(), matrix.area().end()) {
+  for (const std::vector<Float3>& light : lights) {
+    matrix.roles().keep(PatchRoles::kSource, lights_.emplace_back(light));
+    if (!(area_norm(lights_.back(), area_) > 0)) lights_.pop_back();
+  }
+  truths_ = products(matrix, lights_);
+  leave_out_dark();
+  keep_received(matrix.roles());
+}
+
+void LitTruth::keep_received(const PatchRoles& roles) {
+  for (std::vector<Float3>& truth : truths_) {
+    const double all = area_norm(truth, area_);
+    roles.keep(PatchRoles::kReceiver, truth);
+    received_.add(area_norm(truth, area_), all);
+  }
+}
+
+void LitTruth::leave_out_dark() {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    if (arrives_nowhere(truths_[k], lights_[k], area_)) continue;
+    std::swap(lights_[kept], lights_[k]);
+    std::swap(truths_[kept], truths_[k]);
+    ++kept;
+  }
+  if (kept == 0) return;  // light arrives nowhere: the matrix is zero
+  lights_.resize(kept);
+  truths_.resize(kept);
+}
+
+std::vector<double> LitTruth::errors(const TransferOperator& transfer) const {
+  std::vector<double> errors;
+  errors.reserve(lights_.size());
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    errors.push_back(
+        received_error(product(transfer, lights_[k]), truths_[k], area_, received_.reference(k)));
+  }
+  return errors;
+}
+
+Eigen::MatrixXd LitTruth::normalised_lights(std::span<const std::uint32_t> patch,
+                                            std::size_t position_count) const {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(position_count),
+                                                 static_cast<Eigen::Index>(lights_.size()));
+  for (std::size_t k = 0; k < lights_.size(); ++k) {
+    const double norm = received_.reference(k);
+    if (norm == 0) continue;
+    for (std::size_t i = 0; i < patch.size(); ++i) {
+      const Float3& m0 = lights_[k][patch[i]];
+      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
+          std::sqrt(area_[patch[i]]) * (m0[0] + m0[1] + m0[2]) / (kChannelCount * norm);
+    }
+  }
+  return result;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,123 @@
+#include "precompute/lights/measured_error.h"
+
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
+#include "precompute/lights/error_bound.h"
+#include "precompute/lights/lit_truth.h"
+#include "precompute/lights/received_light.h"
+#include "precompute/lights/reference_solution.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+using Exitances = std::vector<std::vector<Float3>>;
+
+// Of a compressed operator, and of one that has rounding errors alone.
+constexpr int kLightCount = 256, kRoundedLightCount = 16;
+
+// Of the initial exitance: rounding errors are above it. Of the reflected light, in parts of the
+// tolerance: a thousandth of an error hangs on it at most (notes/operator.md).
+constexpr double kReferenceResidual = 1e-10, kResidualOfTolerance = 0.02;
+
+KindError summary(LightKind kind, std::size_t light_count, const std::vector<double>& errors) {
+  const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
+  return {kind,
+          static_cast<int>(errors.size()),
+          static_cast<int>(light_count - errors.size()),
+          sum / static_cast<double>(errors.size()),
+          std::ranges::max(errors),
+          error_bound(errors)};
+}
+
+/// The errors of lights, less those from which nothing arrives.
+using ErrorsOf = std::function<std::vector<double>(const Exitances&, const Progress&)>;
+
+std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer, int light_count,
+                               std::uint64_t seed, const ErrorsOf& errors_of,
+                               const Progress& progress) {
+  std::vector<KindError> result;
+  for (std::size_t k = 0; k < kLightKinds.size(); ++k) {
+    const Progress part = [&](double done) {
+      return !progress || progress((k + done) / kLightKinds.size());
+    };
+    if (!part(0)) throw Cancelled();
+    const LightKind kind = kLightKinds[k];
+    const Exitances lights =
+        random_initial_exitances(data, tracer, kind, light_count, seed, data.transfer->roles());
+    const std::vector<double> errors = errors_of(lights, part);
+    if (!errors.empty()) result.push_back(summary(kind, lights.size(), errors));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<LightError> light_errors(const TransferData& data,
+                                     std::span<const std::vector<Float3>> lights,
+                                     const TruthOf& truth_of, const Progress& progress) {
+  const std::vector<float>& area = data.patches.area;
+  std::vector<Float3> indirect_irradiance(data.patches.size());
+  std::vector<float> workspace(data.transfer->workspace_size());
+  ReceivedLight received;
+  std::vector<std::vector<Float3>> arrived, results;
+  std::vector<LightError> errors;
+  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kTogether) {
+    if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
+    const auto some = lights.subspan(
+        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kTogether));
+    auto truths = truth_of(some);
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      if (arrives_nowhere(truths[k], some[k], area)) continue;
+      const double all = area_norm(truths[k], area);
+      data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
+      received.add(area_norm(truths[k], area), all);
+      errors.push_back({.arriving = area_norm(truths[k], area) / area_norm(some[k], area)});
+      data.transfer->apply(some[k], indirect_irradiance, workspace);
+      results.push_back(indirect_irradiance);
+      arrived.push_back(std::move(truths[k]));
+    }
+  }
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    errors[k].error = received_error(results[k], arrived[k], area, received.reference(k));
+  }
+  return errors;
+}
+
+std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
+                                     const DenseOperator* exact, std::uint64_t seed,
+                                     const Progress& progress) {
+  if (exact == nullptr && data.exchange.empty() && data.links.empty()) {
+    throw Error("measured error: there is no truth without pairs or links; store links too");
+  }
+  if (exact == nullptr) {
+    return measure_error(data, tracer, ReferenceSolver(data), 0, seed, progress);
+  }
+  const auto errors_of = [&](const Exitances& lights, const Progress&) {
+    return LitTruth(DenseMatrix(*exact, data.transfer->roles()), lights).errors(*data.transfer);
+  };
+  return measure(data, tracer, kLightCount, seed, errors_of, progress);
+}
+
+std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
+                                     const ReferenceSolver& reference, double tolerance,
+                                     std::uint64_t seed, const Progress& progress) {
+  const auto errors_of = [&](const Exitances& lights, const Progress& part) {
+    const auto truth_of = [&](std::span<const std::vector<Float3>> some) {
+      return reference.indirect_irradiances(some, kReferenceResidual,
+                                            kResidualOfTolerance * tolerance);
+    };
+    std::vector<double> errors;
+    for (const LightError& light : light_errors(data, lights, truth_of, part)) {
+      errors.push_back(light.error);
+    }
+    return errors;
+  };
+  return measure(data, tracer, tolerance > 0 ? kLightCount : kRoundedLightCount, seed, errors_of,
+                 progress);
+}
+
+}  // namespace rebounce

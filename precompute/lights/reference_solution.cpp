@@ -1,0 +1,361 @@
+#include "precompute/lights/reference_solution.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "precompute/base/arithmetic.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+using Double3 = ReferenceSolver::Double3;
+using Form = ReferenceSolver::Form;
+
+constexpr int kMaxSteps = 10000;
+
+// Down to this residual, in parts of the reflected light, links gather in single precision, twice
+// as fast: what that rounds off is a hundredth of it. Lights for which it is more, as what links
+// carry too much and too little of cancels, are solved in double precision after kSingleRounds.
+constexpr double kSinglePrecisionSuffices = 1e-5;
+constexpr int kSingleRounds = 2;
+
+/// A column is a patch and holds all channels of the first light, then of the next.
+template <int kRows>
+using Field = Eigen::Array<double, kRows, Eigen::Dynamic>;
+
+/// F times `in`.
+template <int kRows>
+Field<kRows> times(const FormFactorRows& rows, const Field<kRows>& in) {
+  Field<kRows> out(kRows, in.cols());
+#pragma omp parallel for schedule(dynamic, 64)
+  for (Eigen::Index i = 0; i < in.cols(); ++i) {
+    const auto columns = rows.columns(i);
+    const auto factors = rows.form_factors(i);
+    Eigen::Array<double, kRows, 1> sum = Eigen::Array<double, kRows, 1>::Zero();
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      sum += static_cast<double>(factors[k]) * in.col(columns[k]);
+    }
+    out.col(i) = sum;
+  }
+  return out;
+}
+
+template <typename Scalar, int kRows>
+Field<kRows> gather_along(const LinkedFormFactors& links, const Field<kRows>& in) {
+  using Columns = std::array<Scalar, kRows>;
+  using ScalarField = Eigen::Array<Scalar, kRows, Eigen::Dynamic>;
+  std::vector<Columns> from(in.cols()), to(in.cols());
+  Eigen::Map<ScalarField>(from.front().data(), kRows, in.cols()) = in.template cast<Scalar>();
+  links.gather(std::span<const Columns>(from), std::span(to));
+  return Eigen::Map<const ScalarField>(to.front().data(), kRows, in.cols()).template cast<double>();
+}
+
+template <int kRows>
+Field<kRows> times(const std::shared_ptr<const LinkedFormFactors>& links, const Field<kRows>& in) {
+  return gather_along<double>(*links, in);
+}
+
+/// Light after light, in single precision.
+template <int kRows>
+Field<kRows> times(const CompressedFormFactors& compressed, const Field<kRows>& in) {
+  Field<kRows> out(kRows, in.cols());
+  std::vector<Float3> from(in.cols()), to(in.cols());
+  std::vector<float> workspace(compressed.workspace_size());
+  for (int begin = 0; begin < kRows; begin += kChannelCount) {
+    for (Eigen::Index i = 0; i < in.cols(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) from[i][c] = static_cast<float>(in(begin + c, i));
+    }
+    compressed.gather(from, to, workspace);
+    for (Eigen::Index i = 0; i < in.cols(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) out(begin + c, i) = to[i][c];
+    }
+  }
+  return out;
+}
+
+/// What the system is and how it is solved.
+struct System {
+  const Form& form;
+  const PatchTable& patches;
+  const TransferOperator* nearly_inverse;  ///< may be null
+};
+
+/// That of (I - rho F) B = M0; solved is what has either.
+struct Residual {
+  double of_initial_exitance;  ///< in parts of M0
+  double of_reflected_light;   ///< in parts of rho H
+};
+
+/// kLights lights on one scene, solved together.
+template <int kLights>
+class ConjugateGradients {
+ public:
+  using Lights = std::span<const std::vector<Float3>>;
+  static constexpr int kRows = kLights * kChannelCount;
+  using Field = rebounce::Field<kRows>;
+
+  struct Solution {
+    Field radiosity, indirect_irradiance;
+  };
+
+  /// `lights`: kLights of them at most.
+  ConjugateGradients(const System& system, Lights lights)
+      : form_(system.form),
+        nearly_inverse_(system.nearly_inverse),
+        area_(Eigen::Map<const Eigen::VectorXf>(system.patches.area.data(),
+                                                std::ssize(system.patches.area))
+                  .cast<double>()),
+        root_(kRows, area_.size()),
+        m0_(Field::Zero(kRows, area_.size())) {
+    const PatchTable& patches = system.patches;
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      for (int k = 0; k < kRows; ++k) {
+        const int light = k / kChannelCount, channel = k % kChannelCount;
+        root_(k, i) = std::sqrt(static_cast<double>(patches.reflectance[i][channel]));
+        if (light < std::ssize(lights)) m0_(k, i) = lights[light][i][channel];
+      }
+    }
+  }
+
+  Solution solve(const Residual& residual) const {
+    const Totals of_initial =
+        residual.of_initial_exitance * residual.of_initial_exitance * per_light(product(m0_, m0_));
+    Field z = Field::Zero(kRows, m0_.cols());
+    bool conditioned = nearly_inverse_ != nullptr;
+    if (conditioned) z = root_ * transfer(m0_);
+    const bool coarse = residual.of_reflected_light >= kSinglePrecisionSuffices;
+    for (int steps = 0, round = 0; steps < kMaxSteps; ++round) {
+      const Arithmetic arithmetic =
+          coarse && round < kSingleRounds ? Arithmetic::kSingle : Arithmetic::kDouble;
+      Field b = m0_ + root_ * z, h = gather(b, arithmetic);
+      const Field reflected = root_ * h;
+      const Field r = reflected - z;  // R r is the residual of B
+      const Totals allowed = of_initial.max(
+          residual.of_reflected_light * residual.of_reflected_light * exitance_squares(reflected));
+      if ((exitance_squares(r) <= allowed).all()) return {std::move(b), std::move(h)};
+      if (conditioned) {
+        conditioned = descend_conditioned(r, allowed, arithmetic, z, steps);
+      } else {
+        descend(r, allowed, arithmetic, z, steps);
+      }
+    }
+    throw Error("the reference solution did not converge in " + std::to_string(kMaxSteps) +
+                " steps; a reflectance must be too close to 1");
+  }
+
+ private:
+  using Products = Eigen::Array<double, kRows, 1>;  ///< by light and channel
+  using Totals = Eigen::Array<double, kLights, 1>;  ///< by light
+
+  /// Moves `z`, the residual of which is `r`, until that is small enough by its own recursion
+  /// (M. R. Hestenes, E. Stiefel, 1952).
+  void descend(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z, int& steps) const {
+    Field p = r;
+    Products rr = product(r, r);
+    do {
+      const Field q = p - root_ * gather(root_ * p, arithmetic);
+      const Products alpha = quotient(rr, product(p, q));
+      z += p.colwise() * alpha;
+      r -= q.colwise() * alpha;
+      const Products before = std::exchange(rr, product(r, r));
+      p = r + p.colwise() * quotient(rr, before);
+    } while (++steps < kMaxSteps && !(exitance_squares(r) <= allowed).all());
+  }
+
+  /// The same, preconditioned by I + R Y R, which is nearly the inverse of I - R F R. Directions
+  /// are kept conjugate though it is rounded (G. H. Golub, Q. Ye, 1999). Returns false, with `z` as
+  /// near as it came, if Y is so wrong that it is not positive.
+  bool descend_conditioned(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z,
+                           int& steps) const {
+    Field y = condition(r), p = y;
+    Products ry = product(r, y);
+    for (;;) {
+      if ((ry <= 0 && product(r, r) > 0).any()) return false;
+      const Field q = p - root_ * gather(root_ * p, arithmetic);
+      const Products alpha = quotient(ry, product(p, q));
+      z += p.colwise() * alpha;
+      const Field change = q.colwise() * alpha;
+      r -= change;
+      if (++steps >= kMaxSteps || (exitance_squares(r) <= allowed).all()) return true;
+      y = condition(r);
+      const Products before = std::exchange(ry, product(r, y));
+      p = y - p.colwise() * quotient(product(change, y), before);
+    }
+  }
+
+  /// F times `in`; links alone gather in single precision where that is enough.
+  Field gather(const Field& in, Arithmetic arithmetic) const {
+    using Links = std::shared_ptr<const LinkedFormFactors>;
+    if (const Links* links = std::get_if<Links>(&form_);
+        links != nullptr && arithmetic == Arithmetic::kSingle) {
+      return gather_along<float>(**links, in);
+    }
+    return std::visit([&](const auto& form) { return times<kRows>(form, in); }, form_);
+  }
+
+  Field condition(const Field& r) const { return r + root_ * transfer(root_ * r); }
+
+  /// Y times `in`, in single precision.
+  Field transfer(const Field& in) const {
+    const auto n = static_cast<std::size_t>(in.cols());
+    std::vector<Float3> from(kLights * n), to(kLights * n);
+    std::vector<float> workspace(nearly_inverse_->batch_workspace_size(kLights));
+    for (int k = 0; k < kRows; ++k) {
+      Float3* const light = from.data() + k / kChannelCount * n;
+      for (std::size_t i = 0; i < n; ++i) {
+        light[i][k % kChannelCount] = static_cast<float>(in(k, i));
+      }
+    }
+    nearly_inverse_->apply_batch(kLights, from, to, workspace);
+    Field out(kRows, in.cols());
+    for (int k = 0; k < kRows; ++k) {
+      const Float3* const light = to.data() + k / kChannelCount * n;
+      for (std::size_t i = 0; i < n; ++i) out(k, i) = light[i][k % kChannelCount];
+    }
+    return out;
+  }
+
+  /// The squared area norms of R v.
+  Totals exitance_squares(const Field& v) const {
+    const Field scaled = root_ * v;
+    return per_light(product(scaled, scaled));
+  }
+
+  /// The area-weighted inner products.
+  Products product(const Field& a, const Field& b) const {
+    return ((a * b).rowwise() * area_).rowwise().sum();
+  }
+
+  static Totals per_light(const Products& products) {
+    return products.reshaped(kChannelCount, kLights).colwise().sum().transpose();
+  }
+
+  /// 0 where there is nothing to divide by: channels that are dark or solved.
+  static Products quotient(const Products& a, const Products& b) {
+    return (b > 0).select(a / b, 0);
+  }
+
+  const Form& form_;
+  const TransferOperator* nearly_inverse_;
+  Eigen::Array<double, 1, Eigen::Dynamic> area_;
+  Field root_, m0_;
+};
+
+Form best_form(const TransferData& data) {
+  if (!data.exchange.empty()) return FormFactorRows(data.exchange, data.patches.area);
+  if (!data.links.empty()) {
+    return std::make_shared<const LinkedFormFactors>(data.links, data.patches.area,
+                                                     data.patches.centroid);
+  }
+  return CompressedFormFactors(data.compressed_form_factors);
+}
+
+enum class Quantity { kRadiosity, kIndirectIrradiance };
+
+/// Appends the solutions [n] of kLights lights at most.
+template <int kLights>
+void solve_together(const System& system, std::span<const std::vector<Float3>> lights,
+                    const Residual& residual, Quantity quantity,
+                    std::vector<std::vector<Double3>>& solutions) {
+  const ConjugateGradients<kLights> solver(system, lights);
+  const auto solved = solver.solve(residual);
+  const auto& field =
+      quantity == Quantity::kRadiosity ? solved.radiosity : solved.indirect_irradiance;
+  for (std::size_t light = 0; light < lights.size(); ++light) {
+    std::vector<Double3>& solution = solutions.emplace_back(system.patches.size());
+    for (std::size_t i = 0; i < solution.size(); ++i) {
+      for (int c = 0; c < kChannelCount; ++c) solution[i][c] = field(light * kChannelCount + c, i);
+    }
+  }
+}
+
+std::vector<std::vector<Double3>> solve(const System& system,
+                                        std::span<const std::vector<Float3>> lights,
+                                        Residual residual, Quantity quantity) {
+  if (std::holds_alternative<CompressedFormFactors>(system.form)) {
+    residual.of_initial_exitance =
+        std::max(residual.of_initial_exitance, ReferenceSolver::kSinglePrecisionResidual);
+  }
+  std::vector<std::vector<Double3>> solutions;
+  while (solutions.size() < lights.size()) {
+    const auto left = lights.subspan(solutions.size());
+    if (left.size() == 1) {
+      solve_together<1>(system, left, residual, quantity, solutions);
+    } else {
+      solve_together<ReferenceSolver::kTogether>(
+          system, left.first(std::min<std::size_t>(ReferenceSolver::kTogether, left.size())),
+          residual, quantity, solutions);
+    }
+  }
+  return solutions;
+}
+
+}  // namespace
+
+ReferenceSolver::ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches)
+    : patches_(patches), form_(FormFactorRows(exchange, patches.area)) {}
+
+ReferenceSolver::ReferenceSolver(const FormFactorLinks& links, const PatchTable& patches)
+    : ReferenceSolver(
+          std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
+          patches) {}
+
+ReferenceSolver::ReferenceSolver(std::shared_ptr<const LinkedFormFactors> links,
+                                 const PatchTable& patches)
+    : patches_(patches), form_(std::move(links)) {}
+
+ReferenceSolver::ReferenceSolver(const TransferData& data)
+    : patches_(data.patches), form_(best_form(data)) {}
+
+ReferenceSolver ReferenceSolver::preconditioned(
+    std::shared_ptr<const TransferOperator> nearly_inverse) const {
+  if (nearly_inverse->patch_count() != patches_.size()) {
+    throw Error("reference solution: the operator is not of these patches");
+  }
+  ReferenceSolver solver = *this;
+  if (nearly_inverse->roles().all_are_both()) solver.nearly_inverse_ = std::move(nearly_inverse);
+  return solver;
+}
+
+std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_exitance,
+                                                double residual) const {
+  const std::vector<Float3> light(initial_exitance.begin(), initial_exitance.end());
+  return radiosities({&light, 1}, residual).front();
+}
+
+std::vector<std::vector<Double3>> ReferenceSolver::radiosities(
+    std::span<const std::vector<Float3>> initial_exitances, double residual) const {
+  return solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
+               {.of_initial_exitance = residual, .of_reflected_light = 0}, Quantity::kRadiosity);
+}
+
+std::vector<Float3> ReferenceSolver::indirect_irradiance(std::span<const Float3> initial_exitance,
+                                                         double residual) const {
+  const std::vector<Float3> light(initial_exitance.begin(), initial_exitance.end());
+  return indirect_irradiances({&light, 1}, residual).front();
+}
+
+std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
+    std::span<const std::vector<Float3>> initial_exitances, double residual,
+    double of_reflected_light) const {
+  const auto solutions =
+      solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
+            {.of_initial_exitance = residual, .of_reflected_light = of_reflected_light},
+            Quantity::kIndirectIrradiance);
+  std::vector<std::vector<Float3>> result;
+  for (const std::vector<Double3>& h : solutions) result.push_back(rounded(h));
+  return result;
+}
+
+std::vector<Float3> rounded(std::span<const Double3> solution) {
+  std::vector<Float3> result(solution.size());
+  std::ranges::transform(solution, result.begin(), [](const Double3& v) {
+    return Float3{static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+  });
+  return result;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "transfer/exchange/compressed_form_factors.h"
+#include "transfer/exchange/exchange_matrix.h"
+#include "transfer/exchange/linked_form_factors.h"
+#include "transfer/file/transfer_data.h"
+#include "transfer/operator/transfer_operator.h"
+
+namespace rebounce {
+
+/// The radiosity system in double precision, solved by conjugate gradients: the truth that
+/// everything faster is measured against.
+///
+/// B = M0 + R z with R = rho^1/2 and (I - R F R) z = R F M0, positive definite in the area-weighted
+/// inner product as long as no reflectance is 1; black patches have z = 0 (notes/solvers.md). The
+/// residual is that of (I - rho F) B = M0, computed anew from the solution before it is believed.
+/// The same bits for any number of threads.
+class ReferenceSolver {
+ public:
+  using Double3 = std::array<double, 3>;
+
+  /// Lights for which F is read together: what is gathered for them just fills the registers.
+  static constexpr int kTogether = 8;
+
+  /// What is solved with: F by pairs, as links, or compressed.
+  using Form =
+      std::variant<FormFactorRows, std::shared_ptr<const LinkedFormFactors>, CompressedFormFactors>;
+
+  /// Compressed form factors gather in single precision: no solution with them has a smaller
+  /// residual than this, whatever is asked for.
+  static constexpr double kSinglePrecisionResidual = 1e-6;
+
+  /// `patches` must outlive the solver. Throws Error if sizes do not agree.
+  ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches);
+  ReferenceSolver(const FormFactorLinks& links, const PatchTable& patches);
+
+  /// With links that others gather along too.
+  ReferenceSolver(std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches);
+
+  /// With what `data`, which must outlive the solver, hold F best as: pairs, else links, else
+  /// compressed. Throws Error if they hold none of them.
+  explicit ReferenceSolver(const TransferData& data);
+
+  /// The same system with an operator that nearly solves it, of any error, for first guess and
+  /// preconditioner: fewer steps to the same residual, which is computed from F as ever. One that
+  /// is for some receivers and sources only is not used. Throws Error if it has other patches.
+  ReferenceSolver preconditioned(std::shared_ptr<const TransferOperator> nearly_inverse) const;
+
+  /// Solves (I - rho F) B = M0 until the area-weighted residual is `residual` of M0 (default
+  /// 1e-10); returns the radiosity B [n] in lx. Throws Error if 10,000 steps do not get there.
+  std::vector<Double3> radiosity(std::span<const Float3> initial_exitance,
+                                 double residual = 1e-10) const;
+
+  /// The same for many lights [n each], kTogether at a time: several times faster.
+  std::vector<std::vector<Double3>> radiosities(
+      std::span<const std::vector<Float3>> initial_exitances, double residual = 1e-10) const;
+
+  /// H = F B [n] in lx for that solution.
+  std::vector<Float3> indirect_irradiance(std::span<const Float3> initial_exitance,
+                                          double residual = 1e-10) const;
+
+  /// Of many lights; solved is also what leaves a residual of no more than `of_reflected_light` of
+  /// rho H, so that what arrives is as exact of a lamp in a closet as of one in the room.
+  std::vector<std::vector<Float3>> indirect_irradiances(
+      std::span<const std::vector<Float3>> initial_exitances, double residual = 1e-10,
+      double of_reflected_light = 0) const;
+
+ private:
+  const PatchTable& patches_;
+  Form form_;
+  std::shared_ptr<const TransferOperator> nearly_inverse_;  ///< may be null
+};
+
+/// A solution [n] in single precision.
+std::vector<Float3> rounded(std::span<const ReferenceSolver::Double3> solution);
+
+}  // namespace rebounce

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// A point on a surface that emits.
+struct EmitterPoint {
+  Float3 position;
+  Float3 area;  ///< the front's normal times the area that the point stands for, m²
+};
+
+/// Points spread over one patch that emits.
+struct EmitterPoints {
+  std::uint32_t patch = 0;
+  std::vector<EmitterPoint> point;
+};
+
+/// Points on each patch of `data` that emits, in the order of the patches: `most_each`, or fewer if
+/// there would be more than `most` of them, but one at least. `shown_patch` is that of PatchModel.
+/// The same every time.
+std::vector<EmitterPoints> spread_over_emitters(const TransferData& data,
+                                                std::span<const std::uint32_t> shown_patch,
+                                                int most_each, int most);
+
+}  // namespace rebounce

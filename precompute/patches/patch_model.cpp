@@ -1,0 +1,427 @@
+#include "precompute/patches/patch_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "precompute/patches/contact_cuts.h"
+#include "precompute/patches/covers.h"
+#include "precompute/patches/element_clusters.h"
+#include "precompute/patches/lit_sides.h"
+#include "precompute/patches/opacity_sampling.h"
+#include "precompute/patches/seen_part.h"
+#include "precompute/patches/texture_sampling.h"
+#include "precompute/patches/vertex_split.h"
+#include "precompute/patches/welded_positions.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+// How far the work is when these are done; measured on scenes of some 300,000 triangles.
+constexpr double kAfterContacts = 0.08, kAfterSides = 0.25, kAfterElements = 0.33,
+                 kAfterClusters = 0.92;
+
+// Triangles that are added where others are covered in part, for each patch that is wanted: at
+// most.
+constexpr double kMostAtCovers = 4;
+
+// What is covered counts for so much less where patches are shared out: it is dark, and gets its
+// light from close by.
+constexpr double kLessCovered = 0.75;
+
+// An element of more than this part of a mean patch is looked at for covers at so many points, and
+// by so many rays for what it sees; a smaller one at one, and is taken to see much.
+constexpr double kSmallElement = 1.0 / 16;
+constexpr std::uint32_t kCoverPoints = 8, kSightRays = 64;
+
+class PatchModelBuilder {
+ public:
+  PatchModelBuilder(Scene scene, const SubdivisionSettings& settings, const Progress& progress)
+      : scene_(std::move(scene)), settings_(settings), progress_(progress) {
+    drop_slivers();
+    model_.scene_triangle_count = scene_.triangle.size();
+    cut_at_contacts(scene_, settings);
+    drop_thin(0);
+    report_progress(progress_, kAfterContacts);
+    const OpacityMaps opacity = find_opacity_maps(scene_);
+    const RayTracer tracer(scene_.position, scene_.triangle, opacity);
+    sides_ = find_lit_sides(scene_, tracer, part_of(progress_, kAfterContacts, kAfterSides));
+    for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+      if (opacity.stopping_part(t) == 0) sides_[t] = {SideKind::kOpening, SideKind::kOpening};
+    }
+    const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
+    inherit_sides(subdivide(scene_, patches_per_triangle(), settings, importances(tracer)));
+    refine(tracer, scene_size);
+    drop_thin(0);  // what is as thin as floats can tell has lost its area by cuts
+  }
+
+  PatchModel build() {
+    take_surface();
+    add_second_sides();
+    find_openings();
+    const RayTracer tracer = make_surface_tracer(model_.mesh);
+    make_patches(tracer);
+    find_shown_patches(tracer);
+    report_progress(progress_, kAfterClusters);
+    copy_lightmap_texcoords(split_vertices(model_.shown_patch, tracer,
+                                           kCloseCover * std::sqrt(patch_area_), model_.mesh));
+    if (clamped_count_ > 0) {
+      model_.warnings.push_back("the reflectance of " + std::to_string(clamped_count_) +
+                                " patches was clamped to 0.99");
+    }
+    return std::move(model_);
+  }
+
+ private:
+  std::vector<std::uint8_t> patches_per_triangle() const {
+    std::vector<std::uint8_t> count;
+    count.reserve(sides_.size());
+    for (const TriangleSides& s : sides_) {
+      count.push_back(static_cast<std::uint8_t>(s.patch_count()));
+    }
+    return count;
+  }
+
+  /// Makes triangles that are covered in part small beside patches; `scene_size` is the root of the
+  /// area of all lit sides, metres.
+  void refine(const RayTracer& tracer, double scene_size) {
+    const double patch_size =
+        settings_.patch_count > 0
+            ? scene_size / std::sqrt(static_cast<double>(settings_.patch_count))
+            : settings_.patch_size / kLongestEdge;
+    if (!(patch_size > 0)) return;
+    const double wanted = std::pow(scene_size / patch_size, 2);
+    inherit_sides(refine_at_covers(scene_, sides_, tracer, patch_size,
+                                   static_cast<std::size_t>(kMostAtCovers * wanted)));
+  }
+
+  /// What each triangle counts for: as much as the more important of its lit sides. Nothing where
+  /// patches are to have a size.
+  std::vector<float> importances(const RayTracer& tracer) const {
+    if (settings_.patch_size > 0) return {};
+    const double mean_area =
+        std::pow(mean_patch_size(scene_, patches_per_triangle(), settings_.patch_count), 2);
+    std::vector<float> result(sides_.size(), 1.0F);
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::uint32_t t = 0; t < sides_.size(); ++t) {
+      const auto [p, q, r] = corners_of(scene_, t);
+      const TriangleCorners front{p, q, r}, back{p, r, q};
+      if (rebounce::area_of(front) <= kSmallElement * mean_area) continue;
+      const auto of = [&](const TriangleCorners& side) {
+        return static_cast<float>(importance(seen_part(side, tracer, kSightRays, t)));
+      };
+      float most = 0;
+      if (sides_[t].front == SideKind::kLit) most = of(front);
+      if (sides_[t].back == SideKind::kLit && most < 1) most = std::max(most, of(back));
+      if (most > 0) result[t] = most;
+    }
+    return result;
+  }
+
+  /// Gives the parts of triangles their sides; `source` [t] is the triangle that each was part of.
+  void inherit_sides(const std::vector<std::uint32_t>& source) {
+    std::vector<TriangleSides> sides;
+    sides.reserve(source.size());
+    for (const std::uint32_t t : source) sides.push_back(sides_[t]);
+    sides_ = std::move(sides);
+  }
+
+  bool is_double_sided(std::uint32_t t) const {
+    return scene_.materials[model_.mesh.triangle_material[t]].double_sided;
+  }
+
+  /// Takes the scene's surface over: what is left of the scene is its materials.
+  void take_surface() {
+    DisplayMesh& mesh = model_.mesh;
+    mesh.position = std::move(scene_.position);
+    mesh.normal = std::move(scene_.normal);
+    mesh.base_color_texcoord = std::move(scene_.base_color_texcoord);
+    mesh.emissive_texcoord = std::move(scene_.emissive_texcoord);
+    mesh.vertex_color = std::move(scene_.vertex_color);
+    model_.lightmap_texcoord = std::move(scene_.lightmap_texcoord);
+    model_.lightmap_page = scene_.lightmap_page;
+    mesh.triangle = std::move(scene_.triangle);
+    mesh.triangle_material = std::move(scene_.triangle_material);
+    model_.triangle_mesh = std::move(scene_.triangle_mesh);
+    mesh.back_triangle.assign(mesh.triangle.size(), kNone);
+    for (const TriangleSides& sides : sides_) kind_.push_back(sides.front);
+    surface_of_.resize(mesh.triangle.size());
+    std::iota(surface_of_.begin(), surface_of_.end(), 0U);
+  }
+
+  /// For vertices that were appended as copies.
+  void copy_lightmap_texcoords(std::span<const std::uint32_t> copied) {
+    if (model_.lightmap_texcoord.empty()) return;
+    for (const std::uint32_t v : copied) {
+      model_.lightmap_texcoord.push_back(model_.lightmap_texcoord[v]);
+    }
+  }
+
+  /// Appends a copy with reversed winding and normals of every double-sided triangle.
+  void add_second_sides() {
+    DisplayMesh& mesh = model_.mesh;
+    std::vector<std::uint32_t> back_vertex(mesh.position.size(), kNone);
+    const auto back_of = [&](std::uint32_t v) {
+      if (back_vertex[v] == kNone) {
+        back_vertex[v] = copy_vertex(mesh, v);
+        for (float& n : mesh.normal[back_vertex[v]]) n = -n;
+        if (!model_.lightmap_texcoord.empty()) {
+          model_.lightmap_texcoord.push_back(model_.lightmap_texcoord[v]);
+        }
+      }
+      return back_vertex[v];
+    };
+    for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
+      if (!is_double_sided(t)) continue;
+      mesh.back_triangle[t] = static_cast<std::uint32_t>(mesh.triangle.size());
+      const auto [a, b, c] = mesh.triangle[t];
+      mesh.triangle.push_back({back_of(a), back_of(c), back_of(b)});
+      mesh.triangle_material.push_back(mesh.triangle_material[t]);
+      if (!model_.triangle_mesh.empty()) {
+        model_.triangle_mesh.push_back(model_.triangle_mesh[t]);
+      }
+      kind_.push_back(sides_[t].back);
+      surface_of_.push_back(t);
+    }
+  }
+
+  /// Finds what light passes through, now that the triangles are cut.
+  void find_openings() {
+    DisplayMesh& mesh = model_.mesh;
+    mesh.opacity =
+        find_opacity_maps(scene_, mesh.triangle, mesh.triangle_material, mesh.base_color_texcoord);
+    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+      if (mesh.opacity.stopping_part(t) == 0) kind_[t] = SideKind::kOpening;
+    }
+  }
+
+  std::array<glm::dvec3, 3> corners(std::uint32_t t) const {
+    const DisplayMesh& mesh = model_.mesh;
+    const auto [a, b, c] = mesh.triangle[t];
+    return {to_dvec3(mesh.position[a]), to_dvec3(mesh.position[b]), to_dvec3(mesh.position[c])};
+  }
+
+  double area_of(std::uint32_t t) const {
+    const auto [p, q, r] = corners(t);
+    return 0.5 * glm::length(glm::cross(q - p, r - p));
+  }
+
+  /// Samples of its textures that a display triangle of a patch needs: the patch has them all.
+  int sample_count(std::uint32_t t) const {
+    const double part = area_of(t) / patch_area_;
+    return static_cast<int>(
+        std::min(std::ceil(part * kMostTextureSamples), 1.0 * kMostTextureSamples));
+  }
+
+  /// Mean reflectance of a display triangle, textures integrated.
+  Float3 mean_reflectance(std::uint32_t t) const {
+    const DisplayMesh& mesh = model_.mesh;
+    const auto [a, b, c] = mesh.triangle[t];
+    return mean_base_color(
+        scene_, scene_.materials[mesh.triangle_material[t]],
+        {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]},
+        {mesh.vertex_color[a], mesh.vertex_color[b], mesh.vertex_color[c]}, sample_count(t));
+  }
+
+  /// Mean emitted exitance of a display triangle in lx, textures integrated.
+  Float3 mean_exitance(std::uint32_t t) const {
+    const DisplayMesh& mesh = model_.mesh;
+    const auto [a, b, c] = mesh.triangle[t];
+    Float3 exitance = mean_emitted_luminance(
+        scene_, scene_.materials[mesh.triangle_material[t]],
+        {mesh.emissive_texcoord[a], mesh.emissive_texcoord[b], mesh.emissive_texcoord[c]},
+        {mesh.base_color_texcoord[a], mesh.base_color_texcoord[b], mesh.base_color_texcoord[c]},
+        sample_count(t));
+    for (float& m : exitance) m *= std::numbers::pi_v<float>;
+    return exitance;
+  }
+
+  /// What a patch has of area if there are as many as are wanted, m².
+  double mean_patch_area() const {
+    if (settings_.patch_count == 0) return std::pow(static_cast<double>(settings_.patch_size), 2);
+    double area = 0;
+    for (const std::uint32_t t : element_triangle_) area += area_of(t);
+    return area / static_cast<double>(settings_.patch_count);
+  }
+
+  /// For each vertex the number of its position among those of the elements.
+  std::vector<std::uint32_t> weld_elements() {
+    WeldedPositions welded = weld_positions(model_.mesh.position);
+    elements_.position.resize(welded.count);
+    for (std::size_t v = 0; v < welded.id.size(); ++v) {
+      elements_.position[welded.id[v]] = model_.mesh.position[v];
+    }
+    return std::move(welded.id);
+  }
+
+  /// The lit sides, with what they reflect and emit, and how they are covered.
+  void make_elements(const RayTracer& tracer) {
+    for (std::uint32_t t = 0; t < kind_.size(); ++t) {
+      if (kind_[t] == SideKind::kLit) element_triangle_.push_back(t);
+    }
+    const std::vector<std::uint32_t> position = weld_elements();
+    const std::size_t count = element_triangle_.size();
+    if (count == 0) throw Error("scene " + scene_.name + " has nothing that light falls on");
+    elements_.resize(count);
+    patch_area_ = mean_patch_area();
+#pragma omp parallel for schedule(dynamic, 256)
+    for (std::size_t e = 0; e < count; ++e) {
+      const std::uint32_t t = element_triangle_[e];
+      const auto [p, q, r] = corners(t);
+      const glm::dvec3 cross = glm::cross(q - p, r - p);
+      const auto [a, b, c] = model_.mesh.triangle[t];
+      elements_.triangle[e] = surface_of_[t];
+      elements_.corner[e] = {position[a], position[b], position[c]};
+      elements_.normal[e] = to_float3(glm::normalize(cross));
+      elements_.area[e] =
+          static_cast<float>(0.5 * glm::length(cross) * model_.mesh.opacity.stopping_part(t));
+      elements_.reflectance[e] = mean_reflectance(t);
+      const bool small = elements_.area[e] <= kSmallElement * patch_area_;
+      elements_.covered[e] = static_cast<float>(covered_part(
+          {p, q, r}, tracer, kCoverHeight * std::sqrt(patch_area_), small ? 1 : kCoverPoints));
+      if (settings_.patch_size == 0) {
+        const double seen = small ? 1 : importance(seen_part({p, q, r}, tracer, kSightRays, e));
+        elements_.importance[e] =
+            static_cast<float>(seen * (1 - kLessCovered * elements_.covered[e]));
+      }
+      elements_.emits[e] =
+          std::ranges::any_of(mean_exitance(t), [](float m) { return m > 0; }) ? 1 : 0;
+    }
+  }
+
+  void make_patches(const RayTracer& tracer) {
+    make_elements(tracer);
+    report_progress(progress_, kAfterElements);
+    const ElementPatches merged = merge_elements(
+        elements_, tracer, {.patch_count = settings_.patch_count, .largest = settings_.patch_size},
+        part_of(progress_, kAfterElements, kAfterClusters));
+    model_.element_count = elements_.size();
+    model_.mesh.triangle_patch.assign(model_.mesh.triangle.size(), kNone);
+    for (std::size_t e = 0; e < elements_.size(); ++e) {
+      model_.mesh.triangle_patch[element_triangle_[e]] = merged.patch[e];
+    }
+    average_elements(merged);
+  }
+
+  /// Fills the table of patches with the means of their elements, by area.
+  void average_elements(const ElementPatches& merged) {
+    const std::size_t n = merged.patch_count;
+    std::vector<double> area(n, 0.0);
+    std::vector<glm::dvec3> centroid(n, glm::dvec3(0)), normal = centroid, reflectance = centroid,
+                                                        exitance = centroid;
+    std::vector<Float3> first_normal(n);
+    for (std::size_t e = merged.patch.size(); e-- > 0;) {
+      const std::uint32_t i = merged.patch[e];
+      const double part = elements_.area[e];
+      area[i] += part;
+      centroid[i] += part * to_dvec3(elements_.centroid(e));
+      normal[i] += part * to_dvec3(elements_.normal[e]);
+      reflectance[i] += part * to_dvec3(elements_.reflectance[e]);
+      if (elements_.emits[e] != 0) {
+        exitance[i] += part * to_dvec3(mean_exitance(element_triangle_[e]));
+      }
+      first_normal[i] = elements_.normal[e];
+    }
+    PatchTable& patches = model_.patches;
+    for (std::size_t i = 0; i < n; ++i) {
+      patches.area.push_back(static_cast<float>(area[i]));
+      patches.centroid.push_back(to_float3(centroid[i] / area[i]));
+      const double length = glm::length(normal[i]);
+      // A closed patch has no mean normal.
+      patches.normal.push_back(length > 1e-6 * area[i] ? to_float3(normal[i] / length)
+                                                       : first_normal[i]);
+      patches.reflectance.push_back(clamp_reflectance(to_float3(reflectance[i] / area[i])));
+      patches.emitted_exitance.push_back(to_float3(exitance[i] / area[i]));
+    }
+  }
+
+  Float3 clamp_reflectance(Float3 reflectance) {
+    if (std::ranges::any_of(reflectance, [](float rho) { return rho > kMaxReflectance; })) {
+      ++clamped_count_;
+      for (float& rho : reflectance) rho = std::min(rho, kMaxReflectance);
+    }
+    return reflectance;
+  }
+
+  /// Takes out triangles whose height is below the precision of rays: what stands on them or looks
+  /// at them cannot be told.
+  void drop_slivers() {
+    model_.sliver_count = drop_thin(ray_offset_distance(scene_.position));
+    if (scene_.triangle.empty()) throw Error("scene " + scene_.name + " has nothing but slivers");
+  }
+
+  /// Takes out triangles that are no higher than this, metres, and their sides if these are known.
+  /// Returns how many.
+  std::size_t drop_thin(double thinnest) {
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < scene_.triangle.size(); ++t) {
+      const auto [a, b, c] = scene_.triangle[t];
+      const glm::dvec3 p = to_dvec3(scene_.position[a]), q = to_dvec3(scene_.position[b]),
+                       r = to_dvec3(scene_.position[c]);
+      const double longest =
+          std::max({glm::distance(p, q), glm::distance(q, r), glm::distance(r, p)});
+      if (glm::length(glm::cross(q - p, r - p)) <= thinnest * longest) continue;
+      scene_.triangle[kept] = scene_.triangle[t];
+      if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh[kept] = scene_.triangle_mesh[t];
+      if (!sides_.empty()) sides_[kept] = sides_[t];
+      scene_.triangle_material[kept++] = scene_.triangle_material[t];
+    }
+    const std::size_t dropped = scene_.triangle.size() - kept;
+    scene_.triangle.resize(kept);
+    scene_.triangle_material.resize(kept);
+    if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh.resize(kept);
+    if (!sides_.empty()) sides_.resize(kept);
+    return dropped;
+  }
+
+  /// Covered sides show the light of what covers them at their middle.
+  void find_shown_patches(const RayTracer& tracer) {
+    const DisplayMesh& mesh = model_.mesh;
+    model_.shown_patch = mesh.triangle_patch;
+    std::vector<Hit> hits;
+    std::vector<CoincidentSide> sides;
+    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
+      model_.unlit_side_count += kind_[t] == SideKind::kUnlit ? 1 : 0;
+      model_.opening_side_count += kind_[t] == SideKind::kOpening ? 1 : 0;
+      model_.buried_side_count += kind_[t] == SideKind::kBuried ? 1 : 0;
+      if (kind_[t] != SideKind::kCovered) continue;
+      ++model_.covered_side_count;
+      const auto [p, q, r] = corners(t);
+      find_coincident_sides(
+          tracer, to_float3((p + q + r) / 3.0), to_float3(glm::normalize(glm::cross(q - p, r - p))),
+          surface_of_[t], [&](std::uint32_t o) { return mesh.back_triangle[o] != kNone; }, hits,
+          sides);
+      for (const CoincidentSide& side : sides) {
+        const std::uint32_t other = side.front ? side.triangle : mesh.back_triangle[side.triangle];
+        if (!side.same_way || mesh.triangle_patch[other] == kNone) continue;
+        model_.shown_patch[t] = std::min(model_.shown_patch[t], mesh.triangle_patch[other]);
+      }
+    }
+  }
+
+  Scene scene_;
+  const SubdivisionSettings& settings_;
+  const Progress& progress_;
+  std::vector<TriangleSides> sides_;             ///< of each triangle of the subdivided scene
+  std::vector<SideKind> kind_;                   ///< of each display triangle
+  std::vector<std::uint32_t> surface_of_;        ///< surface triangle of each display triangle
+  std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
+  Elements elements_;
+  double patch_area_ = 0;  ///< the mean patch's, m²
+  PatchModel model_;
+  std::size_t clamped_count_ = 0;
+};
+
+}  // namespace
+
+PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings,
+                            const Progress& progress) {
+  if (scene.triangle.empty()) throw Error("scene " + scene.name + " has no triangles");
+  return PatchModelBuilder(std::move(scene), settings, progress).build();
+}
+
+}  // namespace rebounce

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "precompute/import/scene.h"
+#include "precompute/patches/patch_model.h"
+#include "transfer/data/patch_roles.h"
+
+namespace rebounce {
+
+/// The entries of a comma-separated list of what PatchSelection takes, with the commas of boxes in
+/// them. A name that has a comma of its own cannot be in such a list.
+std::vector<std::string> split_selection(std::string_view list);
+
+/// Some of a scene's surface by name or place. Each entry is one of
+///   NAME                     meshes, nodes that place one, and materials of that name
+///   mesh:NAME                meshes, and nodes that place one
+///   material:NAME            materials
+///   box:X0,Y0,Z0,X1,Y1,Z1    patches with their centroid between two corners, metres in the world
+class PatchSelection {
+ public:
+  /// `list` is how messages call the entries. Throws Error if an entry is malformed or the scene
+  /// has nothing of that name, with the names that come nearest.
+  PatchSelection(std::span<const std::string> entries, const Scene& scene, std::string list);
+  PatchSelection() = default;
+
+  bool empty() const { return boxes_.empty() && meshes_.empty() && materials_.empty(); }
+
+  /// [n] 1 for patches that have a triangle of a surface that is named, or lie in a box; 0 for
+  /// others. `model` is of the scene. Throws Error if there are none.
+  std::vector<std::uint8_t> patches(const PatchModel& model) const;
+
+ private:
+  struct Box {
+    Float3 low, high;
+  };
+
+  void take(const std::string& entry, const Scene& scene);
+  void take_box(const std::string& entry);
+  void take_name(std::string_view name, bool of_meshes, bool of_materials, const Scene& scene);
+
+  std::string list_;
+  std::vector<Box> boxes_;
+  std::vector<std::uint32_t> meshes_, materials_;  ///< numbers in the scene
+};
+
+/// The roles of a model's patches with these receivers and sources, where an empty selection stands
+/// for all patches. What emits is a source, named or not. Throws Error as PatchSelection::patches.
+PatchRoles choose_roles(const PatchModel& model, const PatchSelection& receivers,
+                        const PatchSelection& sources);
+
+/// Of all pairs of so many patches, the part between which light is wanted in either direction:
+/// what of an operator is compressed and stored.
+double wanted_part(const PatchRoles& roles, std::size_t patch_count);
+
+}  // namespace rebounce

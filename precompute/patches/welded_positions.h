@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "transfer/base/types.h"
+
+namespace rebounce {
+
+/// For each vertex the number of its position, equal for vertices at the same place, in [0, count).
+struct WeldedPositions {
+  std::vector<std::uint32_t> id;  ///< [v]
+  std::uint32_t count = 0;
+};
+WeldedPositions weld_positions(std::span<const Float3> position);
+
+}  // namespace rebounce

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "runtime/demo/picture/picture.h"
+#include "runtime/demo/shading/direct_light.h"
+#include "runtime/demo/shading/display_surface.h"
+#include "runtime/demo/shading/emitters.h"
+#include "runtime/demo/shading/vertex_light.h"
+
+namespace rebounce {
+
+/// A piece of surface whose light is wanted, a vertex's or a texel's.
+struct LitPiece {
+  SurfacePoint point;  ///< in its middle
+  float width = 0;     ///< metres
+};
+
+/// Finds the light that leaves pieces of surface: direct light as the mean over points of them,
+/// bounced light as the patches give it, emission.
+class SurfaceLighter {
+ public:
+  /// `samples_per_piece` >= 1 and `emitter_samples` as in LitMeshSettings. Everything that is given
+  /// must outlive it. Throws Error if a texture cannot be decoded.
+  SurfaceLighter(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
+                 int samples_per_piece, int emitter_samples);
+
+  const DisplaySurface& surface() const { return surface_; }
+  int samples_per_piece() const { return samples_per_piece_; }
+
+  /// What `pieces` show in parts of the screen's white, with their base colour's texture or as if
+  /// that were white. They are pieces `first` and following of all; `samples` are points of them:
+  /// CameraSample::pixel is the number of the piece, index that of the sample, below
+  /// samples_per_piece. Samples inside of solid bodies, as below a box that stands on a floor, do
+  /// not count.
+  std::vector<glm::vec3> shown(std::uint32_t first, std::span<const LitPiece> pieces,
+                               std::span<const CameraSample> samples, float exposure_scale,
+                               bool textured) const;
+
+ private:
+  std::vector<CameraSample> uncovered(std::span<const CameraSample> samples) const;
+  std::vector<glm::vec3> direct_irradiance(std::uint32_t first, std::size_t piece_count,
+                                           std::span<const CameraSample> samples) const;
+
+  const TransferData& data_;
+  const RayTracer& tracer_;
+  const PictureLight& light_;
+  int samples_per_piece_;
+  DisplaySurface surface_;
+  Emitters emitters_;
+  VertexLight vertex_light_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+#include "transfer/data/scene_description.h"
+
+namespace rebounce {
+
+/// A decoded texture with its mip levels.
+class FilteredTexture {
+ public:
+  /// Throws Error if the image cannot be decoded or is too large.
+  explicit FilteredTexture(const Texture& texture);
+
+  /// Linear colour at `texcoord`, trilinearly filtered over a footprint of `texcoord_width`
+  /// (in units of texture coordinates).
+  glm::vec3 sample(const glm::vec2& texcoord, float texcoord_width) const;
+
+  /// Alpha in [0, 1] at `texcoord`, bilinearly filtered; 1 if the image has none.
+  float alpha(const glm::vec2& texcoord) const;
+
+ private:
+  struct Level {
+    int width = 0;
+    int height = 0;
+    std::vector<std::uint8_t> rgb{};  // sRGB
+  };
+
+  static Level half_size(const Level& level);
+
+  /// What `texel`(index) gives for the four texels of `level` around `texcoord`, mixed.
+  template <typename TexelValue>
+  auto bilinear(const Level& level, const glm::vec2& texcoord, const TexelValue& texel) const;
+  glm::vec3 bilinear_color(const Level& level, const glm::vec2& texcoord) const;
+
+  std::vector<Level> levels_;
+  std::vector<std::uint8_t> alpha_;  ///< of the finest level; empty if it is 255 everywhere
+  TextureWrap wrap_s_, wrap_t_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,70 @@
+#include "runtime/demo/image/image_file.h"
+
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+
+#include "runtime/demo/image/srgb.h"
+#include "runtime/demo/image/tone_curve.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/error.h"
+#include "transfer/file/atomic_file.h"
+
+namespace rebounce {
+namespace {
+
+/// A pattern of thresholds without structure that the eye finds, so that slow gradients do not show
+/// the steps of eight bits: interleaved gradient noise (J. Jimenez, "Next generation post
+/// processing in Call of Duty: Advanced Warfare", 2014), kept off 0 and 1 so that exact bytes stay.
+float dither_threshold(int x, int y) {
+  const float inner = 0.06711056F * static_cast<float>(x) + 0.00583715F * static_cast<float>(y);
+  const float noise = 52.9829189F * (inner - std::floor(inner));
+  return 0.01F + 0.98F * (noise - std::floor(noise));
+}
+
+}  // namespace
+
+ScreenImage tone_map(const Picture& picture) {
+  ScreenImage image{.width = picture.width, .height = picture.height};
+  image.rgb.reserve(3 * picture.pixel.size());
+  const float scale = std::exp2(picture.exposure);
+  for (std::size_t k = 0; k < picture.pixel.size(); ++k) {
+    const glm::vec3 pixel = to_glm(picture.pixel[k]);
+    const glm::vec3 color = picture.display_referred ? pixel : tone_curve(scale * pixel);
+    const float threshold = picture.display_referred
+                                ? 0.5F
+                                : dither_threshold(static_cast<int>(k) % picture.width,
+                                                   static_cast<int>(k) / picture.width);
+    for (int c = 0; c < kChannelCount; ++c) image.rgb.push_back(to_srgb_byte(color[c], threshold));
+  }
+  return image;
+}
+
+std::vector<std::uint8_t> encode_png(const ScreenImage& image) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(image.width);
+  header.height = static_cast<png_uint_32>(image.height);
+  header.format = PNG_FORMAT_RGB;
+  png_alloc_size_t byte_count = PNG_IMAGE_PNG_SIZE_MAX(header);
+  std::vector<std::uint8_t> bytes(byte_count);
+  if (!png_image_write_to_memory(&header, bytes.data(), &byte_count, 0, image.rgb.data(), 0,
+                                 nullptr)) {
+    throw Error("picture: libpng could not encode it: " + std::string(header.message) +
+                "; check its size");
+  }
+  bytes.resize(byte_count);
+  return bytes;
+}
+
+void write_png(const std::filesystem::path& path, const ScreenImage& image) {
+  const std::vector<std::uint8_t> bytes = encode_png(image);
+  AtomicFile file(path);
+  file.write(std::as_bytes(std::span(bytes)));
+  file.commit();
+}
+
+}  // namespace rebounce

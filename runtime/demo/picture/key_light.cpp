@@ -1,0 +1,97 @@
+#include "runtime/demo/picture/key_light.h"
+
+#include <algorithm>
+#include <numbers>
+#include <numeric>
+#include <vector>
+
+#include "runtime/rays/box.h"
+
+namespace rebounce {
+namespace {
+
+constexpr double kFluxPerArea = 100;  // lm/m²
+constexpr std::size_t kCandidates = 128;
+constexpr std::size_t kReceivers = 512;  // patches that a candidate may reach
+
+// A lamp counts as close to a surface within this part of the scene's diagonal.
+constexpr float kCloseness = 0.15F;
+
+// `count` patches, spread evenly over the surface's area.
+std::vector<std::size_t> spread_patches(const PatchTable& patches, std::size_t count) {
+  const double total = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
+  std::vector<std::size_t> chosen;
+  double sum = 0;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    sum += patches.area[i];
+    const auto due = static_cast<std::size_t>(static_cast<double>(count) * sum / total);
+    if (due > chosen.size()) chosen.resize(due, i);
+  }
+  return chosen;
+}
+
+Float3 above(const PatchTable& patches, std::size_t patch, const RayTracer& tracer) {
+  return tracer.offset_point(patches.centroid[patch], patches.normal[patch]);
+}
+
+// Half way from each patch to what is opposite, or up to `reach`.
+std::vector<Float3> candidates(const PatchTable& patches, const RayTracer& tracer, float reach) {
+  std::vector<Ray> rays;
+  for (const std::size_t i : spread_patches(patches, kCandidates)) {
+    rays.push_back({.origin = above(patches, i, tracer),
+                    .t_near = 0,
+                    .direction = patches.normal[i],
+                    .t_far = reach});
+  }
+  std::vector<Hit> hits(rays.size());
+  tracer.intersect(rays, hits);
+  std::vector<Float3> places;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    const float way = hits[k].triangle == kNone ? reach : hits[k].t;
+    places.push_back(to_float3(to_glm(rays[k].origin) + 0.5F * way * to_glm(rays[k].direction)));
+  }
+  return places;
+}
+
+// How many of `receivers` see `place`, times its distance to the nearest that does, `reach` at
+// most.
+float merit(const Float3& place, std::span<const std::size_t> receivers, const PatchTable& patches,
+            const RayTracer& tracer, float reach) {
+  std::vector<Ray> rays;
+  for (const std::size_t i : receivers) {
+    const Float3 origin = above(patches, i, tracer);
+    const glm::vec3 way = to_glm(place) - to_glm(origin);
+    if (glm::dot(way, to_glm(patches.normal[i])) <= 0) continue;
+    rays.push_back({.origin = origin, .t_near = 0, .direction = to_float3(way), .t_far = 1});
+  }
+  tracer.occluded(rays);
+  int reached = 0;
+  for (const Ray& ray : rays) {
+    if (is_occluded(ray)) continue;
+    ++reached;
+    reach = std::min(reach, glm::length(to_glm(ray.direction)));
+  }
+  return reach * static_cast<float>(reached);
+}
+
+}  // namespace
+
+Light make_key_light(const TransferData& data, const RayTracer& tracer) {
+  const PatchTable& patches = data.patches;
+  const float size = glm::length(box_around(patches.centroid).extent());
+  const std::vector<std::size_t> receivers = spread_patches(patches, kReceivers);
+  const double area = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
+  Light light;
+  light.name = "key light";
+  light.intensity = static_cast<float>(kFluxPerArea * area / (4 * std::numbers::pi));
+  float best = -1;
+  for (const Float3& place : candidates(patches, tracer, 0.5F * size)) {
+    const float value = merit(place, receivers, patches, tracer, kCloseness * size);
+    if (value <= best) continue;
+    best = value;
+    light.position = place;
+  }
+  return light;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,34 @@
+#include "runtime/demo/shading/vertex_light.h"
+
+#include <string>
+
+#include "runtime/demo/shading/display_surface.h"
+#include "runtime/lights/sky_light.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+
+void check_length(std::size_t length, std::size_t patch_count, const char* name) {
+  if (length == 0 || length == patch_count) return;
+  throw Error("picture: " + std::string(name) + " has " + std::to_string(length) + " entries for " +
+              std::to_string(patch_count) + " patches; give one for each");
+}
+
+VertexLight light_at_vertices(const TransferData& data, const PictureLight& light) {
+  const std::size_t n = data.patches.size();
+  check_length(light.indirect_irradiance.size(), n, "indirect_irradiance");
+  check_length(light.emitted_irradiance.size(), n, "emitted_irradiance");
+  check_sky(light.sky, data);
+  std::vector<glm::vec3> sky(n), bounced(n, glm::vec3(0));
+  for (std::size_t i = 0; i < n; ++i) {
+    sky[i] = to_glm(sky_irradiance(data, light.sky, i));
+    if (!light.indirect_irradiance.empty()) bounced[i] = to_glm(light.indirect_irradiance[i]);
+    if (!light.emitted_irradiance.empty()) bounced[i] -= to_glm(light.emitted_irradiance[i]);
+    // The operator's error may leave a little less than the first flight.
+    bounced[i] = glm::max(bounced[i], glm::vec3(0));
+  }
+  return {reconstruct_at_vertices(data.mesh, sky), reconstruct_at_vertices(data.mesh, bounced)};
+}
+
+}  // namespace rebounce

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "runtime/demo/viewer/gl/gpu_scene.h"
+#include "transfer/data/scene_description.h"
+
+namespace rebounce {
+
+/// A vertex of what is not part of the scene: colour and light are linear, light in lx.
+struct BodyVertex {
+  Float3 position{}, normal{}, color{};
+  Float3 first_flight{};  ///< sky and emitters
+  std::array<Float3, kSideCount> bounced{};
+};
+
+/// The triangles of one body.
+struct BodyPart {
+  std::uint32_t begin = 0, end = 0;
+  Float3 emitted_luminance{0, 0, 0};  ///< cd/m²
+};
+
+/// Spheres that are lit, and the surfaces of lamps, as triangles.
+struct BodyMesh {
+  std::vector<BodyVertex> vertex;
+  std::vector<Uint3> triangle;
+  std::vector<BodyPart> part;
+};
+
+/// Unit normals of the vertices that add_sphere makes, in their order.
+const std::vector<Float3>& sphere_normals();
+
+/// Adds a sphere; `shade`(k) is all of its vertex k but place and normal.
+void add_sphere(const Float3& center, float radius,
+                const std::function<BodyVertex(std::size_t k)>& shade, BodyMesh& mesh);
+
+/// Adds the surface of `lamp` as something that shines; nothing if it has none.
+void add_lamp_surface(const Light& lamp, BodyMesh& mesh);
+
+}  // namespace rebounce

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "runtime/demo/image/image_file.h"
+#include "runtime/demo/picture/picture.h"
+#include "runtime/demo/viewer/gl/gl_objects.h"
+#include "runtime/demo/viewer/gl/gl_program.h"
+#include "runtime/demo/viewer/gl/gpu_bodies.h"
+#include "runtime/demo/viewer/gl/gpu_scene.h"
+#include "runtime/demo/viewer/gl/shadow_map.h"
+#include "runtime/lights/prepared_light.h"
+
+namespace rebounce {
+
+/// One frame, for SceneRenderer.
+struct FrameSettings {
+  int width = 1280;
+  int height = 800;
+  Camera camera;
+  Show show = Show::kRadiosity;
+  float exposure = 0;            ///< stops
+  std::optional<float> split{};  ///< part of the width that shows the first side; unset: all
+  std::span<const Light> lights{};
+  Sky sky{};
+};
+
+/// Draws a GpuScene: light from its vertices, then each lamp with its shadow map, into a picture of
+/// wide range; then exposure, tone curve and encoding as in picture.h.
+class SceneRenderer {
+ public:
+  /// `scene` must outlive the renderer.
+  SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh);
+
+  /// What moves through the scene in the next frames: `spheres`, which cast shadows, unless
+  /// `keeps_places` as where they were; and lamps.
+  void set_bodies(BodyMesh spheres, bool keeps_places, std::span<const Light> lamps);
+
+  /// Brings the shadow maps up to date: one for each light.
+  void update_shadows(std::span<const Light> lights);
+
+  const SceneBounds& bounds() const { return bounds_; }
+
+  /// Draws into `framebuffer` (0: the window). update_shadows must have seen the same lights.
+  void draw(const FrameSettings& frame, GLuint framebuffer);
+
+ private:
+  void resize(int width, int height);
+  void draw_sky(const FrameSettings& frame) const;
+  void draw_light(const FrameSettings& frame, const glm::mat4& view);
+  void draw_lamp_surfaces() const;
+  void draw_lamp(const Light& light, const ShadowMap& shadow);
+  void set_lamp_surface(const PreparedLight& lamp) const;
+  void draw_patches(const FrameSettings& frame, const glm::mat4& view);
+  int split_column(const FrameSettings& frame) const;
+  void draw_divider(int column) const;
+  template <typename Draw>
+  void for_each_side(const FrameSettings& frame, const Draw& draw) const;
+
+  const GpuScene& scene_;
+  SceneBounds bounds_;
+  GpuBodies spheres_, lamp_surfaces_;
+  int spheres_version_ = 0;
+  GlProgram ambient_, lamp_, patch_, shadow_, screen_, sky_;
+  GlVertexArray empty_;
+  std::vector<std::unique_ptr<ShadowMap>> shadow_maps_;
+  int width_ = 0, height_ = 0;
+  GlFramebuffer multisampled_, resolved_;
+  GlRenderbuffer multisampled_color_, multisampled_depth_;
+  GlTexture resolved_color_;
+};
+
+/// A picture that is drawn without a window.
+class OffscreenTarget {
+ public:
+  OffscreenTarget(int width, int height);
+  GLuint framebuffer() const { return framebuffer_.name(); }
+  ScreenImage read() const;
+
+ private:
+  int width_, height_;
+  GlFramebuffer framebuffer_;
+  GlRenderbuffer color_;
+};
+
+}  // namespace rebounce

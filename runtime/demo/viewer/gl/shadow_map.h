@@ -1,0 +1,67 @@
+#pragma once
+
+#include <glm/glm.hpp>
+
+#include "runtime/demo/viewer/gl/gl_objects.h"
+#include "runtime/demo/viewer/gl/gl_program.h"
+#include "runtime/demo/viewer/gl/gpu_bodies.h"
+#include "runtime/demo/viewer/gl/gpu_scene.h"
+#include "transfer/data/scene_description.h"
+
+namespace rebounce {
+
+/// A box around the scene.
+struct SceneBounds {
+  glm::vec3 low, high;
+  float diagonal() const { return glm::length(high - low); }
+};
+
+/// What casts shadows: the scene, and what moves through it.
+struct ShadowCasters {
+  const GpuScene& scene;
+  const GpuBodies& bodies;
+  SceneBounds bounds;
+  int version = 0;  ///< another one for other bodies, or where they have moved
+
+  void draw(const GlProgram& program) const {
+    scene.draw_surface(program);
+    bodies.draw_surface(program);
+  }
+};
+
+/// What one lamp sees: a cube of depths around a point or spot light, one plane for a directional
+/// one, cubes around all of its places for one with a surface. Drawn anew only when
+/// the lamp or a caster has moved.
+class ShadowMap {
+ public:
+  /// Makes the map fit `light`; `program` draws depths.
+  void update(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+
+  /// Binds the map to texture units 2 (cube), 3 (plane), 4 and 5 (places) and sets the
+  /// uniforms of shaders::lamp_fragment() that say how to look it up.
+  void bind(const GlProgram& program) const;
+
+  ShadowMap();
+
+ private:
+  void draw_places(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+  /// Draws what is seen from `eye`; attach(face) makes a face the target.
+  template <typename Attach>
+  void draw_faces(const glm::vec3& eye, int side, const ShadowCasters& casters,
+                  const GlProgram& program, const Attach& attach);
+  void set_reach(const glm::vec3& eye, const SceneBounds& bounds);
+  void draw_cube(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+  void draw_plane(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+
+  GlTexture cube_, plane_, places_;
+  GlSampler depth_sampler_;
+  GlFramebuffer framebuffer_;
+  bool drawn_ = false;
+  Light drawn_for_;
+  int drawn_version_ = 0;  // of the casters
+  glm::mat4 plane_from_world_{1};
+  glm::vec2 near_far_{0.01F, 1};
+  float texel_ = 0, smallest_offset_ = 0;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include "runtime/demo/viewer/gl/gl_objects.h"
+
+namespace rebounce {
+
+/// What shaders::kSceneVertex takes of a vertex, by location.
+enum Attribute : GLuint {
+  kPosition,
+  kNormal,
+  kColor,
+  kBaseColorTexcoord,
+  kEmissiveTexcoord,
+  kFirstFlight,
+  kBounced,
+};
+
+/// Replaces what `buffer` holds.
+template <typename T>
+void fill(GLenum target, const GlBuffer& buffer, std::span<const T> values, GLenum usage) {
+  glBindBuffer(target, buffer.name());
+  glBufferData(target, static_cast<GLsizeiptr>(values.size_bytes()), values.data(), usage);
+}
+
+/// Lets `attribute` of the bound vertex array be `components` floats of the bound buffer, every
+/// `stride` bytes from `offset` on.
+inline void point_to(Attribute attribute, int components, std::size_t stride, std::size_t offset) {
+  glEnableVertexAttribArray(attribute);
+  glVertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, static_cast<GLsizei>(stride),
+                        reinterpret_cast<const void*>(offset));  // NOLINT: OpenGL's interface
+}
+
+}  // namespace rebounce

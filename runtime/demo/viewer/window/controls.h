@@ -1,0 +1,47 @@
+#pragma once
+
+#include <glm/glm.hpp>
+#include <optional>
+
+#include "runtime/demo/viewer/gl/scene_renderer.h"
+#include "runtime/demo/viewer/window/lit_scene.h"
+#include "runtime/demo/viewer/window/viewer_state.h"
+
+namespace rebounce {
+
+/// Mouse and keys, apart from the panels: steers the camera and drags spheres and lamps, whose
+/// handles it draws
+/// over the picture. Works on ImGui's input of the current frame.
+class Controls {
+ public:
+  Controls(const LitScene& scene, const SceneBounds& bounds) : scene_(scene), bounds_(bounds) {}
+
+  void update(ViewerState& state);
+
+  /// Draws a disc in its colour for each lamp that has a place; hollow if it is off.
+  void draw_handles(const ViewerState& state) const;
+
+ private:
+  void steer(ViewerState& state);
+  void fly(ViewerState& state) const;
+  void press_keys(ViewerState& state) const;
+  void drag_lamp(ViewerState& state) const;
+  void drag_sphere(ViewerState& state) const;
+  void take_hold(ViewerState& state);
+  std::optional<std::size_t> lamp_under_mouse(const ViewerState& state) const;
+  std::optional<std::size_t> sphere_under_mouse(const ViewerState& state) const;
+  float distance_along(const glm::vec3& origin, const glm::vec3& direction) const;
+
+  const LitScene& scene_;
+  const SceneBounds& bounds_;
+  bool dragging_lamp_ = false, dragging_sphere_ = false, turning_ = false, orbiting_ = false;
+  glm::vec3 orbit_target_{0};
+};
+
+/// Moves a lamp and the way it moves on by `shift` metres.
+void shift_lamp(ViewerLight& lamp, const glm::vec3& shift);
+
+/// The same with a sphere.
+void shift_sphere(ViewerSphere& sphere, const glm::vec3& shift);
+
+}  // namespace rebounce

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "runtime/demo/viewer/gl/gpu_scene.h"
+#include "runtime/demo/viewer/gl/scene_renderer.h"
+#include "runtime/demo/viewer/window/lit_scene.h"
+#include "runtime/demo/viewer/window/viewer_state.h"
+
+namespace rebounce {
+
+/// One frame from light to picture. Needs a current OpenGL context.
+class FrameDrawer {
+ public:
+  FrameDrawer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup);
+
+  /// Relights and draws `state` into `framebuffer`.
+  void draw(ViewerState& state, int width, int height, GLuint framebuffer);
+
+  const StageTimes& times() const { return times_; }
+  const LitScene& scene() const { return lit_; }
+  const SceneBounds& bounds() const { return renderer_.bounds(); }
+
+  /// The largest error of a patch that is shown (LitScene::patch_errors); 0 without any.
+  float error_top() const { return error_top_; }
+
+ private:
+  void upload(const ViewerState& state);
+  void compare(const ViewerState& state);
+  BodyMesh make_spheres(std::span<const ViewerSphere> spheres, const ViewerState& state);
+  void upload_errors();
+
+  LitScene lit_;
+  GpuScene gpu_;
+  SceneRenderer renderer_;
+  StageTimes times_;
+  std::vector<ViewerSphere> spheres_;                       // of the last frame
+  std::array<std::vector<float>, kSideCount> patch_error_;  // empty: not shown
+  float error_top_ = 0;                                     // at the top of the colour map
+};
+
+}  // namespace rebounce

@@ -1,0 +1,113 @@
+#include "runtime/demo/viewer/window/lit_scene.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "runtime/demo/shading/display_surface.h"
+#include "runtime/demo/shading/patch_errors.h"
+#include "runtime/demo/shading/vertex_light.h"
+#include "runtime/lights/sky_light.h"
+#include "runtime/outputs/probe_irradiance.h"
+#include "runtime/outputs/probe_light.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/area_norm.h"
+
+namespace rebounce {
+
+LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference,
+                   MakeProbes make_probes)
+    : data_(std::move(data)),
+      engine_(data_),
+      emitted_(irradiance_from_emitters(*data_)),
+      solver_{IndirectSolver(*data_), IndirectSolver(*data_)},
+      pictures_(*data_, engine_.tracer()),
+      reference_(std::move(reference)),
+      make_probes_(std::move(make_probes)) {
+  for (auto& values : indirect_) values.resize(data_->patches.size());
+  for (auto& values : reflected_) values.resize(data_->patches.size());
+}
+
+void LitScene::relight(std::span<const Light> lights, const Sky& sky,
+                       std::span<const IndirectMethod, kSideCount> methods, bool both,
+                       StageTimes& times) {
+  const auto begin = std::chrono::steady_clock::now();
+  engine_.compute_direct(lights, sky);
+  engine_.compute_initial_exitance();
+  const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
+  times.direct = time.count();
+  for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {
+    IndirectSolver& solver = solver_[side];
+    if (solver.method() != methods[side]) solver.choose(methods[side]);
+    std::ranges::copy(solver.solve(engine_.initial_exitance()), indirect_[side].begin());
+    times.solve[side] = solver.microseconds();
+    for (std::size_t i = 0; i < indirect_[side].size(); ++i) {
+      const glm::vec3 irradiance =
+          to_glm(engine_.direct_irradiance()[i]) + to_glm(indirect_[side][i]);
+      reflected_[side][i] = to_float3(to_glm(data_->patches.reflectance[i]) * irradiance);
+    }
+  }
+}
+
+const LightProbes& LitScene::probes() {
+  if (data_->probes.size() > 0 || !make_probes_) return data_->probes;
+  if (!own_probes_) own_probes_ = make_probes_();
+  return *own_probes_;
+}
+
+LightInAir LitScene::light_in_air(const Float3& position, std::span<const Float3> normals,
+                                  const Sky& sky, bool both) {
+  LightInAir light;
+  light.first_flight.resize(normals.size());
+  for (auto& irradiance : light.bounced) irradiance.resize(normals.size());
+  const LightProbes& around = probes();
+  if (around.size() == 0) return light;
+  // Lamps and openings are small and bright; what has bounced is smooth enough for harmonics.
+  irradiance_in_air(around, data_->patches.emitted_exitance, sky, position, normals,
+                    light.first_flight);
+  for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {
+    const ProbeLight bounced = gather_probe_light(around, reflected_[side], {}, position);
+    for (std::size_t k = 0; k < normals.size(); ++k) {
+      light.bounced[side][k] = probe_irradiance(bounced, normals[k]);
+    }
+  }
+  return light;
+}
+
+std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const {
+  std::vector<glm::vec3> value(emitted_.size());
+  for (std::size_t i = 0; i < value.size(); ++i) {
+    value[i] = to_glm(sky_irradiance(*data_, sky, i)) + to_glm(emitted_[i]);
+  }
+  return reconstruct_at_vertices(data_->mesh, value);
+}
+
+std::vector<glm::vec3> LitScene::bounced_at_vertices(Side side) const {
+  const PictureLight light{.indirect_irradiance = indirect(side), .emitted_irradiance = emitted_};
+  return light_at_vertices(*data_, light).bounced;
+}
+
+std::vector<float> LitScene::patch_errors(Side side) {
+  if (!reference_) return {};
+  const auto exitance = engine_.initial_exitance();
+  if (!std::ranges::equal(exitance, reference_exitance_)) {
+    reference_indirect_ = reference_(exitance);
+    reference_exitance_.assign(exitance.begin(), exitance.end());
+  }
+  const PatchTable& patches = data_->patches;
+  error_[index(side)] = relative_difference(indirect(side), reference_indirect_, patches.area);
+  return rebounce::patch_errors(indirect(side), reference_indirect_, patches.area);
+}
+
+float LitScene::find_exposure(std::span<const Light> lights, const Sky& sky,
+                              const Camera& camera) const {
+  return exposure_for(pictures_,
+                      {.lights = lights,
+                       .sky = sky,
+                       .indirect_irradiance = indirect(Side::kFirst),
+                       .emitted_irradiance = emitted_},
+                      camera);
+}
+
+}  // namespace rebounce

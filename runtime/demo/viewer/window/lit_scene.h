@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <glm/glm.hpp>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "runtime/demo/motion/indirect_solver.h"
+#include "runtime/demo/viewer/gl/gpu_scene.h"
+#include "runtime/demo/viewer/window/viewer.h"
+#include "runtime/frame/engine.h"
+
+namespace rebounce {
+
+/// Irradiance in lx at a point in the air, on surfaces of given normals.
+struct LightInAir {
+  std::vector<Float3> first_flight;  ///< from sky and emitters
+  std::array<std::vector<Float3>, kSideCount> bounced;
+};
+
+/// The light of a frame on the patches, by two methods.
+class LitScene {
+ public:
+  using Reference = decltype(ViewerSetup::reference);
+
+  using MakeProbes = decltype(ViewerSetup::make_probes);
+
+  /// `data` must have an operator. `reference` and `make_probes` may be empty.
+  LitScene(std::shared_ptr<const TransferData> data, Reference reference, MakeProbes make_probes);
+
+  /// Finds direct light, and indirect light by `methods`; the second only if `both`. Sets
+  /// `times.direct` and `times.solve`.
+  void relight(std::span<const Light> lights, const Sky& sky,
+               std::span<const IndirectMethod, kSideCount> methods, bool both, StageTimes& times);
+
+  /// H [n] in lx of the last frame.
+  std::span<const Float3> indirect(Side side) const { return indirect_[index(side)]; }
+
+  /// Values at the vertices [v] in lx: sky and emitters; what has bounced.
+  std::vector<glm::vec3> first_flight_at_vertices(const Sky& sky) const;
+  std::vector<glm::vec3> bounced_at_vertices(Side side) const;
+
+  /// What arrives at `position` on surfaces of these unit normals, as the probes around it see the
+  /// last frame but for lamps; the second side's is zero unless `both`. Finds probes first where
+  /// the file has none.
+  LightInAir light_in_air(const Float3& position, std::span<const Float3> normals, const Sky& sky,
+                          bool both);
+
+  /// Compares a side with the reference solution for the same direct light, which is found anew
+  /// where that has changed. Returns |H - reference| of each patch as a part of the reference's
+  /// root mean square [n]; nothing without a reference.
+  std::vector<float> patch_errors(Side side);
+
+  /// |H - reference| / |reference| of the last patch_errors of that side, area-weighted L2.
+  double error(Side side) const { return error_[index(side)]; }
+  bool has_reference() const { return static_cast<bool>(reference_); }
+
+  /// Stops that a small picture of the scene from `camera` would take.
+  float find_exposure(std::span<const Light> lights, const Sky& sky, const Camera& camera) const;
+
+  const Engine& engine() const { return engine_; }
+  const TransferData& data() const { return *data_; }
+
+ private:
+  static std::size_t index(Side side) { return static_cast<std::size_t>(side); }
+  const LightProbes& probes();
+
+  std::shared_ptr<const TransferData> data_;
+  Engine engine_;
+  std::vector<Float3> emitted_;  // F M_e, lx
+  std::array<IndirectSolver, kSideCount> solver_;
+  std::array<std::vector<Float3>, kSideCount> indirect_;
+  std::array<std::vector<Float3>, kSideCount> reflected_;  // B - M_e, lx
+  std::array<double, kSideCount> error_ = {};
+  PictureRenderer pictures_;
+  Reference reference_;
+  MakeProbes make_probes_;
+  std::optional<LightProbes> own_probes_;                        // of a file without
+  std::vector<Float3> reference_exitance_, reference_indirect_;  // what it was last found for
+};
+
+}  // namespace rebounce

@@ -1,0 +1,372 @@
+#include "runtime/demo/viewer/window/panels.h"
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cfloat>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "runtime/demo/viewer/window/controls.h"
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
+
+namespace rebounce {
+namespace {
+
+constexpr float kDegree = std::numbers::pi_v<float> / 180;
+constexpr float kStepPart = 0.005F;  // of the scene's size, that a pixel of dragging moves
+constexpr const char* kTransferName = "transfer (one product)";
+constexpr const char* kHierarchicalName = "hierarchical (links)";
+
+struct NamedShow {
+  const char* name;
+  Show show;
+};
+constexpr std::array<NamedShow, 5> kShows = {{{"all light", Show::kRadiosity},
+                                              {"direct", Show::kDirect},
+                                              {"indirect", Show::kIndirect},
+                                              {"patches", Show::kPatches},
+                                              {"error", Show::kError}}};
+
+std::string name_of(const IndirectMethod& method) {
+  if (method.on_links) return kHierarchicalName;
+  if (!method.iteration) return kTransferName;
+  const auto* named =
+      std::ranges::find(kSolveMethods, *method.iteration, &NamedSolveMethod::method);
+  return std::string(named->name);
+}
+
+/// Offers what can be done with `data`.
+void choose_method(const char* label, const TransferData& data, IndirectMethod& method) {
+  const auto choice = [&](const std::string& name, std::optional<SolveMethod> iteration,
+                          bool on_links) {
+    const bool is_chosen = method.iteration == iteration && method.on_links == on_links;
+    if (!ImGui::Selectable(name.c_str(), is_chosen)) return;
+    method.iteration = iteration;
+    method.on_links = on_links;
+  };
+  ImGui::PushID(label);
+  ImGui::SetNextItemWidth(-70);
+  if (ImGui::BeginCombo(label, name_of(method).c_str())) {
+    choice(kTransferName, std::nullopt, false);
+    const bool serves_all = data.transfer->roles().all_are_both();
+    for (const NamedSolveMethod& named : kSolveMethods) {
+      if (needs_operator(named.method) && !serves_all) continue;
+      choice(std::string(named.name), named.method, false);
+    }
+    if (!data.links.empty()) choice(kHierarchicalName, std::nullopt, true);
+    ImGui::EndCombo();
+  }
+  if (method.iterates()) {
+    ImGui::SetNextItemWidth(110);
+    ImGui::SliderInt("sweeps", &method.sweeps, 1, 30, "%d", ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SameLine();
+    ImGui::Checkbox("warm", &method.warm);
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("Begin with the solution of the frame before");
+  }
+  ImGui::PopID();
+}
+
+void time_row(const char* stage, double microseconds) {
+  ImGui::TableNextRow();
+  ImGui::TableNextColumn();
+  ImGui::TextUnformatted(stage);
+  ImGui::TableNextColumn();
+  ImGui::Text("%8.2f ms", microseconds / 1000);
+}
+
+// Candela of a lamp of intensity 1, straight ahead.
+float candela_of_unit(const Light& light) {
+  const LampSurface* const surface = lamp_kind(light.type).surface;
+  return surface != nullptr ? surface->candela(PreparedLight(light)) : 1;
+}
+
+// Gives lengths of the kind that have none a value that suits a scene of `size` metres.
+void complete_lengths(Light& light, float size) {
+  for (const LampField* field : lamp_kind(light.type).fields) {
+    if (field->rule != FieldRule::kLength) continue;
+    const std::span<float> values = field->values(light);
+    float length = (values.size() == 1 ? 0.02F : 0.06F) * size;
+    for (float& value : values) {
+      if (value <= 0) value = length;
+      length *= 2.0F / 3;
+    }
+  }
+}
+
+// `size` is that of the scene, metres.
+void edit_type(Light& light, float size) {
+  LightType type = light.type;
+  if (!ImGui::BeginCombo("type", std::string(lamp_kind(type).name).c_str())) return;
+  for (const LampKind* kind : lamp_kinds()) {
+    if (ImGui::Selectable(std::string(kind->name).c_str(), kind->type == type)) type = kind->type;
+  }
+  ImGui::EndCombo();
+  if (type == light.type) return;
+  const bool was_far = !lamp_kind(light.type).has_place();
+  const float candela = light.intensity * candela_of_unit(light);
+  light.type = type;
+  complete_lengths(light, size);
+  light.intensity = candela / candela_of_unit(light);
+  const bool is_far = !lamp_kind(light.type).has_place();
+  // Candela are not lux: begin with what is bright indoors.
+  if (was_far != is_far) light.intensity = is_far ? 1000 : 100 / candela_of_unit(light);
+}
+
+void edit_unit_vector(const LampField& field, Light& light) {
+  const std::span<float> v = field.values(light);
+  if (!ImGui::DragFloat3(field.label, v.data(), 0.01F, -1, 1, "%.2f")) return;
+  const glm::vec3 given(v[0], v[1], v[2]);
+  const float length = glm::length(given);
+  std::ranges::copy(length > 1e-3F ? to_float3(given / length) : Float3{0, -1, 0}, v.begin());
+}
+
+void edit_shape(Light& light, float step) {
+  constexpr float kSmallest = 1e-3F, kLargest = 1e4F;
+  for (const LampField* field : lamp_kind(light.type).fields) {
+    const std::span<float> values = field->values(light);
+    if (field->rule == FieldRule::kLength) {
+      ImGui::DragScalarN(field->label, ImGuiDataType_Float, values.data(),
+                         static_cast<int>(values.size()), step, &kSmallest, &kLargest, "%.2f m",
+                         ImGuiSliderFlags_AlwaysClamp);
+    } else if (field->rule == FieldRule::kAcross) {
+      ImGui::DragFloat3(field->label, values.data(), 0.01F, -1, 1, "%.2f");
+    } else if (field->rule == FieldRule::kUnitVector && field != &kDirection) {
+      edit_unit_vector(*field, light);
+    }
+  }
+}
+
+// A rectangle's first side is not to lie along its direction.
+void keep_first_side_across(Light& light) {
+  const glm::vec3 direction = to_glm(light.direction), tangent = to_glm(light.tangent);
+  if (glm::length(glm::cross(direction, tangent)) > 1e-2F * glm::length(tangent)) return;
+  light.tangent = std::abs(direction.x) < 0.9F ? Float3{1, 0, 0} : Float3{0, 0, 1};
+}
+
+void edit_cone(Light& light) {
+  float inner = light.inner_cone_angle / kDegree, outer = light.outer_cone_angle / kDegree;
+  ImGui::SliderFloat("outer cone", &outer, 1, 90, "%.0f deg", ImGuiSliderFlags_AlwaysClamp);
+  ImGui::SliderFloat("inner cone", &inner, 0, outer - 0.5F, "%.0f deg",
+                     ImGuiSliderFlags_AlwaysClamp);
+  light.outer_cone_angle = outer * kDegree;
+  light.inner_cone_angle = std::min(inner, outer - 0.5F) * kDegree;
+}
+
+// A motion around where something is.
+void begin_motion(const Float3& position, LightMotion::Kind kind, float size, LightMotion& motion) {
+  motion.kind = kind;
+  motion.center = motion.from = motion.to = position;
+  motion.radius = size;
+  motion.from[0] -= size;
+  motion.to[0] += size;
+}
+
+void edit_motion(const Float3& position, LightMotion& motion, float step) {
+  if (motion.kind == LightMotion::Kind::kKeys) {
+    ImGui::TextUnformatted("moves by its light path");
+    return;
+  }
+  int kind = static_cast<int>(motion.kind);
+  if (ImGui::Combo("motion", &kind, "still\0circle\0swing\0")) {
+    begin_motion(position, static_cast<LightMotion::Kind>(kind), 20 * step, motion);
+  }
+  if (motion.kind == LightMotion::Kind::kStill) return;
+  ImGui::DragFloat("period", &motion.period, 0.05F, 0.1F, 600, "%.1f s",
+                   ImGuiSliderFlags_AlwaysClamp);
+  if (motion.kind == LightMotion::Kind::kCircle) {
+    ImGui::DragFloat3("centre", motion.center.data(), step, 0, 0, "%.2f");
+    ImGui::DragFloat("circle", &motion.radius, step, 0, 1e6F, "%.2f m",
+                     ImGuiSliderFlags_AlwaysClamp);
+  } else {
+    ImGui::DragFloat3("from", motion.from.data(), step, 0, 0, "%.2f");
+    ImGui::DragFloat3("to", motion.to.data(), step, 0, 0, "%.2f");
+  }
+}
+
+// `size` is that of the scene, metres.
+void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size) {
+  Light& light = lamp.light;
+  const float step = kStepPart * size;
+  ImGui::Checkbox("on", &lamp.on);
+  edit_type(light, size);
+  const LampKind& kind = lamp_kind(light.type);
+  ImGui::ColorEdit3("colour", light.color.data(), ImGuiColorEditFlags_Float);
+  ImGui::DragFloat("intensity", &light.intensity, 0.01F * std::max(light.intensity, 0.1F), 0, 1e9F,
+                   ("%.1f " + std::string(kind.unit)).c_str(),
+                   ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoRoundToFormat);
+  edit_shape(light, 0.2F * step);
+  if (kind.has_place() && lamp.motion.kind == LightMotion::Kind::kStill) {
+    ImGui::DragFloat3("position", light.position.data(), step, 0, 0, "%.2f");
+  }
+  if (kind.uses(kDirection)) {
+    edit_unit_vector(kDirection, light);
+    if (ImGui::Button("Shine where I look")) light.direction = to_float3(camera.forward());
+  }
+  if (kind.uses(kTangent) || light.profile) keep_first_side_across(light);
+  if (kind.uses(kCone)) edit_cone(light);
+  if (kind.has_place()) edit_motion(light.position, lamp.motion, step);
+}
+
+void edit_sphere(ViewerSphere& sphere, float size) {
+  const float step = kStepPart * size;
+  ImGui::Checkbox("there", &sphere.on);
+  ImGui::ColorEdit3("reflects", sphere.reflectance.data(), ImGuiColorEditFlags_Float);
+  ImGui::DragFloat("radius", &sphere.radius, 0.2F * step, 1e-3F, 1e4F, "%.2f m",
+                   ImGuiSliderFlags_AlwaysClamp);
+  if (sphere.motion.kind == LightMotion::Kind::kStill) {
+    ImGui::DragFloat3("position", sphere.position.data(), step, 0, 0, "%.2f");
+  }
+  edit_motion(sphere.position, sphere.motion, step);
+}
+
+// Lines of a list to choose from.
+void list_line(std::size_t k, const std::string& name, std::size_t& selected) {
+  ImGui::PushID(static_cast<int>(k));
+  const std::string label = std::to_string(k) + (name.empty() ? "" : ": " + name);
+  if (ImGui::Selectable(label.c_str(), k == selected)) selected = k;
+  ImGui::PopID();
+}
+
+ViewerLight lamp_ahead(const FlyCamera& camera, float size) {
+  ViewerLight lamp;
+  lamp.light.position = to_float3(camera.position() + 0.3F * size * camera.forward());
+  lamp.light.intensity = 4 * size * size;  // some lux at the other end of the scene
+  lamp.light.direction = to_float3(camera.forward());
+  return lamp;
+}
+
+}  // namespace
+
+void Panels::smooth(const StageTimes& times) {
+  // The first frames fill caches and make solvers: they do not count.
+  constexpr int kWarmUp = 3;
+  const float part = frame_ < kWarmUp ? 1 : 0.1F;
+  frame_ = std::min(frame_ + 1, kWarmUp);
+  const auto blend = [part](double& old, double value) { old += part * (value - old); };
+  blend(smoothed_.direct, times.direct);
+  for (std::size_t k = 0; k < kSideCount; ++k) blend(smoothed_.solve[k], times.solve[k]);
+  blend(smoothed_.upload, times.upload);
+  blend(smoothed_.shadows, times.shadows);
+  blend(smoothed_.draw, times.draw);
+}
+
+void Panels::draw(ViewerState& state, const FrameDrawer& frame) {
+  smooth(frame.times());
+  ImGui::SetNextWindowPos({10, 10}, ImGuiCond_FirstUseEver);
+  ImGui::SetNextWindowSize({330, std::min(760.0F, ImGui::GetIO().DisplaySize.y - 20)},
+                           ImGuiCond_FirstUseEver);
+  if (ImGui::Begin("Rebounce")) {
+    ImGui::PushItemWidth(-80);
+    draw_view(state, frame);
+    draw_methods(state, frame);
+    draw_times(state);
+    draw_lights(state, frame);
+    draw_spheres(state, frame);
+    ImGui::PopItemWidth();
+  }
+  ImGui::End();
+}
+
+void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
+  ImGui::Text("%zu patches, %s operator", frame.scene().data().patches.size(),
+              std::string(frame.scene().data().transfer->kind()).c_str());
+  if (!ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) return;
+  for (std::size_t k = 0; k < kShows.size(); ++k) {
+    if (k % 3 != 0) ImGui::SameLine(100 * static_cast<float>(k % 3));
+    if (ImGui::RadioButton(kShows[k].name, state.show == kShows[k].show)) {
+      state.show = kShows[k].show;
+    }
+  }
+  ImGui::SliderFloat("exposure", &state.exposure, -16, 16, "%+.1f EV");
+  if (ImGui::Button("Find exposure")) state.wants_exposure = true;
+  if (state.show != Show::kError) return;
+  if (!frame.scene().has_reference()) {
+    ImGui::TextWrapped("There is no reference solution to compare with.");
+    return;
+  }
+  ImGui::Text("error, area-weighted  %.2e", frame.scene().error(Side::kFirst));
+  if (state.is_split) ImGui::Text("right                 %.2e", frame.scene().error(Side::kSecond));
+  ImGui::Text("yellow is             %.2e", static_cast<double>(frame.error_top()));
+}
+
+void Panels::draw_methods(ViewerState& state, const FrameDrawer& frame) const {
+  if (!ImGui::CollapsingHeader("Indirect light", ImGuiTreeNodeFlags_DefaultOpen)) return;
+  const TransferData& data = frame.scene().data();
+  choose_method(state.is_split ? "left" : "method", data, state.methods[0]);
+  ImGui::Checkbox("split the screen", &state.is_split);
+  if (!state.is_split) return;
+  ImGui::SliderFloat("at", &state.split, 0, 1, "%.2f");
+  choose_method("right", data, state.methods[1]);
+}
+
+void Panels::draw_times(const ViewerState& state) const {
+  if (!ImGui::CollapsingHeader("Time of a frame", ImGuiTreeNodeFlags_DefaultOpen)) return;
+  if (!ImGui::BeginTable("times", 2)) return;
+  const StageTimes& t = smoothed_;
+  time_row("direct light, patches", t.direct);
+  time_row(state.is_split ? "indirect light, left" : "indirect light", t.solve[0]);
+  if (state.is_split) time_row("indirect light, right", t.solve[1]);
+  time_row("vertices and upload", t.upload);
+  time_row("shadow maps", t.shadows);
+  time_row("drawing", t.draw);
+  const double solve = t.solve[0] + (state.is_split ? t.solve[1] : 0);
+  time_row("all", t.direct + solve + t.upload + t.shadows + t.draw);
+  ImGui::EndTable();
+}
+
+void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
+  if (!ImGui::CollapsingHeader("Lights", ImGuiTreeNodeFlags_DefaultOpen)) return;
+  const float size = frame.bounds().diagonal();
+  ImGui::Checkbox("play motions", &state.playing);
+  for (std::size_t k = 0; k < state.lights.size(); ++k) {
+    list_line(k, state.lights[k].light.name, state.selected);
+  }
+  if (ImGui::Button("Add")) {
+    state.lights.push_back(lamp_ahead(state.camera, size));
+    state.selected = state.lights.size() - 1;
+  }
+  if (state.selected < state.lights.size()) {
+    ImGui::SameLine();
+    const bool remove = ImGui::Button("Remove");
+    ImGui::Separator();
+    edit_lamp(state.lights[state.selected], state.camera, size);
+    if (remove) {
+      state.lights.erase(state.lights.begin() + static_cast<std::ptrdiff_t>(state.selected));
+    }
+  }
+  ImGui::Separator();
+  ImGui::ColorEdit3("sky", state.sky.color.data(), ImGuiColorEditFlags_Float);
+  ImGui::DragFloat("luminance", &state.sky.luminance, 0.01F * std::max(state.sky.luminance, 1.0F),
+                   0, 1e6F, "%.1f cd/m2", ImGuiSliderFlags_AlwaysClamp);
+}
+
+void Panels::draw_spheres(ViewerState& state, const FrameDrawer& frame) const {
+  if (!ImGui::CollapsingHeader("Moving spheres")) return;
+  const float size = frame.bounds().diagonal();
+  ImGui::PushID("spheres");
+  ImGui::Checkbox("show spheres", &state.shows_spheres);
+  for (std::size_t k = 0; k < state.spheres.size(); ++k) list_line(k, "", state.selected_sphere);
+  if (ImGui::Button("Add")) {
+    ViewerSphere sphere{.radius = 0.03F * size};
+    sphere.position = to_float3(state.camera.position() + 0.25F * size * state.camera.forward());
+    state.spheres.push_back(sphere);
+    state.selected_sphere = state.spheres.size() - 1;
+  }
+  if (state.selected_sphere < state.spheres.size()) {
+    ImGui::SameLine();
+    const bool remove = ImGui::Button("Remove");
+    ImGui::Separator();
+    edit_sphere(state.spheres[state.selected_sphere], size);
+    if (remove) {
+      state.spheres.erase(state.spheres.begin() +
+                          static_cast<std::ptrdiff_t>(state.selected_sphere));
+    }
+  }
+  ImGui::PopID();
+}
+
+}  // namespace rebounce

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "runtime/demo/viewer/window/frame_drawer.h"
+#include "runtime/demo/viewer/window/viewer_state.h"
+
+namespace rebounce {
+
+/// Draws the viewer's panels with ImGui and takes over what the user changes in them.
+class Panels {
+ public:
+  void draw(ViewerState& state, const FrameDrawer& frame);
+
+ private:
+  void smooth(const StageTimes& times);
+  void draw_view(ViewerState& state, const FrameDrawer& frame) const;
+  void draw_methods(ViewerState& state, const FrameDrawer& frame) const;
+  void draw_times(const ViewerState& state) const;
+  void draw_lights(ViewerState& state, const FrameDrawer& frame) const;
+  void draw_spheres(ViewerState& state, const FrameDrawer& frame) const;
+
+  StageTimes smoothed_;
+  int frame_ = 0;
+};
+
+}  // namespace rebounce

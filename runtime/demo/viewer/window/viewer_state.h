@@ -1,0 +1,58 @@
+#pragma once
+
+#include "runtime/demo/motion/fly_camera.h"
+#include "runtime/demo/viewer/window/viewer.h"
+
+namespace rebounce {
+
+/// What the user steers.
+struct ViewerState {
+  explicit ViewerState(const ViewerSetup& setup)
+      : lights(setup.lights),
+        spheres(setup.spheres),
+        sky(setup.sky),
+        camera(setup.camera),
+        show(setup.show),
+        methods(setup.methods),
+        split(setup.split.value_or(0.5F)),
+        is_split(setup.split.has_value()) {}
+
+  /// The lamps that are on, where they are now.
+  std::vector<Light> lights_now() const {
+    std::vector<Light> now;
+    for (const ViewerLight& light : lights) {
+      if (light.on) now.push_back(moved(light.light, light.motion, time));
+    }
+    return now;
+  }
+
+  /// The spheres that are shown, where they are now.
+  std::vector<ViewerSphere> spheres_now() const {
+    std::vector<ViewerSphere> now;
+    for (const ViewerSphere& sphere : spheres) {
+      if (!sphere.on || !shows_spheres) continue;
+      now.push_back(sphere);
+      now.back().position = moved(sphere.position, sphere.motion, time);
+    }
+    return now;
+  }
+
+  std::vector<ViewerLight> lights;
+  std::vector<ViewerSphere> spheres;
+  Sky sky;
+  FlyCamera camera;
+  Show show;
+  float exposure = 0;
+  std::array<IndirectMethod, 2> methods;
+  float split;
+  bool is_split;
+  float time = 0;  ///< seconds
+  bool playing = true;
+  bool wants_exposure = false;  ///< find the exposure anew
+  bool shows_panels = true;
+  bool shows_spheres = true;
+  std::size_t selected = 0;  ///< lamp
+  std::size_t selected_sphere = 0;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,185 @@
+#include "runtime/frame/direct_lighting.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+
+#include "runtime/lights/lamp_shadows.h"
+#include "runtime/lights/sky_light.h"
+#include "runtime/rays/box.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/patch_points.h"
+#include "runtime/rays/sampling.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kBlock = 64;         // patches that are lit at a time
+constexpr std::size_t kAddedPerTask = 16;  // blocks, where no light is traced
+
+/// Moves `places` of the unit square by `shift`, around its edges.
+void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
+                  std::span<glm::vec2> shifted) {
+  const auto around = [](float x) { return x < 1 ? x : x - 1; };
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const glm::vec2 moved = places[k] + shift;
+    shifted[k] = {around(moved.x), around(moved.y)};
+  }
+}
+
+}  // namespace
+
+/// Where light is looked for: the same for every light and every frame.
+struct DirectLighting::Receivers {
+  std::size_t points_per_patch = 0;
+  std::size_t area_light_samples = 0;
+  std::vector<glm::vec2> places;  ///< [points_per_patch][area_light_samples] of every lamp
+  std::vector<LitPoint> points;   ///< [n][points_per_patch]
+  std::vector<Box> block_box;     ///< [blocks] around their points
+
+  std::span<const LitPoint> points_of(std::size_t patch) const {
+    return std::span(points).subspan(patch * points_per_patch, points_per_patch);
+  }
+};
+
+/// What one light does.
+struct DirectLighting::LightResponse {
+  PreparedLight light;
+  bool known = false;  ///< irradiance is that of `light`
+  bool stale = false;  ///< to be traced in this frame
+  glm::vec3 intensity{0};
+  std::vector<float> irradiance;  ///< [n] per unit of intensity
+  std::vector<std::uint8_t> lit;  ///< [blocks] 0: the irradiance of all its patches is 0
+};
+
+DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
+                               const DirectLightingSettings& settings)
+    : data_(data), tracer_(tracer), receivers_(spread_receivers(data, tracer, settings)) {
+  make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
+}
+
+std::shared_ptr<const DirectLighting::Receivers> DirectLighting::spread_receivers(
+    const TransferData& data, const RayTracer& tracer, const DirectLightingSettings& settings) {
+  if (settings.points_per_patch < 1) throw Error("direct light needs at least one point per patch");
+  if (settings.area_light_samples < 1 || settings.area_light_samples > kMaxAreaLightSamples) {
+    throw Error("direct light needs from 1 to " + std::to_string(kMaxAreaLightSamples) +
+                " samples of lamps with a surface");
+  }
+  const std::size_t n = data.patches.size();
+  auto receivers = std::make_shared<Receivers>();
+  const auto points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
+  receivers->points_per_patch = points_per_patch;
+  receivers->area_light_samples = static_cast<std::size_t>(settings.area_light_samples);
+  receivers->places.resize(points_per_patch * receivers->area_light_samples);
+  for (std::uint32_t k = 0; k < receivers->places.size(); ++k) {
+    receivers->places[k] = glm::vec2(r2_point(k, {0, 0}));
+  }
+  receivers->points.resize(n * points_per_patch);
+  receivers->block_box.resize((n + kBlock - 1) / kBlock);
+  const PatchTriangles triangles(data.mesh.triangle_patch, n);
+  std::vector<PatchPoint> spread(points_per_patch);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::ranges::fill(spread, PatchPoint{data.patches.centroid[i], data.patches.normal[i]});
+    if (!triangles[i].empty()) {
+      spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), spread);
+    }
+    for (std::size_t k = 0; k < points_per_patch; ++k) {
+      const Float3 lifted = tracer.offset_point(spread[k].position, spread[k].normal);
+      receivers->points[i * points_per_patch + k] = {to_glm(lifted), to_glm(spread[k].normal)};
+      receivers->block_box[i / kBlock].add(to_glm(lifted));
+    }
+  }
+  return receivers;
+}
+
+DirectLighting::~DirectLighting() = default;
+DirectLighting::DirectLighting(const DirectLighting&) = default;
+
+void DirectLighting::make_room(std::size_t light_count) {
+  while (responses_.size() < light_count) {
+    LightResponse& response = responses_.emplace_back();
+    response.irradiance.resize(data_.patches.size());
+    response.lit.resize(receivers_->block_box.size());
+  }
+}
+
+void DirectLighting::compute(std::span<const Light> lights, const Sky& sky,
+                             std::span<Float3> direct_irradiance, const Scheduler& scheduler) {
+  assert(direct_irradiance.size() == data_.patches.size());
+  check_sky(sky, data_);
+  prepare(lights);
+  const std::size_t blocks_per_task = traced_light_count_ > 0 ? 1 : kAddedPerTask;
+  const std::size_t block_count = receivers_->block_box.size();
+  parallel_for_pieces(scheduler, block_count, blocks_per_task, [&](std::size_t block) {
+    for (std::size_t k = 0; k < light_count_; ++k) {
+      if (responses_[k].stale) respond(responses_[k], block);
+    }
+    add_up(sky, block, direct_irradiance);
+  });
+}
+
+void DirectLighting::prepare(std::span<const Light> lights) {
+  make_room(lights.size());
+  light_count_ = lights.size();
+  traced_light_count_ = 0;
+  for (std::size_t k = 0; k < light_count_; ++k) {
+    LightResponse& response = responses_[k];
+    response.intensity = to_glm(lights[k].color) * lights[k].intensity;
+    response.stale = false;
+    if (response.intensity == glm::vec3(0)) continue;  // off: what is known of it stays
+    const PreparedLight light(lights[k]);
+    response.stale = !response.known || !(response.light == light);
+    if (!response.stale) continue;
+    response.light = light;
+    response.known = true;
+    ++traced_light_count_;
+  }
+}
+
+void DirectLighting::respond(LightResponse& response, std::size_t block) const {
+  const std::size_t begin = block * kBlock,
+                    end = std::min(begin + kBlock, response.irradiance.size());
+  const std::span<float> irradiance(response.irradiance);
+  std::ranges::fill(irradiance.subspan(begin, end - begin), 0.0F);
+  const PreparedLight& light = response.light;
+  const Box& box = receivers_->block_box[block];
+  response.lit[block] = 0;
+  if (box.distance_squared(light.position) >= light.reach_squared) return;
+
+  const float weight = 1 / static_cast<float>(receivers_->points_per_patch);
+  const std::size_t samples = receivers_->area_light_samples;
+  std::array<glm::vec2, kMaxAreaLightSamples> places;
+  LampShadows shadows(tracer_, irradiance);
+  for (std::size_t patch = begin; patch < end; ++patch) {
+    const std::span<const LitPoint> points = receivers_->points_of(patch);
+    const glm::vec2 shift(unit_square(mix_bits(~static_cast<std::uint64_t>(patch))));
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      const std::span<glm::vec2> here = std::span(places).first(light.has_area() ? samples : 0);
+      shift_places(std::span(receivers_->places).subspan(k * samples, here.size()), shift, here);
+      shadows.add(light, points[k], here, weight, patch);
+    }
+  }
+  shadows.flush();
+  const auto lit = [](float e) { return e > 0; };
+  response.lit[block] = std::ranges::any_of(irradiance.subspan(begin, end - begin), lit) ? 1 : 0;
+}
+
+void DirectLighting::add_up(const Sky& sky, std::size_t block,
+                            std::span<Float3> direct_irradiance) const {
+  const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, data_.patches.size());
+  for (std::size_t i = begin; i < end; ++i) direct_irradiance[i] = sky_irradiance(data_, sky, i);
+  for (std::size_t k = 0; k < light_count_; ++k) {
+    const LightResponse& response = responses_[k];
+    const glm::vec3 intensity = response.intensity;
+    if (intensity == glm::vec3(0) || response.lit[block] == 0) continue;
+    for (std::size_t i = begin; i < end; ++i) {
+      const float e = response.irradiance[i];
+      Float3& sum = direct_irradiance[i];
+      sum = {sum[0] + e * intensity.x, sum[1] + e * intensity.y, sum[2] + e * intensity.z};
+    }
+  }
+}
+
+}  // namespace rebounce

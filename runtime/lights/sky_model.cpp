@@ -1,0 +1,107 @@
+#include "runtime/lights/sky_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <numbers>
+#include <string>
+
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// Points along each side of a cell of which its mean is made.
+constexpr int kPointsAcross = 8;
+
+/// Gradation 1 + a exp(b / cos Z), indicatrix 1 + c (exp(d X) - exp(d pi / 2)) + e cos² X.
+struct SkyType {
+  double a, b, c, d, e;
+};
+
+// ISO 15469:2004, table 1.
+constexpr std::array<SkyType, kCieSkyCount> kTypes = {{{4, -0.70, 0, -1, 0},
+                                                       {4, -0.70, 2, -1.5, 0.15},
+                                                       {1.1, -0.8, 0, -1, 0},
+                                                       {1.1, -0.8, 2, -1.5, 0.15},
+                                                       {0, -1, 0, -1, 0},
+                                                       {0, -1, 2, -1.5, 0.15},
+                                                       {0, -1, 5, -2.5, 0.3},
+                                                       {0, -1, 10, -3, 0.45},
+                                                       {-1, -0.55, 2, -1.5, 0.15},
+                                                       {-1, -0.55, 5, -2.5, 0.3},
+                                                       {-1, -0.55, 10, -3, 0.45},
+                                                       {-1, -0.32, 10, -3, 0.45},
+                                                       {-1, -0.32, 16, -3, 0.3},
+                                                       {-1, -0.15, 16, -3, 0.3},
+                                                       {-1, -0.15, 24, -2.8, 0.15}}};
+
+class CieSky {
+ public:
+  CieSky(const SkyType& type, const glm::dvec3& to_sun)
+      : type_(type), to_sun_(to_sun), zenith_(indicatrix(to_sun.y) * gradation(1)) {}
+
+  /// In parts of that of the zenith.
+  double luminance(const glm::dvec3& direction) const {
+    return indicatrix(glm::dot(direction, to_sun_)) * gradation(direction.y) / zenith_;
+  }
+
+ private:
+  double gradation(double cosine) const {
+    return 1 + (cosine > 0 ? type_.a * std::exp(type_.b / cosine) : 0.0);
+  }
+
+  double indicatrix(double cosine) const {
+    const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
+    return 1 + type_.c * (std::exp(type_.d * angle) - std::exp(type_.d * kPi / 2)) +
+           type_.e * cosine * cosine;
+  }
+
+  SkyType type_;
+  glm::dvec3 to_sun_;
+  double zenith_;
+};
+
+void check(int type, const glm::dvec3& to_sun, float ground_reflectance) {
+  if (type < 1 || type > kCieSkyCount) {
+    throw Error("there is no CIE sky " + std::to_string(type) + "; ask for 1 to 15");
+  }
+  if (!(ground_reflectance >= 0 && ground_reflectance <= 1)) {
+    throw Error("the reflectance of the ground must be from 0 to 1");
+  }
+  const bool sees_sun = kTypes[static_cast<std::size_t>(type - 1)].c > 0;
+  if (!(glm::length(to_sun) > 0) || (sees_sun && !(to_sun.y >= 0))) {
+    throw Error("the sun of a CIE sky must stand above the horizon: its light travels downwards");
+  }
+}
+
+}  // namespace
+
+SkyDistribution cie_sky(int type, const Float3& sun_direction, float ground_reflectance) {
+  const glm::dvec3 to_sun = -to_dvec3(sun_direction);
+  check(type, to_sun, ground_reflectance);
+  const CieSky sky(kTypes[static_cast<std::size_t>(type - 1)], glm::normalize(to_sun));
+  SkyDistribution mean{};
+  double horizontal = 0;  // irradiance
+  for (std::uint32_t cell = 1; cell < kSkyCellCount; ++cell) {
+    double sum = 0, received = 0;
+    for (int k = 0; k < kPointsAcross * kPointsAcross; ++k) {
+      const Float2 place = {static_cast<float>((k / kPointsAcross + 0.5) / kPointsAcross),
+                            static_cast<float>((k % kPointsAcross + 0.5) / kPointsAcross)};
+      const glm::dvec3 direction = to_dvec3(point_of_sky_cell(cell, place));
+      const double luminance = sky.luminance(direction);
+      sum += luminance;
+      received += luminance * direction.y;
+    }
+    mean[cell] = static_cast<float>(sum / (kPointsAcross * kPointsAcross));
+    horizontal += received / (kPointsAcross * kPointsAcross) * sky_cell_solid_angle(cell);
+  }
+  mean[0] = static_cast<float>(ground_reflectance * horizontal / kPi);
+  return mean;
+}
+
+}  // namespace rebounce

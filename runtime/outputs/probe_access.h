@@ -1,0 +1,64 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "transfer/base/error.h"
+#include "transfer/data/light_probes.h"
+
+namespace rebounce {
+
+/// Throws Error if an argument of who uses probes has the wrong size.
+inline void check_probe_size(std::size_t size, std::size_t wanted, const char* name) {
+  if (size == wanted) return;
+  throw Error(std::string("probes: ") + name + " has " + std::to_string(size) +
+              " entries; it must have " + std::to_string(wanted));
+}
+
+/// Where a coordinate lies in a row of evenly spaced probes.
+struct GridPlace {
+  std::uint32_t low = 0, high = 0;
+  float fraction = 0;
+};
+
+inline GridPlace place_in_row(float x, float first, float last, std::uint32_t count) {
+  if (count < 2 || !(last > first)) return {};
+  const auto end = static_cast<float>(count - 1);
+  const float at = std::clamp((x - first) / (last - first) * end, 0.0F, end);
+  const auto low = std::min(static_cast<std::uint32_t>(at), count - 2);
+  return {low, low + 1, at - static_cast<float>(low)};
+}
+
+/// Calls visit(probe, weight) for the valid ones of the eight probes around `position`, by
+/// trilinear weights; returns the sum of them, 0 if the probes are no grid.
+template <typename Visit>
+float for_each_probe_around(const LightProbes& probes, const Float3& position, const Visit& visit) {
+  const auto [nx, ny, nz] = probes.grid;
+  if (nx == 0) return 0;
+  const Float3& first = probes.position.front();
+  const Float3& last = probes.position.back();
+  std::array<GridPlace, 3> place;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    place[axis] = place_in_row(position[axis], first[axis], last[axis], probes.grid[axis]);
+  }
+  float total = 0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    float weight = 1;
+    std::array<std::uint32_t, 3> at{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const bool high = (corner >> axis & 1U) != 0;
+      weight *= high ? place[axis].fraction : 1 - place[axis].fraction;
+      at[axis] = high ? place[axis].high : place[axis].low;
+    }
+    const std::size_t probe = at[0] + std::size_t{nx} * (at[1] + std::size_t{ny} * at[2]);
+    if (weight <= 0 || probes.valid[probe] == 0) continue;
+    total += weight;
+    visit(probe, weight);
+  }
+  return total;
+}
+
+}  // namespace rebounce

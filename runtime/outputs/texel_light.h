@@ -1,0 +1,17 @@
+#pragma once
+
+#include <span>
+
+#include "transfer/base/parallel.h"
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// Writes at each texel [height][width] of `lightmap` the value at its place on `mesh`, from values
+/// at the vertices [v] (reconstruct_at_vertices); 0 where it has none, and never below 0. Neither
+/// allocates nor locks; the same bits for any `scheduler`. Throws Error if a size is wrong.
+void interpolate_at_texels(const Lightmap& lightmap, const DisplayMesh& mesh,
+                           std::span<const Float3> vertex_value, std::span<Float3> texel_value,
+                           const Scheduler& scheduler = {});
+
+}  // namespace rebounce

@@ -1,0 +1,35 @@
+#include "runtime/outputs/vertex_light.h"
+
+#include <algorithm>
+
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kVerticesPerTask = 1024;
+
+}  // namespace
+
+void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_value,
+                             std::span<Float3> vertex_value, const Scheduler& scheduler) {
+  const std::size_t vertex_count = mesh.position.size();
+  if (vertex_value.size() != vertex_count) {
+    throw Error("the values at vertices have " + std::to_string(vertex_value.size()) +
+                " entries; the mesh has " + std::to_string(vertex_count) + " vertices");
+  }
+  if (mesh.weight_begin.empty()) {
+    std::ranges::fill(vertex_value, Float3{0, 0, 0});
+    return;
+  }
+  parallel_for_pieces(scheduler, vertex_count, kVerticesPerTask, [&](std::size_t v) {
+    Float3 sum{0, 0, 0};
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      const Float3& value = patch_value[mesh.weight_patch[k]];
+      for (int c = 0; c < kChannelCount; ++c) sum[c] += mesh.weight[k] * value[c];
+    }
+    vertex_value[v] = sum;
+  });
+}
+
+}  // namespace rebounce

@@ -1,0 +1,100 @@
+#pragma once
+
+// Patches as sets of display triangles, and points spread over them.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "runtime/rays/cumulative_choice.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sampling.h"
+#include "transfer/base/grouped.h"
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// The display triangles of each patch, in ascending order.
+class PatchTriangles {
+ public:
+  /// `triangle_patch` [t] is the patch of each display triangle, or kNone; others are <
+  /// `patch_count`.
+  PatchTriangles(std::span<const std::uint32_t> triangle_patch, std::size_t patch_count);
+
+  std::size_t patch_count() const { return of_patch_.group_count(); }
+  std::span<const std::uint32_t> operator[](std::size_t patch) const { return of_patch_[patch]; }
+
+ private:
+  Grouped<std::uint32_t> of_patch_;
+};
+
+/// A point on a side of the surface.
+struct PatchPoint {
+  Float3 position{0, 0, 0};  ///< metres
+  Float3 normal{0, 0, 0};    ///< unit, of the flat triangle
+};
+
+/// Points with their normals, coordinate by coordinate, so that the compiler works on several at
+/// once.
+struct PatchPointBlock {
+  static constexpr std::size_t kSize = 64;
+  using Coordinates = std::array<float, kSize>;
+  std::array<Coordinates, 3> position, normal;  ///< as in PatchPoint
+};
+
+/// What of a patch stops light, to take points from.
+class PatchSurface {
+ public:
+  PatchSurface() = default;
+  PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles);
+
+  /// Maps [0, 1)^2 to it, evenly by area: the first coordinate also chooses the triangle, or the
+  /// micro-triangle of its opacity map, whose order keeps neighbours together. A point without
+  /// normal where nothing stops light.
+  PatchPoint at(const glm::dvec2& square) const {
+    // Most patches are one triangle, and points are made by the million.
+    if (places_.size() == 1 && choice_.total() > 0)
+      return grounds_[0].at(square_to_triangle(square));
+    return at_chosen_place(square);
+  }
+
+  /// The points of the `count` <= PatchPointBlock::kSize squares (`u`[k], `v`[k]), moved by
+  /// `offset` along their normals; in single precision.
+  void fill(std::size_t count, const PatchPointBlock::Coordinates& u,
+            const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block) const;
+
+ private:
+  struct Ground {
+    glm::dvec3 corner, first_edge, second_edge;
+    Float3 normal;
+    int map_level;  ///< of its opacity map
+
+    PatchPoint at(const glm::dvec2& b) const {  ///< weights of the second and third vertex
+      return {to_float3(corner + b.x * first_edge + b.y * second_edge), normal};
+    }
+  };
+  struct Place {  ///< an opaque triangle, or a micro-triangle of one with a map
+    std::uint32_t ground;
+    std::uint32_t micro_triangle;
+  };
+
+  static void fill(const Ground& ground, std::size_t count, const PatchPointBlock::Coordinates& u,
+                   const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block);
+  PatchPoint at_chosen_place(const glm::dvec2& square) const;
+  void add(const DisplayMesh& mesh, std::uint32_t triangle);
+  void add_places(std::span<const std::uint8_t> map, double area);
+
+  std::vector<Ground> grounds_;  ///< its triangles
+  std::vector<Place> places_;
+  CumulativeChoice choice_;  ///< of places
+};
+
+/// Writes points spread evenly by area over what of `triangles` of `mesh` stops light
+/// (PatchSurface): the R2 sequence, shifted by `shift`. Every prefix is well spread.
+void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
+                   const glm::dvec2& shift, std::span<PatchPoint> points);
+
+}  // namespace rebounce

@@ -1,0 +1,89 @@
+// The memory that builds are said to need, and are refused for.
+
+#include "precompute/build/build_estimate.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+
+#include "tests/support/expect_error.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::uint64_t kPlenty = 1ULL << 40;
+
+TEST(BuildEstimate, OfPairsHoldsTheirArraysOfEveryKind) {
+  // Half of all pairs: of 16 bytes in rows and 8 in the matrix, or beside the inverse of 8 in the
+  // matrix and twice 8 in rows.
+  constexpr std::size_t kPatches = 4096, kPairs = kPatches * kPatches / 4;
+  EXPECT_GE(peak_bytes_of_pairs(kPatches, 3, OperatorKind::kNoOperator), (16 + 8) * kPairs);
+  for (const OperatorKind kind :
+       {OperatorKind::kDense, OperatorKind::kHierarchical, OperatorKind::kLowRank}) {
+    const bool dense = kind == OperatorKind::kDense;
+    for (const std::size_t matrices : {1U, 3U}) {
+      // Triangles of the operator in floats and of the system, in doubles if the operator is exact.
+      const std::size_t triangles = 2 * kPairs * (4 * matrices + (dense ? 8 : 4));
+      const std::uint64_t bytes = peak_bytes_of_pairs(kPatches, matrices, kind);
+      EXPECT_GE(bytes, (8 + 2 * 8) * kPairs + triangles);
+      EXPECT_LE(bytes, 2 * ((8 + 2 * 8) * kPairs + triangles));
+    }
+  }
+}
+
+TEST(BuildEstimate, OfLinksHoldsTheirArrays) {
+  const LinkedBuild build{.patch_count = 64000, .link_count = 25'000'000, .matrix_count = 3};
+  // As they are refined, and copied; then 36 bytes each in the file's arrays, and 20 at both nodes.
+  EXPECT_GE(peak_bytes_of_links(build), (44 + 36) * build.link_count);
+  EXPECT_GE(peak_bytes_after_links(build, kPlenty), (36 + 2 * 20) * build.link_count);
+}
+
+TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
+  const LinkedBuild build{.patch_count = 64000, .link_count = 20'000'000, .matrix_count = 3};
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(8);
+  const std::uint64_t free = peak_bytes_after_links(build, kPlenty),
+                      least = peak_bytes_after_links(build, 1),
+                      between = peak_bytes_after_links(build, (free + least) / 2);
+  omp_set_num_threads(before);
+  EXPECT_LT(least, between);
+  EXPECT_LE(between, (free + least) / 2);
+  EXPECT_LT(between, free);
+  EXPECT_EQ(memory_of_large_transfer(build, 1), 1U);
+  EXPECT_EQ(memory_of_large_transfer(build, kPlenty) + 1,
+            memory_of_large_transfer(build, kPlenty + 1));
+}
+
+TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {
+  const LinkedBuild build{.patch_count = 30000, .link_count = 5'000'000, .matrix_count = 1};
+  const auto bytes = [](const LinkedBuild& b) { return peak_bytes_after_links(b, kPlenty); };
+  LinkedBuild larger = build, denser = build, coloured = build, finer = build, part = build;
+  larger.patch_count *= 2;
+  denser.link_count *= 2;
+  coloured.matrix_count = 3;
+  finer.tolerance /= 5;
+  for (const LinkedBuild& other : {larger, denser, coloured, finer}) {
+    EXPECT_GT(bytes(other), bytes(build));
+  }
+  part.roles.role.assign(build.patch_count, 0);
+  std::fill_n(part.roles.role.begin(), 10000, PatchRoles::kBoth);
+  EXPECT_LT(bytes(part), bytes(build));
+  const CostEstimate estimate = estimate_after_links(part, kPlenty);
+  EXPECT_EQ(estimate.receiver_count, 10000U);
+  EXPECT_EQ(estimate.source_count, 10000U);
+  EXPECT_EQ(estimate.link_count, part.link_count);
+  EXPECT_EQ(estimate.peak_bytes, bytes(part));
+}
+
+TEST(BuildEstimate, IsRefusedAboveTheLimit) {
+  CostEstimate estimate;
+  estimate.patch_count = 64000;
+  estimate.peak_bytes = 3ULL << 30;
+  refuse_if_too_large(estimate, estimate.peak_bytes, 12);
+  test::expect_error([&] { refuse_if_too_large(estimate, estimate.peak_bytes - 1, 12); },
+                     "64000 patches (from 12 triangles) need about 3 GiB and the limit is 3 GiB");
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,333 @@
+// The viewer by the pictures it draws without a window, and what it says where there is no display.
+
+#include <gtest/gtest.h>
+#include <stb_image.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command_line.h"
+
+namespace rebounce {
+namespace {
+
+using nlohmann::json;
+using test::CommandLine;
+using test::kBadInput;
+using test::kDone;
+using test::kLights;
+using test::kScene;
+using test::kScenes;
+using test::kUsage;
+using test::Outcome;
+using test::Words;
+
+struct Image {
+  int width = 0, height = 0;
+  std::vector<int> rgb;
+
+  double mean(int channel) const {
+    double sum = 0;
+    for (std::size_t k = static_cast<std::size_t>(channel); k < rgb.size(); k += 3) sum += rgb[k];
+    return 3 * sum / static_cast<double>(rgb.size());
+  }
+};
+
+Image read_image(const std::string& path) {
+  Image image;
+  int channels = 0;
+  const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
+      stbi_load(path.c_str(), &image.width, &image.height, &channels, 3), stbi_image_free);
+  EXPECT_TRUE(texels) << path;
+  if (texels) image.rgb.assign(texels.get(), texels.get() + 3 * image.width * image.height);
+  return image;
+}
+
+struct Difference {
+  double mean = 0;
+  int largest = 0;
+};
+
+Difference difference(const Image& a, const Image& b) {
+  EXPECT_EQ(a.rgb.size(), b.rgb.size());
+  Difference d;
+  for (std::size_t k = 0; k < std::min(a.rgb.size(), b.rgb.size()); ++k) {
+    const int apart = std::abs(a.rgb[k] - b.rgb[k]);
+    d.mean += apart / static_cast<double>(a.rgb.size());
+    d.largest = std::max(d.largest, apart);
+  }
+  return d;
+}
+
+class ViewCommand : public CommandLine {
+ protected:
+  void SetUp() override {
+    // The viewer can be left out of a build; ./dev test leaves it in.
+    if (run({"view", "--help"}).exit_code != kDone) {
+      GTEST_SKIP() << "this build has no viewer (REBOUNCE_BUILD_VIEWER)";
+    }
+    file_ = path("box.safetensors");
+    // As few patches as show colours bleed: it is the drawing that is looked at.
+    ASSERT_EQ(run({"precompute", kScene, "--patches", "120", "--quiet", "-o", file_}).exit_code,
+              kDone);
+    const Outcome outcome =
+        run({"view", file_, "--size", "16x16", "--screenshot", path("try.png")});
+    // ./dev test installs a software renderer; other machines may have none.
+    if (outcome.err.find("no OpenGL 3.3 without a window") != std::string::npos) {
+      GTEST_SKIP() << "no OpenGL here: " << outcome.err;
+    }
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  }
+
+  Image screenshot(Words options, const std::string& name = "picture.png") {
+    Words words = {"view", file_, "--size", "240x160", "--quiet", "--screenshot", path(name)};
+    words.insert(words.end(), options.begin(), options.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    return read_image(path(name));
+  }
+
+  std::string file_;
+};
+
+TEST_F(ViewCommand, DrawsALitScene) {
+  const Image image = screenshot({"--lights", kLights});
+  EXPECT_EQ(image.width, 240);
+  EXPECT_EQ(image.height, 160);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_GT(image.mean(c), 25);
+    EXPECT_LT(image.mean(c), 200);
+  }
+}
+
+TEST_F(ViewCommand, LooksAsThePictureOfRender) {
+  const Outcome outcome = run({"render", file_, "--lights", kLights, "--size", "240x160",
+                               "--exposure", "-4", "--quiet", "-o", path("render.png")});
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image image = screenshot({"--lights", kLights, "--exposure", "-4"});
+  // Shadow borders and edges may differ, and no more.
+  EXPECT_LT(difference(image, read_image(path("render.png"))).mean, 2.0);
+}
+
+TEST_F(ViewCommand, LampsWithASurfaceLookAsRenderDrawsThem) {
+  // The camera looks in from the front; the lamps hang above its view.
+  const std::string place = R"("position": [0.278, 0.53, 0.28], )";
+  const std::vector<std::string> lamps = {
+      R"({"type": "sphere", "radius": 0.015, "intensity": 30000, )" + place + R"("range": 0})",
+      R"({"type": "rectangle", "width": 0.2, "height": 0.1, "intensity": 1500, )" + place +
+          R"("direction": [0, -1, 0]})",
+      R"({"type": "disc", "radius": 0.08, "intensity": 1500, )" + place +
+          R"("direction": [0, -1, 0]})"};
+  for (const std::string& lamp : lamps) {
+    const std::string lights = write("area.lights.json", R"({"lights": [)" + lamp + "]}");
+    const Outcome outcome = run({"render", file_, "--lights", lights, "--size", "240x160",
+                                 "--quiet", "--exposure", "-7", "-o", path("render.png")});
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    const Image drawn = read_image(path("render.png"));
+    EXPECT_GT(drawn.mean(0), 20) << lamp;
+    const Image image = screenshot({"--lights", lights, "--exposure", "-7"});
+    // Half shadows are a guess; see the shader.
+    EXPECT_LT(difference(image, drawn).mean, 2.5) << lamp;
+  }
+}
+
+TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {
+  const std::string lights = write("sky.lights.json", R"({"sky":
+      {"luminance": 300, "cie": 12, "sunDirection": [-1, -0.3, 0.4], "groundReflectance": 0.6}})");
+  const Words light = {"--lights", lights, "--exposure", "-8"};
+  Words words = {"render", file_, "--size", "240x160", "--quiet", "-o", path("render.png")};
+  words.insert(words.end(), light.begin(), light.end());
+  const Outcome outcome = run(words);
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image drawn = read_image(path("render.png"));
+  EXPECT_GT(drawn.mean(0), 20);
+  EXPECT_LT(difference(screenshot(light), drawn).mean, 2.0);
+}
+
+TEST_F(ViewCommand, WhatIsMaskedAwayIsNotDrawn) {
+  std::ifstream scene(kScene);
+  json document = json::parse(scene);
+  json& red = document["materials"][2];
+  red["alphaMode"] = "MASK";
+  red["pbrMetallicRoughness"]["baseColorFactor"][3] = 0.2;
+  const std::string masked = write("masked.gltf", document.dump());
+  const Words light = {"--lights", kLights, "--exposure", "-4", "--size", "240x160", "--quiet"};
+  const auto draw = [&](Words words, const std::string& picture) {
+    words.insert(words.end(), light.begin(), light.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    return read_image(picture);
+  };
+  const std::string file = path("masked.safetensors");
+  ASSERT_EQ(run({"precompute", masked, "--patches", "120", "--quiet", "-o", file}).exit_code,
+            kDone);
+  const Image image = draw({"view", file, "--screenshot", path("masked.png")}, path("masked.png"));
+  const Image drawn = draw({"render", file, "-o", path("render.png")}, path("render.png"));
+  EXPECT_LT(difference(image, drawn).mean, 2.0);
+  EXPECT_GT(difference(image, screenshot({"--lights", kLights, "--exposure", "-4"})).mean, 5);
+}
+
+TEST_F(ViewCommand, ASphereTakesTheColourOfTheWallsThatItFaces) {
+  const std::string still = write("still.json", R"({"spheres":
+      [{"position": [0.278, 0.3, 0.1], "radius": 0.08, "color": [0.9, 0.9, 0.9]}]})");
+  const Words words = {"--lights", kLights, "--show", "indirect", "--exposure", "-3"};
+  const Image without = screenshot(words);
+  Words with = words;
+  with.insert(with.end(), {"--path", still});
+  const Image image = screenshot(with);
+  // By columns, of the pixels that the sphere changes.
+  std::vector<int> columns;
+  std::vector<double> redness;
+  for (int x = 0; x < image.width; ++x) {
+    double red = 0, green = 0;
+    for (int y = 0; y < image.height; ++y) {
+      const auto k = static_cast<std::size_t>(3 * (y * image.width + x));
+      if (image.rgb[k] == without.rgb[k] && image.rgb[k + 1] == without.rgb[k + 1]) continue;
+      red += image.rgb[k];
+      green += image.rgb[k + 1];
+    }
+    if (red + green == 0) continue;
+    columns.push_back(x);
+    redness.push_back(red / green);
+  }
+  ASSERT_GT(columns.size(), 20U);
+  const std::size_t quarter = columns.size() / 4;
+  // The left wall is red, the right one green.
+  EXPECT_GT(redness[quarter], 1.15 * redness[columns.size() - quarter]);
+}
+
+TEST_F(ViewCommand, ASphereCastsShadowsAndCanBeLeftOut) {
+  const Words words = {"--lights", kLights, "--show", "direct", "--exposure", "-4"};
+  const Image without = screenshot(words);
+  Words with = words;
+  with.push_back("--sphere");
+  EXPECT_GT(difference(screenshot(with), without).mean, 0.5);
+  Words panels = with;
+  panels.push_back("--panels");
+  EXPECT_GT(difference(screenshot(panels), without).mean, 5);
+}
+
+TEST_F(ViewCommand, AddsUpDirectAndBouncedLight) {
+  const Words common = {"--lights", kScenes + "spot_on_red_wall.lights.json", "--exposure", "-5"};
+  const auto show = [&](const std::string& what) {
+    Words options = common;
+    options.insert(options.end(), {"--show", what});
+    return screenshot(options, what + ".png");
+  };
+  const Image all = show("radiosity"), direct = show("direct"), indirect = show("indirect");
+  EXPECT_GT(all.mean(0), direct.mean(0));
+  EXPECT_GT(all.mean(0), indirect.mean(0));
+  // The red wall colours what it sends on.
+  EXPECT_GT(indirect.mean(0), 1.15 * indirect.mean(2));
+  EXPECT_GT(difference(show("patches"), all).mean, 20);
+}
+
+TEST_F(ViewCommand, SplitsTheScreenBetweenMethods) {
+  const Words same = {"--lights", kLights, "--exposure", "-4", "--against", "refine"};
+  const Words poor = {"--lights", kLights, "--exposure", "-4", "--against", "gathering", "--cold"};
+  const Image exact = screenshot({"--lights", kLights, "--exposure", "-4"});
+  // Refinement of a dense operator gives what the product does, apart from the line between.
+  EXPECT_LT(difference(screenshot(same), exact).mean, 1.5);
+  const Image split = screenshot(poor);
+  double left = 0, right = 0;
+  for (int y = 0; y < split.height; ++y) {
+    for (int x = 0; x < split.width; ++x) {
+      if (std::abs(x - split.width / 2) < 3) continue;
+      const auto k = static_cast<std::size_t>(3 * (y * split.width + x));
+      (x < split.width / 2 ? left : right) += std::abs(split.rgb[k] - exact.rgb[k]);
+    }
+  }
+  EXPECT_LT(left, 0.01 * right);
+}
+
+TEST_F(ViewCommand, ShowsTheErrorOfAnIteration) {
+  const Image exact = screenshot({"--lights", kLights, "--show", "error", "--method", "gathering"});
+  EXPECT_GT(exact.mean(1), 10);
+}
+
+TEST_F(ViewCommand, DrawsPanels) {
+  const Image without = screenshot({"--lights", kLights});
+  EXPECT_GT(difference(screenshot({"--lights", kLights, "--panels"}), without).mean, 5);
+}
+
+TEST_F(ViewCommand, MovesLampsSmoothlyAlongAPath) {
+  const std::string motion = write("path.json",
+                                   R"({"frames_per_second": 50, "motions": [{"light": 0, "swing":
+          {"from": [0.2, 0.45, 0.2], "to": [0.35, 0.45, 0.3], "period": 2}}]})");
+  const json summary =
+      summary_of({"view", file_, "--lights", kLights, "--size", "120x80", "--show", "indirect",
+                  "--path", motion, "--frames", "6", "--out", path("film")});
+  EXPECT_EQ(summary["frames"], 6);
+  EXPECT_GT(summary["microseconds"]["draw"], 0);
+  const auto frame = [&](int k) {
+    return read_image(path("film/frame_0000" + std::to_string(k) + ".png"));
+  };
+  const Image begin = frame(0), end = frame(5);
+  EXPECT_GT(difference(begin, end).mean, 0.05);
+  for (int k = 0; k < 5; ++k) {
+    // No step is larger than a tenth of the screen's range, anywhere.
+    EXPECT_LT(difference(frame(k), frame(k + 1)).largest, 26) << "frame " << k;
+  }
+}
+
+TEST_F(ViewCommand, ASphereDoesNotPopOnItsWay) {
+  // At even speed, past the blocks and through cells of probes of which some are within them.
+  const std::string motion = write("sphere.json", R"({"frames_per_second": 8, "spheres":
+      [{"radius": 0.05, "keys": [{"time": 0, "position": [0.1, 0.42, 0.0]},
+                                 {"time": 1, "position": [0.45, 0.36, 0.3]}]}]})");
+  summary_of({"view", file_, "--lights", kLights, "--size", "120x80", "--exposure", "-4", "--path",
+              motion, "--frames", "8", "--out", path("film")});
+  std::vector<double> change;
+  for (int k = 0; k < 7; ++k) {
+    const auto frame = [&](int n) {
+      return read_image(path("film/frame_0000" + std::to_string(n) + ".png"));
+    };
+    change.push_back(difference(frame(k), frame(k + 1)).mean);
+  }
+  const double largest = *std::ranges::max_element(change);
+  std::ranges::sort(change);
+  EXPECT_GT(change.front(), 0.02);
+  EXPECT_LT(largest, 2 * change[change.size() / 2]);
+}
+
+TEST_F(ViewCommand, RefusesPathsThatMakeNoSense) {
+  const auto refused = [&](const std::string& text, const std::string& part) {
+    const std::string motion = write("path.json", text);
+    const Outcome outcome = run({"view", file_, "--lights", kLights, "--path", motion,
+                                 "--screenshot", path("no.png"), "--quiet"});
+    EXPECT_EQ(outcome.exit_code, kBadInput);
+    EXPECT_TRUE(test::is_one_line(outcome.err)) << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
+  };
+  refused("{", "is not JSON");
+  refused(R"({"motion": []})", "unknown field");
+  refused(R"({"motions": [{"light": 7, "circle": {}}]})", "\"light\"");
+  refused(R"({"motions": [{"light": 0}]})", "must have one of");
+  refused(R"({"motions": [{"circle": {"period": 0}}]})", "period");
+  refused(R"({"motions": [{"circle": {"axis": [0, 0, 0]}}]})", "axis");
+  refused(R"({"motions": [{"keys": []}]})", "keys");
+  refused(R"({"motions": [{"keys": [{"time": 2}, {"time": 1}]}]})", "key 1: \"time\"");
+  refused(R"({"frames_per_second": 0})", "frames_per_second");
+  refused(R"({"spheres": {}})", "spheres");
+  refused(R"({"spheres": [{"position": [0, 1, 0]}]})", "sphere 0: \"radius\"");
+  refused(R"({"spheres": [{"radius": 1, "circle": {}, "swing": {}}]})", "must have one of");
+  refused(R"({"spheres": [{"radius": 1, "light": 0}]})", "unknown field");
+}
+
+TEST_F(ViewCommand, SaysInOneLineThatThereIsNoDisplay) {
+  const Outcome outcome = test::Subprocess({"/usr/bin/env", "-u", "DISPLAY", "-u",
+                                            "WAYLAND_DISPLAY", REBOUNCE_PROGRAM, "view", file_},
+                                           printed_ / "out", printed_ / "err")
+                              .finish();
+  EXPECT_EQ(outcome.exit_code, kBadInput);
+  EXPECT_TRUE(test::is_one_line(outcome.err)) << outcome.err;
+  EXPECT_NE(outcome.err.find("cannot open a window"), std::string::npos) << outcome.err;
+  EXPECT_EQ(run({"view", file_, "--frames", "3"}).exit_code, kUsage);
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,95 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+
+#include "precompute/compression/basis_remainders.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr Index kSize = 64;
+
+/// Bases of random orthonormal vectors, one matrix whose core is `core` on its diagonal.
+LowRankBlock block_with(const VectorXd& core, bool on_diagonal = false) {
+  std::srand(3);
+  const auto basis = [&] {
+    const Eigen::HouseholderQR<MatrixXd> qr(MatrixXd::Random(kSize, core.size()));
+    return MatrixXd(qr.householderQ() * MatrixXd::Identity(kSize, core.size()));
+  };
+  LowRankBlock block;
+  block.row_basis = basis();
+  block.column_basis = on_diagonal ? MatrixXd(kSize, 0) : basis();
+  block.cores.push_back(core.asDiagonal());
+  return block;
+}
+
+/// Strong light from anywhere, or in one direction.
+ClusterWeight weight(double background, double strength) {
+  return {VectorXd::Constant(kSize, background), VectorXd::Unit(kSize, 5),
+          VectorXd::Constant(1, strength)};
+}
+
+MatrixXd random_errors(Index count) {
+  std::srand(5);
+  return MatrixXd::Random(count, kSize);
+}
+
+TEST(BasisRemainders, GoToTheLargestEntriesFirst) {
+  const ClusterWeight even = weight(1, 0);
+  const LowRankBlock block = block_with(VectorXd{{1, 0.1, 0.01}});
+  // A vector is off by some (0.4 / 127)²/12 of its energy at each of 64 positions.
+  for (const auto& [price, expected] :
+       {std::pair(1e-4, 0), std::pair(1e-7, 1), std::pair(2e-9, 2), std::pair(1e-12, 3)}) {
+    const BasisRemainders found = find_remainders(block, {&even, &even}, {.price = price});
+    EXPECT_EQ(found.row, expected) << price;
+    EXPECT_EQ(found.column, expected) << price;
+  }
+}
+
+TEST(BasisRemainders, AreThoseOfTheFirstVectors) {
+  const ClusterWeight even = weight(1, 0);
+  const LowRankBlock block = block_with(VectorXd{{0.001, 0.001, 1, 0.001}});
+  EXPECT_EQ(find_remainders(block, {&even, &even}, {.price = 1e-7}).row, 3);
+}
+
+TEST(BasisRemainders, OnTheDiagonalBothEndsAreOne) {
+  const ClusterWeight even = weight(1, 0);
+  const LowRankBlock block = block_with(VectorXd{{1, 0.1, 0.01}}, true);
+  const BasisRemainders found = find_remainders(block, {&even, &even}, {.price = 1e-7});
+  EXPECT_EQ(found.row, 1);
+  EXPECT_EQ(found.column, 1);
+}
+
+TEST(BasisRemainders, WhereLightIsStrongThereAreMore) {
+  const ClusterWeight even = weight(1, 0), strong = weight(30, 0);
+  const LowRankBlock block = block_with(VectorXd{{1, 0.1, 0.01}});
+  const CompressionCost cost{.price = 1e-7};
+  EXPECT_EQ(find_remainders(block, {&even, &even}, cost).row, 1);
+  EXPECT_EQ(find_remainders(block, {&strong, &even}, cost).row, 2);
+  EXPECT_EQ(find_remainders(block, {&even, &strong}, cost).row, 2);
+}
+
+TEST(BasisRemainders, NoneWhereNothingIsWanted) {
+  const LowRankBlock block = block_with(VectorXd{{1, 0.1}});
+  EXPECT_EQ(find_remainders(block, {}, {.price = 1e-12}).row, 0);
+}
+
+TEST(ClusterWeights, SquaredNormIsThatOfTheMatrix) {
+  const ClusterWeight lit(VectorXd::LinSpaced(kSize, 1, 3), VectorXd::Unit(kSize, 5),
+                          VectorXd::Constant(1, 4));
+  MatrixXd whole = MatrixXd::Identity(kSize, kSize);
+  lit.put_right(whole);
+  EXPECT_NEAR(lit.squared_norm(), whole.squaredNorm(), 1e-9 * whole.squaredNorm());
+  // So are errors that are as large at all positions, in the mean.
+  MatrixXd errors = random_errors(20000);
+  const double before = errors.squaredNorm() / kSize;
+  lit.put_right(errors);
+  EXPECT_NEAR(errors.squaredNorm() / before, lit.squared_norm(), 0.02 * lit.squared_norm());
+}
+
+}  // namespace
+}  // namespace rebounce

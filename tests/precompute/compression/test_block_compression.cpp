@@ -1,0 +1,121 @@
+// A block by itself, with singular values that are known.
+
+#include "precompute/compression/block_compression.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/QR>
+#include <cmath>
+#include <random>
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+MatrixXd random_orthonormal(Index rows, Index columns, std::uint64_t seed) {
+  std::mt19937_64 engine(seed);
+  std::normal_distribution<double> normal;
+  const MatrixXd random = MatrixXd::NullaryExpr(rows, columns, [&] { return normal(engine); });
+  return Eigen::HouseholderQR<MatrixXd>(random).householderQ() * MatrixXd::Identity(rows, columns);
+}
+
+WideBlock block_with(Index size, const VectorXd& singular) {
+  WideBlock block;
+  block.entries = random_orthonormal(size, singular.size(), 1) * singular.asDiagonal() *
+                  random_orthonormal(size, singular.size(), 2).transpose();
+  return block;
+}
+
+/// k^-exponent.
+VectorXd powers(Index count, double exponent) {
+  return VectorXd::LinSpaced(count, 1, static_cast<double>(count)).array().pow(-exponent);
+}
+
+MatrixXd product(const LowRankBlock& block) {
+  return block.row_basis * block.cores.front() * block.column_basis.transpose();
+}
+
+constexpr double kNoLimit = 1e30;
+
+TEST(BlockCompression, SaysItsErrorAndTakesTheRankThatPays) {
+  for (const Index size : {96, 400}) {  // from the Gram matrix; sketched
+    const VectorXd singular = powers(size / 2, 2);
+    const WideBlock block = block_with(size, singular);
+    const double enough = singular[11] * singular[11] * 1.01;
+    const CompressionCost cost{.price = enough / static_cast<double>(2 * size + 12 * 12)};
+    const auto attempt = compress_block(block, cost, kNoLimit, size / 8, 3);
+    ASSERT_TRUE(attempt.block);
+    EXPECT_GE(attempt.block->row_basis.cols(), 10) << size;
+    EXPECT_LE(attempt.block->row_basis.cols(), size < 100 ? 12 : 16) << size;
+    const double error = (block.entries - product(*attempt.block)).squaredNorm();
+    EXPECT_NEAR(attempt.block->error_squared / error, 1, 1e-6) << size;
+    EXPECT_NEAR(
+        cost.of(*attempt.block),
+        error + cost.price * cost.size(attempt.block->basis_values(), attempt.block->vectors(),
+                                       attempt.block->core_values()),
+        1e-9);
+  }
+}
+
+TEST(BlockCompression, VectorsThatCostMoreAreFewer) {
+  for (const Index size : {96, 400}) {
+    const WideBlock block = block_with(size, powers(size / 2, 1));
+    const auto rank = [&](double vector) {
+      const auto attempt =
+          compress_block(block, {.price = 1e-4, .sizes = {.vector = vector}}, kNoLimit, size, 3);
+      return attempt.block ? attempt.block->row_basis.cols() : 0;
+    };
+    // Energies fall with the square of their number: of directions that take twice as much, some
+    // 0.7 are worth it.
+    const double few = static_cast<double>(rank(static_cast<double>(size)));
+    const double many = static_cast<double>(rank(0));
+    EXPECT_GE(few, 0.6 * many) << size;
+    EXPECT_LE(few, 0.9 * many) << size;
+  }
+}
+
+TEST(BlockCompression, RefusesWhatCostsMoreThanTheLimit) {
+  const WideBlock block = block_with(200, powers(100, 1));
+  const CompressionCost cost{.price = 1e-6};
+  const auto any = compress_block(block, cost, kNoLimit, 200, 3);
+  ASSERT_TRUE(any.block);
+  EXPECT_FALSE(compress_block(block, cost, 0.9 * cost.of(*any.block), 200, 3).block);
+}
+
+TEST(BlockCompression, MoreRanksCostNoLessThanWasSaid) {
+  // Powers, and exponentials, which fall faster.
+  constexpr Index kSize = 512, kFew = 32;
+  std::vector<VectorXd> spectra;
+  for (const double exponent : {0.6, 1.0, 1.5, 2.5}) spectra.push_back(powers(kSize, exponent));
+  for (const double base : {0.9, 0.97}) {
+    spectra.emplace_back(VectorXd::NullaryExpr(kSize, [=](Index k) { return std::pow(base, k); }));
+  }
+  int told = 0;
+  for (const VectorXd& singular : spectra) {
+    const WideBlock block = block_with(kSize, singular);
+    const double energy = block.entries.squaredNorm();
+    for (const double price : {1e-4, 1e-5, 1e-6, 1e-7}) {
+      const CompressionCost cost{.price = price * energy / static_cast<double>(kSize)};
+      const auto few = compress_block(block, cost, kNoLimit, kFew, 3);
+      const auto any = compress_block(block, cost, kNoLimit, kSize, 3);
+      ASSERT_TRUE(few.block && any.block);
+      if (any.block->row_basis.cols() > kFew) {
+        // The factor by which a sketch misses too much is one in the mean.
+        EXPECT_GE(cost.of(*any.block), 0.95 * few.least_beyond) << singular[1] << ' ' << price;
+      }
+      if (few.least_beyond >= cost.of(*few.block)) ++told;
+    }
+  }
+  EXPECT_GE(told, 4);  // or nothing would be saved
+}
+
+TEST(BlockCompression, BlocksThatAreQuicklyTriedSayNothing) {
+  const WideBlock block = block_with(128, powers(128, 1));
+  EXPECT_EQ(compress_block(block, {.price = 1e-4}, kNoLimit, 8, 3).least_beyond, 0);
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,119 @@
+// The search for the price against error curves of known shapes.
+
+#include "precompute/compression/price_search.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+
+namespace rebounce {
+namespace {
+
+constexpr PriceSearch::Range kWanted{0.72, 0.8};
+
+// Errors of less leave more to save than is left, along kShrinking.
+constexpr double kShrinking = 0.3, kLeastGood = 0.65;
+
+/// The smallest of what is good.
+struct Found {
+  double error = 0, size = std::numeric_limits<double>::infinity();
+  int rounds = 0;
+};
+
+Found search(double first_price, const std::function<double(double)>& error_of) {
+  PriceSearch search(first_price, kWanted);
+  Found found;
+  while (!search.done() && found.rounds < 50) {
+    const double price = search.price();
+    const double error = error_of(price), size = std::pow(price, -kShrinking);
+    if (error <= kWanted.most && size < found.size) {
+      found.error = error;
+      found.size = size;
+    }
+    search.report(error, size);
+    ++found.rounds;
+  }
+  return found;
+}
+
+void expect_good(const Found& found, int most_rounds) {
+  EXPECT_GE(found.error, kLeastGood);
+  EXPECT_LE(found.error, kWanted.most);
+  EXPECT_LE(found.rounds, most_rounds);
+}
+
+TEST(PriceSearch, FindsARootInOneStepFromAnywhereWithinReach) {
+  for (const double first : {0.001, 1.0, 500.0}) {
+    expect_good(search(first, [](double price) { return std::sqrt(price); }), 2);
+  }
+}
+
+TEST(PriceSearch, LearnsAnotherSlope) {
+  for (const double power : {0.3, 0.4, 0.7, 0.9}) {
+    for (const double first : {1e-3, 1e3}) {
+      SCOPED_TRACE(power);
+      expect_good(search(first, [=](double price) { return std::pow(price, power); }), 6);
+    }
+  }
+}
+
+TEST(PriceSearch, CrossesManyOrdersOfMagnitude) {
+  expect_good(search(1e-12, [](double price) { return std::sqrt(price); }), 6);
+  expect_good(search(1e12, [](double price) { return std::sqrt(price); }), 6);
+}
+
+TEST(PriceSearch, BendsWithAFloorAndACeiling) {
+  // As operators do: rounding below, everything left out above.
+  const auto error = [](double price) { return std::clamp(3 * std::pow(price, 0.6), 0.2, 100.0); };
+  for (const double first : {1e-6, 1e-2, 1.0, 1e4}) expect_good(search(first, error), 8);
+}
+
+/// Whether a search ends at an error of 0.6 that a second trial gives, of so much of the size of
+/// the first, whose error was half of it.
+bool ends_at(double part_of_size) {
+  PriceSearch search(1, kWanted);
+  search.report(0.3, 1000);
+  EXPECT_FALSE(search.done());
+  search.report(0.6, 1000 * part_of_size);
+  return search.done();
+}
+
+TEST(PriceSearch, EndsWhereAnotherTrialWouldSaveLittle) {
+  EXPECT_TRUE(ends_at(0.95));
+  EXPECT_FALSE(ends_at(0.6));
+}
+
+TEST(PriceSearch, DoesNotEndWhileNoErrorWasGood) {
+  PriceSearch search(1, kWanted);
+  for (const double error : {5.0, 3.0, 2.0, 0.81}) {
+    search.report(error, 1000);
+    EXPECT_FALSE(search.done()) << error;
+  }
+  search.report(0.79, 1000);
+  EXPECT_TRUE(search.done());
+}
+
+TEST(PriceSearch, StopsAtAJumpThatHasNoGoodError) {
+  const Found found = search(1, [](double price) { return price < 7 ? 0.1 : 5.0; });
+  EXPECT_LT(found.rounds, 40);
+}
+
+TEST(PriceSearch, ForgetsWhatTheWeightsBeforeGave) {
+  // The first trial errs ten times as much as it would with the weights of all later ones.
+  int round = 0;
+  const auto error = [&](double price) { return (round++ == 0 ? 10 : 1) * std::sqrt(price); };
+  for (const double first : {0.01, 0.5, 20.0}) {
+    round = 0;
+    expect_good(search(first, error), 5);
+  }
+}
+
+TEST(PriceSearch, LeavesAnErrorOfNothing) {
+  expect_good(search(1e-9, [](double price) { return price < 1e-3 ? 0 : std::sqrt(price); }), 10);
+}
+
+}  // namespace
+}  // namespace rebounce

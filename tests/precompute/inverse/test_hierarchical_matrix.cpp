@@ -1,0 +1,100 @@
+// A hierarchical operator read by its entries and multiplied with many vectors.
+
+#include "precompute/inverse/hierarchical_matrix.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "tests/support/hierarchical_samples.h"
+#include "tests/support/with_threads.h"
+#include "transfer/format/hierarchical_encoding.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kPatchCount = 340;
+
+/// What products are given by: irradiance from exitance, one channel.
+Eigen::MatrixXf expanded(const HierarchicalOperator& transfer, int channel) {
+  const std::size_t n = transfer.patch_count();
+  std::vector<float> entries(n * n);
+  transfer.expand(channel, entries);
+  Eigen::MatrixXf result(n, n);
+  const auto& area = transfer.storage().area;
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      result(i, j) = entries[i * n + j] * std::sqrt(area[i] / area[j]);
+    }
+  }
+  return result;
+}
+
+struct Kind {
+  Precision precision;
+  bool equilibrated = false;
+};
+
+HierarchicalOperator sample(const Kind& kind) {
+  HierarchicalStorage storage = test::random_hierarchical_storage(kPatchCount, 2, 5);
+  if (kind.equilibrated) storage = test::equilibrated(std::move(storage), 6);
+  return HierarchicalOperator(encode_values(storage, kind.precision));
+}
+
+class HierarchicalMatrixOf : public testing::TestWithParam<Kind> {
+ protected:
+  HierarchicalOperator transfer = sample(GetParam());
+  HierarchicalMatrix matrix{transfer.storage()};
+};
+
+TEST_P(HierarchicalMatrixOf, EntriesAreThoseOfTheOperator) {
+  std::vector<std::uint32_t> all(kPatchCount);
+  std::iota(all.begin(), all.end(), 0U);
+  std::ranges::shuffle(all, std::mt19937(1));
+  const std::span patches(all);
+  for (int channel = 0; channel < kChannelCount; ++channel) {
+    const Eigen::MatrixXf truth = expanded(transfer, channel);
+    const float allowed = 1e-5F * truth.cwiseAbs().maxCoeff();
+    for (const auto& [rows, columns] : {std::pair(patches.first(150), patches.last(100)),
+                                        std::pair(patches.first(90), patches.first(90))}) {
+      Eigen::MatrixXf entries(rows.size(), columns.size());
+      matrix.entries(matrix.channel_matrix()[channel], rows, columns, entries);
+      for (std::size_t i = 0; i < rows.size(); ++i) {
+        for (std::size_t j = 0; j < columns.size(); ++j) {
+          ASSERT_NEAR(entries(i, j), truth(rows[i], columns[j]), allowed);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(HierarchicalMatrixOf, ProductsAreThoseOfItsEntries) {
+  const Eigen::MatrixXf x = Eigen::MatrixXf::Random(kPatchCount, 40);  // more than one group
+  for (int channel = 0; channel < kChannelCount; ++channel) {
+    const Eigen::MatrixXf truth = expanded(transfer, channel) * x;
+    const Eigen::MatrixXf y = matrix.multiply(matrix.channel_matrix()[channel], x);
+    EXPECT_LT((y - truth).norm(), 1e-5F * truth.norm());
+  }
+}
+
+TEST_P(HierarchicalMatrixOf, SameBitsForAnyNumberOfThreads) {
+  const Eigen::MatrixXf x = Eigen::MatrixXf::Random(kPatchCount, 100);
+  const auto make = [&] { return matrix.multiply(0, x); };
+  const Eigen::MatrixXf one = test::with_threads(1, make), four = test::with_threads(4, make);
+  EXPECT_EQ(one, four);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, HierarchicalMatrixOf,
+                         testing::Values(Kind{Precision::kF32}, Kind{Precision::kF16},
+                                         Kind{Precision::kQ16}, Kind{Precision::kQ8},
+                                         Kind{Precision::kF32, true}, Kind{Precision::kQ8, true}),
+                         [](const auto& kind) {
+                           return std::string(precision_name(kind.param.precision)) +
+                                  (kind.param.equilibrated ? "_equilibrated" : "");
+                         });
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,58 @@
+// What the search for the tolerance makes of the errors of its judging lights.
+
+#include "precompute/lights/judged_error.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+namespace rebounce {
+namespace {
+
+/// All but some at the end the same.
+std::vector<double> errors(std::size_t count, double usual, const std::vector<double>& last) {
+  std::vector<double> result(count - last.size(), usual);
+  result.insert(result.end(), last.begin(), last.end());
+  return result;
+}
+
+TEST(JudgedError, IsTheMeanOrAThirdOfTheLargestOfAFewLights) {
+  EXPECT_NEAR(judged_error(errors(12, 0.004, {})), 0.004, 1e-12);
+  EXPECT_NEAR(judged_error(errors(12, 0.004, {0.03})), 0.01, 1e-12);
+  EXPECT_NEAR(judged_error(errors(1, 0.004, {})), 0.004, 1e-12);
+}
+
+TEST(JudgedError, IsTheMeanWhereAllErrorsAreAlike) {
+  for (const std::size_t count : {32, 64, 256, 1000}) {
+    EXPECT_NEAR(judged_error(errors(count, 0.004, {})), 0.004, 1e-12);
+  }
+}
+
+TEST(JudgedError, FindsWhatTheLargestOf64LightsIsOfAnExponentialTail) {
+  // 64 of them stay below s log(64 / -log 0.95) with 95 %: 7.13 s.
+  for (const std::size_t count : {64, 256, 4096}) {
+    double sum = 0;
+    constexpr int kSamples = 200;
+    std::mt19937_64 engine(count);
+    std::exponential_distribution<double> error(1 / 0.003);
+    for (int sample = 0; sample < kSamples; ++sample) {
+      std::vector<double> drawn(count);
+      for (double& e : drawn) e = error(engine);
+      sum += judged_error(drawn);
+    }
+    EXPECT_NEAR(sum / kSamples, 7.13 * 0.003 / 3, 0.08 * 7.13 * 0.003 / 3) << count << " lights";
+  }
+}
+
+TEST(JudgedError, DoesNotDependOnTheOrder) {
+  std::vector<double> many = errors(256, 0.003, {0.022, 0.03, 0.04, 0.05});
+  const double judged = judged_error(many);
+  EXPECT_GT(judged, 0.004);
+  std::ranges::reverse(many);
+  EXPECT_EQ(judged_error(many), judged);
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,118 @@
+// The table of lamp kinds, and what every kind must hold to.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+
+#include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
+#include "tests/support/expect_error.h"
+
+namespace rebounce {
+namespace {
+
+/// A lamp of the kind whose fields are as they should be.
+Light good_lamp(const LampKind& kind) {
+  Light light;
+  light.type = kind.type;
+  light.position = {0.2F, 1.5F, -0.1F};
+  for (const LampField* field : kind.fields) {
+    if (field->rule != FieldRule::kLength) continue;
+    for (float& value : field->values(light)) value = 0.3F;
+  }
+  return light;
+}
+
+TEST(LampKinds, AreInTheOrderOfTheirTypeAndOfDifferentNames) {
+  std::set<std::string_view> names;
+  for (std::size_t k = 0; k < lamp_kinds().size(); ++k) {
+    const LampKind& kind = *lamp_kinds()[k];
+    EXPECT_EQ(static_cast<std::size_t>(kind.type), k);
+    EXPECT_EQ(&lamp_kind(kind.type), &kind);
+    EXPECT_TRUE(names.insert(kind.name).second) << kind.name;
+  }
+  EXPECT_EQ(lamp_kind(LightType::kDisc).name, "disc");
+}
+
+TEST(LampKinds, HaveEitherOnePlaceOrASurface) {
+  for (const LampKind* kind : lamp_kinds()) {
+    EXPECT_NE(kind->evaluate == nullptr, kind->surface == nullptr) << kind->name;
+    EXPECT_EQ(kind->surface != nullptr, kind->shadow_map == ShadowMapKind::kPlaces) << kind->name;
+    const std::string glsl = kind->glsl;
+    const std::string name(kind->name);
+    EXPECT_NE(glsl.find("float " + name + "_irradiance("), std::string::npos) << name;
+    EXPECT_EQ(glsl.find("vec3 " + name + "_normal(") != std::string::npos, kind->surface != nullptr)
+        << name;
+  }
+}
+
+TEST(LampKinds, RefuseNumbersThatAreNotOnes) {
+  for (const LampKind* kind : lamp_kinds()) {
+    const Light good = good_lamp(*kind);
+    EXPECT_NO_THROW(check_light(good)) << kind->name;
+    for (const LampField* field : kind->fields) {
+      Light bad = good;
+      const std::span<float> values = field->values(bad);
+      if (values.empty()) continue;
+      values.back() = std::numeric_limits<float>::quiet_NaN();
+      test::expect_error([&] { check_light(bad); }, std::string(field->name));
+    }
+  }
+}
+
+/// Of a lamp of uniform luminance, the closed form is the mean over its places.
+TEST(LampKinds, SurfacesShineAsTheirPlacesDo) {
+  int count = 0;
+  for (const LampKind* kind : lamp_kinds()) {
+    if (kind->surface == nullptr) continue;
+    ++count;
+    const PreparedLight lamp(good_lamp(*kind));
+    for (const glm::vec3& normal : {glm::vec3(0, 1, 0), glm::vec3(0.8F, 0.6F, 0)}) {
+      constexpr int kSide = 200;
+      double sum = 0;
+      for (int k = 0; k < kSide * kSide; ++k) {
+        const glm::vec2 place((static_cast<float>(k % kSide) + 0.5F) / kSide,
+                              (static_cast<float>(k / kSide) + 0.5F) / kSide);
+        UnitLight light;
+        lamp.evaluate_places({0, 0, 0}, {&place, 1}, {&light, 1});
+        sum += light.illuminance * std::max(0.0F, glm::dot(light.direction, normal));
+      }
+      const double mean = sum / (kSide * kSide);
+      EXPECT_GT(mean, 1e-3) << kind->name;
+      EXPECT_NEAR(lamp.unoccluded_irradiance({0, 0, 0}, normal) / mean, 1, 1e-3) << kind->name;
+    }
+  }
+  EXPECT_GE(count, 3);
+}
+
+TEST(LampKinds, MeshesAndPlacesLieOnTheSurface) {
+  for (const LampKind* kind : lamp_kinds()) {
+    if (kind->surface == nullptr) continue;
+    const PreparedLight lamp(good_lamp(*kind));
+    const LampMesh mesh = kind->surface->mesh(lamp);
+    ASSERT_EQ(mesh.normal.size(), mesh.position.size());
+    double area = 0, turned_away = 0;
+    for (const Uint3& t : mesh.triangle) {
+      const glm::vec3 a = to_glm(mesh.position[t[0]]);
+      const glm::vec3 twice =
+          glm::cross(to_glm(mesh.position[t[1]]) - a, to_glm(mesh.position[t[2]]) - a);
+      area += 0.5 * glm::length(twice);
+      if (glm::dot(twice, to_glm(mesh.normal[t[0]])) < 0) turned_away += 0.5 * glm::length(twice);
+    }
+    EXPECT_NEAR(area / lamp.area, 1, 0.01) << kind->name;
+    EXPECT_EQ(turned_away, 0) << kind->name;
+    float reach = 0;
+    for (const Float3& v : mesh.position) {
+      reach = std::max(reach, glm::distance(to_glm(v), lamp.position));
+    }
+    for (std::uint32_t k = 0; k < 16; ++k) {
+      EXPECT_LE(glm::length(kind->surface->place(lamp, k, 16)), 1.001F * reach) << kind->name;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "precompute/build/build.h"
+
+namespace rebounce::test {
+
+/// A scene of tests/scenes through the offline stage.
+inline TransferData built_scene(const std::string& file, const BuildSettings& settings) {
+  BuildReport report;
+  return build_transfer_data(std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests" / "scenes" / file,
+                             settings, report);
+}
+
+}  // namespace rebounce::test

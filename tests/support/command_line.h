@@ -1,0 +1,82 @@
+#pragma once
+
+// The program `rebounce` as scripts see it: exit status, what it prints where, what it writes.
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "tests/support/subprocess.h"
+#include "tests/support/temporary_folder.h"
+
+namespace rebounce::test {
+
+using Names = std::vector<std::string>;
+using Words = std::vector<std::string>;
+
+inline constexpr int kDone = 0, kBadInput = 1, kUsage = 2;
+inline constexpr int kPatchCount = 300;
+
+inline const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
+inline const std::string kScene = kScenes + "cornell_box.gltf";
+inline const std::string kLights = kScenes + "ceiling_point.lights.json";
+
+inline bool is_one_line(const std::string& text) {
+  return !text.empty() && text.find('\n') == text.size() - 1;
+}
+
+class CommandLine : public testing::Test {
+ protected:
+  Outcome run(Words words) {
+    words.insert(words.begin(), REBOUNCE_PROGRAM);
+    return Subprocess(words, printed_ / "out", printed_ / "err").finish();
+  }
+
+  /// Runs what must succeed with --json; its summary.
+  nlohmann::json summary_of(Words words) {
+    words.emplace_back("--json");
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    nlohmann::json summary = nlohmann::json::parse(outcome.out, nullptr, false);
+    EXPECT_TRUE(summary.is_object()) << outcome.out;
+    return summary;
+  }
+
+  /// Runs what must fail because of its input: status 1, one line that holds `part`, no file.
+  void expect_refused(Words words, const std::string& part) {
+    const Names before = folder_.names();
+    words.emplace_back("--quiet");
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kBadInput) << outcome.err;
+    EXPECT_EQ(outcome.out, "");
+    EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
+    EXPECT_TRUE(outcome.err.starts_with("rebounce: ")) << outcome.err;
+    EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err << "lacks " << part;
+    EXPECT_EQ(folder_.names(), before) << part;
+  }
+
+  /// Precomputes the Cornell box; its transfer file.
+  std::string precompute(const std::string& name, const Words& options = {}) {
+    Words words = {"precompute", kScene,     "--patches", std::to_string(kPatchCount),
+                   "-o",         path(name), "--quiet"};
+    words.insert(words.end(), options.begin(), options.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+    EXPECT_EQ(outcome.out + outcome.err, "");
+    return path(name);
+  }
+
+  std::string write(const std::string& name, const std::string& text) {
+    write_bytes(folder_ / name, text);
+    return path(name);
+  }
+
+  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  const TemporaryFolder folder_;               // what the program is asked to write
+  const TemporaryFolder printed_{"-printed"};  // what it prints
+};
+
+}  // namespace rebounce::test

@@ -1,0 +1,115 @@
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <stdexcept>
+
+#include "tests/support/expect_error.h"
+#include "tests/support/file_size_limit.h"
+#include "tests/support/temporary_folder.h"
+#include "transfer/file/atomic_file.h"
+
+namespace rebounce {
+namespace {
+
+using test::expect_error;
+using Names = std::vector<std::string>;
+
+std::span<const std::byte> bytes_of(const std::string& text) {
+  return std::as_bytes(std::span(text));
+}
+
+TEST(AtomicFile, AppearsOnCommitAndReplacesWhatWasThere) {
+  const test::TemporaryFolder folder;
+  test::write_bytes(folder / "file", "old and longer");
+  {
+    AtomicFile file(folder / "file");
+    file.write(bytes_of("new "));
+    file.write({});
+    file.write(bytes_of("bytes"));
+    EXPECT_EQ(test::read_bytes(folder / "file"), "old and longer");
+    EXPECT_EQ(file.temporary_path().parent_path(), (folder / "file").parent_path());
+    file.commit();
+  }
+  EXPECT_EQ(test::read_bytes(folder / "file"), "new bytes");
+  EXPECT_EQ(folder.names(), Names{"file"});
+}
+
+TEST(AtomicFile, LeavesTheTargetAloneWhenAnExceptionPasses) {
+  const test::TemporaryFolder folder;
+  test::write_bytes(folder / "file", "old");
+  try {
+    AtomicFile file(folder / "file");
+    file.write(bytes_of("half"));
+    throw std::runtime_error("elsewhere");
+  } catch (const std::runtime_error&) {
+  }
+  EXPECT_EQ(test::read_bytes(folder / "file"), "old");
+  EXPECT_EQ(folder.names(), Names{"file"});
+}
+
+TEST(AtomicFile, ReportsAFullDisk) {
+  const test::TemporaryFolder folder;
+  test::write_bytes(folder / "file", "old");
+  {
+    const test::FileSizeLimit limit(4096);
+    expect_error(
+        [&] {
+          AtomicFile file(folder / "file");
+          file.write(bytes_of(std::string(10'000, 'x')));
+          file.commit();
+        },
+        "cannot write " + (folder / "file").string());
+  }
+  EXPECT_EQ(test::read_bytes(folder / "file"), "old");
+  EXPECT_EQ(folder.names(), Names{"file"});
+}
+
+TEST(AtomicFile, RefusesAMissingFolderAFolderAndADevice) {
+  const test::TemporaryFolder folder;
+  expect_error([&] { AtomicFile(folder / "none/file"); }, "create the folder first");
+  std::filesystem::create_directory(folder / "folder");
+  expect_error([&] { AtomicFile(folder / "folder"); }, "not a regular file");
+  expect_error([&] { AtomicFile(folder / "folder/"); }, "not a regular file");
+  expect_error([&] { AtomicFile("/dev/null"); }, "not a regular file");
+  expect_error([&] { AtomicFile(""); }, "not a regular file");
+  EXPECT_EQ(folder.names(), Names{"folder"});
+}
+
+TEST(AtomicFile, WritesThroughASymbolicLink) {
+  const test::TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "elsewhere");
+  test::write_bytes(folder / "elsewhere/file", "old");
+  std::filesystem::create_symlink(folder / "elsewhere/file", folder / "link");
+  {
+    AtomicFile file(folder / "link");
+    file.write(bytes_of("new"));
+    file.commit();
+  }
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_EQ(test::read_bytes(folder / "elsewhere/file"), "new");
+}
+
+TEST(AtomicFile, TwoAtOnceDoNotMeet) {
+  const test::TemporaryFolder folder;
+  AtomicFile first(folder / "file");
+  AtomicFile second(folder / "file");
+  first.write(bytes_of("first"));
+  second.write(bytes_of("second"));
+  second.commit();
+  first.commit();
+  EXPECT_EQ(test::read_bytes(folder / "file"), "first");
+}
+
+TEST(AtomicFile, HasTheRightsOfAnOrdinaryFile) {
+  const test::TemporaryFolder folder;
+  const mode_t mask = ::umask(022);
+  {
+    AtomicFile file(folder / "file");
+    file.commit();
+  }
+  ::umask(mask);
+  EXPECT_EQ(static_cast<unsigned>(std::filesystem::status(folder / "file").permissions()), 0644U);
+}
+
+}  // namespace
+}  // namespace rebounce

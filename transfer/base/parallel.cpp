@@ -1,0 +1,41 @@
+#include "transfer/base/parallel.h"
+
+namespace rebounce {
+namespace {
+
+void run_here(const ParallelLoop& loop) {
+  for (std::uint32_t i = 0; i < loop.count; ++i) loop.task(loop.context, i);
+}
+
+#ifdef _OPENMP
+/// All loops in one parallel region: threads meet after each of them, but start only once.
+void run_with_openmp(std::initializer_list<ParallelLoop> loops) {
+#pragma omp parallel
+  for (const ParallelLoop& loop : loops) {
+    if (loop.count == 0) continue;
+#pragma omp for schedule(dynamic, 1)
+    for (std::uint32_t i = 0; i < loop.count; ++i) loop.task(loop.context, i);
+  }
+}
+#endif
+
+}  // namespace
+
+void run_in_turn(const Scheduler& scheduler, std::initializer_list<ParallelLoop> loops) {
+#ifdef _OPENMP
+  const auto is_shared = [](const ParallelLoop& loop) { return loop.count > 1; };
+  if (scheduler.parallel_for == nullptr && std::ranges::any_of(loops, is_shared)) {
+    run_with_openmp(loops);
+    return;
+  }
+#endif
+  for (const ParallelLoop& loop : loops) {
+    if (scheduler.parallel_for != nullptr && loop.count > 1) {
+      scheduler.parallel_for(scheduler.user, loop.count, loop.task, loop.context);
+    } else {
+      run_here(loop);
+    }
+  }
+}
+
+}  // namespace rebounce

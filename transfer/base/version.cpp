@@ -1,0 +1,9 @@
+#include "transfer/base/version.h"
+
+namespace rebounce {
+
+const char* version() {
+  return REBOUNCE_VERSION;
+}
+
+}  // namespace rebounce

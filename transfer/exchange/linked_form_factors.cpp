@@ -1,0 +1,353 @@
+#include "transfer/exchange/linked_form_factors.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <string>
+#include <type_traits>
+
+#include "transfer/base/error.h"
+#include "transfer/exchange/links_by_node.h"
+#include "transfer/kernels/kernels.h"
+#include "transfer/kernels/link_gather.h"
+
+namespace rebounce {
+namespace {
+
+[[noreturn]] void refuse(const std::string& reason) {
+  throw Error("links: " + reason + "; make them again");
+}
+
+// Nodes that a task pulls or pushes light through, and nodes that it gathers at.
+constexpr std::size_t kNodesPerTask = 2048, kGatheredPerTask = 128;
+
+/// What gathers along links, many lights with the widest instructions that there are.
+template <typename Columns>
+GatherAlongLinks<Columns> fastest_gather() {
+  if constexpr (std::is_same_v<Columns, ManyFloats>) {
+    return kernels().link.gather_floats;
+  } else if constexpr (std::is_same_v<Columns, ManyDoubles>) {
+    return kernels().link.gather_doubles;
+  } else {
+    return gather_along_links<Columns>;
+  }
+}
+
+std::array<std::uint16_t, 3> bfloat16s(const float* values) {
+  return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
+}
+
+IncomingLink seen_from(std::uint32_t node, const FormFactorLinks& links, std::uint32_t link) {
+  const auto [a, b] = links.pair[link];
+  const float exchange = links.exchange_area[link];
+  const auto of_a = bfloat16s(links.gradient[link].data());
+  const auto of_b = bfloat16s(links.gradient[link].data() + 3);
+  if (a == node) return {of_b, of_a, b, exchange};
+  return {of_a, of_b, a, exchange};
+}
+
+/// Children follow each other level by level, and are as large as their parent together.
+void check_tree(const FormFactorLinks& links, std::size_t n) {
+  const std::size_t m = links.first_child.size();
+  if (n == 0 || m != 2 * n - 1 || links.count.size() != m || links.count[0] != n) {
+    refuse("not a binary tree over the patches");
+  }
+  std::size_t next = 1;
+  for (std::size_t k = 0; k < m; ++k) {
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) {
+      if (links.count[k] != 1) refuse("a leaf is not one patch");
+      continue;
+    }
+    if (child != next || child <= k || next + 2 > m) refuse("nodes are not in order of levels");
+    const std::uint64_t both =
+        static_cast<std::uint64_t>(links.count[child]) + links.count[child + 1];
+    if (both != links.count[k]) refuse("children are not as large as their parent");
+    next += 2;
+  }
+  if (next != m) refuse("a node has no parent");
+}
+
+void check_permutation(const FormFactorLinks& links, std::size_t n) {
+  std::vector<bool> there(n, false);
+  for (const std::uint32_t patch : links.patch) {
+    if (patch >= n || there[patch]) refuse("a patch is not there once");
+    there[patch] = true;
+  }
+}
+
+void check_values(const FormFactorLinks& links) {
+  const auto is_finite = [](float x) { return std::isfinite(x); };
+  const std::size_t m = links.first_child.size();
+  for (const auto& [a, b] : links.pair) {
+    if (a >= m || b >= m) refuse("no such node");
+  }
+  for (const float s : links.exchange_area) {
+    if (!(s >= 0) || !is_finite(s)) refuse("an exchange area is not finite and >= 0");
+  }
+  for (const auto& g : links.gradient) {
+    if (!std::ranges::all_of(g, is_finite)) refuse("a gradient is not finite");
+  }
+  for (const float s : links.scale) {
+    if (!(s >= 0) || !is_finite(s)) refuse("a scale is not finite and >= 0");
+  }
+}
+
+}  // namespace
+
+void check_links(const FormFactorLinks& links, std::size_t patch_count) {
+  const std::size_t l = links.pair.size();
+  if (links.patch.size() != patch_count || links.scale.size() != patch_count) {
+    refuse("they and the patches differ in number");
+  }
+  if (links.exchange_area.size() != l || links.gradient.size() != l) {
+    refuse("their arrays differ in number");
+  }
+  check_tree(links, patch_count);
+  check_permutation(links, patch_count);
+  check_values(links);
+}
+
+std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
+  std::vector<std::uint32_t> begin(links.first_child.size(), 0);
+  for (std::size_t k = 0; k < begin.size(); ++k) {
+    const std::uint32_t child = links.first_child[k];
+    if (child == kNone) continue;
+    begin[child] = begin[k];
+    begin[child + 1] = begin[k] + links.count[child];
+  }
+  return begin;
+}
+
+/// The nodes and their links in the order in which a gather goes through them.
+class LinkedFormFactors::Tree {
+ public:
+  Tree(const FormFactorLinks& links, std::span<const float> area, std::span<const Float3> centroid);
+
+  std::size_t patch_count() const { return scale_.size(); }
+  std::size_t node_count() const { return node_.size(); }
+  std::size_t bytes() const;
+
+  /// Pulls, gathers and pushes; `light` and `arrived` are [m].
+  template <typename Columns, typename Lanes>
+  void gather(std::span<const Columns> in, std::span<Columns> out, LinkLightOf<Lanes>* light,
+              LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node,
+              const Scheduler& scheduler) const;
+
+ private:
+  struct Node {
+    std::uint32_t first_child = kNone;
+    std::uint32_t patch = kNone;  ///< of a leaf
+    float area = 0;
+    float part = 1;        ///< of its parent's area
+    Float3 from_parent{};  ///< its centre less that of its parent, metres
+  };
+
+  void build_tree(const FormFactorLinks& links, std::span<const float> area,
+                  std::span<const Float3> centroid);
+  void place_children(std::span<const std::array<double, 4>> sum);
+  void find_levels();
+  void sort_links(const FormFactorLinks& links);
+
+  template <typename Columns, typename Lanes>
+  void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
+            const Scheduler& scheduler) const;
+  template <typename Lanes, typename Columns>
+  void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out, const Scheduler& scheduler) const;
+
+  std::vector<Node> node_;                     ///< level by level
+  std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number
+  std::vector<std::uint64_t> incoming_begin_;  ///< [m + 1]
+  std::vector<IncomingLink> incoming_;         ///< every link twice, by the node that gathers
+  std::vector<float> scale_;                   ///< [n]
+};
+
+LinkedFormFactors::Tree::Tree(const FormFactorLinks& links, std::span<const float> area,
+                              std::span<const Float3> centroid)
+    : scale_(links.scale) {
+  check_links(links, area.size());
+  if (centroid.size() != area.size()) refuse("centroids and areas differ in number");
+  build_tree(links, area, centroid);
+  sort_links(links);
+}
+
+/// Lays out the nodes, and their areas and centres.
+void LinkedFormFactors::Tree::build_tree(const FormFactorLinks& links, std::span<const float> area,
+                                         std::span<const Float3> centroid) {
+  const std::size_t m = links.first_child.size();
+  const std::vector<std::uint32_t> begin = first_positions(links);
+  node_.resize(m);
+  std::vector<std::array<double, 4>> sum(m);  // area times centroid, area
+  for (std::size_t k = m; k-- > 0;) {
+    Node& node = node_[k];
+    node.first_child = links.first_child[k];
+    if (node.first_child == kNone) node.patch = links.patch[begin[k]];
+    for (int axis = 0; axis < 4; ++axis) {
+      if (node.patch == kNone) {
+        sum[k][axis] = sum[node.first_child][axis] + sum[node.first_child + 1][axis];
+      } else {
+        const double a = area[node.patch];
+        sum[k][axis] = axis < 3 ? a * centroid[node.patch][axis] : a;
+      }
+    }
+    node.area = static_cast<float>(sum[k][3]);
+  }
+  place_children(sum);
+  find_levels();
+}
+
+/// Where children lie in their parent; `sum` has the area times the centre of each node, and the
+/// area.
+void LinkedFormFactors::Tree::place_children(std::span<const std::array<double, 4>> sum) {
+  for (std::size_t k = 0; k < node_.size(); ++k) {
+    if (node_[k].patch != kNone) continue;
+    for (std::uint32_t c = node_[k].first_child; c < node_[k].first_child + 2; ++c) {
+      node_[c].part = static_cast<float>(sum[c][3] / sum[k][3]);
+      for (int axis = 0; axis < 3; ++axis) {
+        node_[c].from_parent[axis] =
+            static_cast<float>(sum[c][axis] / sum[c][3] - sum[k][axis] / sum[k][3]);
+      }
+    }
+  }
+}
+
+/// The root, then its children, then theirs.
+void LinkedFormFactors::Tree::find_levels() {
+  level_begin_ = {0, 1};
+  while (level_begin_.back() < node_.size()) {
+    const std::uint32_t begin = level_begin_[level_begin_.size() - 2], end = level_begin_.back();
+    std::uint32_t next_end = end;
+    for (std::uint32_t k = begin; k < end; ++k) {
+      if (node_[k].patch == kNone) next_end += 2;
+    }
+    level_begin_.push_back(next_end);
+  }
+}
+
+/// Every link twice, once for each of its nodes, by the node that gathers.
+void LinkedFormFactors::Tree::sort_links(const FormFactorLinks& links) {
+  const LinksByNode of_node =
+      links_by_node(node_.size(), links.pair.size(), [&](std::size_t k) { return links.pair[k]; });
+  incoming_begin_ = of_node.offsets();
+  incoming_.reserve(incoming_begin_.back());
+  for (std::uint32_t node = 0; node < node_.size(); ++node) {
+    for (const std::uint32_t link : of_node[node]) {
+      incoming_.push_back(seen_from(node, links, link));
+    }
+  }
+}
+
+std::size_t LinkedFormFactors::Tree::bytes() const {
+  return incoming_.size() * sizeof(IncomingLink) + incoming_begin_.size() * sizeof(std::uint64_t) +
+         2 * node_.size() * sizeof(Node);
+}
+
+template <typename Columns, typename Lanes>
+void LinkedFormFactors::Tree::gather(std::span<const Columns> in, std::span<Columns> out,
+                                     LinkLightOf<Lanes>* light, LinkLightOf<Lanes>* arrived,
+                                     GatherAlongLinks<Lanes> gather_node,
+                                     const Scheduler& scheduler) const {
+  assert(in.size() == patch_count() && out.size() == patch_count());
+  pull(in, light, scheduler);
+  parallel_for_pieces(scheduler, node_.size(), kGatheredPerTask, [&](std::size_t k) {
+    arrived[k] = gather_node(incoming_.data() + incoming_begin_[k],
+                             incoming_begin_[k + 1] - incoming_begin_[k], light);
+  });
+  push(arrived, out, scheduler);
+}
+
+template <typename Columns, typename Lanes>
+void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
+                                   const Scheduler& scheduler) const {
+  for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
+    const std::uint32_t begin = level_begin_[level], count = level_begin_[level + 1] - begin;
+    parallel_for_pieces(scheduler, count, kNodesPerTask, [&](std::size_t of_level) {
+      const std::size_t k = begin + of_level;
+      const Node& node = node_[k];
+      LinkLightOf<Lanes> sum{};
+      if (node.patch != kNone) {
+        const Columns& x = in[node.patch];
+        for (std::size_t c = 0; c < x.size(); ++c) sum.mean[c] = scale_[node.patch] * x[c];
+      } else {
+        for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+          const Node& child = node_[c];
+          add_scaled(sum.mean, child.part, light[c].mean);
+          for (int axis = 0; axis < 3; ++axis) {
+            add_scaled(sum.first[axis], child.part, light[c].first[axis]);
+            add_scaled(sum.first[axis], child.part * child.from_parent[axis], light[c].mean);
+          }
+        }
+      }
+      light[k] = sum;
+    });
+  }
+}
+
+template <typename Lanes, typename Columns>
+void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Columns> out,
+                                   const Scheduler& scheduler) const {
+  for (std::size_t level = 0; level + 1 < level_begin_.size(); ++level) {
+    const std::uint32_t begin = level_begin_[level], count = level_begin_[level + 1] - begin;
+    parallel_for_pieces(scheduler, count, kNodesPerTask, [&](std::size_t of_level) {
+      const std::size_t k = begin + of_level;
+      const Node& node = node_[k];
+      const LinkLightOf<Lanes>& here = arrived[k];
+      if (node.patch != kNone) {
+        const typename Lanes::value_type scale = scale_[node.patch], factor = scale / node.area;
+        Columns& y = out[node.patch];
+        for (std::size_t c = 0; c < y.size(); ++c) y[c] = factor * here.mean[c];
+        return;
+      }
+      for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+        const Node& child = node_[c];
+        add_scaled(arrived[c].mean, child.part, here.mean);
+        for (int axis = 0; axis < 3; ++axis) {
+          add_scaled(arrived[c].mean, child.part * child.from_parent[axis], here.first[axis]);
+          add_scaled(arrived[c].first[axis], child.part, here.first[axis]);
+        }
+      }
+    });
+  }
+}
+
+LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
+                                     std::span<const Float3> centroid)
+    : tree_(std::make_shared<const Tree>(links, area, centroid)) {}
+
+std::size_t LinkedFormFactors::patch_count() const {
+  return tree_->patch_count();
+}
+
+std::size_t LinkedFormFactors::node_count() const {
+  return tree_->node_count();
+}
+
+std::size_t LinkedFormFactors::bytes() const {
+  return tree_->bytes();
+}
+
+std::size_t LinkedFormFactors::workspace_size() const {
+  return 2 * node_count() * sizeof(LinkLight) / sizeof(float);
+}
+
+void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
+                               std::span<float> workspace, const Scheduler& scheduler) const {
+  assert(workspace.size() >= workspace_size());
+  auto* light = reinterpret_cast<LinkLight*>(workspace.data());
+  tree_->gather(in, out, light, light + node_count(), kernels().link.gather, scheduler);
+}
+
+template <typename Columns>
+void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
+  std::vector<LinkLightOf<Columns>> light(node_count()), arrived(node_count());
+  tree_->gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>(), {});
+}
+
+template void LinkedFormFactors::gather(std::span<const std::array<float, 3>>,
+                                        std::span<std::array<float, 3>>) const;
+template void LinkedFormFactors::gather(std::span<const ManyFloats>, std::span<ManyFloats>) const;
+template void LinkedFormFactors::gather(std::span<const std::array<double, 3>>,
+                                        std::span<std::array<double, 3>>) const;
+template void LinkedFormFactors::gather(std::span<const ManyDoubles>, std::span<ManyDoubles>) const;
+
+}  // namespace rebounce

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "transfer/base/grouped.h"
+
+namespace rebounce {
+
+using LinksByNode = Grouped<std::uint64_t>;
+
+/// Which links each node has; a link between two nodes is with both. `ends`(k) are the two nodes of
+/// link k, as an array.
+template <typename Ends>
+LinksByNode links_by_node(std::size_t node_count, std::size_t link_count, const Ends& ends) {
+  return {node_count, [&](const auto& add) {
+            for (std::uint32_t k = 0; k < link_count; ++k) {
+              const auto [a, b] = ends(k);
+              add(a, k);
+              if (a != b) add(b, k);
+            }
+          }};
+}
+
+}  // namespace rebounce

@@ -1,0 +1,73 @@
+#include "transfer/file/mapped_file.h"
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <memory>
+#include <string>
+#include <system_error>
+
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+[[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
+  throw Error("cannot read " + path.string() + ": " + reason + "; check the name and its rights");
+}
+
+class Descriptor {
+ public:
+  explicit Descriptor(const std::filesystem::path& path)
+      // Not blocking: a pipe must be refused, not waited for.
+      : value_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
+    if (value_ < 0) fail(path, std::generic_category().message(errno));
+  }
+  ~Descriptor() { ::close(value_); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int value() const { return value_; }
+
+ private:
+  int value_;
+};
+
+class Mapping {
+ public:
+  Mapping(const std::filesystem::path& path, const Descriptor& descriptor, std::size_t size)
+      : address_(::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor.value(), 0)),
+        size_(size) {
+    if (address_ == MAP_FAILED) fail(path, std::generic_category().message(errno));
+  }
+  ~Mapping() { ::munmap(address_, size_); }
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+  std::span<const std::byte> bytes() const {
+    return {static_cast<const std::byte*>(address_), size_};
+  }
+
+ private:
+  void* address_;
+  std::size_t size_;
+};
+
+}  // namespace
+
+SharedArray<std::byte> map_file(const std::filesystem::path& path) {
+  const Descriptor descriptor(path);
+  struct stat status {};
+  if (::fstat(descriptor.value(), &status) != 0) {
+    fail(path, std::generic_category().message(errno));
+  }
+  if (!S_ISREG(status.st_mode)) fail(path, "it is not a regular file");
+  if (status.st_size == 0) return {};  // mmap refuses to map nothing
+  auto mapping =
+      std::make_shared<const Mapping>(path, descriptor, static_cast<std::size_t>(status.st_size));
+  const std::span<const std::byte> bytes = mapping->bytes();
+  return {bytes, std::move(mapping)};
+}
+
+}  // namespace rebounce

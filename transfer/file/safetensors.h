@@ -1,0 +1,146 @@
+#pragma once
+
+// The safetensors container: an 8-byte little-endian header length, a JSON header that names the
+// type, shape and place of each tensor, then the tensors, without holes. There is no code in it,
+// and it can be read in place. https://github.com/huggingface/safetensors
+
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "transfer/base/shared_array.h"
+
+namespace rebounce {
+
+enum class TensorType : std::uint8_t {
+  kBool,
+  kU8,
+  kI8,
+  kU16,
+  kI16,
+  kF16,
+  kBF16,
+  kU32,
+  kI32,
+  kF32,
+  kU64,
+  kI64,
+  kF64,
+};
+
+/// Bytes of one element.
+std::size_t element_size(TensorType type);
+
+/// The tensor type that stores a C++ type as it is.
+template <typename T>
+constexpr TensorType tensor_type() {
+  if constexpr (std::same_as<T, std::uint8_t>)
+    return TensorType::kU8;
+  else if constexpr (std::same_as<T, std::uint16_t>)
+    return TensorType::kU16;
+  else if constexpr (std::same_as<T, std::uint32_t>)
+    return TensorType::kU32;
+  else if constexpr (std::same_as<T, std::uint64_t>)
+    return TensorType::kU64;
+  else if constexpr (std::same_as<T, float>)
+    return TensorType::kF32;
+  else {
+    static_assert(std::same_as<T, double>, "no tensor type stores this C++ type");
+    return TensorType::kF64;
+  }
+}
+
+using TensorShape = std::vector<std::uint64_t>;
+using SafetensorsMetadata = std::map<std::string, std::string>;
+
+/// A tensor to be written; its bytes are borrowed until they are.
+struct TensorView {
+  std::string name;  ///< unique in the file, and not "__metadata__"
+  TensorType type = TensorType::kU8;
+  TensorShape shape;                 ///< outermost dimension first
+  std::span<const std::byte> bytes;  ///< element_size(type) x the product of `shape`, row-major
+};
+
+/// A file that is ready to be written: `prefix`, then the bytes of each tensor in turn.
+///
+/// The first tensor begins at a multiple of 64 bytes. Tensors come in descending order of the
+/// largest power of two, at most 64, that divides their size (names in ascending order within one):
+/// each is aligned to that power, hence to its element, and one of a size that is a multiple of 64
+/// to 64, all of it without the holes that the format forbids.
+struct SafetensorsLayout {
+  std::string prefix;  ///< header length and header
+  std::vector<TensorView> tensors;
+};
+
+/// Plans a file. The same input gives the same bytes; keys are sorted, and a byte of `metadata`
+/// that is not UTF-8 becomes U+FFFD. Throws Error when two tensors share a name.
+SafetensorsLayout lay_out_safetensors(std::vector<TensorView> tensors,
+                                      const SafetensorsMetadata& metadata);
+
+/// Writes a planned file, whole or not at all (see AtomicFile). Throws Error when it cannot.
+void write_safetensors(const std::filesystem::path& path, const SafetensorsLayout& layout);
+
+/// Where a tensor of a file lies, and what it is.
+struct TensorInfo {
+  TensorType type = TensorType::kU8;
+  TensorShape shape;
+  std::uint64_t begin = 0;  ///< bytes from the start of the data section
+  std::uint64_t end = 0;
+};
+
+/// In an expected shape: any number.
+inline constexpr std::uint64_t kAnySize = ~std::uint64_t{0};
+
+/// A safetensors file, of which everything but the values has been checked: the header is whole, at
+/// most 100 MB and sound; names are unique, types known, sizes those of the shapes; the tensors
+/// fill the data section without hole, overlap or rest.
+class SafetensorsFile {
+ public:
+  /// Maps and checks the file. Throws Error when it cannot be read or is not sound.
+  explicit SafetensorsFile(const std::filesystem::path& path);
+
+  /// Checks a file that is in memory already; `name` stands for it in messages.
+  SafetensorsFile(SharedArray<std::byte> bytes, std::string name);
+
+  const std::string& name() const { return name_; }
+  const SafetensorsMetadata& metadata() const { return metadata_; }
+  const std::map<std::string, TensorInfo>& tensors() const { return tensors_; }
+
+  /// Header length and header, and the data section after them.
+  std::span<const std::byte> prefix() const { return bytes_.span().first(prefix_size_); }
+  std::span<const std::byte> data() const { return bytes_.span().subspan(prefix_size_); }
+
+  /// Throws Error when there is no such tensor.
+  const TensorInfo& info(const std::string& tensor) const;
+
+  /// The values of a tensor, in place: the array keeps the file's memory alive. `shape` is what it
+  /// must be, with kAnySize where any size will do. Throws Error, naming the tensor, when there is
+  /// none or its type, shape or alignment is another.
+  template <typename T>
+  SharedArray<T> tensor(const std::string& tensor, const TensorShape& shape,
+                        TensorType type = tensor_type<T>()) const {
+    const std::span<const std::byte> bytes = checked_bytes(tensor, shape, type, alignof(T));
+    return {{reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)}, bytes_.owner()};
+  }
+
+ private:
+  void parse_header(std::string_view header);
+  void check_contiguous() const;
+  std::span<const std::byte> checked_bytes(const std::string& tensor, const TensorShape& shape,
+                                           TensorType type, std::size_t alignment) const;
+
+  SharedArray<std::byte> bytes_;
+  std::string name_;
+  std::size_t prefix_size_ = 0;
+  SafetensorsMetadata metadata_;
+  std::map<std::string, TensorInfo> tensors_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,24 @@
+#pragma once
+
+// The transfer file: a safetensors container; notes/file_format.md documents every tensor.
+
+#include <filesystem>
+#include <memory>
+
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// Raised whenever a file of the previous version can no longer be read or means something else.
+inline constexpr int kFileFormatVersion = 6;
+
+/// Writes `data` whole or not at all: into a temporary file beside `path`, flushed to disk and then
+/// renamed over it. Throws Error when the folder is missing, not writable or full.
+void save_transfer_file(const std::filesystem::path& path, const TransferData& data);
+
+/// Loads a transfer file, mapping the operator and the form factors instead of copying them.
+/// Verifies version, checksum, the size and range of every tensor before anything is used; throws
+/// Error with the reason when the file is not one, is damaged, or is of another version.
+TransferData load_transfer_file(const std::filesystem::path& path);
+
+}  // namespace rebounce

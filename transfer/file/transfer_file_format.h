@@ -1,0 +1,268 @@
+#pragma once
+
+// The names in a transfer file, once for its writer, its reader and its checks. What they mean is
+// in notes/file_format.md.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include "transfer/file/content_hash.h"
+#include "transfer/file/safetensors.h"
+#include "transfer/file/transfer_data.h"
+#include "transfer/format/operator_format.h"
+
+namespace rebounce {
+
+inline constexpr char kFormatName[] = "rebounce transfer";
+
+namespace key {
+inline constexpr char kFormat[] = "format";
+inline constexpr char kFormatVersion[] = "format_version";
+inline constexpr char kChecksum[] = "checksum";
+inline constexpr char kOperator[] = "operator";
+inline constexpr char kNames[] = "names";
+}  // namespace key
+
+namespace tensor {
+inline constexpr char kOpacityMap[] = "mesh.opacity_map";  // a file without it has no opacity maps
+inline constexpr char kRowBegin[] = "form_factor.row_begin";
+inline constexpr char kColumn[] = "form_factor.column";
+inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
+inline constexpr char kLinksPatch[] = "links.patch";
+inline constexpr char kProbePosition[] = "probe.position";
+inline constexpr char kProbeGrid[] = "probe.grid";
+inline constexpr char kProbeSkyBegin[] = "probe.sky_begin";
+inline constexpr char kLightmapSize[] = "lightmap.size";
+inline constexpr char kSkyBegin[] = "sky.entry_begin";
+inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
+inline constexpr char kSurfaceSkyBegin[] = "surface_harmonics.sky_begin";
+inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
+inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
+inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
+inline constexpr char kLowRankCore[] = "transfer.low_rank.core";
+inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matrix";
+}  // namespace tensor
+
+/// The tensors of a hierarchical operator; `role` is null where every patch has both roles.
+struct HierarchicalTensors {
+  const char *patch, *blocks, *bases, *values, *channel_matrix, *role, *moment_scale,
+      *scale_exponent;
+};
+
+inline constexpr HierarchicalTensors kHierarchicalTransfer = {
+    "transfer.hierarchical.patch",          "transfer.hierarchical.blocks",
+    "transfer.hierarchical.bases",          "transfer.hierarchical.values",
+    "transfer.hierarchical.channel_matrix", "transfer.hierarchical.role",
+    "transfer.hierarchical.moment_scale",   "transfer.hierarchical.scale_exponent"};
+inline constexpr HierarchicalTensors kCompressedFormFactors = {
+    "form_factor.hierarchical.patch",
+    "form_factor.hierarchical.blocks",
+    "form_factor.hierarchical.bases",
+    "form_factor.hierarchical.values",
+    "form_factor.hierarchical.channel_matrix",
+    nullptr,
+    nullptr,
+    "form_factor.hierarchical.scale_exponent"};
+
+/// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
+/// order.
+using StoredBlock = std::array<std::uint32_t, 9>;
+
+inline std::string texture_tensor(std::size_t texture) {
+  return "texture." + std::to_string(texture);
+}
+
+/// How one entry of an array is stored: `Scalar`s, `kColumns` to a row.
+template <typename T>
+struct Stored {
+  using Scalar = std::conditional_t<std::is_enum_v<T> || std::is_same_v<T, bool>, std::uint8_t, T>;
+  static constexpr std::uint64_t kColumns = 1;
+};
+template <typename T, std::size_t N>
+struct Stored<std::array<T, N>> {
+  using Scalar = T;
+  static constexpr std::uint64_t kColumns = N;
+};
+
+/// [rows] for scalars, [rows, columns] for the rest.
+template <typename T>
+TensorShape stored_shape(std::uint64_t rows) {
+  if constexpr (Stored<T>::kColumns == 1)
+    return {rows};
+  else
+    return {rows, Stored<T>::kColumns};
+}
+
+// visit(name, array) for each tensor that is an array of the data.
+template <typename Patches, typename Visit>
+void visit_tensors_of_patches(Patches& patches, Visit&& visit) {
+  visit("patch.area", patches.area);
+  visit("patch.centroid", patches.centroid);
+  visit("patch.normal", patches.normal);
+  visit("patch.reflectance", patches.reflectance);
+  visit("patch.emitted_exitance", patches.emitted_exitance);
+  visit("patch.sky_visibility", patches.sky_visibility);
+  visit("patch.absorbed", patches.absorbed);
+}
+
+template <typename Mesh, typename Visit>
+void visit_tensors_of_mesh(Mesh& mesh, Visit&& visit) {
+  visit("mesh.position", mesh.position);
+  visit("mesh.normal", mesh.normal);
+  visit("mesh.base_color_texcoord", mesh.base_color_texcoord);
+  visit("mesh.emissive_texcoord", mesh.emissive_texcoord);
+  visit("mesh.vertex_color", mesh.vertex_color);
+  visit("mesh.triangle", mesh.triangle);
+  visit("mesh.triangle_patch", mesh.triangle_patch);
+  visit("mesh.triangle_material", mesh.triangle_material);
+  visit("mesh.back_triangle", mesh.back_triangle);
+  visit("mesh.weight_begin", mesh.weight_begin);
+  visit("mesh.weight_patch", mesh.weight_patch);
+  visit("mesh.weight", mesh.weight);
+}
+
+template <typename Probes, typename Visit>
+void visit_tensors_of_probes(Probes& probes, Visit&& visit) {
+  visit("probe.position", probes.position);
+  visit("probe.valid", probes.valid);
+  visit("probe.sky", probes.sky);
+  visit("probe.entry_begin", probes.entry_begin);
+  visit("probe.entry_patch", probes.entry_patch);
+  visit("probe.entry_weight", probes.entry_weight);
+}
+
+template <typename Cells, typename Visit>
+void visit_tensors_of_probe_sky(Cells& cells, Visit&& visit) {
+  visit(tensor::kProbeSkyBegin, cells.entry_begin);
+  visit("probe.sky_cell", cells.entry_cell);
+  visit("probe.sky_weight", cells.entry_weight);
+}
+
+template <typename Cells, typename Visit>
+void visit_tensors_of_sky(Cells& cells, Visit&& visit) {
+  visit(tensor::kSkyBegin, cells.entry_begin);
+  visit("sky.entry_cell", cells.entry_cell);
+  visit("sky.entry_part", cells.entry_part);
+}
+
+template <typename Light, typename Visit>
+void visit_tensors_of_surface_harmonics(Light& harmonics, Visit&& visit) {
+  visit(tensor::kSurfaceSky, harmonics.sky);
+  visit("surface_harmonics.entry_begin", harmonics.entry_begin);
+  visit("surface_harmonics.entry_patch", harmonics.entry_patch);
+  visit("surface_harmonics.entry_weight", harmonics.entry_weight);
+}
+
+template <typename Cells, typename Visit>
+void visit_tensors_of_surface_sky(Cells& cells, Visit&& visit) {
+  visit(tensor::kSurfaceSkyBegin, cells.entry_begin);
+  visit("surface_harmonics.sky_cell", cells.entry_cell);
+  visit("surface_harmonics.sky_weight", cells.entry_weight);
+}
+
+template <typename Map, typename Visit>
+void visit_tensors_of_lightmap(Map& map, Visit&& visit) {
+  visit("lightmap.texcoord", map.texcoord);
+  visit("lightmap.has_texels", map.has_texels);
+  visit("lightmap.triangle", map.triangle);
+  visit("lightmap.weight", map.weight);
+}
+
+template <typename Maps, typename Visit>
+void visit_tensors_of_opacity(Maps& maps, Visit&& visit) {
+  visit(tensor::kOpacityMap, maps.triangle_map);
+  visit("mesh.opacity_begin", maps.begin);
+  visit("mesh.opacity", maps.opacity);
+}
+
+template <typename Links, typename Visit>
+void visit_tensors_of_links(Links& links, Visit&& visit) {
+  visit(tensor::kLinksPatch, links.patch);
+  visit("links.first_child", links.first_child);
+  visit("links.count", links.count);
+  visit("links.pair", links.pair);
+  visit("links.exchange_area", links.exchange_area);
+  visit("links.gradient", links.gradient);
+  visit("links.scale", links.scale);
+}
+
+// visit(name, items, member) for each tensor that is a member of every item of an array.
+template <typename Data, typename Visit>
+void visit_tensors_of_scene(Data& data, Visit&& visit) {
+  visit("material.base_color", data.materials, &Material::base_color);
+  visit("material.emitted_luminance", data.materials, &Material::emitted_luminance);
+  visit("material.base_color_texture", data.materials, &Material::base_color_texture);
+  visit("material.emissive_texture", data.materials, &Material::emissive_texture);
+  visit("material.double_sided", data.materials, &Material::double_sided);
+  visit("material.alpha_mode", data.materials, &Material::alpha_mode);
+  visit("material.alpha_cutoff", data.materials, &Material::alpha_cutoff);
+  visit("material.base_alpha", data.materials, &Material::base_alpha);
+  visit("material.transmission", data.materials, &Material::transmission);
+  visit("texture.wrap_s", data.textures, &Texture::wrap_s);
+  visit("texture.wrap_t", data.textures, &Texture::wrap_t);
+  visit("camera.position", data.cameras, &Camera::position);
+  visit("camera.right", data.cameras, &Camera::right);
+  visit("camera.up", data.cameras, &Camera::up);
+  visit("camera.backward", data.cameras, &Camera::backward);
+  visit("camera.vertical_fov", data.cameras, &Camera::vertical_fov);
+  visit("light.type", data.lights, &Light::type);
+  visit("light.position", data.lights, &Light::position);
+  visit("light.direction", data.lights, &Light::direction);
+  visit("light.color", data.lights, &Light::color);
+  visit("light.intensity", data.lights, &Light::intensity);
+  visit("light.range", data.lights, &Light::range);
+  visit("light.inner_cone_angle", data.lights, &Light::inner_cone_angle);
+  visit("light.outer_cone_angle", data.lights, &Light::outer_cone_angle);
+}
+
+// visit(key, value) for each member of the record that is a text, and each that is a number.
+template <typename Record, typename Visit>
+void visit_texts_of_record(Record& record, Visit&& visit) {
+  visit("generator", record.generator);
+  visit("scene_name", record.scene_name);
+  visit("scene_hash", record.scene_hash);
+  visit("settings", record.settings_json);
+  visit("report", record.report_json);
+}
+
+template <typename Record, typename Visit>
+void visit_numbers_of_record(Record& record, Visit&& visit) {
+  visit("solve_residual", record.solve_residual);
+  visit("tolerance", record.tolerance);
+  visit("error_mean", record.error_mean);
+  visit("error_max", record.error_max);
+  visit("error_bound", record.error_bound);
+}
+
+// visit(kind, items) for each array whose items have names.
+template <typename Data, typename Visit>
+void visit_named_items(Data& data, Visit&& visit) {
+  visit("materials", data.materials);
+  visit("cameras", data.cameras);
+  visit("lights", data.lights);
+}
+
+/// Where the checksum's digits are in a file's prefix, or npos if that is not one place.
+std::size_t find_checksum_digits(std::string_view prefix);
+
+/// The checksum of a whole file: `prefix` with its checksum's digits, at `digits`, read as zeros,
+/// then `data`.
+class FileChecksum {
+ public:
+  FileChecksum(std::string_view prefix, std::size_t digits);
+  void update(std::span<const std::byte> data) { hash_.update(data); }
+  std::string text() const { return hash_.text(); }
+
+ private:
+  ContentHash hash_;
+};
+
+/// What the checksum is before it is known.
+std::string zero_checksum();
+
+}  // namespace rebounce

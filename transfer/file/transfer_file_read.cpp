@@ -1,0 +1,429 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "transfer/base/error.h"
+#include "transfer/exchange/form_factor_blocks.h"
+#include "transfer/file/checked_json.h"
+#include "transfer/file/transfer_data_check.h"
+#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_format.h"
+#include "transfer/format/hierarchical_storage.h"
+#include "transfer/operator/dense_operator.h"
+#include "transfer/operator/hierarchical_operator.h"
+#include "transfer/operator/low_rank_operator.h"
+
+namespace rebounce {
+namespace {
+
+using nlohmann::json;
+
+// Settings and reports nest by subject; nothing of ours comes near.
+constexpr std::size_t kRecordDepth = 16;
+
+[[noreturn]] void refuse(const SafetensorsFile& file, const std::string& reason) {
+  throw Error(file.name() + ": " + reason + "; make the file again");
+}
+
+const std::string& metadata(const SafetensorsFile& file, const char* name) {
+  const auto found = file.metadata().find(name);
+  if (found == file.metadata().end()) refuse(file, std::string("metadata ") + name + " is missing");
+  return found->second;
+}
+
+template <typename Number>
+Number number(const SafetensorsFile& file, const char* name) {
+  const std::string& text = metadata(file, name);
+  const char* end = text.data() + text.size();
+  Number value{};
+  const auto result = std::from_chars(text.data(), end, value);
+  if (result.ec != std::errc() || result.ptr != end) {
+    refuse(file, std::string("metadata ") + name + " is not a number");
+  }
+  return value;
+}
+
+void check_version(const SafetensorsFile& file) {
+  const auto format = file.metadata().find(key::kFormat);
+  if (format == file.metadata().end() || format->second != kFormatName) {
+    throw Error(file.name() + " is not a transfer file; give one that Rebounce wrote");
+  }
+  const int version = number<int>(file, key::kFormatVersion);
+  if (version != kFileFormatVersion) {
+    throw Error(file.name() + " is of format version " + std::to_string(version) +
+                ", and this program reads version " + std::to_string(kFileFormatVersion) +
+                "; make the file again with this program");
+  }
+}
+
+void check_checksum(const SafetensorsFile& file) {
+  const auto bytes = file.prefix();
+  const std::string_view prefix(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::size_t digits = find_checksum_digits(prefix);
+  if (digits == std::string_view::npos) refuse(file, "the checksum is missing");
+  FileChecksum checksum(prefix, digits);
+  checksum.update(file.data());
+  if (checksum.text() != metadata(file, key::kChecksum)) {
+    refuse(file, "the checksum does not match, the file is damaged");
+  }
+}
+
+/// The largest byte that stores a flag or an enumerator.
+template <typename T>
+constexpr std::uint8_t kLastByte = 0;
+template <>
+constexpr std::uint8_t kLastByte<bool> = 1;
+template <>
+constexpr std::uint8_t kLastByte<LightType> = static_cast<std::uint8_t>(LightType::kDirectional);
+template <>
+constexpr std::uint8_t kLastByte<AlphaMode> = static_cast<std::uint8_t>(AlphaMode::kBlend);
+template <>
+constexpr std::uint8_t kLastByte<TextureWrap> =
+    static_cast<std::uint8_t>(TextureWrap::kMirroredRepeat);
+
+/// Fills arrays, and members of arrays of structs, from tensors.
+class TensorReader {
+ public:
+  explicit TensorReader(const SafetensorsFile& file) : file_(file) {}
+
+  template <typename T>
+  void operator()(const char* name, std::vector<T>& values) const {
+    const auto scalars = scalars_of<T>(name, kAnySize);
+    values.resize(scalars.size() / Stored<T>::kColumns);
+    if (!values.empty()) std::memcpy(values.data(), scalars.data(), scalars.size_bytes());
+  }
+
+  template <typename Item, typename T>
+  void operator()(const char* name, std::vector<Item>& items, T Item::*member) const {
+    const auto scalars = scalars_of<T>(name, items.size());
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      assign(name, i, scalars.data() + i * Stored<T>::kColumns, items[i].*member);
+    }
+  }
+
+  /// Of a tensor that stores this member.
+  template <typename Item, typename T>
+  std::size_t row_count(const char* name, T Item::* /*member*/) const {
+    return scalars_of<T>(name, kAnySize).size() / Stored<T>::kColumns;
+  }
+
+ private:
+  template <typename T>
+  SharedArray<typename Stored<T>::Scalar> scalars_of(const char* name, std::uint64_t rows) const {
+    return file_.tensor<typename Stored<T>::Scalar>(name, stored_shape<T>(rows));
+  }
+
+  template <typename T>
+  void assign(const char* name, std::size_t entry, const typename Stored<T>::Scalar* from,
+              T& to) const {
+    if constexpr (std::is_enum_v<T> || std::is_same_v<T, bool>) {
+      if (*from > kLastByte<T>) {
+        refuse(file_, std::string("tensor ") + name + ": entry " + std::to_string(entry) + " is " +
+                          std::to_string(*from) + ", not at most " + std::to_string(kLastByte<T>));
+      }
+      to = static_cast<T>(*from);
+    } else {
+      std::memcpy(&to, from, sizeof(T));
+    }
+  }
+
+  const SafetensorsFile& file_;
+};
+
+void read_textures(const SafetensorsFile& file, std::vector<Texture>& textures) {
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    const auto encoded = file.tensor<std::uint8_t>(texture_tensor(i), {kAnySize});
+    textures[i].encoded.assign(encoded.begin(), encoded.end());
+  }
+}
+
+template <typename Item>
+void read_names(const SafetensorsFile& file, const json& names, const char* kind,
+                std::vector<Item>& items) {
+  const json list = names.value(kind, json());
+  if (!list.is_array() || list.size() != items.size()) {
+    refuse(file, std::string("metadata names: not one for each of the ") + kind);
+  }
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (!list[i].is_string()) refuse(file, "metadata names: something else than a string");
+    items[i].name = list[i].template get<std::string>();
+  }
+}
+
+json parse_object(const SafetensorsFile& file, const char* name) {
+  try {
+    json value = parse_untrusted_json(metadata(file, name), kRecordDepth);
+    if (!value.is_object()) throw Error("not an object");
+    return value;
+  } catch (const Error& error) {
+    refuse(file, std::string("metadata ") + name + ": " + error.what());
+  }
+}
+
+void read_scene(const SafetensorsFile& file, TransferData& data) {
+  const TensorReader reader(file);
+  data.materials.resize(reader.row_count("material.base_color", &Material::base_color));
+  data.textures.resize(reader.row_count("texture.wrap_s", &Texture::wrap_s));
+  data.cameras.resize(reader.row_count("camera.position", &Camera::position));
+  data.lights.resize(reader.row_count("light.position", &Light::position));
+  visit_tensors_of_scene(data, reader);
+  read_textures(file, data.textures);
+  const json names = parse_object(file, key::kNames);
+  visit_named_items(data,
+                    [&](const char* kind, auto& items) { read_names(file, names, kind, items); });
+}
+
+/// Empty if the file has none.
+ExchangeMatrix read_exchange(const SafetensorsFile& file) {
+  if (!file.tensors().contains(tensor::kRowBegin)) return {};
+  return {file.tensor<std::uint64_t>(tensor::kRowBegin, {kAnySize}),
+          file.tensor<std::uint32_t>(tensor::kColumn, {kAnySize}),
+          file.tensor<float>(tensor::kExchangeArea, {kAnySize})};
+}
+
+/// Empty if the file has none.
+FormFactorLinks read_links(const SafetensorsFile& file, const PatchTable& patches) {
+  FormFactorLinks links;
+  if (!file.tensors().contains(tensor::kLinksPatch)) return links;
+  visit_tensors_of_links(links, TensorReader(file));
+  try {
+    check_links(links, patches.size());
+  } catch (const Error& error) {
+    refuse(file, error.what());
+  }
+  return links;
+}
+
+BuildRecord read_record(const SafetensorsFile& file) {
+  BuildRecord record;
+  visit_texts_of_record(record,
+                        [&](const char* name, std::string& text) { text = metadata(file, name); });
+  visit_numbers_of_record(record, [&](const char* name, double& value) {
+    value = number<double>(file, name);
+    if (!std::isfinite(value) || value < 0) {
+      refuse(file, std::string("metadata ") + name + " is not finite and >= 0");
+    }
+  });
+  for (const char* name : {"settings", "report"}) {
+    if (!metadata(file, name).empty()) parse_object(file, name);
+  }
+  return record;
+}
+
+/// Which of `matrix_count` matrices each channel uses.
+std::array<std::uint32_t, kChannelCount> read_channel_matrix(const SafetensorsFile& file,
+                                                             const char* name,
+                                                             std::uint32_t matrix_count) {
+  const auto stored = file.tensor<std::uint32_t>(name, {kChannelCount});
+  std::array<std::uint32_t, kChannelCount> channel_matrix{};
+  for (std::size_t channel = 0; channel < stored.size(); ++channel) {
+    if (stored[channel] >= matrix_count) {
+      refuse(file, std::string("tensor ") + name + ": no such matrix");
+    }
+    channel_matrix[channel] = stored[channel];
+  }
+  return channel_matrix;
+}
+
+std::shared_ptr<const DenseOperator> read_dense_operator(const SafetensorsFile& file,
+                                                         const std::vector<float>& area) {
+  DenseOperator::Storage storage;
+  storage.area = area;
+  const TensorInfo& tiles = file.info(tensor::kDenseTiles);
+  const TensorShape shape{kAnySize, DenseOperator::tile_count(area.size()), DenseOperator::kTile,
+                          DenseOperator::kTile};
+  if (tiles.type == TensorType::kF16) {
+    storage.precision = Precision::kF16;
+    storage.tiles_f16 = file.tensor<std::uint16_t>(tensor::kDenseTiles, shape, TensorType::kF16);
+  } else {
+    storage.tiles_f32 = file.tensor<float>(tensor::kDenseTiles, shape);
+  }
+  if (tiles.shape[0] < 1 || tiles.shape[0] > kChannelCount) {
+    refuse(file, std::string("tensor ") + tensor::kDenseTiles + ": not 1, 2 or 3 matrices");
+  }
+  storage.matrix_count = static_cast<std::uint32_t>(tiles.shape[0]);
+  storage.channel_matrix =
+      read_channel_matrix(file, tensor::kDenseChannelMatrix, storage.matrix_count);
+  return std::make_shared<const DenseOperator>(std::move(storage));
+}
+
+std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* name) {
+  std::vector<StoredBlock> stored;
+  TensorReader{file}(name, stored);
+  std::vector<TransferBlock> blocks;
+  blocks.reserve(stored.size());
+  for (const StoredBlock& b : stored) {
+    blocks.push_back(
+        {b[0], b[1], b[2], b[3], static_cast<TransferBlock::Kind>(b[4]), b[5], b[6], b[7], b[8]});
+  }
+  return blocks;
+}
+
+void read_integer_bases(const SafetensorsFile& file, const char* name,
+                        HierarchicalStorage& storage) {
+  if (file.info(name).type == TensorType::kI16) {
+    storage.precision = Precision::kQ16;
+    storage.bases_q16 = file.tensor<std::int16_t>(name, {kAnySize}, TensorType::kI16);
+  } else {
+    storage.precision = Precision::kQ8;
+    storage.bases_q8 = file.tensor<std::int8_t>(name, {kAnySize}, TensorType::kI8);
+  }
+}
+
+/// A file without the tensor has an operator that serves all patches.
+PatchRoles read_roles(const SafetensorsFile& file, const char* name, std::size_t patch_count) {
+  if (name == nullptr || !file.tensors().contains(name)) return {};
+  const auto stored = file.tensor<std::uint8_t>(name, {patch_count});
+  PatchRoles roles;
+  roles.role.assign(stored.begin(), stored.end());
+  return roles;
+}
+
+std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
+    const SafetensorsFile& file, const HierarchicalTensors& names, const std::vector<float>& area) {
+  HierarchicalStorage storage;
+  storage.area = area;
+  storage.order = HierarchicalStorage::Order::kStreamed;
+  TensorReader{file}(names.patch, storage.patch);
+  storage.blocks = read_blocks(file, names.blocks);
+  storage.channel_matrix = read_channel_matrix(file, names.channel_matrix, kChannelCount);
+  storage.matrix_count = 1 + std::ranges::max(storage.channel_matrix);
+  storage.roles = read_roles(file, names.role, area.size());
+  if (names.moment_scale != nullptr && file.tensors().contains(names.moment_scale)) {
+    TensorReader{file}(names.moment_scale, storage.moment_scale);
+  }
+  if (names.scale_exponent != nullptr && file.tensors().contains(names.scale_exponent)) {
+    const auto stored =
+        file.tensor<std::int8_t>(names.scale_exponent, {area.size()}, TensorType::kI8);
+    storage.scale_exponent.assign(stored.begin(), stored.end());
+  }
+  if (file.info(names.values).type == TensorType::kF16) {
+    storage.precision = Precision::kF16;
+    storage.values_f16 = file.tensor<std::uint16_t>(names.values, {kAnySize}, TensorType::kF16);
+  } else {
+    storage.values_f32 = file.tensor<float>(names.values, {kAnySize});
+  }
+  if (file.tensors().contains(names.bases)) read_integer_bases(file, names.bases, storage);
+  try {
+    return std::make_shared<const HierarchicalOperator>(std::move(storage));
+  } catch (const Error& error) {
+    refuse(file, error.what());
+  }
+}
+
+std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsFile& file,
+                                                              const std::vector<float>& area) {
+  LowRankOperator::Storage storage;
+  storage.area = area;
+  const TensorInfo& basis = file.info(tensor::kLowRankBasis);
+  const TensorShape shape{LowRankOperator::tile_count(storage.area.size()), kAnySize,
+                          LowRankOperator::kTile};
+  if (basis.type == TensorType::kF16) {
+    storage.precision = Precision::kF16;
+    storage.basis_f16 = file.tensor<std::uint16_t>(tensor::kLowRankBasis, shape, TensorType::kF16);
+  } else {
+    storage.basis_f32 = file.tensor<float>(tensor::kLowRankBasis, shape);
+  }
+  storage.rank = basis.shape[1];
+  storage.core = file.tensor<float>(tensor::kLowRankCore, {kAnySize, storage.rank, storage.rank});
+  storage.matrix_count = static_cast<std::uint32_t>(file.info(tensor::kLowRankCore).shape[0]);
+  storage.channel_matrix =
+      read_channel_matrix(file, tensor::kLowRankChannelMatrix, storage.matrix_count);
+  try {
+    return std::make_shared<const LowRankOperator>(std::move(storage));
+  } catch (const Error& error) {
+    refuse(file, error.what());
+  }
+}
+
+std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& file,
+                                                      const TransferData& data) {
+  const std::vector<float>& area = data.patches.area;
+  const std::string& kind = metadata(file, key::kOperator);
+  if (kind == "dense") return read_dense_operator(file, area);
+  if (kind == "hierarchical") return read_hierarchical_operator(file, kHierarchicalTransfer, area);
+  if (kind == "low-rank") return read_low_rank_operator(file, area);
+  refuse(file, "the operator is of a kind that this program does not know");
+}
+
+/// Nothing if the file holds none.
+std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
+    const SafetensorsFile& file, const std::vector<float>& area) {
+  const HierarchicalTensors& names = kCompressedFormFactors;
+  if (!file.tensors().contains(names.values)) return nullptr;
+  auto exchange = read_hierarchical_operator(file, names, area);
+  if (exchange->storage().matrix_count != 1) {
+    refuse(file, std::string("tensor ") + names.channel_matrix + ": more than one matrix");
+  }
+  return exchange;
+}
+
+/// A file without probes has no tensors of them.
+void read_probes(const SafetensorsFile& file, TransferData& data) {
+  if (!file.tensors().contains(tensor::kProbePosition)) return;
+  visit_tensors_of_probes(data.probes, TensorReader(file));
+  if (file.tensors().contains(tensor::kProbeSkyBegin)) {
+    visit_tensors_of_probe_sky(data.probes.sky_cells, TensorReader(file));
+  }
+  const auto grid = file.tensor<std::uint32_t>(tensor::kProbeGrid, {3});
+  std::ranges::copy(grid, data.probes.grid.begin());
+  data.probes.patch_count = data.patches.size();
+}
+
+/// A file without surface harmonics has no tensors of them.
+SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
+  SurfaceHarmonics harmonics;
+  if (!file.tensors().contains(tensor::kSurfaceSky)) return harmonics;
+  visit_tensors_of_surface_harmonics(harmonics, TensorReader(file));
+  if (file.tensors().contains(tensor::kSurfaceSkyBegin)) {
+    visit_tensors_of_surface_sky(harmonics.sky_cells, TensorReader(file));
+  }
+  return harmonics;
+}
+
+/// A file without a lightmap has no tensors of one.
+Lightmap read_lightmap(const SafetensorsFile& file) {
+  Lightmap map;
+  if (!file.tensors().contains(tensor::kLightmapSize)) return map;
+  visit_tensors_of_lightmap(map, TensorReader(file));
+  const auto size = file.tensor<std::uint32_t>(tensor::kLightmapSize, {2});
+  map.width = size[0];
+  map.height = size[1];
+  return map;
+}
+
+}  // namespace
+
+TransferData load_transfer_file(const std::filesystem::path& path) {
+  const SafetensorsFile file(path);
+  check_version(file);
+  check_checksum(file);
+
+  TransferData data;
+  visit_tensors_of_patches(data.patches, TensorReader(file));
+  visit_tensors_of_mesh(data.mesh, TensorReader(file));
+  if (file.tensors().contains(tensor::kOpacityMap)) {
+    visit_tensors_of_opacity(data.mesh.opacity, TensorReader(file));
+  }
+  read_scene(file, data);
+  if (file.tensors().contains(tensor::kSkyBegin)) {
+    visit_tensors_of_sky(data.sky_cells, TensorReader(file));
+  }
+  read_probes(file, data);
+  data.lightmap = read_lightmap(file);
+  data.surface_harmonics = read_surface_harmonics(file);
+  data.exchange = read_exchange(file);
+  data.record = read_record(file);
+  check_transfer_data(data, file.name());
+  data.links = read_links(file, data.patches);
+  data.transfer = read_operator(file, data);
+  data.compressed_form_factors = read_compressed_form_factors(file, data.patches.area);
+  if (data.exchange.empty() && !data.compressed_form_factors) {
+    refuse(file, "there are no form factors, neither pairs nor compressed ones");
+  }
+  return data;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,232 @@
+#include <cstring>
+#include <deque>
+#include <nlohmann/json.hpp>
+
+#include "transfer/base/error.h"
+#include "transfer/base/shortest_decimal.h"
+#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_format.h"
+#include "transfer/format/hierarchical_storage.h"
+#include "transfer/operator/dense_operator.h"
+#include "transfer/operator/hierarchical_operator.h"
+#include "transfer/operator/low_rank_operator.h"
+
+namespace rebounce {
+namespace {
+
+/// Collects tensors: borrows what is an array already, copies members out of arrays of structs.
+class TensorCollector {
+ public:
+  template <typename T>
+  void add(std::string name, TensorShape shape, std::span<const T> values,
+           TensorType type = tensor_type<T>()) {
+    tensors_.push_back({std::move(name), type, std::move(shape), std::as_bytes(values)});
+  }
+
+  template <typename T>
+  void operator()(const char* name, const std::vector<T>& values) {
+    tensors_.push_back({name, tensor_type<typename Stored<T>::Scalar>(),
+                        stored_shape<T>(values.size()), std::as_bytes(std::span(values))});
+  }
+
+  template <typename Item, typename T>
+  void operator()(const char* name, const std::vector<Item>& items, T Item::*member) {
+    std::vector<std::byte>& column = columns_.emplace_back(items.size() * sizeof(T));
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      std::memcpy(column.data() + i * sizeof(T), &(items[i].*member), sizeof(T));
+    }
+    tensors_.push_back(
+        {name, tensor_type<typename Stored<T>::Scalar>(), stored_shape<T>(items.size()), column});
+  }
+
+  /// Copies an array that was made for the file.
+  template <typename T>
+  void add_made(const char* name, std::span<const T> values) {
+    const auto bytes = std::as_bytes(values);
+    const std::vector<std::byte>& copy = columns_.emplace_back(bytes.begin(), bytes.end());
+    tensors_.push_back(
+        {name, tensor_type<typename Stored<T>::Scalar>(), stored_shape<T>(values.size()), copy});
+  }
+
+  const std::vector<TensorView>& tensors() const { return tensors_; }
+
+ private:
+  std::vector<TensorView> tensors_;
+  std::deque<std::vector<std::byte>> columns_;
+};
+
+void collect_textures(const std::vector<Texture>& textures, TensorCollector& collector) {
+  for (std::size_t i = 0; i < textures.size(); ++i) {
+    const std::vector<std::uint8_t>& encoded = textures[i].encoded;
+    collector.add<std::uint8_t>(texture_tensor(i), {encoded.size()}, encoded);
+  }
+}
+
+/// Files of scenes with too many pairs have no tensors of them.
+void collect_exchange(const ExchangeMatrix& exchange, TensorCollector& collector) {
+  if (exchange.empty()) return;
+  collector.add(tensor::kRowBegin, {exchange.row_begin.size()}, exchange.row_begin.span());
+  collector.add(tensor::kColumn, {exchange.column.size()}, exchange.column.span());
+  collector.add(tensor::kExchangeArea, {exchange.exchange_area.size()},
+                exchange.exchange_area.span());
+}
+
+void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollector& collector) {
+  const TensorShape shape{storage.matrix_count, DenseOperator::tile_count(storage.area.size()),
+                          DenseOperator::kTile, DenseOperator::kTile};
+  if (storage.precision == Precision::kF16) {
+    collector.add(tensor::kDenseTiles, shape, storage.tiles_f16.span(), TensorType::kF16);
+  } else {
+    collector.add(tensor::kDenseTiles, shape, storage.tiles_f32.span());
+  }
+  collector.add<std::uint32_t>(tensor::kDenseChannelMatrix, {storage.channel_matrix.size()},
+                               storage.channel_matrix);
+}
+
+void collect_hierarchical_operator(const HierarchicalStorage& storage,
+                                   const HierarchicalTensors& names, TensorCollector& collector) {
+  std::vector<StoredBlock> blocks;
+  for (const TransferBlock& b : storage.blocks) {
+    blocks.push_back({b.row_begin, b.row_count, b.column_begin, b.column_count,
+                      static_cast<std::uint32_t>(b.kind), b.row_rank, b.column_rank,
+                      b.row_remainders, b.column_remainders});
+  }
+  collector.add_made<StoredBlock>(names.blocks, blocks);
+  collector(names.patch, storage.patch);
+  if (!storage.roles.all_are_both()) collector(names.role, storage.roles.role);
+  if (!storage.moment_scale.empty()) collector(names.moment_scale, storage.moment_scale);
+  if (!storage.scale_exponent.empty()) {
+    collector.add<std::int8_t>(names.scale_exponent, {storage.scale_exponent.size()},
+                               storage.scale_exponent, TensorType::kI8);
+  }
+  collector.add<std::uint32_t>(names.channel_matrix, {storage.channel_matrix.size()},
+                               storage.channel_matrix);
+  if (storage.precision == Precision::kQ16) {
+    collector.add(names.bases, {storage.bases_q16.size()}, storage.bases_q16.span(),
+                  TensorType::kI16);
+  }
+  if (storage.precision == Precision::kQ8) {
+    collector.add(names.bases, {storage.bases_q8.size()}, storage.bases_q8.span(), TensorType::kI8);
+  }
+  if (storage.precision != Precision::kF32) {
+    collector.add(names.values, {storage.values_f16.size()}, storage.values_f16.span(),
+                  TensorType::kF16);
+  } else {
+    collector.add(names.values, {storage.values_f32.size()}, storage.values_f32.span());
+  }
+}
+
+void collect_low_rank_operator(const LowRankOperator::Storage& storage,
+                               TensorCollector& collector) {
+  const TensorShape shape{LowRankOperator::tile_count(storage.area.size()), storage.rank,
+                          LowRankOperator::kTile};
+  if (storage.precision == Precision::kF16) {
+    collector.add(tensor::kLowRankBasis, shape, storage.basis_f16.span(), TensorType::kF16);
+  } else {
+    collector.add(tensor::kLowRankBasis, shape, storage.basis_f32.span());
+  }
+  collector.add(tensor::kLowRankCore, {storage.matrix_count, storage.rank, storage.rank},
+                storage.core.span());
+  collector.add<std::uint32_t>(tensor::kLowRankChannelMatrix, {storage.channel_matrix.size()},
+                               storage.channel_matrix);
+}
+
+void collect_operator(const TransferOperator* transfer, TensorCollector& collector) {
+  if (const auto* dense = dynamic_cast<const DenseOperator*>(transfer)) {
+    collect_dense_operator(dense->storage(), collector);
+  } else if (const auto* blocks = dynamic_cast<const HierarchicalOperator*>(transfer)) {
+    collect_hierarchical_operator(blocks->storage(), kHierarchicalTransfer, collector);
+  } else if (const auto* low_rank = dynamic_cast<const LowRankOperator*>(transfer)) {
+    collect_low_rank_operator(low_rank->storage(), collector);
+  } else {
+    throw Error(
+        "a transfer file cannot hold this kind of operator; give it one that the library has");
+  }
+}
+
+/// Files without probes have no tensors of them.
+void collect_probes(const LightProbes& probes, TensorCollector& collector) {
+  if (probes.size() == 0) return;
+  visit_tensors_of_probes(probes, collector);
+  if (!probes.sky_cells.empty()) visit_tensors_of_probe_sky(probes.sky_cells, collector);
+  collector.add<std::uint32_t>(tensor::kProbeGrid, {probes.grid.size()}, probes.grid);
+}
+
+/// Files without surface harmonics have no tensors of them.
+void collect_surface_harmonics(const SurfaceHarmonics& harmonics, TensorCollector& collector) {
+  if (harmonics.empty()) return;
+  visit_tensors_of_surface_harmonics(harmonics, collector);
+  if (!harmonics.sky_cells.empty()) visit_tensors_of_surface_sky(harmonics.sky_cells, collector);
+}
+
+/// Files without a lightmap have no tensors of one.
+void collect_lightmap(const Lightmap& map, TensorCollector& collector) {
+  if (map.empty()) return;
+  visit_tensors_of_lightmap(map, collector);
+  const std::array<std::uint32_t, 2> size = {map.width, map.height};
+  collector.add_made<std::uint32_t>(tensor::kLightmapSize, size);
+}
+
+std::string names_text(const TransferData& data) {
+  nlohmann::json names;
+  visit_named_items(data, [&](const char* kind, const auto& items) {
+    names[kind] = nlohmann::json::array();
+    for (const auto& item : items) names[kind].push_back(item.name);
+  });
+  return names.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+SafetensorsMetadata make_metadata(const TransferData& data) {
+  SafetensorsMetadata metadata{{key::kFormat, kFormatName},
+                               {key::kFormatVersion, std::to_string(kFileFormatVersion)},
+                               {key::kChecksum, zero_checksum()},
+                               {key::kOperator, data.transfer->kind()},
+                               {key::kNames, names_text(data)}};
+  visit_texts_of_record(data.record,
+                        [&](const char* name, const std::string& text) { metadata[name] = text; });
+  visit_numbers_of_record(data.record, [&](const char* name, double value) {
+    metadata[name] = shortest_decimal(value);
+  });
+  return metadata;
+}
+
+/// Puts the checksum of the whole file where its zeros are.
+void seal(SafetensorsLayout& layout) {
+  const std::size_t digits = find_checksum_digits(layout.prefix);
+  FileChecksum checksum(layout.prefix, digits);
+  for (const TensorView& tensor : layout.tensors) checksum.update(tensor.bytes);
+  const std::string text = checksum.text();
+  layout.prefix.replace(digits, ContentHash::kDigitCount,
+                        text.substr(text.size() - ContentHash::kDigitCount));
+}
+
+}  // namespace
+
+void save_transfer_file(const std::filesystem::path& path, const TransferData& data) {
+  if (data.exchange.empty() && !data.compressed_form_factors) {
+    throw Error("a transfer file needs form factors; give it pairs or compressed ones");
+  }
+  TensorCollector collector;
+  visit_tensors_of_patches(data.patches, collector);
+  visit_tensors_of_mesh(data.mesh, collector);
+  if (!data.mesh.opacity.empty()) visit_tensors_of_opacity(data.mesh.opacity, collector);
+  visit_tensors_of_scene(data, collector);
+  collect_textures(data.textures, collector);
+  if (!data.sky_cells.empty()) visit_tensors_of_sky(data.sky_cells, collector);
+  collect_probes(data.probes, collector);
+  collect_lightmap(data.lightmap, collector);
+  collect_surface_harmonics(data.surface_harmonics, collector);
+  collect_exchange(data.exchange, collector);
+  if (!data.links.empty()) visit_tensors_of_links(data.links, collector);
+  collect_operator(data.transfer.get(), collector);
+  if (data.compressed_form_factors) {
+    collect_hierarchical_operator(data.compressed_form_factors->storage(), kCompressedFormFactors,
+                                  collector);
+  }
+
+  SafetensorsLayout layout = lay_out_safetensors(collector.tensors(), make_metadata(data));
+  seal(layout);
+  write_safetensors(path, layout);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,201 @@
+#include "transfer/format/hierarchical_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "transfer/base/error.h"
+#include "transfer/format/hierarchical_layout.h"
+
+namespace rebounce {
+namespace {
+
+using Storage = HierarchicalStorage;
+
+constexpr std::size_t kAlignment = HierarchicalFormat::kAlignment;
+
+[[noreturn]] void refuse(const std::string& reason) {
+  throw Error("hierarchical operator: " + reason);
+}
+
+void check_permutation(std::span<const std::uint32_t> patch, std::size_t patch_count) {
+  if (patch.size() != patch_count) refuse("not one position for each patch");
+  std::vector<bool> seen(patch_count, false);
+  for (const std::uint32_t p : patch) {
+    if (p >= patch_count || seen[p]) refuse("the order of patches is not a permutation");
+    seen[p] = true;
+  }
+}
+
+void check_exponents(std::span<const std::int8_t> exponents, std::size_t patch_count) {
+  if (!exponents.empty() && exponents.size() != patch_count) {
+    refuse("not one scale for each position");
+  }
+  constexpr int kLargest = HierarchicalFormat::kLargestExponent;
+  if (std::ranges::any_of(exponents, [](int e) { return e < -kLargest || e > kLargest; })) {
+    refuse("a scale of a position is beyond 2^+-" + std::to_string(kLargest));
+  }
+}
+
+/// Positions of patches, with their padding, and the moments that are numbered after them.
+struct Places {
+  std::size_t position_count, moment_count;
+
+  /// Whether [begin, begin + count) is a cluster's range of positions.
+  bool are_positions(std::uint64_t begin, std::uint64_t count) const {
+    return are_aligned(begin, count) && begin + count <= position_count;
+  }
+  bool are_moments(std::uint64_t begin, std::uint64_t count) const {
+    return are_aligned(begin, count) && begin >= position_count &&
+           begin + count <= position_count + moment_count;
+  }
+
+ private:
+  static bool are_aligned(std::uint64_t begin, std::uint64_t count) {
+    return count > 0 && begin % kAlignment == 0 && count % kAlignment == 0;
+  }
+};
+
+void check_moments(const TransferBlock& block, const Places& places) {
+  if (!places.are_positions(block.row_begin, block.row_count))
+    refuse("moments are of no positions");
+  if (block.row_rank != block.column_count || block.row_rank > block.row_count ||
+      block.column_rank != 0 || block.row_remainders > block.row_rank ||
+      block.column_remainders != 0) {
+    refuse("the rank of moments does not fit their number");
+  }
+}
+
+void check_block(const TransferBlock& block, const Places& places) {
+  if (is_moments(block)) return check_moments(block, places);
+  const auto is_range = [&](std::uint32_t begin, std::uint32_t count) {
+    return places.are_positions(begin, count) ||
+           (block.kind == TransferBlock::Kind::kLowRank && places.are_moments(begin, count));
+  };
+  if (!is_range(block.row_begin, block.row_count) ||
+      !is_range(block.column_begin, block.column_count)) {
+    refuse("a block is empty, not aligned or reaches outside the matrix");
+  }
+  const bool misplaced = block.on_diagonal()
+                             ? block.row_count != block.column_count
+                             : block.column_begin + block.column_count > block.row_begin;
+  if (misplaced) refuse("a block is neither on the diagonal nor below it");
+  switch (block.kind) {
+    case TransferBlock::Kind::kDense:
+      if ((block.row_rank | block.column_rank | block.row_remainders | block.column_remainders) !=
+          0) {
+        refuse("a dense block has a rank");
+      }
+      return;
+    case TransferBlock::Kind::kLowRank:
+      if (block.row_rank > block.row_count || block.column_rank > block.column_count ||
+          (block.on_diagonal() && block.row_rank != block.column_rank)) {
+        refuse("the ranks of a block do not fit its size");
+      }
+      if (block.row_remainders > block.row_rank || block.column_remainders > block.column_rank ||
+          (block.on_diagonal() && block.row_remainders != block.column_remainders)) {
+        refuse("the remainders of a block do not fit its ranks");
+      }
+      return;
+    case TransferBlock::Kind::kMoments:
+      return;
+  }
+  refuse("a block is of an unknown kind");
+}
+
+/// Of the blocks of moments, which must be numbered in their order; their scales must be there.
+std::size_t checked_moment_count(const Storage& storage, std::size_t position_count) {
+  std::uint64_t end = position_count;
+  for (const TransferBlock& block : storage.blocks) {
+    if (!is_moments(block)) continue;
+    if (block.column_begin != end) refuse("moments are not numbered in the order of their blocks");
+    end += block.column_count;
+  }
+  if (storage.moment_scale.size() != end - position_count) refuse("not one scale for each moment");
+  if (!std::ranges::all_of(storage.moment_scale, [](float s) { return std::isfinite(s); })) {
+    refuse("a scale of a moment is not finite");
+  }
+  return end - position_count;
+}
+
+void check_tables(const Storage& storage) {
+  const std::size_t n = storage.area.size();
+  if (n == 0) refuse("there are no patches");
+  if (storage.matrix_count < 1 || storage.matrix_count > kChannelCount) {
+    refuse("not 1, 2 or 3 matrices");
+  }
+  for (const std::uint32_t matrix : storage.channel_matrix) {
+    if (matrix >= storage.matrix_count) refuse("a channel has no matrix");
+  }
+  check_permutation(storage.patch, n);
+  check_exponents(storage.scale_exponent, n);
+  try {
+    check_roles(storage.roles, n);
+  } catch (const Error& error) {
+    refuse(error.what());
+  }
+  const std::size_t positions = HierarchicalFormat::position_count(n);
+  const Places places{positions, checked_moment_count(storage, positions)};
+  for (const TransferBlock& block : storage.blocks) {
+    check_block(block, places);
+    const bool one_rank = !is_moments(block) && (block.row_rank == 0) != (block.column_rank == 0);
+    if (one_rank && storage.order == HierarchicalStorage::Order::kStreamed) {
+      refuse("a block has only one rank");
+    }
+    const bool rounded =
+        storage.precision == Precision::kF16 || storage.precision == Precision::kQ16;
+    if (rounded && (block.row_remainders | block.column_remainders) != 0) {
+      refuse("a block has remainders, which are for bases in 8 bits alone");
+    }
+  }
+}
+
+std::uint64_t block_order_count(const Storage& storage) {
+  std::uint64_t count = HierarchicalFormat::kPadding;
+  for (const TransferBlock& block : storage.blocks)
+    count += block.value_count(storage.matrix_count);
+  return count;
+}
+
+/// Numbers of values that the arrays must have.
+struct ArraySizes {
+  std::uint64_t f32 = 0, f16 = 0, q16 = 0, q8 = 0;
+  bool operator==(const ArraySizes&) const = default;
+};
+
+ArraySizes expected_sizes(const Storage& storage) {
+  const HierarchicalLayout layout(storage);
+  const std::uint64_t bases = HierarchicalLayout::padded(layout.basis_value_count);
+  const std::uint64_t cores = HierarchicalLayout::padded(layout.core_value_count);
+  if (storage.precision == Precision::kQ16) return {.f16 = cores, .q16 = bases};
+  if (storage.precision == Precision::kQ8) return {.f16 = cores, .q8 = bases};
+  const std::uint64_t all =
+      storage.order == HierarchicalStorage::Order::kStreamed
+          ? HierarchicalLayout::padded(layout.basis_value_count + layout.core_value_count)
+          : block_order_count(storage);
+  if (storage.precision == Precision::kF16) return {.f16 = all};
+  return {.f32 = all};
+}
+
+}  // namespace
+
+void check_hierarchical_storage(const Storage& storage) {
+  check_tables(storage);
+  if (has_integer_bases(storage.precision) &&
+      storage.order != HierarchicalStorage::Order::kStreamed) {
+    refuse("integers are for streamed values alone");
+  }
+  const ArraySizes sizes{storage.values_f32.size(), storage.values_f16.size(),
+                         storage.bases_q16.size(), storage.bases_q8.size()};
+  if (sizes != expected_sizes(storage)) refuse("the number of values does not fit the blocks");
+  // Sums of their products must not overflow.
+  constexpr std::int16_t kLargest = HierarchicalFormat::kLargestShort;
+  const auto too_large = [](std::int16_t value) { return value > kLargest || value < -kLargest; };
+  if (std::ranges::any_of(storage.bases_q16.span(), too_large)) {
+    refuse("a value of the bases is beyond +-" + std::to_string(kLargest));
+  }
+}
+
+}  // namespace rebounce

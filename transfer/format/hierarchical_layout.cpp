@@ -1,0 +1,165 @@
+#include "transfer/format/hierarchical_layout.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "transfer/base/error.h"
+#include "transfer/kernels/block_kernels.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::uint64_t kStrip = HierarchicalFormat::kStrip;
+
+// More values than any memory holds: sums of block sizes stay far from the end of 64 bits.
+constexpr std::uint64_t kMostValues = std::uint64_t{1} << 48;
+
+using Cluster = HierarchicalLayout::Cluster;
+using End = HierarchicalLayout::End;
+
+bool comes_before(const Cluster& a, const Cluster& b) {
+  return a.begin != b.begin ? a.begin < b.begin : a.size > b.size;
+}
+
+bool has_bases(const TransferBlock& block) {
+  return block.kind != TransferBlock::Kind::kDense && has_values(block);
+}
+
+/// visit(end, begin, size, rank, remainders) for the ends of the blocks with bases in the order of
+/// these.
+template <typename Visit>
+void visit_ends(std::span<const TransferBlock> blocks,
+                std::vector<HierarchicalLayout::Place>& places, const Visit& visit) {
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const TransferBlock& block = blocks[b];
+    if (!has_bases(block)) continue;
+    visit(places[b].row, block.row_begin, block.row_count, block.row_rank, block.row_remainders);
+    if (is_moments(block)) continue;
+    if (block.on_diagonal()) {
+      places[b].column = places[b].row;
+    } else {
+      visit(places[b].column, block.column_begin, block.column_count, block.column_rank,
+            block.column_remainders);
+    }
+  }
+}
+
+std::uint32_t checked_count(std::uint64_t count) {
+  if (count > std::numeric_limits<std::uint32_t>::max() / 2) {
+    throw Error("hierarchical operator: its blocks have too many ranks");
+  }
+  return static_cast<std::uint32_t>(count);
+}
+
+}  // namespace
+
+bool has_values(const TransferBlock& block) {
+  return block.kind == TransferBlock::Kind::kDense || block.row_rank > 0;
+}
+
+HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
+                                       std::uint32_t matrix_count, Precision precision)
+    : places(blocks.size()),
+      rank_group(has_integer_bases(precision) ? HierarchicalFormat::kRankGroup : 1) {
+  std::uint64_t total = 0;
+  for (const TransferBlock& block : blocks) {
+    total += block.value_count(matrix_count);
+    if (is_moments(block))
+      moment_count = checked_count(std::uint64_t{moment_count} + block.column_count);
+    if (total > kMostValues) {
+      throw Error("hierarchical operator: its blocks are larger than any memory");
+    }
+  }
+  find_clusters(blocks);
+  place_bases(blocks, precision);
+  place_cores(blocks, matrix_count);
+}
+
+std::uint64_t HierarchicalLayout::filled_rank(const Cluster& cluster) const {
+  return (std::uint64_t{cluster.rank} + rank_group - 1) / rank_group * rank_group;
+}
+
+std::uint64_t HierarchicalLayout::basis_index(const End& end, std::uint64_t rank,
+                                              std::uint64_t position) const {
+  const Cluster& cluster = clusters[end.cluster];
+  const std::uint64_t r = end.coefficient - cluster.coefficient + rank;
+  if (rank_group == 1) return cluster.values + r * cluster.size + position;
+  const std::uint64_t begin = position / kStrip * kStrip;
+  const std::uint64_t width = std::min(kStrip, cluster.size - begin);
+  const std::uint64_t pair = (position - begin) / 2;
+  return cluster.values + begin * filled_rank(cluster) +
+         (r / rank_group * width + 2 * pair) * rank_group + r % rank_group * 2 + position % 2;
+}
+
+void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {
+  visit_ends(blocks, places,
+             [&](End&, std::uint32_t begin, std::uint32_t size, std::uint32_t, std::uint32_t) {
+               clusters.push_back({.begin = begin, .size = size});
+             });
+  std::ranges::sort(clusters, comes_before);
+  const auto same = [](const Cluster& a, const Cluster& b) {
+    return a.begin == b.begin && a.size == b.size;
+  };
+  const auto rest = std::ranges::unique(clusters, same);
+  clusters.erase(rest.begin(), rest.end());
+}
+
+std::uint32_t HierarchicalLayout::cluster_at(std::uint32_t begin, std::uint32_t size) const {
+  const Cluster key{.begin = begin, .size = size};
+  const auto found = std::ranges::lower_bound(clusters, key, comes_before);
+  return static_cast<std::uint32_t>(found - clusters.begin());
+}
+
+void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks, Precision precision) {
+  // First each end's place among the bases of its cluster, then that of the clusters.
+  visit_ends(blocks, places,
+             [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank,
+                 std::uint32_t remainders) {
+               end.cluster = cluster_at(begin, size);
+               end.remainders = precision == Precision::kQ8 ? remainders : 0;
+               Cluster& cluster = clusters[end.cluster];
+               end.coefficient = cluster.rank;
+               cluster.rank = checked_count(std::uint64_t{cluster.rank} + rank + end.remainders);
+             });
+  for (Cluster& cluster : clusters) {
+    cluster.coefficient = coefficient_count;
+    cluster.values = basis_value_count;
+    coefficient_count = checked_count(coefficient_count + filled_rank(cluster));
+    basis_value_count += filled_rank(cluster) * cluster.size;
+  }
+  visit_ends(blocks, places,
+             [&](End& end, std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t) {
+               end.coefficient += clusters[end.cluster].coefficient;
+             });
+}
+
+void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
+                                     std::uint32_t matrix_count) {
+  const auto add_coefficients = [&](End& end, std::uint32_t count) {
+    end.coefficient = coefficient_count;
+    coefficient_count = checked_count(std::uint64_t{coefficient_count} + count);
+  };
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const TransferBlock& block = blocks[b];
+    Place& place = places[b];
+    place.values = core_value_count;
+    if (block.kind == TransferBlock::Kind::kDense) {
+      core_value_count += block.value_count(matrix_count);
+      add_coefficients(place.row, block.row_count);
+      place.column = place.row;
+      if (!block.on_diagonal()) add_coefficients(place.column, block.column_count);
+      largest_taken = std::max(largest_taken, taken_size(block.row_count, block.column_count));
+    } else {
+      largest_taken = std::max(largest_taken, taken_size(block.row_rank, block.column_rank));
+      core_value_count +=
+          std::uint64_t{matrix_count} * block.row_rank * std::uint64_t{block.column_rank};
+    }
+  }
+}
+
+std::uint64_t HierarchicalLayout::padded(std::uint64_t value_count) {
+  constexpr std::uint64_t kMultiple = 64;
+  return (value_count + HierarchicalFormat::kPadding + kMultiple - 1) / kMultiple * kMultiple;
+}
+
+}  // namespace rebounce

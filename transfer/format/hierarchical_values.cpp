@@ -1,0 +1,190 @@
+#include "transfer/format/hierarchical_values.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "transfer/base/half_float.h"
+#include "transfer/format/hierarchical_encoding.h"
+
+namespace rebounce {
+namespace {
+
+using Storage = HierarchicalStorage;
+
+/// Reads values of any precision as what they stand for.
+class ValueReader {
+ public:
+  ValueReader(const Storage& storage, const HierarchicalLayout& layout)
+      : storage_(storage), layout_(layout), first_core_(layout.basis_value_count) {}
+
+  /// Of one end of a block of that rank.
+  double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vector,
+               std::uint64_t position) const {
+    const double value = stored_basis(layout_.basis_index(end, vector, position));
+    if (vector >= end.remainders) return value;
+    return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
+                       double{HierarchicalFormat::kRemainderScale};
+  }
+  /// Of a core or a dense entry.
+  double core(std::uint64_t index) const {
+    if (storage_.precision == Precision::kF32) return storage_.values_f32[first_core_ + index];
+    const std::uint64_t first = storage_.precision == Precision::kF16 ? first_core_ : 0;
+    return half_to_float(storage_.values_f16[first + index]) /
+           double{HierarchicalFormat::kHalfScale};
+  }
+
+  const Storage& storage() const { return storage_; }
+  const HierarchicalLayout& layout() const { return layout_; }
+
+ private:
+  double stored_basis(std::uint64_t index) const {
+    switch (storage_.precision) {
+      case Precision::kF16:
+        return half_to_float(storage_.values_f16[index]);
+      case Precision::kQ16:
+        return storage_.bases_q16[index] / double{HierarchicalFormat::kShortScale};
+      case Precision::kQ8:
+        return storage_.bases_q8[index] / double{HierarchicalFormat::kByteScale};
+      case Precision::kF32:
+        break;
+    }
+    return storage_.values_f32[index];
+  }
+
+  const Storage& storage_;
+  const HierarchicalLayout& layout_;
+  std::uint64_t first_core_;
+};
+
+/// [row_count][column_count] of one matrix, positions or moments.
+std::vector<double> block_entries(const ValueReader& read, const HierarchicalLayout::Place& place,
+                                  const TransferBlock& block, std::uint32_t matrix) {
+  const std::size_t rows = block.row_count, columns = block.column_count;
+  const std::uint32_t matrices = read.storage().matrix_count;
+  std::vector<double> entries(rows * columns, 0.0);
+  if (block.kind == TransferBlock::Kind::kDense) {
+    for (std::size_t k = 0; k < entries.size(); ++k) {
+      entries[k] = read.core(place.values + k * matrices + matrix);
+    }
+    return entries;
+  }
+  const std::size_t row_rank = block.row_rank, column_rank = block.column_rank;
+  std::vector<double> right(columns);  // a row of S V^T
+  for (std::size_t r = 0; r < row_rank; ++r) {
+    std::ranges::fill(right, 0.0);
+    for (std::size_t k = 0; k < column_rank; ++k) {
+      const std::uint64_t entry = r * column_rank + k;
+      const double core = read.core(place.values + entry * matrices + matrix);
+      for (std::size_t j = 0; j < columns; ++j)
+        right[j] += core * read.basis(place.column, column_rank, k, j);
+    }
+    for (std::size_t i = 0; i < rows; ++i) {
+      const double left = read.basis(place.row, row_rank, r, i);
+      for (std::size_t j = 0; j < columns; ++j) entries[i * columns + j] += left * right[j];
+    }
+  }
+  return entries;
+}
+
+/// Entries [rows][columns] the other way around.
+std::vector<double> transposed(const std::vector<double>& entries, std::size_t columns) {
+  std::vector<double> result(entries.size());
+  const std::size_t rows = entries.size() / columns;
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t j = 0; j < columns; ++j) result[j * rows + i] = entries[i * columns + j];
+  }
+  return result;
+}
+
+/// Positions or moments.
+struct Range {
+  std::uint32_t begin, count;
+};
+
+/// Rows of entries [rows.count][columns] that are moments become rows of the positions that these
+/// are of, `positions`.
+std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_t columns,
+                                 std::vector<double> entries,
+                                 std::vector<std::uint32_t>& positions) {
+  const Storage& storage = read.storage();
+  const std::size_t position_count = HierarchicalFormat::position_count(storage.area.size());
+  if (rows.begin < position_count) {
+    for (std::uint32_t k = 0; k < rows.count; ++k) positions.push_back(rows.begin + k);
+    return entries;
+  }
+  std::vector<double> result;
+  for (std::size_t b = 0; b < storage.blocks.size(); ++b) {
+    const TransferBlock& moments = storage.blocks[b];
+    if (!is_moments(moments) || moments.column_begin < rows.begin ||
+        moments.column_begin >= rows.begin + rows.count) {
+      continue;
+    }
+    const HierarchicalLayout::End& end = read.layout().places[b].row;
+    const float* const scale = storage.moment_scale.data() + moments.column_begin - position_count;
+    for (std::uint32_t k = 0; k < moments.row_count; ++k) {
+      positions.push_back(moments.row_begin + k);
+      std::vector<double> row(columns, 0.0);
+      for (std::uint32_t m = 0; m < moments.row_rank; ++m) {
+        const double weight = scale[m] * read.basis(end, moments.row_rank, m, k);
+        const double* const from =
+            entries.data() + (moments.column_begin - rows.begin + m) * columns;
+        for (std::size_t c = 0; c < columns; ++c) row[c] += weight * from[c];
+      }
+      result.insert(result.end(), row.begin(), row.end());
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Storage decode(const Storage& storage) {
+  const Storage streamed = stream_values(storage);
+  if (streamed.precision == Precision::kF32) return streamed;
+  Storage decoded = streamed;
+  decoded.precision = Precision::kF32;
+  decoded.values_f16 = {};
+  decoded.bases_q16 = {};
+  decoded.bases_q8 = {};
+  const HierarchicalLayout from(streamed), to(decoded);
+  const ValueReader read(streamed, from);
+  std::vector<float> values(HierarchicalLayout::padded(to.basis_value_count + to.core_value_count));
+  const auto copy_basis = [&](const HierarchicalLayout::End& source,
+                              const HierarchicalLayout::End& target, std::uint32_t rank,
+                              std::uint32_t size) {
+    for (std::uint32_t r = 0; r < rank; ++r) {
+      for (std::uint32_t k = 0; k < size; ++k) {
+        values[to.basis_index(target, r, k)] = static_cast<float>(read.basis(source, rank, r, k));
+      }
+    }
+  };
+  for (std::size_t b = 0; b < streamed.blocks.size(); ++b) {
+    const TransferBlock& block = streamed.blocks[b];
+    if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
+    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_count);
+    if (block.on_diagonal() || is_moments(block)) continue;
+    copy_basis(from.places[b].column, to.places[b].column, block.column_rank, block.column_count);
+  }
+  for (std::uint64_t k = 0; k < to.core_value_count; ++k) {
+    values[to.basis_value_count + k] = static_cast<float>(read.core(k));
+  }
+  decoded.values_f32 = SharedArray(std::move(values));
+  return decoded;
+}
+
+BlockOfPositions block_of_positions(const Storage& storage, const HierarchicalLayout& layout,
+                                    std::size_t index, std::uint32_t matrix) {
+  const ValueReader read(storage, layout);
+  const TransferBlock& block = storage.blocks[index];
+  BlockOfPositions result;
+  std::vector<double> entries = block_entries(read, layout.places[index], block, matrix);
+  entries = of_positions(read, {block.row_begin, block.row_count}, block.column_count,
+                         std::move(entries), result.rows);
+  entries = transposed(entries, block.column_count);
+  entries = of_positions(read, {block.column_begin, block.column_count}, result.rows.size(),
+                         std::move(entries), result.columns);
+  result.entries = transposed(entries, result.rows.size());
+  return result;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,40 @@
+#pragma once
+
+// All kernels of blocks for one instruction set, whose file includes this: `V` is its vector of
+// floats (vector_load.h), `N` of integers.
+
+#include <cstdint>
+
+#include "transfer/kernels/basis_kernels_impl.h"
+#include "transfer/kernels/block_kernels.h"
+#include "transfer/kernels/core_kernels_impl.h"
+#include "transfer/kernels/dense_block_kernels_impl.h"
+#include "transfer/kernels/integer_kernels_impl.h"
+
+namespace rebounce {
+namespace {
+
+template <typename V, typename Value>
+constexpr BasisKernels<Value> make_basis_kernels() {
+  return {project<V, Value>, expand<V, Value>};
+}
+
+template <typename N, typename Value>
+constexpr BasisKernels<Value> make_integer_kernels() {
+  return {project_integers<N, Value>, expand_integers<N, Value>};
+}
+
+template <typename V, typename N>
+constexpr BlockKernels make_block_kernels() {
+  return {
+      make_basis_kernels<V, float>(),
+      make_basis_kernels<V, std::uint16_t>(),
+      make_integer_kernels<N, std::int16_t>(),
+      make_integer_kernels<N, std::int8_t>(),
+      {multiply_cores<V, float>, multiply_dense<V, float>, add_products<V>, add_dense<V, float>},
+      {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>, add_products<V>,
+       add_dense<V, std::uint16_t>}};
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,215 @@
+#pragma once
+
+// Products with the cores of low-rank blocks, whose coefficients have their channels side by side;
+// written once over a vector type `V` (vector_load.h), as basis_kernels_impl.h are.
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+
+#include "transfer/format/operator_format.h"
+#include "transfer/kernels/block_kernels.h"
+#include "transfer/kernels/vector_load.h"
+
+namespace rebounce {
+namespace {
+
+using Direction = CoreBlock::Direction;
+
+/// Neighbouring entries of a row of a core, whose next ones are `step` values on.
+template <typename V, std::size_t kWide, typename Entries, typename Value>
+REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std::size_t step,
+                                     V (&b)[kWide]) {
+  if constexpr (Entries::kWholeRows) {
+    entry.load_row(row, b);
+  } else {
+    unroll<kWide>([&](auto w) REBOUNCE_INLINE { b[w] = entry.load(row + w * step); });
+  }
+}
+
+/// What a core takes: its coefficients at both ends.
+struct TakenEnds {
+  const float *row, *column;
+};
+
+/// Columns from `begin` on, as many as fill kWide vectors or are left, for one light. The lanes of
+/// a vector are the channels of neighbouring entries of a row: ranks are 5 in the mean, and vectors
+/// of as many entries as there are lanes would be two thirds empty. Lanes beyond the last column
+/// read on into the next row: what comes in there is zero, and what comes out is not stored.
+template <typename V, Direction kDirection, std::size_t kWide, typename Entries, typename Value>
+REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBlock& core,
+                                             std::size_t begin, const ChannelLanes& lanes,
+                                             const TakenEnds& taken, float* out) {
+  constexpr bool kToRows = kDirection != Direction::kToColumns;
+  constexpr bool kToColumns = kDirection != Direction::kToRows;
+  constexpr std::size_t kEntries = V::kWidth / kChannelLanes, kLast = kWide - 1;
+  const Entries entry(lanes);
+  const std::size_t step = core.columns * lanes.matrix_count;
+  const std::size_t last_lanes =
+      (std::min(core.columns - begin, kWide * kEntries) - kLast * kEntries) * kChannelLanes;
+  const Value* const s = values + begin * lanes.matrix_count;
+  const float* const row_in = taken.row;
+  const float* const column_in = taken.column + begin * kChannelLanes;
+  float* const row_out = out + core.row * kChannelLanes;
+  float* const column_out = out + (core.column + begin) * kChannelLanes;
+  V from_columns[kWide], to_columns[kWide];
+  unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+    to_columns[w] = V::zero();
+    if constexpr (kToRows && w < kLast) from_columns[w] = V::load(column_in + w * V::kWidth);
+  });
+  if constexpr (kToRows) {
+    from_columns[kLast] = V::load_some(column_in + kLast * V::kWidth, last_lanes);
+  }
+  for_each_rows<kEntries>(core.rows, [&]<std::size_t kRows>(std::size_t i) REBOUNCE_INLINE {
+    V product[kEntries];
+    unroll<kEntries>([&](auto r) REBOUNCE_INLINE { product[r] = V::zero(); });
+    unroll<kRows>([&](auto r) REBOUNCE_INLINE {
+      V b[kWide];
+      load_row(entry, s + (i + r) * step, kEntries * lanes.matrix_count, b);
+      unroll<kWide>([&](auto w) REBOUNCE_INLINE {
+        if constexpr (kToColumns) {
+          to_columns[w] =
+              multiply_add(b[w], V::repeat_four(row_in + (i + r) * kChannelLanes), to_columns[w]);
+        }
+        if constexpr (kToRows) product[r] = multiply_add(b[w], from_columns[w], product[r]);
+      });
+    });
+    if constexpr (kToRows) {
+      V sum = V::sums_of_fours(product);
+      if (begin > 0)
+        sum = add(sum, V::load_some(row_out + i * kChannelLanes, kRows * kChannelLanes));
+      sum.store_some(row_out + i * kChannelLanes, kRows * kChannelLanes);
+    }
+  });
+  if constexpr (kToColumns) {
+    unroll<kLast>([&](auto w) REBOUNCE_INLINE { to_columns[w].store(column_out + w * V::kWidth); });
+    to_columns[kLast].store_some(column_out + kLast * V::kWidth, last_lanes);
+  }
+}
+
+template <typename V, Direction kDirection, typename Entries, typename Value>
+REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& core,
+                                          const ChannelLanes& lanes, const TakenEnds& taken,
+                                          float* out) {
+  constexpr std::size_t kEntries = V::kWidth / kChannelLanes;
+  for_each_rows<V::kCoreVectors>((core.columns + kEntries - 1) / kEntries,
+                                 [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
+                                   multiply_columns<V, kDirection, kWide, Entries>(
+                                       values, core, first * kEntries, lanes, taken, out);
+                                 });
+}
+
+// What there is of remainders is half a vector or less as a rule: masked vectors, as loops that g++
+// makes of such counts are mostly their beginnings and ends.
+
+/// The coefficients of an end, with what came in for remainders added to those that they belong to.
+/// They are where they are, unless that changes them or they are written over: then in `taken`.
+template <typename V>
+REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
+                                             std::size_t remainders, bool in_place, float* taken) {
+  if (!in_place && remainders == 0) return in;
+  const V scale = V::broadcast(1 / HierarchicalFormat::kRemainderScale);
+  const std::size_t count = rank * kChannelLanes, rest = remainders * kChannelLanes;
+  for (std::size_t k = 0; k < count; k += V::kWidth) {
+    V coefficients = V::load_some(in + k, std::min(count - k, V::kWidth));
+    if (k < rest) {
+      const V remainder = V::load_some(in + count + k, std::min(rest - k, V::kWidth));
+      coefficients = multiply_add(remainder, scale, coefficients);
+    }
+    coefficients.store(taken + k);
+  }
+  return taken;
+}
+
+/// What goes out to remainders.
+template <typename V>
+REBOUNCE_INLINE inline void spread_remainders(float* out, std::size_t rank,
+                                              std::size_t remainders) {
+  const V scale = V::broadcast(1 / HierarchicalFormat::kRemainderScale);
+  float* const remainder = out + rank * kChannelLanes;
+  const std::size_t count = remainders * kChannelLanes;
+  for (std::size_t k = 0; k < count; k += V::kWidth) {
+    const std::size_t lanes = std::min(count - k, V::kWidth);
+    multiply(V::load_some(out + k, lanes), scale).store_some(remainder + k, lanes);
+  }
+}
+
+/// A core in its direction, with the remainders at its ends.
+template <typename V, Direction kDirection, typename Entries, typename Value>
+REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CoreBlock& core,
+                                          const ChannelLanes& lanes, const float* in, float* out,
+                                          float* taken) {
+  const std::size_t row = std::size_t{core.row} * kChannelLanes;
+  const std::size_t column = std::size_t{core.column} * kChannelLanes;
+  const bool in_place = in == out;
+  TakenEnds ends{};
+  if constexpr (kDirection != Direction::kToColumns) {
+    ends.column = take_end<V>(in + column, core.columns, core.column_remainders, in_place, taken);
+  }
+  if constexpr (kDirection != Direction::kToRows) {
+    ends.row = take_end<V>(in + row, core.rows, core.row_remainders, in_place,
+                           taken + end_size(core.columns));
+  }
+  multiply_core<V, kDirection, Entries>(values, core, lanes, ends, out);
+  if constexpr (kDirection != Direction::kToColumns) {
+    spread_remainders<V>(out + row, core.rows, core.row_remainders);
+  }
+  if constexpr (kDirection != Direction::kToRows) {
+    spread_remainders<V>(out + column, core.columns, core.column_remainders);
+  }
+}
+
+// Cores are asked for this many before their turn: sweeps and applies leave out what lies between
+// them. Most have two cache lines at most.
+constexpr std::size_t kCoresAhead = 8;
+
+inline void ask_for_two_lines(const void* p) {
+  constexpr std::size_t kLine = 64;
+  __builtin_prefetch(p);
+  __builtin_prefetch(static_cast<const char*>(p) + kLine);
+}
+
+template <typename V, typename Entries, typename Value>
+void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
+                         const ChannelLanes& lanes, std::size_t light_count,
+                         Coefficients<const float> in, Coefficients<float> out, float* taken) {
+  for (std::size_t l = 0; l < light_count; ++l) {
+    const float* const from = in.data + l * in.stride;
+    float* const to = out.data + l * out.stride;
+    for (std::size_t k = 0; k < cores.size(); ++k) {
+      const CoreBlock& core = cores[k];
+      const Value* const s = values + core.values;
+      if (k + kCoresAhead < cores.size()) {
+        ask_for_two_lines(values + cores[k + kCoresAhead].values);
+      }
+      switch (core.direction) {
+        case Direction::kBoth:
+          multiply_ends<V, Direction::kBoth, Entries>(s, core, lanes, from, to, taken);
+          break;
+        case Direction::kToRows:
+          multiply_ends<V, Direction::kToRows, Entries>(s, core, lanes, from, to, taken);
+          break;
+        case Direction::kToColumns:
+          multiply_ends<V, Direction::kToColumns, Entries>(s, core, lanes, from, to, taken);
+          break;
+      }
+    }
+  }
+}
+
+template <typename V, typename Value>
+void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
+                    const ChannelLanes& lanes, std::size_t light_count,
+                    Coefficients<const float> in, Coefficients<float> out, float* taken) {
+  if constexpr (V::kWidth == 16) {
+    if (lanes.matrix_count == 1) {
+      using Entries = typename V::OneMatrixEntries;
+      return multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out, taken);
+    }
+  }
+  using Entries = typename V::template EntryLanes<Value>;
+  multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out, taken);
+}
+
+}  // namespace
+}  // namespace rebounce

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "transfer/format/form_factor_block.h"
+
+namespace rebounce {
+
+/// Products with one row of F in blocks, for one instruction set. The row's `count` blocks begin at
+/// `values`; block k stands for the columns from kFormFactorBlock x position[k] on. Vectors are
+/// three planes, `stride` floats apart.
+struct GatherKernels {
+  /// sum[c] = sum over the columns j of F(j) x_c(j).
+  void (*gather)(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
+                 const float* x, std::size_t stride, float* sum);
+
+  /// sum[c] = sum over the columns j of F(j) x_c(j), and y_c(j) += value[c] F(j): a row of a
+  /// symmetric matrix and the column that is its mirror image.
+  void (*gather_and_spread)(const FormFactorBlock* values, const std::uint32_t* position,
+                            std::size_t count, const float* value, const float* x, float* y,
+                            std::size_t stride, float* sum);
+
+  /// The second half of that: y_c(j) += value[c] F(j).
+  void (*spread)(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
+                 const float* value, float* y, std::size_t stride);
+};
+
+/// AVX-512 has the same: per block a gather loads 32 bytes of F and 96 of the vector. At two loads
+/// a cycle that is 16 bytes of F a cycle, several times what memory delivers.
+extern const GatherKernels kGatherKernelsAvx2;
+
+}  // namespace rebounce

@@ -1,0 +1,32 @@
+#pragma once
+
+#include "transfer/base/bfloat16.h"
+#include "transfer/kernels/link_kernels.h"
+
+namespace rebounce {
+
+// Static: each file has its own, for the instructions that it is compiled with.
+
+/// Adds `factor` times `from` to `to`, arrays of as many numbers.
+template <typename Lanes>
+static inline void add_scaled(Lanes& to, float factor, const Lanes& from) {
+  for (std::size_t lane = 0; lane < to.size(); ++lane) to[lane] += factor * from[lane];
+}
+
+/// GatherAlongLinks in plain C++, for light of any precision and number of channels.
+template <typename Lanes>
+static inline LinkLightOf<Lanes> gather_along_links(const IncomingLink* link, std::size_t count,
+                                                    const LinkLightOf<Lanes>* light) {
+  LinkLightOf<Lanes> sum{};
+  for (std::size_t l = 0; l < count; ++l) {
+    const LinkLightOf<Lanes>& from = light[link[l].from];
+    add_scaled(sum.mean, link[l].exchange_area, from.mean);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      add_scaled(sum.mean, bfloat16_to_float(link[l].gradient_from[axis]), from.first[axis]);
+      add_scaled(sum.first[axis], bfloat16_to_float(link[l].gradient_to[axis]), from.mean);
+    }
+  }
+  return sum;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,483 @@
+#include "transfer/operator/hierarchical_operator.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <utility>
+
+#include "transfer/base/error.h"
+#include "transfer/format/hierarchical_encoding.h"
+#include "transfer/format/hierarchical_values.h"
+#include "transfer/kernels/block_kernels.h"
+#include "transfer/kernels/kernels_of_storage.h"
+#include "transfer/operator/hierarchical_plan.h"
+
+namespace rebounce {
+namespace {
+
+// Of the vectors in the workspace, in floats: a cache line.
+constexpr std::size_t kLine = 16;
+
+// Positions whose light a task takes in.
+constexpr std::size_t kGathered = 1024;
+
+// Ends of dense blocks whose light a task takes, and bases of moments.
+constexpr std::size_t kDenseEndsPerTask = 64, kMomentsPerTask = 32;
+
+// Positions ahead at which the light of a patch is asked for. A second-level cache has more loads
+// under way at a time than the nearest one.
+constexpr std::size_t kPatchesAhead = 64;
+constexpr int kToRead = 0, kToWrite = 1, kSecondLevel = 2;
+
+std::size_t round_up(std::size_t size, std::size_t multiple) {
+  return (size + multiple - 1) / multiple * multiple;
+}
+
+/// The vectors of an apply to some lights. Positions of patches are followed by moments. What cores
+/// and dense blocks make of coefficients is written over what they take: less memory to go through.
+struct WorkVectors {
+  std::size_t light_count;
+  PlanarVectors<float> x;           ///< by position, times the root of the area
+  Coefficients<float> coefficient;  ///< of x in the bases, and then of y
+  PlanarVectors<float> taken;       ///< by the cores of each part
+  PlanarVectors<float> y;           ///< by position, what arrives
+
+  WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
+              float* buffer)
+      : light_count(lights) {
+    const std::size_t vector = vector_size(positions, layout);
+    const std::size_t coefficients = coefficients_size(layout);
+    const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
+    x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
+    coefficient = {take(light_count * coefficients), coefficients};
+    taken = {take(kParts * layout.largest_taken), layout.largest_taken, kParts};
+    y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
+  }
+
+  static std::size_t size(std::size_t positions, const HierarchicalLayout& layout,
+                          std::size_t light_count) {
+    return (2 * kChannelCount * vector_size(positions, layout) + coefficients_size(layout)) *
+               light_count +
+           kParts * layout.largest_taken;
+  }
+
+ private:
+  static constexpr std::size_t kParts = HierarchicalPlan::kMostParts;
+
+  static std::size_t vector_size(std::size_t positions, const HierarchicalLayout& layout) {
+    return round_up(positions + layout.moment_count, kLine);
+  }
+  static std::size_t coefficients_size(const HierarchicalLayout& layout) {
+    return round_up(layout.coefficient_count * kChannelLanes, kLine);
+  }
+};
+
+PlanarVectors<const float> constant(const PlanarVectors<float>& vectors) {
+  return {vectors.data, vectors.stride, vectors.count};
+}
+
+Coefficients<const float> constant(const Coefficients<float>& coefficients) {
+  return {coefficients.data, coefficients.stride};
+}
+
+/// Entries [first, last).
+template <typename T>
+std::span<const T> between(const std::vector<T>& all, std::uint32_t first, std::uint32_t last) {
+  return std::span(all).subspan(first, last - first);
+}
+
+/// The phases of an apply.
+template <typename Basis, typename Value>
+class Phases {
+ public:
+  Phases(const BasisKernels<Basis>& bases, const CoreKernels<Value>& cores, const Basis* basis,
+         const Value* value, const ChannelLanes& lanes, float basis_scale,
+         std::span<const float> moment_scale, const WorkVectors& work)
+      : bases_(bases),
+        cores_(cores),
+        basis_(basis),
+        value_(value),
+        lanes_(lanes),
+        basis_scale_(basis_scale),
+        moment_scale_(moment_scale),
+        work_(work) {}
+
+  void project(std::span<const BasisPart> parts) const {
+    bases_.project(basis_, parts, constant(work_.x), work_.coefficient);
+  }
+
+  void take_light(const DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.x.count; ++v) {
+      const float* const x = work_.x.data + v * work_.x.stride + end.position;
+      float* const lane = lane_of(work_.coefficient, v, end.coefficient);
+      for (std::size_t k = 0; k < end.count; ++k) lane[k * kChannelLanes] = x[k];
+    }
+  }
+
+  /// The moments of the light, from its coefficients.
+  void take_moments(const HierarchicalPlan::Moments& moments) const {
+    const std::size_t stride = work_.x.stride;
+    for (std::size_t light = 0; light < work_.light_count; ++light) {
+      float* const lane = lane_of(work_.coefficient, light * kChannelCount, moments.coefficient);
+      const float* const remainder = lane + moments.rank * kChannelLanes;
+      for (std::size_t k = 0; k < moments.remainders * kChannelLanes; ++k) {
+        lane[k] += kRemainder * remainder[k];
+      }
+      float* const x = work_.x.data + light * kChannelCount * stride + moments.position;
+      for (std::size_t k = 0; k < moments.rank; ++k) {
+        const float scale = moment_scale_[moments.scale + k] / basis_scale_;
+        for (int c = 0; c < kChannelCount; ++c)
+          x[c * stride + k] = scale * lane[k * kChannelLanes + c];
+      }
+    }
+  }
+
+  /// The coefficients of the light that arrives, from its moments.
+  void put_moments(const HierarchicalPlan::Moments& moments) const {
+    const std::size_t stride = work_.y.stride;
+    for (std::size_t light = 0; light < work_.light_count; ++light) {
+      const float* const y = work_.y.data + light * kChannelCount * stride + moments.position;
+      float* const lane = lane_of(work_.coefficient, light * kChannelCount, moments.coefficient);
+      for (std::size_t k = 0; k < moments.rank; ++k) {
+        const float scale = moment_scale_[moments.scale + k] / basis_scale_;
+        for (int c = 0; c < kChannelCount; ++c)
+          lane[k * kChannelLanes + c] = scale * y[c * stride + k];
+        lane[k * kChannelLanes + kChannelCount] = 0;
+      }
+      float* const remainder = lane + moments.rank * kChannelLanes;
+      for (std::size_t k = 0; k < moments.remainders * kChannelLanes; ++k) {
+        remainder[k] = kRemainder * lane[k];
+      }
+    }
+  }
+
+  /// Those of one part.
+  void multiply(std::span<const CoreBlock> cores, std::size_t part) const {
+    cores_.multiply(value_, cores, lanes_, work_.light_count, constant(work_.coefficient),
+                    work_.coefficient, work_.taken.data + part * work_.taken.stride);
+  }
+
+  void multiply_dense(std::span<const DenseBlock> blocks) const {
+    cores_.multiply_dense(value_, blocks, constant(work_.x), work_.coefficient);
+  }
+
+  void expand(std::span<const BasisPart> parts) const {
+    bases_.expand(basis_, parts, constant(work_.coefficient), work_.y);
+  }
+
+  void add_light(std::span<const DenseEnd> ends) const {
+    if (lanes_.matrix_count == 1) {
+      cores_.add_products(ends, constant(work_.coefficient), product_scale(), work_.y);
+    } else {
+      for (const DenseEnd& end : ends) add_coefficients(end);
+    }
+  }
+
+ private:
+  static constexpr float kRemainder = 1 / HierarchicalFormat::kRemainderScale;
+
+  /// Of light that goes through no bases, which other light does twice.
+  float product_scale() const { return basis_scale_ * basis_scale_; }
+
+  /// The coefficients of a channel of a light, kChannelLanes floats from one to the next.
+  static float* lane_of(const Coefficients<float>& coefficients, std::size_t v, std::size_t first) {
+    return coefficients.data + v / kChannelCount * coefficients.stride + first * kChannelLanes +
+           v % kChannelCount;
+  }
+
+  void add_coefficients(const DenseEnd& end) const {
+    for (std::size_t v = 0; v < work_.y.count; ++v) {
+      const float* const lane = lane_of(work_.coefficient, v, end.coefficient + end.first);
+      float* const y = work_.y.data + v * work_.y.stride + end.position;
+      for (std::size_t k = 0; k < end.count; ++k) y[k] += product_scale() * lane[k * kChannelLanes];
+    }
+  }
+
+  const BasisKernels<Basis>& bases_;
+  const CoreKernels<Value>& cores_;
+  const Basis* basis_;
+  const Value* value_;
+  const ChannelLanes& lanes_;
+  float basis_scale_;
+  std::span<const float> moment_scale_;
+  const WorkVectors& work_;
+};
+
+void clear(const PlanarVectors<float>& vectors, std::size_t begin, std::size_t end) {
+  for (std::size_t v = 0; v < vectors.count; ++v) {
+    float* const data = vectors.data + v * vectors.stride;
+    std::fill(data + begin, data + end, 0.0F);
+  }
+}
+
+/// Takes the light of the patches into x and what arrives out of y.
+struct Exchange {
+  std::span<const std::uint32_t> patch;                ///< [n] at each position
+  std::span<const float> gather_scale, scatter_scale;  ///< [n] by position
+  const WorkVectors& work;
+
+  void gather(std::span<const Float3> light, std::size_t begin, std::size_t end) const {
+    const std::size_t n = patch.size(), stride = work.x.stride, last = std::min(end, n);
+    for (std::size_t v = 0; v < work.x.count; v += kChannelCount) {
+      const Float3* const from_light = light.data() + v / kChannelCount * n;
+      float* const x = work.x.data + v * stride;
+      for (std::size_t k = begin; k < last; ++k) {
+        if (k + kPatchesAhead < n) {
+          __builtin_prefetch(&from_light[patch[k + kPatchesAhead]], kToRead, kSecondLevel);
+        }
+        const Float3& m = from_light[patch[k]];
+        const float weight = gather_scale[k];
+        for (int c = 0; c < kChannelCount; ++c) x[c * stride + k] = weight * m[c];
+      }
+    }
+    clear(work.x, std::max(begin, last), end);
+  }
+
+  /// At the positions `targets`.
+  void scatter(std::span<const std::uint32_t> targets, std::span<Float3> light) const {
+    const std::size_t n = patch.size(), stride = work.y.stride;
+    for (std::size_t v = 0; v < work.y.count; v += kChannelCount) {
+      Float3* const to_light = light.data() + v / kChannelCount * n;
+      const float* const y = work.y.data + v * stride;
+      for (const std::uint32_t k : targets) {
+        if (k + kPatchesAhead < n) {
+          __builtin_prefetch(&to_light[patch[k + kPatchesAhead]], kToWrite, kSecondLevel);
+        }
+        Float3& h = to_light[patch[k]];
+        const float weight = scatter_scale[k];
+        for (int c = 0; c < kChannelCount; ++c) h[c] = weight * y[c * stride + k];
+      }
+    }
+  }
+};
+
+/// All that arrives at some positions or moments.
+template <typename Phases>
+void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arrival,
+            const Phases& phases, const WorkVectors& work) {
+  clear(work.y, arrival.begin, arrival.end);
+  phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
+  phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
+}
+
+/// Of the entries of a part of a step.
+template <typename Entry>
+std::span<const Entry> of_part(const std::vector<Entry>& entries,
+                               const std::vector<std::uint32_t>& parts, std::size_t part) {
+  return between(entries, parts[part], parts[part + 1]);
+}
+
+template <typename Basis, typename Value>
+void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
+              const Exchange& exchange, const WorkVectors& work,
+              std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+              const Scheduler& scheduler) {
+  const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
+  const auto gather = [&](std::size_t k) {
+    const std::size_t begin = k * kGathered;
+    exchange.gather(initial_exitance, begin, std::min(begin + kGathered, positions));
+  };
+  // Light goes to dense blocks of several matrices while it is projected for others.
+  const std::size_t dense_ends = piece_count(plan.dense_in.size(), kDenseEndsPerTask);
+  const auto take_light = [&](std::size_t k) { phases.take_light(plan.dense_in[k]); };
+  const auto take_piece = on_piece(plan.dense_in.size(), kDenseEndsPerTask, take_light);
+  const auto project = [&](std::size_t k) {
+    if (k < dense_ends) {
+      take_piece(k);
+    } else {
+      phases.project(of_part(plan.projections, plan.projection_parts, k - dense_ends));
+    }
+  };
+  const std::size_t moments_in = plan.moments_in.size(), moments_out = plan.moments_out.size();
+  const auto take_moments = [&](std::size_t k) { phases.take_moments(plan.moments_in[k]); };
+  const auto project_moments = [&](std::size_t k) {
+    phases.project(of_part(plan.moment_projections, plan.moment_projection_parts, k));
+  };
+  const std::size_t dense_parts = plan.dense_parts.size() - 1;
+  const auto multiply = [&](std::size_t k) {
+    if (k < dense_parts) {
+      phases.multiply_dense(of_part(plan.dense, plan.dense_parts, k));
+    } else {
+      const std::size_t part = k - dense_parts;
+      phases.multiply(of_part(plan.cores, plan.core_parts, part), part);
+    }
+  };
+  const auto arrive_at_moments = [&](std::size_t k) {
+    arrive(plan, plan.moment_arrivals[plan.moment_arrivals.size() - 1 - k], phases, work);
+  };
+  const auto put_moments = [&](std::size_t k) { phases.put_moments(plan.moments_out[k]); };
+  // The last of them first.
+  const auto arrive_at_patches = [&](std::size_t k) {
+    const HierarchicalPlan::Arrival& arrival = plan.arrivals[plan.arrivals.size() - 1 - k];
+    arrive(plan, arrival, phases, work);
+    exchange.scatter(between(plan.targets, arrival.first_target, arrival.last_target),
+                     indirect_irradiance);
+  };
+  run_in_turn(scheduler,
+              {{piece_count(positions, kGathered), gather},
+               {dense_ends + plan.projection_parts.size() - 1, project},
+               {piece_count(moments_in, kMomentsPerTask),
+                on_piece(moments_in, kMomentsPerTask, take_moments)},
+               {moments_in == 0 ? 0 : plan.moment_projection_parts.size() - 1, project_moments},
+               {dense_parts + plan.core_parts.size() - 1, multiply},
+               {moments_out == 0 ? 0 : plan.moment_arrivals.size(), arrive_at_moments},
+               {piece_count(moments_out, kMomentsPerTask),
+                on_piece(moments_out, kMomentsPerTask, put_moments)},
+               {plan.arrivals.size(), arrive_at_patches}});
+}
+
+}  // namespace
+
+std::uint64_t HierarchicalOperator::Receivers::value_count() const {
+  return plan_->value_count;
+}
+
+HierarchicalOperator::HierarchicalOperator(HierarchicalStorage storage)
+    : storage_(std::make_shared<HierarchicalStorage>(stream_values(storage))),
+      layout_(std::make_shared<HierarchicalLayout>(*storage_)) {
+  const std::size_t n = storage_->area.size();
+  gather_scale_.reserve(n);
+  scatter_scale_.reserve(n);
+  const float scale = product_scale(storage_->precision);
+  for (std::size_t k = 0; k < n; ++k) {
+    const std::uint32_t p = storage_->patch[k];
+    const float root = std::sqrt(storage_->area[p]), of_position = storage_->position_scale(k);
+    gather_scale_.push_back(roles().is_source(p) ? of_position * root : 0);
+    scatter_scale_.push_back(of_position * scale / root);
+  }
+  plan_ = plan_to(std::vector<bool>(patch_count(), true));
+}
+
+std::shared_ptr<const HierarchicalPlan> HierarchicalOperator::plan_to(
+    const std::vector<bool>& wanted) const {
+  std::vector<std::uint32_t> positions, dark;
+  for (std::uint32_t k = 0; k < patch_count(); ++k) {
+    const std::uint32_t p = storage_->patch[k];
+    if (!wanted[p]) continue;
+    if (roles().is_receiver(p)) {
+      positions.push_back(k);
+    } else {
+      dark.push_back(p);
+    }
+  }
+  return std::make_shared<HierarchicalPlan>(*storage_, *layout_, std::move(positions),
+                                            std::move(dark));
+}
+
+const PatchRoles& HierarchicalOperator::roles() const {
+  return storage_->roles;
+}
+
+std::size_t HierarchicalOperator::bytes() const {
+  return storage_->values_f16.size_bytes() + storage_->values_f32.size_bytes() +
+         storage_->bases_q16.size_bytes() + storage_->bases_q8.size_bytes() +
+         storage_->blocks.size() * sizeof(TransferBlock) +
+         storage_->moment_scale.size() * sizeof(float) + storage_->scale_exponent.size() +
+         storage_->patch.size() * sizeof(std::uint32_t) + storage_->roles.role.size();
+}
+
+std::size_t HierarchicalOperator::bytes_per_apply() const {
+  const auto bytes_of_bases = [this](const auto&, const auto&, const auto* basis, const auto*,
+                                     float) { return layout_->basis_value_count * sizeof(*basis); };
+  return bytes() + with_kernels_of(*storage_, *layout_, bytes_of_bases);
+}
+
+std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
+  return WorkVectors::size(HierarchicalFormat::position_count(patch_count()), *layout_,
+                           light_count) +
+         kLine;
+}
+
+void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_count,
+                               std::span<const Float3> initial_exitance,
+                               std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                               const Scheduler& scheduler) const {
+  assert(initial_exitance.size() == light_count * patch_count());
+  assert(indirect_irradiance.size() == light_count * patch_count());
+  assert(workspace.size() >= batch_workspace_size(light_count));
+  // The workspace has room for one line more than its vectors, so that they may begin with one.
+  const std::size_t misplaced = reinterpret_cast<std::uintptr_t>(workspace.data()) / sizeof(float);
+  float* const aligned = workspace.data() + (kLine - misplaced % kLine) % kLine;
+  const WorkVectors work(HierarchicalFormat::position_count(patch_count()), *layout_, light_count,
+                         aligned);
+  const Exchange exchange{storage_->patch, gather_scale_, scatter_scale_, work};
+  const ChannelLanes lanes(storage_->channel_matrix, storage_->matrix_count);
+  for (std::size_t light = 0; light < light_count; ++light) {
+    for (const std::uint32_t p : plan.dark) {
+      indirect_irradiance[light * patch_count() + p] = {0, 0, 0};
+    }
+  }
+  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
+                                const auto* core, float basis_scale) {
+    const Phases phases(bases, cores, basis, core, lanes, basis_scale, storage_->moment_scale,
+                        work);
+    run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance, scheduler);
+  };
+  with_kernels_of(*storage_, *layout_, apply_phases);
+}
+
+void HierarchicalOperator::apply(std::span<const Float3> initial_exitance,
+                                 std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                                 const Scheduler& scheduler) const {
+  run(*plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
+}
+
+void HierarchicalOperator::apply_batch(std::size_t light_count,
+                                       std::span<const Float3> initial_exitance,
+                                       std::span<Float3> indirect_irradiance,
+                                       std::span<float> workspace,
+                                       const Scheduler& scheduler) const {
+  run(*plan_, light_count, initial_exitance, indirect_irradiance, workspace, scheduler);
+}
+
+HierarchicalOperator::Receivers HierarchicalOperator::receivers(
+    std::span<const std::uint32_t> patches) const {
+  std::vector<bool> wanted(patch_count());
+  for (const std::uint32_t p : patches) {
+    if (p >= patch_count()) {
+      throw Error("hierarchical operator: receiver " + std::to_string(p) +
+                  " does not exist; there are " + std::to_string(patch_count()) + " patches");
+    }
+    wanted[p] = true;
+  }
+  return Receivers(plan_to(wanted));
+}
+
+void HierarchicalOperator::apply_to(const Receivers& receivers,
+                                    std::span<const Float3> initial_exitance,
+                                    std::span<Float3> indirect_irradiance,
+                                    std::span<float> workspace, const Scheduler& scheduler) const {
+  run(*receivers.plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
+}
+
+void HierarchicalOperator::expand(int channel, std::span<float> transfer) const {
+  const std::size_t n = patch_count();
+  assert(transfer.size() == n * n);
+  std::ranges::fill(transfer, 0.0F);
+  const auto put = [&](std::size_t i, std::size_t j, double value) {
+    const std::size_t row = storage_->patch[i], column = storage_->patch[j];
+    if (!roles().is_receiver(row) || !roles().is_source(column)) return;
+    transfer[row * n + column] = static_cast<float>(value * std::sqrt(storage_->area[column]) /
+                                                    std::sqrt(storage_->area[row]));
+  };
+  for (std::size_t b = 0; b < storage_->blocks.size(); ++b) {
+    if (is_moments(storage_->blocks[b])) continue;
+    const BlockOfPositions block =
+        block_of_positions(*storage_, *layout_, b, storage_->channel_matrix[channel]);
+    for (std::size_t r = 0; r < block.rows.size(); ++r) {
+      const std::size_t i = block.rows[r];
+      if (i >= n) continue;
+      const double scale = storage_->position_scale(i);
+      for (std::size_t c = 0; c < block.columns.size(); ++c) {
+        const std::size_t j = block.columns[c];
+        if (j >= n) continue;
+        const double entry =
+            scale * storage_->position_scale(j) * block.entries[r * block.columns.size() + c];
+        put(i, j, entry);
+        if (!storage_->blocks[b].on_diagonal()) put(j, i, entry);
+      }
+    }
+  }
+}
+
+}  // namespace rebounce

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "transfer/base/precision.h"
+#include "transfer/base/shared_array.h"
+#include "transfer/operator/transfer_operator.h"
+
+namespace rebounce {
+
+/// Y of one low rank for the whole scene, in its symmetric form Yhat = A^1/2 Y A^-1/2 ~ V S V^T.
+///
+/// The channels share the basis V, whose columns are orthonormal, and have a symmetric core S each.
+class LowRankOperator final : public TransferOperator {
+ public:
+  /// The basis is kept in tiles of this many patches, so that threads share the patches out.
+  static constexpr std::size_t kTile = 256;
+
+  struct Storage {
+    std::vector<float> area;                                    ///< [n] m²
+    std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
+    std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
+    std::size_t rank = 0;                                       ///< at most n
+    Precision precision = Precision::kF32;                      ///< of the basis
+    SharedArray<float> basis_f32;  ///< [tile_count(n)][rank][kTile], if kF32; zero past patch n
+    SharedArray<std::uint16_t> basis_f16;  ///< the same as IEEE half-precision bits, if kF16
+    SharedArray<float> core;               ///< [matrix_count][rank][rank]
+  };
+
+  static std::size_t tile_count(std::size_t patch_count);
+
+  /// The same with the basis as half-precision numbers.
+  static Storage encode_half(const Storage& storage);
+
+  /// Takes over `storage`. Throws Error if sizes do not agree.
+  explicit LowRankOperator(Storage storage);
+
+  const Storage& storage() const { return storage_; }
+
+  std::size_t patch_count() const override { return storage_.area.size(); }
+  std::size_t bytes() const override;
+  /// The basis is read twice, to project light and to expand it.
+  std::size_t bytes_per_apply() const override;
+  std::string kind() const override { return "low-rank"; }
+  std::size_t workspace_size() const override;
+  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+             std::span<float> workspace, const Scheduler& scheduler = {}) const override;
+
+ private:
+  std::size_t stride() const { return tile_count(patch_count()) * kTile; }
+  /// Ranks of the three channels, each rounded up to whole vectors.
+  std::size_t coefficient_size() const { return (kChannelCount + 1) * rank_stride_; }
+  /// V^T x of one tile, and the sum [coefficient_size()] of all tiles'.
+  void project_tile(std::size_t tile, const float* x, float* tile_coefficient) const;
+  void add_up(const float* tile_coefficient, float* coefficient) const;
+  /// One row of the core of a channel.
+  void multiply_row(std::size_t channel, std::size_t row, const float* in, float* out) const;
+  void expand_tile(std::size_t tile, const float* coefficient, float* y) const;
+
+  Storage storage_;
+  std::vector<float> sqrt_area_;  ///< [n]
+  std::size_t rank_stride_ = 0;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,48 @@
+#include "transfer/operator/transfer_operator.h"
+
+#include <cassert>
+
+namespace rebounce {
+
+const PatchRoles& TransferOperator::roles() const {
+  static const PatchRoles all_both;
+  return all_both;
+}
+
+std::size_t TransferOperator::batch_workspace_size(std::size_t) const {
+  return workspace_size();
+}
+
+void TransferOperator::apply_batch(std::size_t light_count,
+                                   std::span<const Float3> initial_exitance,
+                                   std::span<Float3> indirect_irradiance,
+                                   std::span<float> workspace, const Scheduler& scheduler) const {
+  const std::size_t n = patch_count();
+  for (std::size_t light = 0; light < light_count; ++light) {
+    apply(initial_exitance.subspan(light * n, n), indirect_irradiance.subspan(light * n, n),
+          workspace, scheduler);
+  }
+}
+
+void TransferOperator::expand(int channel, std::span<float> transfer) const {
+  const std::size_t n = patch_count();
+  assert(transfer.size() == n * n);
+  std::vector<Float3> unit(n, {0, 0, 0}), column(n);
+  std::vector<float> workspace(workspace_size());
+  for (std::size_t j = 0; j < n; ++j) {
+    unit[j][channel] = 1;
+    apply(unit, column, workspace);
+    unit[j][channel] = 0;
+    for (std::size_t i = 0; i < n; ++i) transfer[i * n + j] = column[i][channel];
+  }
+}
+
+std::vector<Float3> product(const TransferOperator& transfer,
+                            std::span<const Float3> initial_exitance) {
+  std::vector<Float3> indirect_irradiance(initial_exitance.size());
+  std::vector<float> workspace(transfer.workspace_size());
+  transfer.apply(initial_exitance, indirect_irradiance, workspace);
+  return indirect_irradiance;
+}
+
+}  // namespace rebounce

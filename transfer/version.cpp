@@ -1,9 +1,0 @@
-#include "rebounce/transfer/version.h"
-
-namespace rebounce {
-
-const char* version() {
-  return REBOUNCE_VERSION;
-}
-
-}  // namespace rebounce
