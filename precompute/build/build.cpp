@@ -81,7 +81,7 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
     const bool dense = settings.operator_kind == OperatorKind::kDense;
     settings.precision = hierarchical ? Precision::kQ8 : dense ? Precision::kF32 : Precision::kF16;
   }
-  if (has_integer_bases(*settings.precision) && !hierarchical) {
+  if (are_integers(hierarchical_precision(*settings.precision).bases) && !hierarchical) {
     throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
   }
   if (!hierarchical) settings.tolerance = 0;

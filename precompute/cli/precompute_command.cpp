@@ -169,6 +169,12 @@ FormFactorQuality quality_named(std::string_view name) {
   return name == "high" ? FormFactorQuality::kHigh : FormFactorQuality::kDefault;
 }
 
+std::vector<std::string> precision_names() {
+  std::vector<std::string> names;
+  for (const OfferedPrecision& offered : kOfferedPrecisions) names.emplace_back(offered.name);
+  return names;
+}
+
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
   take_probes(chosen.probes, settings.probes);
@@ -177,9 +183,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   if (chosen.form_factors == "pairs") settings.form_factor_kind = FormFactorKind::kPairs;
   if (chosen.form_factors == "links") settings.form_factor_kind = FormFactorKind::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
-  for (const Precision precision :
-       {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
-    if (chosen.precision == precision_name(precision)) settings.precision = precision;
+  for (const OfferedPrecision& offered : kOfferedPrecisions) {
+    if (chosen.precision == offered.name) settings.precision = offered.precision;
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
   if (chosen.operator_kind == "low-rank") settings.operator_kind = OperatorKind::kLowRank;
@@ -287,7 +292,7 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
           "q8 for a third of the bytes, q16 for half of them and, where all of them fit a "
           "processor's own cache, a little less time; by default f32 for a dense operator, q8 for "
           "a hierarchical one, f16 for others")
-      ->check(CLI::IsMember({"f16", "f32", "q16", "q8"}));
+      ->check(CLI::IsMember(precision_names()));
   command
       .add_option("--receivers", chosen.receivers,
                   "Surfaces whose indirect light is wanted, and none of others is stored: a list "

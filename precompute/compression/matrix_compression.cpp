@@ -106,7 +106,8 @@ struct KeptParts {
 /// beside halves. One with moments is for applies, whose time counts too.
 PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_count) {
   PartSizes sizes;
-  sizes.basis_value = settings.precision == Precision::kQ8 ? 0.55 : 1;
+  sizes.basis_value =
+      hierarchical_precision(settings.precision).bases == BasisPrecision::kQ8 ? 0.55 : 1;
   if (settings.moments) {
     const double part = std::min(1.0, static_cast<double>(patch_count) / kSizedPatches);
     sizes.vector += kVectorSize * part;
@@ -131,7 +132,8 @@ struct Form {
 /// Bases in integers have one step for all patches of a cluster; sweeps work on the light at
 /// positions, and do not know moments.
 Form form_of(const HierarchicalSettings& settings) {
-  return {.balanced = has_integer_bases(settings.precision) || settings.moments,
+  return {.balanced =
+              are_integers(hierarchical_precision(settings.precision).bases) || settings.moments,
           .nested = settings.moments};
 }
 

@@ -8,7 +8,7 @@
 
 #include "runtime/frame/engine.h"
 #include "runtime/outputs/vertex_light.h"
-#include "tests/support/thread_pool.h"
+#include "../support/thread_pool.h"
 #include "transfer/file/transfer_file.h"
 
 int main(int argc, char** argv) {

@@ -1,19 +1,34 @@
 #include "transfer/base/precision.h"
 
+#include <algorithm>
+
 namespace rebounce {
+namespace {
+
+const OfferedPrecision& offered(Precision precision) {
+  return *std::ranges::find(kOfferedPrecisions, precision, &OfferedPrecision::precision);
+}
+
+auto find(const HierarchicalPrecision& precision) {
+  return std::ranges::find(kOfferedPrecisions, precision, &OfferedPrecision::hierarchical);
+}
+
+}  // namespace
+
+HierarchicalPrecision hierarchical_precision(Precision precision) {
+  return offered(precision).hierarchical;
+}
+
+bool is_offered(const HierarchicalPrecision& precision) {
+  return find(precision) != kOfferedPrecisions.end();
+}
 
 std::string precision_name(Precision precision) {
-  switch (precision) {
-    case Precision::kF16:
-      return "f16";
-    case Precision::kQ16:
-      return "q16";
-    case Precision::kQ8:
-      return "q8";
-    case Precision::kF32:
-      break;
-  }
-  return "f32";
+  return offered(precision).name;
+}
+
+std::string precision_name(const HierarchicalPrecision& precision) {
+  return find(precision)->name;
 }
 
 }  // namespace rebounce

@@ -14,10 +14,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <type_traits>
 #include <vector>
 
 #include "transfer/exchange/cluster_sweep_plan.h"
+#include "transfer/format/hierarchical_layout.h"
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/kernels_of_storage.h"
 
@@ -70,19 +70,14 @@ class CoefficientArray {
   std::vector<float> values_;
 };
 
-template <typename Basis, typename Value>
 class ClusterRelaxation final : public Relaxation {
  public:
-  ClusterRelaxation(const HierarchicalStorage& exchange, const BasisKernels<Basis>& bases,
-                    const CoreKernels<Value>& cores, const Basis* basis_values,
-                    const Value* core_values, float basis_scale)
+  explicit ClusterRelaxation(const HierarchicalStorage& exchange)
       : exchange_(exchange),
-        bases_(bases),
-        cores_(cores),
-        basis_values_(basis_values),
-        core_values_(core_values),
-        value_scale_(product_scale(exchange.precision)),
-        dense_scale_(basis_scale * basis_scale),
+        bases_(exchange),
+        couplings_(exchange, HierarchicalLayout(exchange).basis_value_count),
+        value_scale_(product_scale(bases_, couplings_)),
+        dense_scale_(bases_.scale() * bases_.scale()),
         plan_(exchange),
         light_(positions()),
         reflectance_(positions()),
@@ -210,11 +205,11 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void project(std::span<const BasisPart> bases) {
-    bases_.project(basis_values_, bases, radiosity_.from(0), sent_.to(0));
+    bases_.project(bases, radiosity_.from(0), sent_.to(0));
   }
 
   void expand(std::span<const BasisPart> bases, Planes& arrived) {
-    bases_.expand(basis_values_, bases, arrived_.from(0), arrived.to(0));
+    bases_.expand(bases, arrived_.from(0), arrived.to(0));
   }
 
   void send_to_rows(const Plan::Products& products, std::size_t step) {
@@ -228,11 +223,11 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void multiply(std::span<const CoreBlock> cores) {
-    cores_.multiply(core_values_, cores, lanes_, 1, sent_.from(0), arrived_.to(0), taken_.data());
+    couplings_.multiply(cores, lanes_, 1, sent_.from(0), arrived_.to(0), taken_.data());
   }
 
   void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
-    cores_.add_dense(core_values_, blocks, radiosity_.from(0), dense_scale_, to.to(0));
+    couplings_.add_dense(blocks, radiosity_.from(0), dense_scale_, to.to(0));
   }
 
   /// Relaxes the positions of a block on the diagonal.
@@ -323,12 +318,10 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   const HierarchicalStorage& exchange_;
-  const BasisKernels<Basis>& bases_;
-  const CoreKernels<Value>& cores_;
+  BasisProducts bases_;
+  CouplingProducts couplings_;
   ChannelLanes lanes_{{0, 0, 0}, 1};  ///< one matrix for all channels
-  const Basis* basis_values_;
-  const Value* core_values_;
-  float value_scale_;  ///< what a product with stored values is to be multiplied by
+  float value_scale_;                 ///< what a product with stored values is to be multiplied by
   float dense_scale_;  ///< of one with dense entries, which other light meets in both bases
   ClusterSweepPlan plan_;
   /// R A^1/2 M0, R^2 rho x value_scale, R A^1/2 B.
@@ -345,13 +338,7 @@ class ClusterRelaxation final : public Relaxation {
 }  // namespace
 
 std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalStorage& exchange) {
-  const auto make = [&](const auto& bases, const auto& cores, const auto* basis_values,
-                        const auto* core_values, float basis_scale) -> std::unique_ptr<Relaxation> {
-    return std::make_unique<ClusterRelaxation<std::remove_cvref_t<decltype(*basis_values)>,
-                                              std::remove_cvref_t<decltype(*core_values)>>>(
-        exchange, bases, cores, basis_values, core_values, basis_scale);
-  };
-  return with_kernels_of(exchange, HierarchicalLayout(exchange), make);
+  return std::make_unique<ClusterRelaxation>(exchange);
 }
 
 }  // namespace rebounce

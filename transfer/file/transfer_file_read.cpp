@@ -264,10 +264,10 @@ std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* 
 void read_integer_bases(const SafetensorsFile& file, const char* name,
                         HierarchicalStorage& storage) {
   if (file.info(name).type == TensorType::kI16) {
-    storage.precision = Precision::kQ16;
+    storage.precision.bases = BasisPrecision::kQ16;
     storage.bases_q16 = file.tensor<std::int16_t>(name, {kAnySize}, TensorType::kI16);
   } else {
-    storage.precision = Precision::kQ8;
+    storage.precision.bases = BasisPrecision::kQ8;
     storage.bases_q8 = file.tensor<std::int8_t>(name, {kAnySize}, TensorType::kI8);
   }
 }
@@ -300,7 +300,7 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
     storage.scale_exponent.assign(stored.begin(), stored.end());
   }
   if (file.info(names.values).type == TensorType::kF16) {
-    storage.precision = Precision::kF16;
+    storage.precision = hierarchical_precision(Precision::kF16);
     storage.values_f16 = file.tensor<std::uint16_t>(names.values, {kAnySize}, TensorType::kF16);
   } else {
     storage.values_f32 = file.tensor<float>(names.values, {kAnySize});

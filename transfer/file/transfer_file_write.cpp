@@ -1,3 +1,4 @@
+#include <concepts>
 #include <cstring>
 #include <deque>
 #include <nlohmann/json.hpp>
@@ -83,6 +84,15 @@ void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollect
                                storage.channel_matrix);
 }
 
+/// The tensor type of values of a HierarchicalOperator: those of 16 bits without a sign are halves.
+template <typename Value>
+constexpr TensorType value_type() {
+  if constexpr (std::same_as<Value, std::uint16_t>) return TensorType::kF16;
+  if constexpr (std::same_as<Value, std::int16_t>) return TensorType::kI16;
+  if constexpr (std::same_as<Value, std::int8_t>) return TensorType::kI8;
+  if constexpr (std::same_as<Value, float>) return TensorType::kF32;
+}
+
 void collect_hierarchical_operator(const HierarchicalStorage& storage,
                                    const HierarchicalTensors& names, TensorCollector& collector) {
   std::vector<StoredBlock> blocks;
@@ -101,19 +111,13 @@ void collect_hierarchical_operator(const HierarchicalStorage& storage,
   }
   collector.add<std::uint32_t>(names.channel_matrix, {storage.channel_matrix.size()},
                                storage.channel_matrix);
-  if (storage.precision == Precision::kQ16) {
-    collector.add(names.bases, {storage.bases_q16.size()}, storage.bases_q16.span(),
-                  TensorType::kI16);
-  }
-  if (storage.precision == Precision::kQ8) {
-    collector.add(names.bases, {storage.bases_q8.size()}, storage.bases_q8.span(), TensorType::kI8);
-  }
-  if (storage.precision != Precision::kF32) {
-    collector.add(names.values, {storage.values_f16.size()}, storage.values_f16.span(),
-                  TensorType::kF16);
-  } else {
-    collector.add(names.values, {storage.values_f32.size()}, storage.values_f32.span());
-  }
+  const auto add = [&](const char* name) {
+    return [&collector, name]<typename Value>(const SharedArray<Value>& array) {
+      collector.add(name, {array.size()}, array.span(), value_type<Value>());
+    };
+  };
+  if (!storage.one_array()) with_bases(storage, add(names.bases));
+  with_couplings(storage, add(names.values));
 }
 
 void collect_low_rank_operator(const LowRankOperator::Storage& storage,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -144,8 +145,8 @@ void check_tables(const Storage& storage) {
     if (one_rank && storage.order == HierarchicalStorage::Order::kStreamed) {
       refuse("a block has only one rank");
     }
-    const bool rounded =
-        storage.precision == Precision::kF16 || storage.precision == Precision::kQ16;
+    const bool rounded = storage.precision.bases == BasisPrecision::kF16 ||
+                         storage.precision.bases == BasisPrecision::kQ16;
     if (rounded && (block.row_remainders | block.column_remainders) != 0) {
       refuse("a block has remainders, which are for bases in 8 bits alone");
     }
@@ -159,37 +160,36 @@ std::uint64_t block_order_count(const Storage& storage) {
   return count;
 }
 
-/// Numbers of values that the arrays must have.
-struct ArraySizes {
-  std::uint64_t f32 = 0, f16 = 0, q16 = 0, q8 = 0;
-  bool operator==(const ArraySizes&) const = default;
-};
-
-ArraySizes expected_sizes(const Storage& storage) {
+/// Whether all arrays have as many values as the blocks ask for.
+bool sizes_fit(const Storage& storage) {
   const HierarchicalLayout layout(storage);
-  const std::uint64_t bases = HierarchicalLayout::padded(layout.basis_value_count);
-  const std::uint64_t cores = HierarchicalLayout::padded(layout.core_value_count);
-  if (storage.precision == Precision::kQ16) return {.f16 = cores, .q16 = bases};
-  if (storage.precision == Precision::kQ8) return {.f16 = cores, .q8 = bases};
-  const std::uint64_t all =
-      storage.order == HierarchicalStorage::Order::kStreamed
-          ? HierarchicalLayout::padded(layout.basis_value_count + layout.core_value_count)
-          : block_order_count(storage);
-  if (storage.precision == Precision::kF16) return {.f16 = all};
-  return {.f32 = all};
+  const std::uint64_t bases = layout.basis_value_count, couplings = layout.core_value_count;
+  std::map<const void*, std::uint64_t> expected;
+  const auto expect = [&](std::uint64_t count) {
+    return [&expected, count](const auto& array) { expected[&array] = count; };
+  };
+  if (storage.one_array()) {
+    with_bases(storage, expect(storage.order == HierarchicalStorage::Order::kStreamed
+                                   ? HierarchicalLayout::padded(bases + couplings)
+                                   : block_order_count(storage)));
+  } else {
+    with_bases(storage, expect(HierarchicalLayout::padded(bases)));
+    with_couplings(storage, expect(HierarchicalLayout::padded(couplings)));
+  }
+  bool fit = true;
+  for_each_array(storage, [&](const auto& array) { fit &= array.size() == expected[&array]; });
+  return fit;
 }
 
 }  // namespace
 
 void check_hierarchical_storage(const Storage& storage) {
   check_tables(storage);
-  if (has_integer_bases(storage.precision) &&
-      storage.order != HierarchicalStorage::Order::kStreamed) {
+  if (!is_offered(storage.precision)) refuse("its precisions do not go together");
+  if (!storage.one_array() && storage.order != HierarchicalStorage::Order::kStreamed) {
     refuse("integers are for streamed values alone");
   }
-  const ArraySizes sizes{storage.values_f32.size(), storage.values_f16.size(),
-                         storage.bases_q16.size(), storage.bases_q8.size()};
-  if (sizes != expected_sizes(storage)) refuse("the number of values does not fit the blocks");
+  if (!sizes_fit(storage)) refuse("the number of values does not fit the blocks");
   // Sums of their products must not overflow.
   constexpr std::int16_t kLargest = HierarchicalFormat::kLargestShort;
   const auto too_large = [](std::int16_t value) { return value > kLargest || value < -kLargest; };

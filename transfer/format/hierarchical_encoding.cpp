@@ -2,17 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "transfer/base/error.h"
 #include "transfer/base/half_float.h"
 #include "transfer/format/hierarchical_check.h"
 #include "transfer/format/hierarchical_layout.h"
-#include "transfer/format/integer_encoding.h"
+#include "transfer/format/stored_values.h"
 
 namespace rebounce {
 namespace {
 
 using Storage = HierarchicalStorage;
+using Layout = HierarchicalLayout;
 
 using Order = HierarchicalStorage::Order;
 
@@ -43,7 +48,7 @@ void place_block(const HierarchicalLayout& layout, const TransferBlock& block,
 template <typename Value>
 SharedArray<Value> stream_array(const Storage& storage, const std::vector<TransferBlock>& blocks,
                                 const SharedArray<Value>& values) {
-  const HierarchicalLayout layout(blocks, storage.matrix_count, storage.precision);
+  const HierarchicalLayout layout(blocks, storage.matrix_count, storage.precision.bases);
   std::vector<Value> streamed(
       HierarchicalLayout::padded(layout.basis_value_count + layout.core_value_count));
   const Value* from = values.data();
@@ -79,34 +84,155 @@ void fit_halves(Storage& exact) {
 
 /// Values in f32, which can be rounded, in the order kStreamed.
 Storage stream_exact(const Storage& storage) {
-  if (storage.precision != Precision::kF32) {
-    throw Error("hierarchical operator: values in " + precision_name(storage.precision) +
+  Storage streamed = stream_values(storage);
+  if (streamed.precision != hierarchical_precision(Precision::kF32)) {
+    throw Error("hierarchical operator: values in " + precision_name(streamed.precision) +
                 " cannot be rounded again; give them in f32");
   }
-  return stream_values(storage);
+  return streamed;
 }
 
-/// The same within the range of halves, as far as scales of positions allow.
-Storage stream_for_halves(const Storage& storage) {
-  Storage exact = stream_exact(storage);
-  fit_halves(exact);
-  return exact;
-}
+/// Integers that bases are rounded to: their largest magnitude.
+template <typename Basis>
+struct IntegerRange;
+template <>
+struct IntegerRange<std::int8_t> {
+  static constexpr float kLargest = 127;
+};
+template <>
+struct IntegerRange<std::int16_t> {
+  static constexpr float kLargest = HierarchicalFormat::kLargestShort;
+};
 
-Storage encode_half(const Storage& storage) {
-  const Storage exact = stream_for_halves(storage);
-  Storage half = exact;
-  half.precision = Precision::kF16;
-  half.values_f32 = {};
-  drop_remainders(half);
-  const HierarchicalLayout layout(half);
-  std::vector<std::uint16_t> values(exact.values_f32.size());
-  for (std::uint64_t k = 0; k < values.size(); ++k) {
-    const float value = exact.values_f32[k];
-    values[k] = k < layout.basis_value_count ? float_to_half(value) : encode_core_value(value);
+/// Writes an operator in f32 in other precisions. Where bases become integers, coupling matrices
+/// make up for the scales of their vectors.
+template <typename Basis, typename Coupling>
+class Encoder {
+ public:
+  /// `bases` and `couplings` have room for all values, and are zero.
+  Encoder(const Storage& exact, const Storage& rounded, Basis* bases, Coupling* couplings)
+      : exact_(exact.values_f32.data()),
+        matrix_count_(exact.matrix_count),
+        from_(exact),
+        to_(rounded),
+        moment_scale_(exact.moment_scale),
+        bases_(bases),
+        couplings_(couplings) {
+    for (std::size_t b = 0; b < exact.blocks.size(); ++b) encode(exact.blocks[b], b);
   }
-  half.values_f16 = SharedArray(std::move(values));
-  return half;
+
+  std::vector<float> take_moment_scale() { return std::move(moment_scale_); }
+
+ private:
+  static constexpr bool kIntegers = std::is_integral_v<Basis> && std::is_signed_v<Basis>;
+
+  void encode(const TransferBlock& block, std::size_t index) {
+    const Layout::Place &from = from_.places[index], &to = to_.places[index];
+    const float* core = exact_ + from_.basis_value_count + from.values;
+    Coupling* encoded = couplings_ + to.values;
+    if (block.kind == TransferBlock::Kind::kDense) {
+      for (std::uint64_t k = 0; k < block.value_count(matrix_count_); ++k) {
+        store_coupling(core[k], encoded[k]);
+      }
+    } else if (has_values(block)) {
+      const std::vector<float> rows =
+          encode_basis(from.row, to.row, block.row_rank, block.row_count);
+      if (is_moments(block)) {
+        for (const float row : rows) moment_scale_[moment_++] *= row;
+        return;
+      }
+      const std::vector<float> columns =
+          encode_basis(from.column, to.column, block.column_rank, block.column_count);
+      for (const float row : rows) {
+        for (const float column : columns) {
+          for (std::uint32_t matrix = 0; matrix < matrix_count_; ++matrix) {
+            store_coupling(*core++ * row * column, *encoded++);
+          }
+        }
+      }
+    }
+  }
+
+  /// Returns what each vector must be multiplied by, over the integer that stands for 1.
+  std::vector<float> encode_basis(const Layout::End& from, const Layout::End& to, std::size_t rank,
+                                  std::size_t size) {
+    std::vector<float> scales(rank, 1.0F);
+    std::vector<float> vector(size);
+    for (std::size_t r = 0; r < rank; ++r) {
+      std::copy_n(exact_ + from_.basis_index(from, r, 0), size, vector.begin());
+      if constexpr (kIntegers) {
+        scales[r] = put_integers(vector, to, rank, r);
+      } else {
+        for (std::size_t k = 0; k < size; ++k) put(vector[k], bases_[to_.basis_index(to, r, k)]);
+      }
+    }
+    return scales;
+  }
+
+  static void put(float value, float& stored) { stored = value; }
+  static void put(float value, std::uint16_t& stored) { stored = float_to_half(value); }
+
+  float put_integers(std::vector<float>& rest, const Layout::End& to, std::size_t rank,
+                     std::size_t r) {
+    float largest = 0;
+    for (const float v : rest) largest = std::max(largest, std::abs(v));
+    const float step = largest / IntegerRange<Basis>::kLargest;
+    put_multiples(rest, step, to, r);
+    if (r < to.remainders) {
+      put_multiples(rest, step / HierarchicalFormat::kRemainderScale, to, rank + r);
+    }
+    return step * kBasisScale<Basis>;
+  }
+
+  /// Stores a vector in multiples of `step`, and leaves what they are off.
+  void put_multiples(std::span<float> vector, float step, const Layout::End& to, std::size_t rank) {
+    constexpr float kLargest = IntegerRange<Basis>::kLargest;
+    if (step == 0) return;
+    for (std::size_t k = 0; k < vector.size(); ++k) {
+      const float steps = std::clamp(std::round(vector[k] / step), -kLargest, kLargest);
+      bases_[to_.basis_index(to, rank, k)] = static_cast<Basis>(steps);
+      vector[k] -= steps * step;
+    }
+  }
+
+  const float* exact_;
+  std::uint32_t matrix_count_;
+  Layout from_, to_;
+  std::vector<float> moment_scale_;
+  std::size_t moment_ = 0;  ///< the next one
+  Basis* bases_;
+  Coupling* couplings_;
+};
+
+/// Values in f32 and in the order kStreamed in another precision.
+Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact) {
+  Storage rounded = exact;
+  rounded.precision = precision;
+  rounded.values_f32 = {};
+  if (precision.bases != BasisPrecision::kQ8) {
+    for (TransferBlock& block : rounded.blocks) block.row_remainders = block.column_remainders = 0;
+  }
+  const Layout layout(rounded);
+  with_bases(rounded, [&]<typename Basis>(SharedArray<Basis>& bases) {
+    with_couplings(rounded, [&]<typename Coupling>(SharedArray<Coupling>& couplings) {
+      const std::uint64_t basis_count = layout.basis_value_count;
+      std::vector<Basis> basis_values(
+          Layout::padded(basis_count + (rounded.one_array() ? layout.core_value_count : 0)));
+      const auto encode_into = [&](Coupling* coupling_values) {
+        Encoder<Basis, Coupling> encoder(exact, rounded, basis_values.data(), coupling_values);
+        rounded.moment_scale = encoder.take_moment_scale();
+      };
+      if constexpr (std::is_same_v<Basis, Coupling>) {
+        encode_into(basis_values.data() + basis_count);
+      } else {
+        std::vector<Coupling> coupling_values(Layout::padded(layout.core_value_count));
+        encode_into(coupling_values.data());
+        couplings = SharedArray(std::move(coupling_values));
+      }
+      bases = SharedArray(std::move(basis_values));
+    });
+  });
+  return rounded;
 }
 
 }  // namespace
@@ -120,25 +246,15 @@ Storage stream_values(const Storage& storage) {
     if (is_moments(block)) continue;
     if (block.row_rank == 0 || block.column_rank == 0) block.row_rank = block.column_rank = 0;
   }
-  if (storage.precision == Precision::kF16) {
-    streamed.values_f16 = stream_array(storage, streamed.blocks, storage.values_f16);
-  } else {
-    streamed.values_f32 = stream_array(storage, streamed.blocks, storage.values_f32);
-  }
+  with_bases(streamed, [&](auto& array) { array = stream_array(storage, streamed.blocks, array); });
   return streamed;
 }
 
 Storage encode_values(const Storage& storage, Precision precision) {
-  switch (precision) {
-    case Precision::kF16:
-      return encode_half(storage);
-    case Precision::kQ16:
-    case Precision::kQ8:
-      return encode_integers(stream_for_halves(storage), precision);
-    case Precision::kF32:
-      break;
-  }
-  return stream_exact(storage);
+  Storage exact = stream_exact(storage);
+  if (precision == Precision::kF32) return exact;
+  fit_halves(exact);
+  return rounded_to(hierarchical_precision(precision), exact);
 }
 
 }  // namespace rebounce

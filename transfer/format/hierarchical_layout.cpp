@@ -58,9 +58,9 @@ bool has_values(const TransferBlock& block) {
 }
 
 HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
-                                       std::uint32_t matrix_count, Precision precision)
+                                       std::uint32_t matrix_count, BasisPrecision precision)
     : places(blocks.size()),
-      rank_group(has_integer_bases(precision) ? HierarchicalFormat::kRankGroup : 1) {
+      rank_group(are_integers(precision) ? HierarchicalFormat::kRankGroup : 1) {
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
     total += block.value_count(matrix_count);
@@ -110,13 +110,14 @@ std::uint32_t HierarchicalLayout::cluster_at(std::uint32_t begin, std::uint32_t 
   return static_cast<std::uint32_t>(found - clusters.begin());
 }
 
-void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks, Precision precision) {
+void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks,
+                                     BasisPrecision precision) {
   // First each end's place among the bases of its cluster, then that of the clusters.
   visit_ends(blocks, places,
              [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank,
                  std::uint32_t remainders) {
                end.cluster = cluster_at(begin, size);
-               end.remainders = precision == Precision::kQ8 ? remainders : 0;
+               end.remainders = precision == BasisPrecision::kQ8 ? remainders : 0;
                Cluster& cluster = clusters[end.cluster];
                end.coefficient = cluster.rank;
                cluster.rank = checked_count(std::uint64_t{cluster.rank} + rank + end.remainders);

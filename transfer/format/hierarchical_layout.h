@@ -34,11 +34,11 @@ struct HierarchicalLayout {
 
   /// The blocks must be checked. Throws Error if they hold more values than any memory.
   HierarchicalLayout(std::span<const TransferBlock> blocks, std::uint32_t matrix_count,
-                     Precision precision);
+                     BasisPrecision precision);
 
   /// Of the blocks of an operator.
   explicit HierarchicalLayout(const HierarchicalStorage& storage)
-      : HierarchicalLayout(storage.blocks, storage.matrix_count, storage.precision) {}
+      : HierarchicalLayout(storage.blocks, storage.matrix_count, storage.precision.bases) {}
 
   /// Where the value of a basis is: a rank of one end of a low-rank block, at a position of its
   /// cluster.
@@ -60,7 +60,7 @@ struct HierarchicalLayout {
   std::uint64_t filled_rank(const Cluster& cluster) const;
   void find_clusters(std::span<const TransferBlock> blocks);
   std::uint32_t cluster_at(std::uint32_t begin, std::uint32_t size) const;
-  void place_bases(std::span<const TransferBlock> blocks, Precision precision);
+  void place_bases(std::span<const TransferBlock> blocks, BasisPrecision precision);
   void place_cores(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
 };
 

@@ -44,16 +44,68 @@ struct HierarchicalStorage {
   std::vector<std::int8_t> scale_exponent;
   PatchRoles roles;  ///< by patch; entries that no source and receiver share are of no meaning
   Order order = Order::kByBlock;  ///< of the values
-  Precision precision = Precision::kF32;
-  SharedArray<float> values_f32;          ///< if kF32
-  SharedArray<std::uint16_t> values_f16;  ///< IEEE half-precision bits, if kF16
-  SharedArray<std::int16_t> bases_q16;    ///< if kQ16; values_f16 then holds the others alone
-  SharedArray<std::int8_t> bases_q8;      ///< if kQ8; likewise
+  HierarchicalPrecision precision;
+  /// Bases are in the array of their type, and so are coupling matrices and dense entries: after
+  /// the bases if both are of one type. The other arrays are empty.
+  SharedArray<float> values_f32;
+  SharedArray<std::uint16_t> values_f16;  ///< IEEE half-precision bits
+  SharedArray<std::int16_t> bases_q16;
+  SharedArray<std::int8_t> bases_q8;
+
+  /// Whether bases and coupling matrices are in one array.
+  bool one_array() const;
+
+  /// Where coupling matrices begin in their array, with bases of `basis_value_count` values.
+  std::uint64_t first_coupling(std::uint64_t basis_value_count) const {
+    return one_array() ? basis_value_count : 0;
+  }
 
   /// R at a position that holds a patch.
   float position_scale(std::size_t position) const {
     return scale_exponent.empty() ? 1 : std::ldexp(1.0F, scale_exponent[position]);
   }
 };
+
+/// Returns work(array) with the array of `storage`, constant or not, that the bases are in.
+template <typename Storage, typename Work>
+decltype(auto) with_bases(Storage& storage, const Work& work) {
+  switch (storage.precision.bases) {
+    case BasisPrecision::kF16:
+      return work(storage.values_f16);
+    case BasisPrecision::kQ16:
+      return work(storage.bases_q16);
+    case BasisPrecision::kQ8:
+      return work(storage.bases_q8);
+    case BasisPrecision::kF32:
+      break;
+  }
+  return work(storage.values_f32);
+}
+
+/// Likewise with that of coupling matrices and dense entries.
+template <typename Storage, typename Work>
+decltype(auto) with_couplings(Storage& storage, const Work& work) {
+  switch (storage.precision.couplings) {
+    case CouplingPrecision::kF16:
+      return work(storage.values_f16);
+    case CouplingPrecision::kF32:
+      break;
+  }
+  return work(storage.values_f32);
+}
+
+/// Calls work(array) for all arrays of values.
+template <typename Storage, typename Work>
+void for_each_array(Storage& storage, const Work& work) {
+  work(storage.values_f32);
+  work(storage.values_f16);
+  work(storage.bases_q16);
+  work(storage.bases_q8);
+}
+
+inline bool HierarchicalStorage::one_array() const {
+  const auto address = [](const auto& array) -> const void* { return &array; };
+  return with_bases(*this, address) == with_couplings(*this, address);
+}
 
 }  // namespace rebounce

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "transfer/base/half_float.h"
 #include "transfer/format/hierarchical_encoding.h"
+#include "transfer/format/stored_values.h"
 
 namespace rebounce {
 namespace {
@@ -15,7 +15,9 @@ using Storage = HierarchicalStorage;
 class ValueReader {
  public:
   ValueReader(const Storage& storage, const HierarchicalLayout& layout)
-      : storage_(storage), layout_(layout), first_core_(layout.basis_value_count) {}
+      : storage_(storage),
+        layout_(layout),
+        first_core_(storage.first_coupling(layout.basis_value_count)) {}
 
   /// Of one end of a block of that rank.
   double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vector,
@@ -27,10 +29,8 @@ class ValueReader {
   }
   /// Of a core or a dense entry.
   double core(std::uint64_t index) const {
-    if (storage_.precision == Precision::kF32) return storage_.values_f32[first_core_ + index];
-    const std::uint64_t first = storage_.precision == Precision::kF16 ? first_core_ : 0;
-    return half_to_float(storage_.values_f16[first + index]) /
-           double{HierarchicalFormat::kHalfScale};
+    return with_couplings(
+        storage_, [&](const auto& array) { return coupling_value(array[first_core_ + index]); });
   }
 
   const Storage& storage() const { return storage_; }
@@ -38,17 +38,7 @@ class ValueReader {
 
  private:
   double stored_basis(std::uint64_t index) const {
-    switch (storage_.precision) {
-      case Precision::kF16:
-        return half_to_float(storage_.values_f16[index]);
-      case Precision::kQ16:
-        return storage_.bases_q16[index] / double{HierarchicalFormat::kShortScale};
-      case Precision::kQ8:
-        return storage_.bases_q8[index] / double{HierarchicalFormat::kByteScale};
-      case Precision::kF32:
-        break;
-    }
-    return storage_.values_f32[index];
+    return with_bases(storage_, [&](const auto& array) { return basis_value(array[index]); });
   }
 
   const Storage& storage_;
@@ -140,12 +130,11 @@ std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_
 
 Storage decode(const Storage& storage) {
   const Storage streamed = stream_values(storage);
-  if (streamed.precision == Precision::kF32) return streamed;
+  const HierarchicalPrecision exact = hierarchical_precision(Precision::kF32);
+  if (streamed.precision == exact) return streamed;
   Storage decoded = streamed;
-  decoded.precision = Precision::kF32;
-  decoded.values_f16 = {};
-  decoded.bases_q16 = {};
-  decoded.bases_q8 = {};
+  decoded.precision = exact;
+  for_each_array(decoded, [](auto& array) { array = {}; });
   const HierarchicalLayout from(streamed), to(decoded);
   const ValueReader read(streamed, from);
   std::vector<float> values(HierarchicalLayout::padded(to.basis_value_count + to.core_value_count));

@@ -1,53 +1,116 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <type_traits>
+#include <variant>
 
-#include "transfer/format/hierarchical_layout.h"
 #include "transfer/format/hierarchical_storage.h"
+#include "transfer/format/stored_values.h"
 #include "transfer/kernels/kernels.h"
 
 namespace rebounce {
 
-/// Calls work(bases, cores, basis_values, core_values, basis_scale): the widest kernels for the
-/// precision of an operator, its values, and what those of bases must be multiplied by.
-template <typename Work>
-auto with_kernels_of(const HierarchicalStorage& storage, const HierarchicalLayout& layout,
-                     const Work& work) {
-  const BlockKernels& blocks = kernels().blocks;
-  const std::uint16_t* const f16 = storage.values_f16.data();
-  const float* const f32 = storage.values_f32.data();
-  const std::uint64_t first_core = layout.basis_value_count;
-  switch (storage.precision) {
-    case Precision::kF32:
-      return work(blocks.bases_f32, blocks.cores_f32, f32, f32 + first_core, 1.0F);
-    case Precision::kQ16:
-      return work(blocks.bases_q16, blocks.cores_f16, storage.bases_q16.data(), f16,
-                  HierarchicalFormat::kShortScale);
-    case Precision::kQ8:
-      return work(blocks.bases_q8, blocks.cores_f16, storage.bases_q8.data(), f16,
-                  HierarchicalFormat::kByteScale);
-    case Precision::kF16:
-      break;
-  }
-  return work(blocks.bases_f16, blocks.cores_f16, f16, f16 + first_core, 1.0F);
+/// The kernels for bases of a type.
+template <typename Value>
+const BasisKernels<Value>& basis_kernels(const BlockKernels& kernels) {
+  if constexpr (std::is_same_v<Value, float>) return kernels.bases_f32;
+  if constexpr (std::is_same_v<Value, std::uint16_t>) return kernels.bases_f16;
+  if constexpr (std::is_same_v<Value, std::int16_t>) return kernels.bases_q16;
+  if constexpr (std::is_same_v<Value, std::int8_t>) return kernels.bases_q8;
 }
 
-/// What products of stored values must be multiplied by.
-inline float product_scale(Precision precision) {
-  constexpr float kHalfScale = HierarchicalFormat::kHalfScale;
-  constexpr float kByteScale = HierarchicalFormat::kByteScale;
-  constexpr float kShortScale = HierarchicalFormat::kShortScale;
-  switch (precision) {
-    case Precision::kF16:
-      return 1 / kHalfScale;
-    case Precision::kQ16:
-      return 1 / (kHalfScale * kShortScale * kShortScale);
-    case Precision::kQ8:
-      return 1 / (kHalfScale * kByteScale * kByteScale);
-    case Precision::kF32:
-      break;
+/// The kernels for coupling matrices of a type.
+template <typename Value>
+const CoreKernels<Value>& coupling_kernels(const BlockKernels& kernels) {
+  if constexpr (std::is_same_v<Value, float>) return kernels.cores_f32;
+  if constexpr (std::is_same_v<Value, std::uint16_t>) return kernels.cores_f16;
+}
+
+/// Kernels for one type of values, and values of it.
+template <typename Kernels, typename Value>
+struct KernelsOn {
+  const Kernels* kernels;
+  const Value* values;
+};
+
+/// Products with the bases of an operator, by the widest kernels for their precision; see
+/// BasisKernels. The storage must outlive it.
+class BasisProducts {
+ public:
+  explicit BasisProducts(const HierarchicalStorage& storage) {
+    with_bases(storage, [this]<typename Value>(const SharedArray<Value>& array) {
+      on_ = On<Value>{&basis_kernels<Value>(kernels().blocks), array.data()};
+      scale_ = kBasisScale<Value>;
+    });
   }
-  return 1;
+
+  void project(std::span<const BasisPart> parts, PlanarVectors<const float> x,
+               Coefficients<float> coefficient) const {
+    std::visit([&](const auto& on) { on.kernels->project(on.values, parts, x, coefficient); }, on_);
+  }
+  void expand(std::span<const BasisPart> parts, Coefficients<const float> coefficient,
+              PlanarVectors<float> y) const {
+    std::visit([&](const auto& on) { on.kernels->expand(on.values, parts, coefficient, y); }, on_);
+  }
+
+  /// What stands for 1 in the bases.
+  float scale() const { return scale_; }
+
+ private:
+  template <typename Value>
+  using On = KernelsOn<BasisKernels<Value>, Value>;
+  std::variant<On<float>, On<std::uint16_t>, On<std::int16_t>, On<std::int8_t>> on_;
+  float scale_ = 1;
+};
+
+/// Products with its coupling matrices and dense blocks likewise; see CoreKernels. The bases take
+/// up `basis_value_count` values.
+class CouplingProducts {
+ public:
+  CouplingProducts(const HierarchicalStorage& storage, std::uint64_t basis_value_count) {
+    const std::uint64_t first = storage.first_coupling(basis_value_count);
+    with_couplings(storage, [this, first]<typename Value>(const SharedArray<Value>& array) {
+      on_ = On<Value>{&coupling_kernels<Value>(kernels().blocks), array.data() + first};
+      scale_ = kCouplingScale<Value>;
+    });
+  }
+
+  void multiply(std::span<const CoreBlock> cores, const ChannelLanes& lanes,
+                std::size_t light_count, Coefficients<const float> in, Coefficients<float> out,
+                float* taken) const {
+    std::visit(
+        [&](const auto& on) {
+          on.kernels->multiply(on.values, cores, lanes, light_count, in, out, taken);
+        },
+        on_);
+  }
+  void multiply_dense(std::span<const DenseBlock> blocks, PlanarVectors<const float> x,
+                      Coefficients<float> out) const {
+    std::visit([&](const auto& on) { on.kernels->multiply_dense(on.values, blocks, x, out); }, on_);
+  }
+  void add_products(std::span<const DenseEnd> ends, Coefficients<const float> products, float scale,
+                    PlanarVectors<float> y) const {
+    std::visit([&](const auto& on) { on.kernels->add_products(ends, products, scale, y); }, on_);
+  }
+  void add_dense(std::span<const DenseBlock> blocks, PlanarVectors<const float> x, float scale,
+                 PlanarVectors<float> y) const {
+    std::visit([&](const auto& on) { on.kernels->add_dense(on.values, blocks, x, scale, y); }, on_);
+  }
+
+  /// What stands for 1 in the coupling matrices.
+  float scale() const { return scale_; }
+
+ private:
+  template <typename Value>
+  using On = KernelsOn<CoreKernels<Value>, Value>;
+  std::variant<On<float>, On<std::uint16_t>> on_;
+  float scale_ = 1;
+};
+
+/// What products of stored values must be multiplied by.
+inline float product_scale(const BasisProducts& bases, const CouplingProducts& couplings) {
+  return 1 / (couplings.scale() * bases.scale() * bases.scale());
 }
 
 }  // namespace rebounce

@@ -87,23 +87,19 @@ std::span<const T> between(const std::vector<T>& all, std::uint32_t first, std::
 }
 
 /// The phases of an apply.
-template <typename Basis, typename Value>
 class Phases {
  public:
-  Phases(const BasisKernels<Basis>& bases, const CoreKernels<Value>& cores, const Basis* basis,
-         const Value* value, const ChannelLanes& lanes, float basis_scale,
+  Phases(const BasisProducts& bases, const CouplingProducts& couplings, const ChannelLanes& lanes,
          std::span<const float> moment_scale, const WorkVectors& work)
       : bases_(bases),
-        cores_(cores),
-        basis_(basis),
-        value_(value),
+        couplings_(couplings),
         lanes_(lanes),
-        basis_scale_(basis_scale),
+        basis_scale_(bases.scale()),
         moment_scale_(moment_scale),
         work_(work) {}
 
   void project(std::span<const BasisPart> parts) const {
-    bases_.project(basis_, parts, constant(work_.x), work_.coefficient);
+    bases_.project(parts, constant(work_.x), work_.coefficient);
   }
 
   void take_light(const DenseEnd& end) const {
@@ -153,21 +149,21 @@ class Phases {
 
   /// Those of one part.
   void multiply(std::span<const CoreBlock> cores, std::size_t part) const {
-    cores_.multiply(value_, cores, lanes_, work_.light_count, constant(work_.coefficient),
-                    work_.coefficient, work_.taken.data + part * work_.taken.stride);
+    couplings_.multiply(cores, lanes_, work_.light_count, constant(work_.coefficient),
+                        work_.coefficient, work_.taken.data + part * work_.taken.stride);
   }
 
   void multiply_dense(std::span<const DenseBlock> blocks) const {
-    cores_.multiply_dense(value_, blocks, constant(work_.x), work_.coefficient);
+    couplings_.multiply_dense(blocks, constant(work_.x), work_.coefficient);
   }
 
   void expand(std::span<const BasisPart> parts) const {
-    bases_.expand(basis_, parts, constant(work_.coefficient), work_.y);
+    bases_.expand(parts, constant(work_.coefficient), work_.y);
   }
 
   void add_light(std::span<const DenseEnd> ends) const {
     if (lanes_.matrix_count == 1) {
-      cores_.add_products(ends, constant(work_.coefficient), product_scale(), work_.y);
+      couplings_.add_products(ends, constant(work_.coefficient), product_scale(), work_.y);
     } else {
       for (const DenseEnd& end : ends) add_coefficients(end);
     }
@@ -193,10 +189,8 @@ class Phases {
     }
   }
 
-  const BasisKernels<Basis>& bases_;
-  const CoreKernels<Value>& cores_;
-  const Basis* basis_;
-  const Value* value_;
+  const BasisProducts& bases_;
+  const CouplingProducts& couplings_;
   const ChannelLanes& lanes_;
   float basis_scale_;
   std::span<const float> moment_scale_;
@@ -252,7 +246,6 @@ struct Exchange {
 };
 
 /// All that arrives at some positions or moments.
-template <typename Phases>
 void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arrival,
             const Phases& phases, const WorkVectors& work) {
   clear(work.y, arrival.begin, arrival.end);
@@ -267,11 +260,9 @@ std::span<const Entry> of_part(const std::vector<Entry>& entries,
   return between(entries, parts[part], parts[part + 1]);
 }
 
-template <typename Basis, typename Value>
-void run_plan(const HierarchicalPlan& plan, const Phases<Basis, Value>& phases,
-              const Exchange& exchange, const WorkVectors& work,
-              std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-              const Scheduler& scheduler) {
+void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange& exchange,
+              const WorkVectors& work, std::span<const Float3> initial_exitance,
+              std::span<Float3> indirect_irradiance, const Scheduler& scheduler) {
   const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
   const auto gather = [&](std::size_t k) {
     const std::size_t begin = k * kGathered;
@@ -338,7 +329,8 @@ HierarchicalOperator::HierarchicalOperator(HierarchicalStorage storage)
   const std::size_t n = storage_->area.size();
   gather_scale_.reserve(n);
   scatter_scale_.reserve(n);
-  const float scale = product_scale(storage_->precision);
+  const float scale = product_scale(BasisProducts(*storage_),
+                                    CouplingProducts(*storage_, layout_->basis_value_count));
   for (std::size_t k = 0; k < n; ++k) {
     const std::uint32_t p = storage_->patch[k];
     const float root = std::sqrt(storage_->area[p]), of_position = storage_->position_scale(k);
@@ -369,17 +361,17 @@ const PatchRoles& HierarchicalOperator::roles() const {
 }
 
 std::size_t HierarchicalOperator::bytes() const {
-  return storage_->values_f16.size_bytes() + storage_->values_f32.size_bytes() +
-         storage_->bases_q16.size_bytes() + storage_->bases_q8.size_bytes() +
-         storage_->blocks.size() * sizeof(TransferBlock) +
+  std::size_t values = 0;
+  for_each_array(*storage_, [&](const auto& array) { values += array.size_bytes(); });
+  return values + storage_->blocks.size() * sizeof(TransferBlock) +
          storage_->moment_scale.size() * sizeof(float) + storage_->scale_exponent.size() +
          storage_->patch.size() * sizeof(std::uint32_t) + storage_->roles.role.size();
 }
 
 std::size_t HierarchicalOperator::bytes_per_apply() const {
-  const auto bytes_of_bases = [this](const auto&, const auto&, const auto* basis, const auto*,
-                                     float) { return layout_->basis_value_count * sizeof(*basis); };
-  return bytes() + with_kernels_of(*storage_, *layout_, bytes_of_bases);
+  return bytes() + with_bases(*storage_, [this](const auto& array) {
+           return layout_->basis_value_count * sizeof(*array.data());
+         });
 }
 
 std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
@@ -407,13 +399,10 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
       indirect_irradiance[light * patch_count() + p] = {0, 0, 0};
     }
   }
-  const auto apply_phases = [&](const auto& bases, const auto& cores, const auto* basis,
-                                const auto* core, float basis_scale) {
-    const Phases phases(bases, cores, basis, core, lanes, basis_scale, storage_->moment_scale,
-                        work);
-    run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance, scheduler);
-  };
-  with_kernels_of(*storage_, *layout_, apply_phases);
+  const BasisProducts bases(*storage_);
+  const CouplingProducts couplings(*storage_, layout_->basis_value_count);
+  const Phases phases(bases, couplings, lanes, storage_->moment_scale, work);
+  run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance, scheduler);
 }
 
 void HierarchicalOperator::apply(std::span<const Float3> initial_exitance,

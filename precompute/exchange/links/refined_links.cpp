@@ -25,12 +25,6 @@ std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tr
   return escape;
 }
 
-/// The part from `begin` to `end` of `progress`.
-Progress part_of(const Progress& progress, double begin, double end) {
-  if (!progress) return {};
-  return [&progress, begin, end](double part) { return progress(begin + part * (end - begin)); };
-}
-
 }  // namespace
 
 RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,

@@ -322,16 +322,17 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
        }},
       {"8 bits alone",
        [](Storage& s) {
-         s.precision = Precision::kF16;
+         s.precision = hierarchical_precision(Precision::kF16);
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
          s.blocks[0].row_remainders = s.blocks[0].column_remainders = 1;
        }},
+      {"do not go together", [](Storage& s) { s.precision.couplings = CouplingPrecision::kF16; }},
       {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
       {"number of values", [](Storage& s) { s.order = HierarchicalStorage::Order::kStreamed; }},
       {"number of values",
        [](Storage& s) {
-         s.precision = Precision::kF16;
+         s.precision = hierarchical_precision(Precision::kF16);
          for (TransferBlock& block : s.blocks) block.row_remainders = block.column_remainders = 0;
        }},
   };
