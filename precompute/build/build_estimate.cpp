@@ -36,7 +36,7 @@ constexpr std::size_t kLinkBytesFound = 4 * sizeof(Link);
 constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.exchange_area[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
-constexpr std::size_t kLinkBytesKept = 2 * kFlatLinkBytes + 2 * sizeof(IncomingLink);
+constexpr std::size_t kLinkBytesKept = 2 * kFlatLinkBytes + LinkedFormFactors::kBytesPerLink;
 
 // A patch beside links, an upper estimate: its triangles, in the mesh and in the ray tracer;
 // radiosities under 274 lights; compressed form factors, which are only known later.

@@ -15,6 +15,7 @@
 #include "precompute/lights/judged_error.h"
 #include "precompute/lights/lit_truth.h"
 #include "transfer/format/hierarchical_encoding.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce {
 namespace {

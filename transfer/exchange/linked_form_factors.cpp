@@ -119,6 +119,8 @@ std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
   return begin;
 }
 
+static_assert(LinkedFormFactors::kBytesPerLink == 2 * sizeof(IncomingLink));
+
 /// The nodes and their links in the order in which a gather goes through them.
 class LinkedFormFactors::Tree {
  public:

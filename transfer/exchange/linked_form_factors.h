@@ -44,6 +44,9 @@ std::vector<std::uint32_t> first_positions(const FormFactorLinks& links);
 /// that of the links, not of the pairs of patches; area times F is symmetric.
 class LinkedFormFactors final : public FormFactorOperator {
  public:
+  /// A link is stored once for each of its two nodes.
+  static constexpr std::size_t kBytesPerLink = 40;
+
   /// `area` [n] in m², `centroid` [n] in metres. Throws Error if `links` are not a tree over n
   /// patches and links between its nodes.
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
