@@ -252,7 +252,7 @@ class ApplyBenchmark {
 
   void add_gauss_seidel() {
     const SolveSettings one_sweep{.max_sweeps = 1, .residual = 0, .measure_residual = false};
-    const auto start = [this] { gauss_seidel_.forget(); };
+    const auto start = [this] { gauss_seidel_.reset(); };
     const auto sweep = [this, one_sweep] { gauss_seidel_.solve(initial_exitance_, one_sweep); };
     const auto error = [this, start, sweep] {
       start();

@@ -30,8 +30,8 @@ Lights bounced_lights(const Lights& lights, const FormFactorOperator& form_facto
 
 DrawnLights bounced(const DrawnLights& lights, const FormFactorOperator& form_factors,
                     const PatchTable& patches) {
-  return {bounced_lights(lights.shaping, form_factors, patches),
-          bounced_lights(lights.judging, form_factors, patches)};
+  return {bounced_lights(lights.training, form_factors, patches),
+          bounced_lights(lights.validation, form_factors, patches)};
 }
 
 }  // namespace rebounce::bench

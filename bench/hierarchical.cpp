@@ -39,8 +39,8 @@ struct HierarchicalOptions {
   std::vector<std::string> scenes;
   std::vector<std::size_t> patches = {4000, 16000};
   std::vector<double> epsilons = {kLinkEpsilon};
-  std::vector<double> worths = {kLinkWorth};  ///< what fitted links must be worth
-  std::vector<double> compression = {1e-3};   ///< errors of F B to which F is compressed
+  std::vector<double> worths = {kErrorPerLink};  ///< what fitted links must be worth
+  std::vector<double> compression = {1e-3};      ///< errors of F B to which F is compressed
   std::string pairs;              ///< transfer file with F of all pairs; empty: they are found
   std::size_t most_flat = 20000;  ///< patches of which F of all pairs is found
   int light_count = 4;            ///< of each kind
@@ -157,7 +157,7 @@ class HierarchicalBench {
          std::make_unique<ConjugateGradientSolver>(*half, problem())});
     RadiositySolver& exact = *contenders_.back().solver;
     for (LightCase& light : lights_) {
-      exact.forget();
+      exact.reset();
       exact.solve(light.initial_exitance, {.residual = 1e-7});
       light.indirect_irradiance = indirect_irradiance(exact, light);
     }
@@ -229,7 +229,7 @@ class HierarchicalBench {
   }
 
   static void solve(const Contender& contender, const LightCase& light, int sweeps) {
-    contender.solver->forget();
+    contender.solver->reset();
     contender.solver->solve(light.initial_exitance,
                             {.max_sweeps = sweeps, .residual = 0, .measure_residual = false});
   }

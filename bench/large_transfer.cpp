@@ -1,7 +1,7 @@
 // Operators without any matrix of all pairs: processor seconds of the stages, bytes and errors,
 // beside the way over the dense inverse of the same form factors where that is not too large.
 
-#include "precompute/compression/large_transfer.h"
+#include "precompute/compression/matrix_free_transfer.h"
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -69,8 +69,8 @@ class SceneBench {
     const SolvedTransfer exact(*form_factors_, data_.patches, 1e-6);
     const Lights truth = products(exact);
     for (const double residual : options_.residuals) try_residual(exact, residual);
-    LargeTransferSettings settings{.compression = {.tolerance = options_.tolerance},
-                                   .checkpoint = options_.checkpoint};
+    MatrixFreeTransferSettings settings{.compression = {.tolerance = options_.tolerance},
+                                        .checkpoint = options_.checkpoint};
     std::shared_ptr<const HierarchicalOperator> large;
     const Progress progress = [last = 0.0, this](double done) mutable {
       if (done >= last + 0.05) {
@@ -80,8 +80,8 @@ class SceneBench {
       return true;
     };
     const double seconds = processor_seconds_of([&] {
-      large =
-          build_large_transfer(*form_factors_, data_.patches, lights_.view(), settings, progress);
+      large = build_matrix_free_transfer(*form_factors_, data_.patches, lights_.view(), settings,
+                                         progress);
     });
     add(name, "large", *large, seconds, truth, table);
     if (data_.patches.size() <= options_.dense_limit) measure_dense(name, truth, table);
@@ -125,7 +125,7 @@ class SceneBench {
   void try_residual(const SolvedTransfer& exact, double residual) {
     const SolvedTransfer solved(*form_factors_, data_.patches, residual);
     const auto order = solved.patch();
-    const std::size_t n = order.size(), count = SolvedTransfer::kTogether;
+    const std::size_t n = order.size(), count = SolvedTransfer::kBatchColumns;
     double error = 0, norm = 0, seconds = 0;
     Eigen::VectorXd sum, exact_sum;
     for (std::size_t begin = 0; begin + count <= n; begin += n / 4) {

@@ -10,9 +10,9 @@
 #include "bench/program.h"
 #include "precompute/base/symmetric_matrix.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "precompute/lights/lit_truth.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/random_lights.h"
+#include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/error.h"
@@ -58,7 +58,7 @@ class Truth {
   /// The largest relative difference from plain conjugate gradients over the first lights.
   double error(std::span<const std::vector<Float3>> lights) const {
     const auto some =
-        lights.first(std::min<std::size_t>(lights.size(), ReferenceSolver::kTogether));
+        lights.first(std::min<std::size_t>(lights.size(), ReferenceSolver::kBatchLights));
     const auto truths = (*this)(some);
     const auto others = plain_.indirect_irradiances(some, kResidual);
     double largest = 0;
@@ -85,7 +85,7 @@ TransferData load_or_build_with_truth(const std::string& input, BuildSettings se
                 ": the file does not hold the pairs that its operator was made from, which the "
                 "truth is found with; give the scene, with --form-factors links");
   }
-  settings.form_factor_kind = FormFactorKind::kLinks;
+  settings.exchange_source = ExchangeSource::kLinks;
   settings.operator_kind = OperatorKind::kNoOperator;
   data.links = load_or_build(input, settings).links;
   return data;
@@ -171,8 +171,8 @@ int main(int argc, char** argv) {
   app.add_option_function<std::string>(
          "--form-factors",
          [&](const std::string& kind) {
-           options.settings.form_factor_kind = kind == "links" ? rebounce::FormFactorKind::kLinks
-                                                               : rebounce::FormFactorKind::kPairs;
+           options.settings.exchange_source = kind == "links" ? rebounce::ExchangeSource::kLinks
+                                                              : rebounce::ExchangeSource::kPairs;
          },
          "What operators are built from")
       ->check(CLI::IsMember({"pairs", "links"}));

@@ -209,7 +209,7 @@ class SolverBenchmark {
         change.before.empty() ? change.before : solution(form, change.before);
     const auto prepare = [&] {
       if (before.empty()) {
-        solver.forget();
+        solver.reset();
       } else {
         solver.start_from(before);
       }

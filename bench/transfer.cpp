@@ -163,7 +163,7 @@ class TransferBenchmark {
   std::vector<Float3> indirect_irradiance(const Entry& entry,
                                           const std::vector<Float3>& light) const {
     if (entry.transfer) return product(*entry.transfer, light);
-    entry.method->forget();
+    entry.method->reset();
     entry.method->run(light, entry.sweeps);
     return gather(*entry.form_factors, entry.method->radiosity());
   }
@@ -186,7 +186,7 @@ class TransferBenchmark {
     for (const Entry& entry : entries_) {
       cases.push_back({.work = [&entry] { entry.read->read(); }});
       cases.push_back({.work = [&entry, &light] { entry.method->run(light, entry.sweeps); },
-                       .prepare = [&entry] { entry.method->forget(); },
+                       .prepare = [&entry] { entry.method->reset(); },
                        .repeat_prepared = true});
     }
     return time_interleaved(cases, {.rounds = repeats});

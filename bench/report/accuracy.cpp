@@ -68,7 +68,7 @@ class AccuracyBench {
   void begin(const Contestant& contestant, std::size_t k, Method& method) const {
     method.set_reflectance(cases_[k].reflectance);
     if (cases_[k].cold()) {
-      method.forget();
+      method.reset();
     } else if (method.iterates()) {
       method.start_from(own_.at(contestant.form).before[k]);
     }

@@ -29,7 +29,7 @@ class ProductMethod final : public Method {
   }
   std::span<const Float3> radiosity() const override { return radiosity_; }
   bool iterates() const override { return false; }
-  void forget() override {}
+  void reset() override {}
   void start_from(std::span<const Float3> /*radiosity*/) override {}
   void set_reflectance(std::span<const Float3> reflectance) override {
     std::ranges::copy(reflectance, reflectance_.begin());
@@ -52,7 +52,7 @@ class IterativeMethod final : public Method {
   }
   std::span<const Float3> radiosity() const override { return solver_->radiosity(); }
   bool iterates() const override { return true; }
-  void forget() override { solver_->forget(); }
+  void reset() override { solver_->reset(); }
   void start_from(std::span<const Float3> radiosity) override { solver_->start_from(radiosity); }
   void set_reflectance(std::span<const Float3> reflectance) override {
     solver_->set_reflectance(reflectance);

@@ -26,7 +26,7 @@ class Method {
   virtual std::span<const Float3> radiosity() const = 0;
 
   virtual bool iterates() const = 0;
-  virtual void forget() = 0;
+  virtual void reset() = 0;
   virtual void start_from(std::span<const Float3> radiosity) = 0;
   virtual void set_reflectance(std::span<const Float3> reflectance) = 0;
 };

@@ -18,7 +18,7 @@ using RowMajorMatrixXf = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Ei
 
 // Rows and columns that are looked at together: few columns, which are what threads share, and many
 // rows, as a matrix made of links is read by the columns.
-constexpr std::size_t kTogetherRows = 2048, kTogetherColumns = 256;
+constexpr std::size_t kBatchRows = 2048, kBatchColumns = 256;
 
 /// Patches [begin, begin + count) of a list, or those that there are.
 std::span<const std::uint32_t> part_of(std::span<const std::uint32_t> patches, std::size_t begin,
@@ -43,10 +43,10 @@ Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) 
   const auto receivers = with_role(order, roles_, PatchRoles::kReceiver);
   Eigen::VectorXd energy = Eigen::VectorXd::Zero(static_cast<Index>(order.size()));
 #pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t column = 0; column < sources.size(); column += kTogetherColumns) {
-    const auto columns = part_of(sources, column, kTogetherColumns);
-    for (std::size_t row = 0; row < receivers.size(); row += kTogetherRows) {
-      const auto rows = part_of(receivers, row, kTogetherRows);
+  for (std::size_t column = 0; column < sources.size(); column += kBatchColumns) {
+    const auto columns = part_of(sources, column, kBatchColumns);
+    for (std::size_t row = 0; row < receivers.size(); row += kBatchRows) {
+      const auto rows = part_of(receivers, row, kBatchRows);
       MatrixXf part(rows.size(), columns.size());
       for (std::uint32_t m = 0; m < matrix_count(); ++m) {
         entries(m, rows, columns, part);

@@ -42,39 +42,39 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
 /// The kind of an operator from pairs, if that was left open.
 OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& model) {
   if (settings.operator_kind != OperatorKind::kAutomatic) return settings.operator_kind;
-  const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
-  return of_some || model.patches.size() > kDensePatchCount ? OperatorKind::kHierarchical
-                                                            : OperatorKind::kDense;
+  const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
+  return restricted_roles || model.patches.size() > kDensePatchCount ? OperatorKind::kHierarchical
+                                                                     : OperatorKind::kDense;
 }
 
 /// What the operator is to be made from, if that was left open.
-FormFactorKind choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
+ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
   const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
                           settings.operator_kind == OperatorKind::kHierarchical;
-  if (settings.form_factor_kind == FormFactorKind::kLinks && !from_links &&
+  if (settings.exchange_source == ExchangeSource::kLinks && !from_links &&
       settings.operator_kind != OperatorKind::kNoOperator) {
     throw Error("from links only a hierarchical operator is made; ask for that, or for pairs");
   }
-  if (settings.form_factor_kind != FormFactorKind::kAutomatic) return settings.form_factor_kind;
+  if (settings.exchange_source != ExchangeSource::kAutomatic) return settings.exchange_source;
   const std::size_t n = model.patches.size();
   const bool too_many =
       n > kPairsPatchCount ||
       peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
                           kind_from_pairs(settings, model)) > memory_limit_bytes(settings);
-  return from_links && too_many ? FormFactorKind::kLinks : FormFactorKind::kPairs;
+  return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
 }
 
 /// The settings with what was left open decided.
 BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   settings.memory_limit_bytes = memory_limit_bytes(settings);
-  settings.form_factor_kind = choose_form_factors(settings, model);
-  const bool links = settings.form_factor_kind == FormFactorKind::kLinks;
-  const bool of_some = !settings.receivers.empty() || !settings.sources.empty();
+  settings.exchange_source = choose_form_factors(settings, model);
+  const bool links = settings.exchange_source == ExchangeSource::kLinks;
+  const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
   if (settings.operator_kind == OperatorKind::kAutomatic) {
     settings.operator_kind = links ? OperatorKind::kHierarchical : kind_from_pairs(settings, model);
   }
   const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
-  if (of_some && !hierarchical) {
+  if (restricted_roles && !hierarchical) {
     throw Error("receivers and sources are for hierarchical operators alone; ask for one");
   }
   if (!settings.precision) {
@@ -90,7 +90,7 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
     throw Error("the error of a link is for form factors from links; ask for these");
   }
   if (links && link_epsilon == 0) link_epsilon = kLinkEpsilon;
-  if (links && settings.form_factor_tolerance == 0 && !of_some) {
+  if (links && settings.form_factor_tolerance == 0 && !restricted_roles) {
     settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
   }
   return settings;
@@ -144,7 +144,7 @@ class TransferBuild {
     decided_ = decide(settings_, model_);
     report_.estimate = estimate_cost(model_, roles_, decided_);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
-    if (fits && decided_.form_factor_kind == FormFactorKind::kPairs) forecast_pairs();
+    if (fits && decided_.exchange_source == ExchangeSource::kPairs) forecast_pairs();
     announce(report_.estimate);
   }
 
@@ -152,7 +152,7 @@ class TransferBuild {
   void find_exchange() {
     if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
     EscapedLight escaped =
-        decided_.form_factor_kind == FormFactorKind::kLinks ? find_links_alone() : find_pairs();
+        decided_.exchange_source == ExchangeSource::kLinks ? find_links_alone() : find_pairs();
     data_.patches = std::move(model_.patches);
     data_.patches.sky_visibility = std::move(escaped.sky_visibility);
     data_.patches.absorbed = std::move(escaped.absorbed);
@@ -191,7 +191,7 @@ class TransferBuild {
   /// Makes the operator, and measures how far off it is.
   void make_operator() {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
-    const bool links = decided_.form_factor_kind == FormFactorKind::kLinks;
+    const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const auto make = links ? make_operator_from_links : make_operator_from_pairs;
     make(*tracer_, decided_, roles_, data_, report_, clock_);
   }
@@ -230,7 +230,7 @@ class TransferBuild {
     report_.closure = form_factors.closure;
     if (settings_.store_links) {
       data_.links = clock_.run("links", [&](const Progress& part) {
-        return fit_links(form_factors.exchange, model_.patches, kLinkWorth, part);
+        return fit_links(form_factors.exchange, model_.patches, kErrorPerLink, part);
       });
       report_.link_count = data_.links.pair.size();
     }

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "precompute/build/operator_stage.h"
-#include "precompute/compression/large_transfer.h"
+#include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/links/link_refinement.h"
 #include "precompute/exchange/pairs/closure.h"
 #include "precompute/inverse/dense_transfer.h"
@@ -93,14 +93,14 @@ std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
 }
 
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
-  LargeTransferSettings settings{.compression = {.tolerance = build.tolerance},
-                                 .roles = build.roles};
-  settings.memory_limit_bytes = memory_of_large_transfer(build, limit_bytes);
+  MatrixFreeTransferSettings settings{.compression = {.tolerance = build.tolerance},
+                                      .roles = build.roles};
+  settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, limit_bytes);
   return bytes_beside_transfer(build) +
-         plan_large_transfer(build.patch_count, build.matrix_count, settings).peak_bytes;
+         plan_matrix_free_transfer(build.patch_count, build.matrix_count, settings).peak_bytes;
 }
 
-std::uint64_t memory_of_large_transfer(const LinkedBuild& build, std::uint64_t limit_bytes) {
+std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes) {
   const std::uint64_t beside = bytes_beside_transfer(build);
   return limit_bytes > beside ? limit_bytes - beside : 1;
 }
@@ -110,7 +110,7 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   const std::size_t n = model.patches.size();
   const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
   CostEstimate estimate = estimate_of(n, roles);
-  if (decided.form_factor_kind == FormFactorKind::kPairs) {
+  if (decided.exchange_source == ExchangeSource::kPairs) {
     estimate.peak_bytes = peak_bytes_of_pairs(n, matrices, decided.operator_kind);
     return estimate;
   }

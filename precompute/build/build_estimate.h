@@ -33,8 +33,8 @@ std::uint64_t peak_bytes_of_links(const LinkedBuild& build);
 /// Peak of all that comes after links, with the threads that fit the limit, one at least.
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
-/// What of a limit is left for build_large_transfer; 1 where it is nothing.
-std::uint64_t memory_of_large_transfer(const LinkedBuild& build, std::uint64_t limit_bytes);
+/// What of a limit is left for build_matrix_free_transfer; 1 where it is nothing.
+std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes);
 
 /// The memory that form factors and operator need; no times. `decided`: settings that leave nothing
 /// open. Links are taken to be as many as in a furnished room, until they are known.

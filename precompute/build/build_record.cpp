@@ -21,14 +21,14 @@ const char* name(OperatorKind kind) {
   return "dense";
 }
 
-const char* name(FormFactorKind kind) {
-  return kind == FormFactorKind::kLinks ? "links" : "pairs";
+const char* name(ExchangeSource kind) {
+  return kind == ExchangeSource::kLinks ? "links" : "pairs";
 }
 
 std::string settings_json(const BuildSettings& settings) {
   const FormFactorSettings& f = settings.form_factors;
   return nlohmann::json{{"operator", name(settings.operator_kind)},
-                        {"form_factors", name(settings.form_factor_kind)},
+                        {"form_factors", name(settings.exchange_source)},
                         {"tolerance", settings.tolerance},
                         {"form_factor_tolerance", settings.form_factor_tolerance},
                         {"rank", settings.rank},

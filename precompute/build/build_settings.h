@@ -29,7 +29,7 @@ enum class OperatorKind : std::uint8_t {
 inline constexpr std::size_t kDensePatchCount = 5000;
 
 /// What the operator is made from.
-enum class FormFactorKind : std::uint8_t {
+enum class ExchangeSource : std::uint8_t {
   kAutomatic,  ///< links above kPairsPatchCount patches or where pairs are over the memory limit
   kPairs,      ///< all pairs of patches, up to n² / 4 of them, and a dense inverse
   kLinks,      ///< links (links.h): nothing grows with n²; the file holds F compressed only
@@ -44,7 +44,7 @@ struct BuildSettings {
   FormFactorSettings form_factors;
   /// kPairs: link_epsilon is 0.
   /// kLinks: link_epsilon 0 stands for kLinkEpsilon, and the operator is hierarchical or none.
-  FormFactorKind form_factor_kind = FormFactorKind::kAutomatic;
+  ExchangeSource exchange_source = ExchangeSource::kAutomatic;
   /// Store links too, for hierarchical radiosity: fitted to the form factors of all pairs, or to
   /// the links that were found instead.
   bool store_links = false;

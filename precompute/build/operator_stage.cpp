@@ -50,8 +50,8 @@ void compress_form_factors_of(TransferData& data, const TransferOperator& transf
   report.form_factor_tolerance = settings.form_factor_tolerance;
   const std::vector<Float3>& reflectance = data.patches.reflectance;
   const DrawnLights drawn = draw_fitting_lights(data, tracer, seed);
-  const DrawnLights fitting{radiosities_of(transfer, reflectance, drawn.shaping),
-                            radiosities_of(transfer, reflectance, drawn.judging)};
+  const DrawnLights fitting{radiosities_of(transfer, reflectance, drawn.training),
+                            radiosities_of(transfer, reflectance, drawn.validation)};
   data.compressed_form_factors =
       compress_form_factors(data.exchange, data.patches, fitting.view(),
                             {settings.form_factor_tolerance, Precision::kF16}, progress);

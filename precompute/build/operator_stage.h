@@ -30,7 +30,7 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
                               PhaseClock& clock);
 
 /// From data.links, which stay only if that was asked for: F is compressed, and what is then
-/// solved for is never there as a whole (large_transfer.h). The error is measured against the
+/// solved for is never there as a whole (matrix_free_transfer.h). The error is measured against the
 /// links, which know nothing of either compression. A tolerance of form factors that is still 0 is
 /// as much less than usual as receivers get less than all of the light.
 void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,

@@ -42,11 +42,11 @@ std::string rough_time(double seconds) {
 
 std::string described(const CostEstimate& estimate) {
   const bool links_known = estimate.link_count > 0;
-  const bool of_some = estimate.receiver_count < estimate.patch_count ||
-                       estimate.source_count < estimate.patch_count;
+  const bool restricted_roles = estimate.receiver_count < estimate.patch_count ||
+                                estimate.source_count < estimate.patch_count;
   std::string line = fmt::format("{} {}", links_known ? estimate.link_count : estimate.patch_count,
                                  links_known ? "links" : "patches");
-  if (of_some) {
+  if (restricted_roles) {
     line +=
         fmt::format(" ({} receivers, {} sources)", estimate.receiver_count, estimate.source_count);
   }
@@ -180,8 +180,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   take_probes(chosen.probes, settings.probes);
   settings.receivers = split_lists(chosen.receivers);
   settings.sources = split_lists(chosen.sources);
-  if (chosen.form_factors == "pairs") settings.form_factor_kind = FormFactorKind::kPairs;
-  if (chosen.form_factors == "links") settings.form_factor_kind = FormFactorKind::kLinks;
+  if (chosen.form_factors == "pairs") settings.exchange_source = ExchangeSource::kPairs;
+  if (chosen.form_factors == "links") settings.exchange_source = ExchangeSource::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
   for (const OfferedPrecision& offered : kOfferedPrecisions) {
     if (chosen.precision == offered.name) settings.precision = offered.precision;

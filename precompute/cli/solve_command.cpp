@@ -70,7 +70,7 @@ Solution solve_by_iteration(RadiositySolver& solver, const Engine& engine,
   Solution solution;
   SolveResult result;
   solution.microseconds = median_microseconds([&] {
-    solver.forget();
+    solver.reset();
     result = solver.solve(engine.initial_exitance(), settings);
     return result.microseconds;
   });

@@ -116,13 +116,13 @@ Index largest_rank_of(const WideBlock& block) {
 }
 
 Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cost, double limit) {
-  const double affordable = limit / (cost.price * size_per_rank(block, cost));
+  const double affordable = limit / (cost.multiplier * size_per_rank(block, cost));
   const Index largest = largest_rank_of(block);
   return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
 }
 
 /// The least cost of ranks above `seen`, as far as energies of the rows' directions tell: those of
-/// the columns' and cores are left out. 0 for blocks that do not take long to try.
+/// the columns' and coupling matrices are left out. 0 for blocks that do not take long to try.
 double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index seen,
                          const CompressionCost& cost) {
   constexpr Index kFewest = 8;
@@ -158,8 +158,8 @@ void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index large
   result.row_basis = rows.directions.leftCols(rank);
   double kept = 0;
   for (Index c = 0; c < matrices; ++c) {
-    result.cores.push_back(result.row_basis.transpose() * block.matrix(c) * result.row_basis);
-    kept += result.cores.back().squaredNorm();
+    result.couplings.push_back(result.row_basis.transpose() * block.matrix(c) * result.row_basis);
+    kept += result.couplings.back().squaredNorm();
   }
   result.error_squared = std::max(0.0, block.entries.squaredNorm() - kept);
 }
@@ -167,7 +167,7 @@ void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index large
 void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
               const CompressionCost& cost, LowRankBlock& result) {
   const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
-  // Half of a core for the rows and half for the columns.
+  // Half of a coupling matrix for the rows and half for the columns.
   const Index row_rank = cheapest_rank(
       rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, k, matrices * k * k / 2); });
   result.row_basis = rows.directions.leftCols(row_rank);
@@ -188,7 +188,7 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
     result.column_basis.resize(n, 0);
   }
   for (Index c = 0; c < matrices; ++c) {
-    result.cores.push_back(projected.middleRows(c * row_rank, row_rank) * result.column_basis);
+    result.couplings.push_back(projected.middleRows(c * row_rank, row_rank) * result.column_basis);
   }
 }
 

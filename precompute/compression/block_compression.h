@@ -21,44 +21,48 @@ struct WideBlock {
 /// B_m ~ row_basis core_m column_basis^T; the column basis is empty on the diagonal, where it is
 /// the row basis.
 struct LowRankBlock {
-  Eigen::MatrixXd row_basis;           ///< [rows][row rank], orthonormal columns
-  Eigen::MatrixXd column_basis;        ///< [columns][column rank], likewise
-  std::vector<Eigen::MatrixXd> cores;  ///< [matrices], [row rank][column rank]
-  double error_squared = 0;            ///< Frobenius, of all matrices together
+  Eigen::MatrixXd row_basis;               ///< [rows][row rank], orthonormal columns
+  Eigen::MatrixXd column_basis;            ///< [columns][column rank], likewise
+  std::vector<Eigen::MatrixXd> couplings;  ///< [matrices], [row rank][column rank]
+  double error_squared = 0;                ///< Frobenius, of all matrices together
 
   Eigen::Index basis_values() const { return row_basis.size() + column_basis.size(); }
   Eigen::Index vectors() const { return row_basis.cols() + column_basis.cols(); }
-  Eigen::Index core_values() const {
-    return cores.empty() ? 0 : static_cast<Eigen::Index>(cores.size()) * cores.front().size();
+  Eigen::Index coupling_values() const {
+    return couplings.empty()
+               ? 0
+               : static_cast<Eigen::Index>(couplings.size()) * couplings.front().size();
   }
 };
 
-/// What the parts of an operator take, in values of cores; may count the time of a product too.
+/// What the parts of an operator take, in values of coupling matrices; may count the time of a
+/// product too.
 struct PartSizes {
   double basis_value = 1;
   double vector = 0;  ///< a vector of a basis beside its values: its coefficients
   double block = 32;  ///< a block beside its values: its description, and the start of its loops
 };
 
-/// What the construction minimises: error² + price x size, summed over the blocks. For every
-/// price this is the smallest operator of its error (and the most exact one of its size) that the
-/// cluster tree admits.
+/// What the construction minimises: error² + multiplier x size, summed over the blocks. For every
+/// multiplier this is the smallest operator of its error (and the most exact one of its size) that
+/// the cluster tree admits.
 struct CompressionCost {
-  double price = 0;  ///< squared error that one stored value of a core or dense block is worth
+  double multiplier =
+      0;  ///< squared error that one stored value of a coupling matrix or dense block is worth
   double multiplicity = 1;  ///< 2 for a block that stands for its mirror image as well
   PartSizes sizes = {};
 
-  /// Of bases with so many values in so many vectors, and cores with so many values.
-  double size(Eigen::Index basis_values, Eigen::Index vectors, Eigen::Index core_values) const {
+  /// Of bases with so many values in so many vectors, and coupling matrices with so many values.
+  double size(Eigen::Index basis_values, Eigen::Index vectors, Eigen::Index coupling_values) const {
     return sizes.basis_value * static_cast<double>(basis_values) +
-           sizes.vector * static_cast<double>(vectors) + static_cast<double>(core_values);
+           sizes.vector * static_cast<double>(vectors) + static_cast<double>(coupling_values);
   }
   double total(double error_squared, double size) const {
-    return multiplicity * error_squared + price * size;
+    return multiplicity * error_squared + multiplier * size;
   }
   double of(const LowRankBlock& block) const {
     return total(block.error_squared,
-                 size(block.basis_values(), block.vectors(), block.core_values()));
+                 size(block.basis_values(), block.vectors(), block.coupling_values()));
   }
 };
 

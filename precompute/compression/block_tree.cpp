@@ -6,8 +6,8 @@
 
 #include "precompute/base/blas.h"
 #include "precompute/base/parallel_progress.h"
-#include "precompute/compression/basis_remainders.h"
 #include "precompute/compression/block_compression.h"
+#include "precompute/compression/residual_ranks.h"
 
 namespace rebounce {
 namespace {
@@ -44,12 +44,12 @@ class PieceCompressor {
  public:
   PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
                   const std::vector<ClusterWeight>& weights, const WantedBlocks& wanted,
-                  const PartSizes& sizes, double price, const BlockPiece& piece)
+                  const PartSizes& sizes, double multiplier, const BlockPiece& piece)
       : tree_(tree),
         weights_(weights),
         wanted_(wanted),
         sizes_(sizes),
-        price_(price),
+        multiplier_(multiplier),
         row_(piece.row),
         column_(piece.column),
         row_begin_(tree.clusters[piece.row].begin),
@@ -116,9 +116,9 @@ class PieceCompressor {
                               .column_count = columns.count};
     const WideBlock block = weighted_block(place, row, column);
     const CompressionCost cost{
-        .price = price_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
+        .multiplier = multiplier_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
     const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
-    const double overhead = price_ * sizes_.block;
+    const double overhead = multiplier_ * sizes_.block;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
     const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
     const bool leaves = rows.is_leaf() && columns.is_leaf();
@@ -168,7 +168,7 @@ class PieceCompressor {
     const WideBlock block = wide_block(place);
     BlockPart part{{place}, {}, 0};
     for (Index m = 0; m < block.matrix_count; ++m) append_rows(block.matrix(m), part.values);
-    part.cost = price_ * (sizes_.block + static_cast<double>(part.values.size()));
+    part.cost = multiplier_ * (sizes_.block + static_cast<double>(part.values.size()));
     return part;
   }
 
@@ -178,7 +178,7 @@ class PieceCompressor {
   }
 
   /// Of the weighted block's factors those of the block itself. Bases are made orthonormal again,
-  /// so that neither they nor the cores leave the range of half precision.
+  /// so that neither they nor the coupling matrices leave the range of half precision.
   void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
     if (const auto* weight = weight_of(row, column)) weight->take_away(block.row_basis);
     const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);
@@ -187,7 +187,8 @@ class PieceCompressor {
       if (const auto* weight = weight_of(column, row)) weight->take_away(block.column_basis);
       column_factor = make_orthonormal(block.column_basis);
     }
-    for (Eigen::MatrixXd& core : block.cores) core = row_factor * core * column_factor.transpose();
+    for (Eigen::MatrixXd& coupling : block.couplings)
+      coupling = row_factor * coupling * column_factor.transpose();
   }
 
   BlockPart low_rank_part(TransferBlock place, LowRankBlock block, std::uint32_t row,
@@ -197,15 +198,15 @@ class PieceCompressor {
     place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
     place.column_rank = place.on_diagonal() ? place.row_rank
                                             : static_cast<std::uint32_t>(block.column_basis.cols());
-    const BasisRemainders remainders =
-        find_remainders(block, {weight_of(row, column), weight_of(column, row)}, cost);
-    place.row_remainders = static_cast<std::uint32_t>(remainders.row);
-    place.column_remainders = static_cast<std::uint32_t>(remainders.column);
+    const ResidualRanks residual_rank =
+        find_residual_ranks(block, {weight_of(row, column), weight_of(column, row)}, cost);
+    place.row_residual_rank = static_cast<std::uint32_t>(residual_rank.row);
+    place.column_residual_rank = static_cast<std::uint32_t>(residual_rank.column);
     BlockPart part{{place}, {}, 0};
     append_columns(block.row_basis, part.values);
     append_columns(block.column_basis, part.values);
-    for (const Eigen::MatrixXd& core : block.cores) append_rows(core, part.values);
-    part.cost = cost.of(block) + price_ * sizes_.block;
+    for (const Eigen::MatrixXd& coupling : block.couplings) append_rows(coupling, part.values);
+    part.cost = cost.of(block) + multiplier_ * sizes_.block;
     return part;
   }
 
@@ -213,7 +214,7 @@ class PieceCompressor {
   const std::vector<ClusterWeight>& weights_;
   const WantedBlocks& wanted_;
   const PartSizes& sizes_;
-  double price_;
+  double multiplier_;
   std::uint32_t row_, column_, row_begin_, column_begin_;
   std::vector<Eigen::MatrixXf> matrices_;
 };
@@ -260,7 +261,7 @@ std::vector<BlockPiece> BlockTreeCompressor::pieces() const {
   return block_pieces(tree_, largest_piece(tree_.clusters.front().count));
 }
 
-BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double price,
+BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double multiplier,
                                         const Progress& progress) const {
   load_blas();
   std::vector<BlockPart> parts(pieces.size());
@@ -269,8 +270,8 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (loop.stopped()) continue;
     if (wants(pieces[k])) {
-      parts[k] =
-          PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, price, pieces[k]).compress();
+      parts[k] = PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, multiplier, pieces[k])
+                     .compress();
     }
     loop.advance();
   }

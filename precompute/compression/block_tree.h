@@ -36,12 +36,12 @@ std::uint32_t largest_piece(std::uint32_t position_count);
 /// traversal.
 std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t largest);
 
-/// Compresses one matrix at any number of prices.
+/// Compresses one matrix at any number of multipliers.
 ///
-/// What is minimised is error² + price x size, in which the error is that of the symmetric form in
-/// the Frobenius norm, with the weights of light_weights.h on both sides, or on the side that light
-/// comes from where but one direction is wanted. Where the roles of the matrix want none there is
-/// no block.
+/// What is minimised is error² + multiplier x size, in which the error is that of the symmetric
+/// form in the Frobenius norm, with the weights of light_weights.h on both sides, or on the side
+/// that light comes from where but one direction is wanted. Where the roles of the matrix want none
+/// there is no block.
 class BlockTreeCompressor {
  public:
   /// All that is given must outlive the object; `weights` has one entry for each cluster.
@@ -59,8 +59,8 @@ class BlockTreeCompressor {
   /// Whether anything of a piece is wanted.
   bool wants(const BlockPiece& piece) const { return wanted_.wanted(piece.row, piece.column); }
 
-  /// Some pieces of the operator (f32) at a price > 0. Throws Cancelled if asked to stop.
-  BlockPart compress(std::span<const BlockPiece> pieces, double price,
+  /// Some pieces of the operator (f32) at a multiplier > 0. Throws Cancelled if asked to stop.
+  BlockPart compress(std::span<const BlockPiece> pieces, double multiplier,
                      const Progress& progress = {}) const;
 
   /// The operator that all parts together are.

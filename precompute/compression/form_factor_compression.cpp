@@ -13,8 +13,8 @@ namespace rebounce {
 namespace {
 
 /// Sweeps work on the light at positions.
-HierarchicalSettings without_moments(HierarchicalSettings settings) {
-  settings.moments = false;
+HierarchicalSettings without_cluster_bases(HierarchicalSettings settings) {
+  settings.cluster_coefficients = false;
   return settings;
 }
 
@@ -24,7 +24,7 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, radiosities,
-                               without_moments(settings), progress);
+                               without_cluster_bases(settings), progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
@@ -40,7 +40,7 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(LinkedMatrix(links, std::move(product), patches), patches,
-                               radiosities, without_moments(settings), progress);
+                               radiosities, without_cluster_bases(settings), progress);
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
@@ -79,8 +79,8 @@ std::vector<std::vector<Float3>> radiosities_of(
 }
 
 DrawnLights radiosities_of(const DrawnLights& lights, const TransferData& data) {
-  return {radiosities_of(*data.transfer, data.patches.reflectance, lights.shaping),
-          radiosities_of(*data.transfer, data.patches.reflectance, lights.judging)};
+  return {radiosities_of(*data.transfer, data.patches.reflectance, lights.training),
+          radiosities_of(*data.transfer, data.patches.reflectance, lights.validation)};
 }
 
 }  // namespace rebounce

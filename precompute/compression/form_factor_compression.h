@@ -32,7 +32,7 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const HierarchicalSettings& settings, const Progress& progress = {});
 
 /// The same from links, without the pairs that they stand for: the cost is that of the links and of
-/// a look at each entry for every price that is tried, the memory that of a few pieces of the
+/// a look at each entry for every multiplier that is tried, the memory that of a few pieces of the
 /// matrix. Throws Error if `links` are not of these patches.
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,

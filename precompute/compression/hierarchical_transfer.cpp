@@ -6,9 +6,10 @@
 namespace rebounce {
 
 HierarchicalStorage compress_transfer(const DenseOperator& dense, const PatchTable& patches,
-                                      std::span<const std::vector<Float3>> shaping, double price,
-                                      const Progress& progress, const PatchRoles& roles) {
-  return compress_matrix(DenseMatrix(dense, roles), patches, shaping, price, progress);
+                                      std::span<const std::vector<Float3>> training,
+                                      double multiplier, const Progress& progress,
+                                      const PatchRoles& roles) {
+  return compress_matrix(DenseMatrix(dense, roles), patches, training, multiplier, progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(

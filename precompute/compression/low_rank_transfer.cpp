@@ -81,11 +81,11 @@ SharedArray<float> tile_basis(const MatrixXf& basis) {
   return SharedArray(std::move(values));
 }
 
-SharedArray<float> make_cores(const RitzVectors& vectors) {
+SharedArray<float> make_couplings(const RitzVectors& vectors) {
   std::vector<float> values;
   for (const MatrixXf& image : vectors.images) {
-    const MatrixXf core = vectors.basis.transpose() * image;
-    const MatrixXf symmetric = 0.5F * (core + core.transpose());
+    const MatrixXf coupling = vectors.basis.transpose() * image;
+    const MatrixXf symmetric = 0.5F * (coupling + coupling.transpose());
     values.insert(values.end(), symmetric.data(), symmetric.data() + symmetric.size());
   }
   return SharedArray(std::move(values));
@@ -122,7 +122,7 @@ std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperat
   storage.matrix_count = dense.storage().matrix_count;
   storage.rank = static_cast<std::size_t>(rank);
   storage.basis_f32 = tile_basis(vectors.basis);
-  storage.core = make_cores(vectors);
+  storage.coupling = make_couplings(vectors);
   if (settings.precision == Precision::kF16) storage = LowRankOperator::encode_half(storage);
   return std::make_shared<const LowRankOperator>(std::move(storage));
 }

@@ -19,9 +19,9 @@ struct LowRankSettings {
 /// channels together, up to the few per cent of its error that a randomised method may add where
 /// the spectrum is flat.
 ///
-/// The basis is that of the leading eigenvectors of sum Yhat_c², each channel's core V^T Yhat_c V;
-/// for one channel V S V^T is the truncated eigenvalue decomposition, and no other operator of this
-/// rank is nearer (C. Eckart and G. Young, 1936).
+/// The basis is that of the leading eigenvectors of sum Yhat_c², each channel's coupling matrix V^T
+/// Yhat_c V; for one channel V S V^T is the truncated eigenvalue decomposition, and no other
+/// operator of this rank is nearer (C. Eckart and G. Young, 1936).
 ///
 /// Up to some hundreds of patches the eigenvectors are found densely, above by subspace iteration
 /// from a random start: N. Halko, P. G. Martinsson and J. A. Tropp, "Finding structure with

@@ -7,13 +7,13 @@
 #include <numeric>
 #include <optional>
 
-#include "precompute/compression/balanced_matrix.h"
 #include "precompute/compression/block_tree.h"
+#include "precompute/compression/equilibrated_matrix.h"
+#include "precompute/compression/multiplier_search.h"
 #include "precompute/compression/nested_bases.h"
-#include "precompute/compression/price_search.h"
 #include "precompute/compression/wanted_blocks.h"
-#include "precompute/lights/judged_error.h"
-#include "precompute/lights/lit_truth.h"
+#include "precompute/lights/reference_lighting.h"
+#include "precompute/lights/validation_error.h"
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/operator/hierarchical_operator.h"
 
@@ -23,8 +23,8 @@ namespace {
 // Measured: notes/operator.md.
 constexpr std::uint32_t kLeafSize = 32;
 
-// The search for the price aims at this part of the tolerance, and ends at kMost at most: other
-// lights than those that it sees may do a little worse.
+// The search for the multiplier aims at this part of the tolerance, and ends at kMost at most:
+// other lights than those that it sees may do a little worse.
 constexpr int kMostRounds = 8;
 constexpr double kAim = 0.76, kMost = 0.8;
 
@@ -37,19 +37,20 @@ constexpr std::size_t kKeptPieces = 64;
 
 // What one value per patch is worth at the tolerance, to begin the search with: measured over
 // scenes and sizes, notes/operator.md.
-constexpr double kFirstPrice = 2.5;
+constexpr double kInitialMultiplier = 2.5;
 
-// Operators with moments mostly end far above it. Their search begins higher by this power of how
-// many times so many patches they have, and by so much at most. Measured: notes/operator.md.
+// Operators with cluster coefficients mostly end far above it. Their search begins higher by this
+// power of how many times so many patches they have, and by so much at most. Measured:
+// notes/operator.md.
 constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
 
 // Those without, form factors, end at 2.5 to 22 times it as a rule.
 constexpr double kPlainStart = 2;
 
-// From one round to the next, the strength of a shaping light changes by a factor between these.
+// From one round to the next, the strength of a training light changes by a factor between these.
 constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 
-// The uniform light's part of the energy of all shaping lights: what makes black surfaces, which
+// The uniform light's part of the energy of all training lights: what makes black surfaces, which
 // reflect no light, good enough as lamps.
 constexpr double kUniformShare = 0.1;
 
@@ -67,9 +68,11 @@ std::vector<std::vector<Float3>> with_uniform(std::size_t patch_count, Exitances
   return all;
 }
 
-LitTruth judging_truth(const SymmetricMatrix& matrix, Exitances lights) {
-  LitTruth truth(matrix, lights);
-  return truth.light_count() > 0 ? truth : LitTruth(matrix, with_uniform(matrix.area().size(), {}));
+ReferenceLighting validation_truth(const SymmetricMatrix& matrix, Exitances lights) {
+  ReferenceLighting truth(matrix, lights);
+  return truth.light_count() > 0
+             ? truth
+             : ReferenceLighting(matrix, with_uniform(matrix.area().size(), {}));
 }
 
 double mean(const std::vector<double>& errors) {
@@ -77,15 +80,15 @@ double mean(const std::vector<double>& errors) {
 }
 
 CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patches,
-                          const LitTruth& shaping) {
+                          const ReferenceLighting& training) {
   constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment);
   CompressionFrame frame;
   frame.roles = matrix.roles();
-  frame.received_part = shaping.received().part();
+  frame.received_part = training.received().part();
   frame.tree = build_cluster_tree(patches, kLeafSize, kAlignment, role_groups(frame.roles));
   frame.background = background_light(matrix, frame.tree);
-  frame.sample = shaping.normalised_lights(frame.tree.patch,
-                                           HierarchicalFormat::position_count(patches.size()));
+  frame.sample = training.normalised_lights(frame.tree.patch,
+                                            HierarchicalFormat::position_count(patches.size()));
   frame.sample.col(0) *= std::sqrt(kUniformShare * static_cast<double>(frame.sample.cols()));
   return frame;
 }
@@ -103,13 +106,13 @@ struct KeptParts {
   std::string prefix;
 };
 
-/// What parts of an operator take. In bytes, with the remainders of some, a value of a basis is
-/// beside halves. One with moments is for applies, whose time counts too.
+/// What parts of an operator take. In bytes, with the residuals of some, a value of a basis is
+/// beside halves. One with cluster coefficients is for applies, whose time counts too.
 PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_count) {
   PartSizes sizes;
   sizes.basis_value =
       hierarchical_precision(settings.precision).bases == BasisPrecision::kQ8 ? 0.55 : 1;
-  if (settings.moments) {
+  if (settings.cluster_coefficients) {
     const double part = std::min(1.0, static_cast<double>(patch_count) / kSizedPatches);
     sizes.vector += kVectorSize * part;
     sizes.block += kBlockSize * part;
@@ -126,37 +129,37 @@ std::vector<std::int8_t> by_patch(const std::vector<std::int8_t>& at_position,
 }
 
 /// Beyond blocks of low rank.
-struct Form {
-  bool balanced = false, nested = false;
+struct CompressionOptions {
+  bool equilibrated = false, nested = false;
 };
 
 /// Bases in integers have one step for all patches of a cluster; sweeps work on the light at
-/// positions, and do not know moments.
-Form form_of(const HierarchicalSettings& settings) {
-  return {.balanced =
-              are_integers(hierarchical_precision(settings.precision).bases) || settings.moments,
-          .nested = settings.moments};
+/// positions, and do not know cluster coefficients.
+CompressionOptions options_of(const HierarchicalSettings& settings) {
+  return {.equilibrated = are_integers(hierarchical_precision(settings.precision).bases) ||
+                          settings.cluster_coefficients,
+          .nested = settings.cluster_coefficients};
 }
 
 /// A compressor with all that it looks at.
 class Compression {
  public:
-  Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances shaping,
-              const PartSizes& sizes, const Form& form)
+  Compression(const SymmetricMatrix& matrix, const PatchTable& patches, Exitances training,
+              const PartSizes& sizes, const CompressionOptions& options)
       : matrix_(matrix),
         sizes_(sizes),
-        nested_(form.nested),
-        truth_(matrix, with_uniform(patches.size(), shaping)),
+        nested_(options.nested),
+        truth_(matrix, with_uniform(patches.size(), training)),
         frame_(frame_of(matrix, patches, truth_)) {
-    if (!form.balanced) return;
+    if (!options.equilibrated) return;
     exponent_ = frame_.balance();
-    balanced_.emplace(matrix, by_patch(exponent_, frame_.tree));
+    equilibrated_.emplace(matrix, by_patch(exponent_, frame_.tree));
   }
 
-  HierarchicalStorage at(double price, const KeptParts& kept, const Progress& progress) const {
+  HierarchicalStorage at(double multiplier, const KeptParts& kept, const Progress& progress) const {
     const std::vector<ClusterWeight> weights = frame_.weights();
-    const BlockTreeCompressor compressor(balanced_ ? *balanced_ : matrix_, frame_.tree, weights,
-                                         sizes_);
+    const BlockTreeCompressor compressor(equilibrated_ ? *equilibrated_ : matrix_, frame_.tree,
+                                         weights, sizes_);
     const std::vector<BlockPiece> pieces = compressor.pieces();
     const std::size_t together = kept.checkpoint.keeps() ? kKeptPieces : pieces.size();
     const auto all = static_cast<double>(pieces.size());
@@ -165,14 +168,14 @@ class Compression {
       const std::size_t end = std::min(pieces.size(), begin + together);
       const auto some = std::span(pieces).subspan(begin, end - begin);
       const Progress part = part_of(progress, static_cast<double>(begin) / all, end / all);
-      whole.append(
-          kept.checkpoint.find_or_make(fmt::format("{}_part_{:04}", kept.prefix, begin / together),
-                                       [&] { return compressor.compress(some, price, part); }));
+      whole.append(kept.checkpoint.find_or_make(
+          fmt::format("{}_part_{:04}", kept.prefix, begin / together),
+          [&] { return compressor.compress(some, multiplier, part); }));
       report_progress(part, 1);
     }
     HierarchicalStorage storage = compressor.assemble(std::move(whole));
     if (nested_) {
-      const CompressionCost cost{.price = price, .sizes = sizes_};
+      const CompressionCost cost{.multiplier = multiplier, .sizes = sizes_};
       const WantedBlocks wanted(frame_.roles, frame_.tree);
       storage = nest_bases(std::move(storage), {frame_.tree, weights, wanted, cost});
     }
@@ -180,9 +183,9 @@ class Compression {
     return storage;
   }
 
-  double price_of(double usual) const { return frame_.price_of(usual); }
+  double multiplier_for(double usual) const { return frame_.multiplier_for(usual); }
 
-  /// Gives the shaping lights weight by the errors that they have with `transfer`.
+  /// Gives the training lights weight by the errors that they have with `transfer`.
   void emphasise(const TransferOperator& transfer) {
     const std::vector<double> errors = truth_.errors(transfer);
     const double usual = mean(errors);
@@ -197,10 +200,10 @@ class Compression {
   const SymmetricMatrix& matrix_;
   PartSizes sizes_;
   bool nested_;
-  LitTruth truth_;
+  ReferenceLighting truth_;
   CompressionFrame frame_;
-  std::vector<std::int8_t> exponent_;  ///< by position, as BalancedMatrix has them
-  std::optional<BalancedMatrix> balanced_;
+  std::vector<std::int8_t> exponent_;  ///< by position, as EquilibratedMatrix has them
+  std::optional<EquilibratedMatrix> equilibrated_;
 };
 
 /// The best operator that the search has met: the smallest within the limit, or the most exact.
@@ -224,10 +227,10 @@ class Best {
   std::shared_ptr<const HierarchicalOperator> best_;
 };
 
-/// The price that a search begins with.
+/// The multiplier that a search begins with.
 double search_start(const HierarchicalSettings& settings, std::size_t patch_count) {
-  const double usual = first_price(settings.tolerance, patch_count);
-  if (!settings.moments) return kPlainStart * usual;
+  const double usual = initial_multiplier(settings.tolerance, patch_count);
+  if (!settings.cluster_coefficients) return kPlainStart * usual;
   const double times = static_cast<double>(patch_count) / kStartPatches;
   return usual * std::clamp(std::pow(times, kStartGrowth), 1.0, kHighestStart);
 }
@@ -247,37 +250,39 @@ std::vector<std::int8_t> CompressionFrame::balance() {
 }
 
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
-                                   Exitances shaping) {
-  return frame_of(matrix, patches, LitTruth(matrix, with_uniform(patches.size(), shaping)));
+                                   Exitances training) {
+  return frame_of(matrix, patches,
+                  ReferenceLighting(matrix, with_uniform(patches.size(), training)));
 }
 
-double first_price(double tolerance, std::size_t patch_count) {
-  return kFirstPrice * tolerance * tolerance / static_cast<double>(patch_count);
+double initial_multiplier(double tolerance, std::size_t patch_count) {
+  return kInitialMultiplier * tolerance * tolerance / static_cast<double>(patch_count);
 }
 
 HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
-                                    Exitances shaping, double price, const Progress& progress) {
-  return Compression(matrix, patches, shaping, PartSizes(), Form())
-      .at(price, {BlockCheckpoint(), {}}, progress);
+                                    Exitances training, double multiplier,
+                                    const Progress& progress) {
+  return Compression(matrix, patches, training, PartSizes(), CompressionOptions())
+      .at(multiplier, {BlockCheckpoint(), {}}, progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
-  const LitTruth judging = judging_truth(matrix, lights.judging);
-  Compression compression(matrix, patches, lights.shaping, part_sizes(settings, patches.size()),
-                          form_of(settings));
+  const ReferenceLighting validation = validation_truth(matrix, lights.validation);
+  Compression compression(matrix, patches, lights.training, part_sizes(settings, patches.size()),
+                          options_of(settings));
   const double tolerance = settings.tolerance;
-  PriceSearch search(compression.price_of(search_start(settings, patches.size())),
-                     {kAim * tolerance, kMost * tolerance});
+  MultiplierSearch search(compression.multiplier_for(search_start(settings, patches.size())),
+                          {kAim * tolerance, kMost * tolerance});
   Best best(kMost * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
     const auto candidate = std::make_shared<const HierarchicalOperator>(
-        encode_values(compression.at(search.price(), kept, part), settings.precision));
-    const double error = judged_error(judging.errors(*candidate));
+        encode_values(compression.at(search.multiplier(), kept, part), settings.precision));
+    const double error = validation_error(validation.errors(*candidate));
     best.offer(candidate, error);
     search.report(error, static_cast<double>(candidate->bytes()));
     if (!search.done()) compression.emphasise(*candidate);

@@ -20,16 +20,16 @@ namespace rebounce {
 struct CompressionFrame {
   ClusterTree tree;
   Eigen::VectorXd background;  ///< as background_light gives it
-  Eigen::MatrixXd sample;      ///< the shaping lights, normalised
+  Eigen::MatrixXd sample;      ///< the training lights, normalised
   PatchRoles roles;            ///< of the matrix
-  double received_part = 1;    ///< ReceivedLight::part of the shaping lights
+  double received_part = 1;    ///< ReceivedLight::part of the training lights
 
   /// What a value is worth where that is `usual` with all patches receivers: squares of errors are
   /// relative to those of what arrives.
-  double price_of(double usual) const { return usual * received_part * received_part; }
+  double multiplier_for(double usual) const { return usual * received_part * received_part; }
 
   /// Goes over to the coordinates of a matrix K that leaves the background of all lights about 1,
-  /// BalancedMatrix: x becomes R x. Returns R as powers of two, by position.
+  /// EquilibratedMatrix: x becomes R x. Returns R as powers of two, by position.
   std::vector<std::int8_t> balance();
 
   std::vector<ClusterWeight> weights() const {
@@ -39,15 +39,15 @@ struct CompressionFrame {
 
 /// That of `matrix` under these lights; only its products and energies are asked for.
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
-                                   std::span<const std::vector<Float3>> shaping);
+                                   std::span<const std::vector<Float3>> training);
 
 /// What a value per patch is worth at the tolerance: that with which searches begin, or near it.
-double first_price(double tolerance, std::size_t patch_count);
+double initial_multiplier(double tolerance, std::size_t patch_count);
 
 /// Compresses `matrix` as compress_transfer does. `patches` are those of the matrix.
 HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
-                                    std::span<const std::vector<Float3>> shaping, double price,
-                                    const Progress& progress = {});
+                                    std::span<const std::vector<Float3>> training,
+                                    double multiplier, const Progress& progress = {});
 
 /// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. What each round of the
 /// search does is kept in `checkpoint`, made for all that is given here, and taken from there: the

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "precompute/base/blas.h"
-#include "precompute/compression/basis_remainders.h"
+#include "precompute/compression/residual_ranks.h"
 
 namespace rebounce {
 namespace {
@@ -19,12 +19,13 @@ using Eigen::VectorXd;
 using Storage = HierarchicalStorage;
 using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Cells have so many positions at most; a side of a block has moments if it is made of whole
-// groups, clusters of so many positions at most. Measured: notes/operator.md.
+// Cells have so many positions at most; a side of a block has cluster coefficients if it is made of
+// whole groups, clusters of so many positions at most. Measured: notes/operator.md.
 constexpr std::uint32_t kCell = 128, kGroup = 256;
 
-// The largest entry of a core between moments: half of what half precision has room for.
-constexpr double kLargestCore = 32768 / HierarchicalFormat::kHalfScale;
+// The largest entry of a coupling matrix between cluster coefficients: half of what half precision
+// has room for.
+constexpr double kLargestCoupling = 32768 / HierarchicalFormat::kHalfScale;
 
 // A cell's description, in values.
 constexpr double kCellOverhead = 32;
@@ -70,8 +71,8 @@ struct NestedEnd {
   /// [rank][rank]: an error E of the basis is one of the block whose square is the trace of
   /// E weighted E^T, and of E plain E^T where light at the other side is not weighed.
   MatrixXd weighted = {}, plain = {};
-  RowMajor moments = {};  ///< [rank][moments] in place of the basis
-  MatrixXd folded = {};   ///< [rank][vectors before]: what the vectors were combined of
+  RowMajor cluster_coefficients = {};  ///< [rank][cluster coefficients] in place of the basis
+  MatrixXd folded = {};  ///< [rank][vectors before]: what the vectors were combined of
 
   Index rank() const { return plain.rows(); }
 };
@@ -88,10 +89,10 @@ struct CellBasis {
   VectorXd energies;              ///< of directions, falling
   MatrixXd directions;            ///< [positions][positions], then [positions][rank]
   Index stacked = 0, rank = 0;    ///< vectors of all blocks; of the basis
-  Index first_moment = 0;
+  Index first_coefficient = 0;
   MatrixXd vectors;       ///< [positions][rank], columns of norm 1
   VectorXd norm, length;  ///< [rank] of the vectors before; what coefficients are divided by
-  Index remainders = 0;
+  Index residual_rank = 0;
 };
 
 class Nesting {
@@ -129,11 +130,11 @@ class Nesting {
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t c = 0; c < bases_.size(); ++c) make_basis(c);
 #pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t e = 0; e < ends_.size(); ++e) take_moments(ends_[e]);
+    for (std::size_t e = 0; e < ends_.size(); ++e) take_coefficients(ends_[e]);
     for (NestedEnd& end : ends_) fold(end);
-    fit_cores();
+    fit_couplings();
 #pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t c = 0; c < bases_.size(); ++c) find_remainders(c);
+    for (std::size_t c = 0; c < bases_.size(); ++c) find_residual_ranks(c);
     return assemble();
   }
 
@@ -146,8 +147,8 @@ class Nesting {
   const ClusterWeight& weight_of_cell(std::size_t c) const {
     return frame_.weights[cells_.cluster[c]];
   }
-  double price() const {
-    return frame_.cost.price;
+  double multiplier() const {
+    return frame_.cost.multiplier;
   }
 
   /// The basis of one side of a block, [rank][positions].
@@ -159,8 +160,8 @@ class Nesting {
             block.column_count};
   }
 
-  /// Its core for one matrix, [row rank][column rank].
-  Vectors core(std::size_t b, std::uint32_t matrix) const {
+  /// Its coupling matrix for one matrix, [row rank][column rank].
+  Vectors coupling(std::size_t b, std::uint32_t matrix) const {
     const TransferBlock& block = storage_.blocks[b];
     const Index size = Index{block.row_rank} * block.column_rank;
     const float* const end =
@@ -204,7 +205,7 @@ class Nesting {
     if (end.receives) frame_.weights[end.other].put_left(other);
     const MatrixXd gram = other.transpose() * other;
     for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
-      MatrixXd s = core(end.block, m).cast<double>();
+      MatrixXd s = coupling(end.block, m).cast<double>();
       if (!end.is_row) s.transposeInPlace();
       if (m == 0) end.weighted = end.plain = MatrixXd::Zero(s.rows(), s.rows());
       end.weighted += s * gram * s.transpose();
@@ -237,12 +238,12 @@ class Nesting {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
     own.directions = solver.eigenvectors().rowwise().reverse();
     own.energies = solver.eigenvalues().reverse().cwiseMax(0);
-    const double worth = price() * frame_.cost.size(size + own.stacked, 1, 0);
+    const double worth = multiplier() * frame_.cost.size(size + own.stacked, 1, 0);
     own.rank = (own.energies.array() > worth).count();
   }
 
-  /// Groups begin at multiples of the alignment, and so do their moments: the ranks of their cells
-  /// are filled up with the best directions that are left.
+  /// Groups begin at multiples of the alignment, and so do their cluster coefficients: the ranks of
+  /// their cells are filled up with the best directions that are left.
   void fill_groups() {
     for (std::size_t g = 0; g + 1 < cells_.group_first.size(); ++g) {
       const std::span group = std::span(bases_).subspan(
@@ -258,10 +259,10 @@ class Nesting {
         ++total;
       }
     }
-    Index moment = 0;
+    Index coefficient = 0;
     for (CellBasis& own : bases_) {
-      own.first_moment = moment;
-      moment += own.rank;
+      own.first_coefficient = coefficient;
+      coefficient += own.rank;
     }
   }
 
@@ -271,11 +272,11 @@ class Nesting {
     const double before = frame_.cost.size(size * own.stacked, 0, 0);
     const double after =
         frame_.cost.size((size + own.stacked) * own.rank, own.rank, 0) + kCellOverhead;
-    return price() * (before - after) - own.energies.tail(size - own.rank).sum();
+    return multiplier() * (before - after) - own.energies.tail(size - own.rank).sum();
   }
 
-  /// Vectors of norm 1, and lengths of the moments between those of coefficients (all alike as
-  /// they are rounded) and of energies: rounding does the least there. notes/operator.md.
+  /// Vectors of norm 1, and lengths of the cluster coefficients between those of coefficients (all
+  /// alike as they are rounded) and of energies: rounding does the least there. notes/operator.md.
   void make_basis(std::size_t c) {
     CellBasis& own = bases_[c];
     own.directions.conservativeResize(Eigen::NoChange, own.rank);
@@ -289,29 +290,32 @@ class Nesting {
         (own.energies.head(own.rank) / std::max(most, 1e-300)).array().pow(0.125).max(kLeast);
   }
 
-  void take_moments(NestedEnd& end) {
+  void take_coefficients(NestedEnd& end) {
     const CellBasis &first = bases_[end.first_cell], &last = bases_[end.last_cell - 1];
-    end.moments.resize(end.rank(), last.first_moment + last.rank - first.first_moment);
+    end.cluster_coefficients.resize(end.rank(),
+                                    last.first_coefficient + last.rank - first.first_coefficient);
     for (std::size_t c = end.first_cell; c < end.last_cell; ++c) {
       const CellBasis& own = bases_[c];
       const MatrixXd coefficients = own.directions.transpose() * weighted_part(end, c);
-      end.moments.middleCols(own.first_moment - first.first_moment, own.rank) =
+      end.cluster_coefficients.middleCols(own.first_coefficient - first.first_coefficient,
+                                          own.rank) =
           (own.length.cwiseInverse().asDiagonal() * coefficients).transpose().cast<float>();
     }
   }
 
-  /// Vectors of moments get norm 1, as those of bases, and cores what they were longer by. Of a
-  /// side with more vectors than moments as many do, and the rest goes into the core.
+  /// Vectors of cluster coefficients get norm 1, as those of bases, and coupling matrices what they
+  /// were longer by. Of a side with more vectors than cluster coefficients as many do, and the rest
+  /// goes into the coupling matrix.
   static void fold(NestedEnd& end) {
-    if (end.rank() > end.moments.cols()) {
-      const MatrixXd vectors = end.moments.transpose().cast<double>();
+    if (end.rank() > end.cluster_coefficients.cols()) {
+      const MatrixXd vectors = end.cluster_coefficients.transpose().cast<double>();
       const Eigen::HouseholderQR<MatrixXd> qr(vectors);
       end.folded = qr.matrixQR().triangularView<Eigen::Upper>();
-      end.moments = MatrixXd(qr.householderQ()).transpose().cast<float>();
+      end.cluster_coefficients = MatrixXd(qr.householderQ()).transpose().cast<float>();
     } else {
-      const VectorXd norm = end.moments.rowwise().norm().cast<double>();
+      const VectorXd norm = end.cluster_coefficients.rowwise().norm().cast<double>();
       end.folded = (norm.array() > 0).select(norm, 1).asDiagonal();
-      end.moments.rowwise().normalize();
+      end.cluster_coefficients.rowwise().normalize();
     }
     scale_errors(end, end.folded);
   }
@@ -321,17 +325,19 @@ class Nesting {
     end.plain = by * end.plain * by.transpose();
   }
 
-  /// Moments get longer, and cores smaller, until the largest entry of all cores fits half
-  /// precision well. By as much for all: small cores are not to fall below its normal numbers.
-  void fit_cores() {
+  /// Cluster coefficients get longer, and coupling matrices smaller, until the largest entry of all
+  /// coupling matrices fits half precision well. By as much for all: small coupling matrices are
+  /// not to fall below its normal numbers.
+  void fit_couplings() {
     double one_side = 0, both_sides = 0;
     for (const auto& [b, sides] : sides_of_blocks()) {
       double& largest = sides.row != nullptr && sides.column != nullptr ? both_sides : one_side;
       for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
-        largest = std::max<double>(largest, folded_core(b, m, sides).cwiseAbs().maxCoeff());
+        largest = std::max<double>(largest, folded_coupling(b, m, sides).cwiseAbs().maxCoeff());
       }
     }
-    const double length = std::max(one_side / kLargestCore, std::sqrt(both_sides / kLargestCore));
+    const double length =
+        std::max(one_side / kLargestCoupling, std::sqrt(both_sides / kLargestCoupling));
     if (length == 0) return;
     for (NestedEnd& end : ends_) {
       end.folded /= length;
@@ -352,42 +358,43 @@ class Nesting {
     return sides;
   }
 
-  /// A core with what its sides have folded into it.
-  MatrixXd folded_core(std::size_t b, std::uint32_t matrix, const NestedSides& sides) const {
-    MatrixXd s = core(b, matrix).cast<double>();
+  /// A coupling matrix with what its sides have folded into it.
+  MatrixXd folded_coupling(std::size_t b, std::uint32_t matrix, const NestedSides& sides) const {
+    MatrixXd s = coupling(b, matrix).cast<double>();
     if (sides.row != nullptr) s = sides.row->folded * s;
     if (sides.column != nullptr) s *= sides.column->folded.transpose();
     return s;
   }
 
-  void find_remainders(std::size_t c) {
+  void find_residual_ranks(std::size_t c) {
     CellBasis& own = bases_[c];
     VectorXd arriving = VectorXd::Zero(own.rank), leaving = arriving;
     for (const std::size_t e : own.ends) {
       const NestedEnd& end = ends_[e];
-      const Index first = own.first_moment - bases_[end.first_cell].first_moment;
-      const MatrixXd t = own.length.asDiagonal() *
-                         end.moments.middleCols(first, own.rank).transpose().cast<double>();
+      const Index first = own.first_coefficient - bases_[end.first_cell].first_coefficient;
+      const MatrixXd t =
+          own.length.asDiagonal() *
+          end.cluster_coefficients.middleCols(first, own.rank).transpose().cast<double>();
       if (end.receives) arriving += (t * end.weighted).cwiseProduct(t).rowwise().sum();
       if (end.sends) leaving += (t * end.plain).cwiseProduct(t).rowwise().sum();
     }
     const double size = cell(c).count, weight = weight_of_cell(c).squared_norm();
-    own.remainders = worthwhile_remainders(own.vectors, price(), [&](Index k) {
+    own.residual_rank = worthwhile_residual_rank(own.vectors, multiplier(), [&](Index k) {
       return own.norm[k] * own.norm[k] * (size * arriving[k] + weight * leaving[k]);
     });
   }
 
-  /// Of the vectors of moments of an end.
-  Index remainder_count(const NestedEnd& end) const {
+  /// Of the vectors of cluster coefficients of an end.
+  Index residual_rank(const NestedEnd& end) const {
     double arriving = 0, leaving = 0;
     for (std::size_t c = end.first_cell; c < end.last_cell; ++c) {
       const CellBasis& own = bases_[c];
       if (end.receives) arriving += own.norm.cwiseProduct(own.length).squaredNorm();
       if (end.sends) leaving += own.length.squaredNorm();
     }
-    return worthwhile_remainders(end.moments.transpose().cast<double>(), price(), [&](Index r) {
-      return arriving * end.weighted(r, r) + leaving * end.plain(r, r);
-    });
+    return worthwhile_residual_rank(
+        end.cluster_coefficients.transpose().cast<double>(), multiplier(),
+        [&](Index r) { return arriving * end.weighted(r, r) + leaving * end.plain(r, r); });
   }
 
   Storage assemble() const {
@@ -396,7 +403,7 @@ class Nesting {
     std::vector<float> values;
     const auto positions =
         static_cast<std::uint32_t>(HierarchicalFormat::position_count(tree_.patch.size()));
-    add_moments(positions, result, values);
+    add_coefficients(positions, result, values);
     const std::map<std::size_t, NestedSides> sides = sides_of_blocks();
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       const auto found = sides.find(b);
@@ -414,7 +421,8 @@ class Nesting {
     return result;
   }
 
-  void add_moments(std::uint32_t positions, Storage& result, std::vector<float>& values) const {
+  void add_coefficients(std::uint32_t positions, Storage& result,
+                        std::vector<float>& values) const {
     for (std::size_t c = 0; c < bases_.size(); ++c) {
       const CellBasis& own = bases_[c];
       if (own.rank == 0) continue;
@@ -422,23 +430,23 @@ class Nesting {
       result.blocks.push_back(
           {.row_begin = cell(c).begin,
            .row_count = cell(c).count,
-           .column_begin = positions + static_cast<std::uint32_t>(own.first_moment),
+           .column_begin = positions + static_cast<std::uint32_t>(own.first_coefficient),
            .column_count = rank,
-           .kind = TransferBlock::Kind::kMoments,
+           .kind = TransferBlock::Kind::kClusterBasis,
            .row_rank = rank,
-           .row_remainders = static_cast<std::uint32_t>(own.remainders)});
+           .row_residual_rank = static_cast<std::uint32_t>(own.residual_rank)});
       for (Index k = 0; k < own.vectors.size(); ++k) {
         values.push_back(static_cast<float>(own.vectors.data()[k]));
       }
       for (Index k = 0; k < own.rank; ++k) {
-        result.moment_scale.push_back(static_cast<float>(own.norm[k] * own.length[k]));
+        result.coefficient_scale.push_back(static_cast<float>(own.norm[k] * own.length[k]));
       }
     }
   }
 
   /// One side of a block as it will be.
   struct Side {
-    std::uint32_t begin, count, rank, remainders;
+    std::uint32_t begin, count, rank, residual_rank;
     RowMajor vectors;
   };
 
@@ -446,19 +454,21 @@ class Nesting {
     const TransferBlock& block = storage_.blocks[b];
     const std::uint32_t rank = is_row ? block.row_rank : block.column_rank;
     if (end != nullptr) {
-      const Index first = bases_[end->first_cell].first_moment;
+      const Index first = bases_[end->first_cell].first_coefficient;
       return {positions + static_cast<std::uint32_t>(first),
-              static_cast<std::uint32_t>(end->moments.cols()),
+              static_cast<std::uint32_t>(end->cluster_coefficients.cols()),
               static_cast<std::uint32_t>(end->rank()),
-              static_cast<std::uint32_t>(remainder_count(*end)), end->moments};
+              static_cast<std::uint32_t>(residual_rank(*end)), end->cluster_coefficients};
     }
     if (is_row) {
-      return {block.row_begin, block.row_count, rank, block.row_remainders, basis(b, true)};
+      return {block.row_begin, block.row_count, rank, block.row_residual_rank, basis(b, true)};
     }
-    return {block.column_begin, block.column_count, rank, block.column_remainders, basis(b, false)};
+    return {block.column_begin, block.column_count, rank, block.column_residual_rank,
+            basis(b, false)};
   }
 
-  /// Rows come after columns: the sides change places if only the columns have moments.
+  /// Rows come after columns: the sides change places if only the columns have cluster
+  /// coefficients.
   void add_block(std::size_t b, const NestedSides& sides, std::uint32_t positions, Storage& result,
                  std::vector<float>& values) const {
     const bool diagonal = storage_.blocks[b].on_diagonal();
@@ -473,15 +483,15 @@ class Nesting {
                              .kind = TransferBlock::Kind::kLowRank,
                              .row_rank = row.rank,
                              .column_rank = column.rank,
-                             .row_remainders = row.remainders,
-                             .column_remainders = column.remainders});
+                             .row_residual_rank = row.residual_rank,
+                             .column_residual_rank = column.residual_rank});
     const auto add = [&](const RowMajor& matrix) {
       values.insert(values.end(), matrix.data(), matrix.data() + matrix.size());
     };
     add(row.vectors);
     if (!diagonal) add(column.vectors);
     for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
-      RowMajor s = folded_core(b, m, sides).cast<float>();
+      RowMajor s = folded_coupling(b, m, sides).cast<float>();
       if (swapped) s.transposeInPlace();
       add(s);
     }

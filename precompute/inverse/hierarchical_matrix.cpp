@@ -18,7 +18,7 @@ using ConstMap = Eigen::Map<const Vectors>;
 constexpr std::uint32_t kStrip = 512;
 
 // Vectors that one thread multiplies with at a time.
-constexpr Index kTogether = 32;
+constexpr Index kBatchLights = 32;
 
 /// to = matrix from, or with kAdd to += matrix from; matrix [rows][columns], the others with
 /// `width` columns, all of them row after row.
@@ -53,14 +53,15 @@ struct HierarchicalMatrix::Places {
 
 HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage)
     : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
-  if (layout_.moment_count > 0) throw Error("hierarchical matrix: its blocks have moments");
+  if (layout_.cluster_coefficient_count > 0)
+    throw Error("hierarchical matrix: its blocks have moments");
   const SharedArray<float> values = std::exchange(storage_.values_f32, {});
   bases_.assign(values.begin(), values.begin() + layout_.basis_value_count);
-  const std::uint64_t count = layout_.core_value_count / matrix_count();
-  const float* const cores = values.data() + layout_.basis_value_count;
+  const std::uint64_t count = layout_.coupling_value_count / matrix_count();
+  const float* const couplings = values.data() + layout_.basis_value_count;
   for (std::uint32_t m = 0; m < matrix_count(); ++m) {
-    std::vector<float>& own = cores_.emplace_back(count);
-    for (std::uint64_t k = 0; k < count; ++k) own[k] = cores[k * matrix_count() + m];
+    std::vector<float>& own = couplings_.emplace_back(count);
+    for (std::uint64_t k = 0; k < count; ++k) own[k] = couplings[k * matrix_count() + m];
   }
   for (std::uint32_t k = 0; k < position_.size(); ++k) position_[storage_.patch[k]] = k;
   for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
@@ -86,7 +87,7 @@ void HierarchicalMatrix::take_scales() {
     const TransferBlock& block = storage_.blocks[b];
     if (block.kind != TransferBlock::Kind::kDense) continue;
     const std::uint64_t begin = layout_.places[b].values / matrix_count();
-    for (std::vector<float>& own : cores_) {
+    for (std::vector<float>& own : couplings_) {
       Eigen::Map<Vectors> entries(own.data() + begin, block.row_count, block.column_count);
       entries = (at(block.row_begin, block.row_count) * entries *
                  at(block.column_begin, block.column_count))
@@ -120,8 +121,8 @@ const float* HierarchicalMatrix::basis(const HierarchicalLayout::End& end) const
   return bases_.data() + layout_.basis_index(end, 0, 0);
 }
 
-const float* HierarchicalMatrix::core(std::uint32_t matrix, std::size_t block) const {
-  return cores_[matrix].data() + layout_.places[block].values / matrix_count();
+const float* HierarchicalMatrix::coupling(std::uint32_t matrix, std::size_t block) const {
+  return couplings_[matrix].data() + layout_.places[block].values / matrix_count();
 }
 
 void HierarchicalMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
@@ -148,7 +149,7 @@ MatrixXf HierarchicalMatrix::block_entries(std::uint32_t matrix, std::size_t ind
   const TransferBlock& block = storage_.blocks[index];
   MatrixXf entries(rows.size(), columns.size());
   if (block.kind == TransferBlock::Kind::kDense) {
-    const ConstMap whole(core(matrix, index), block.row_count, block.column_count);
+    const ConstMap whole(coupling(matrix, index), block.row_count, block.column_count);
     for (Index j = 0; j < entries.cols(); ++j) {
       for (Index i = 0; i < entries.rows(); ++i) {
         entries(i, j) =
@@ -169,7 +170,7 @@ MatrixXf HierarchicalMatrix::block_entries(std::uint32_t matrix, std::size_t ind
   const Vectors u = some(place.row, block.row_rank, block.row_begin, block.row_count, rows);
   const Vectors v =
       some(place.column, block.column_rank, block.column_begin, block.column_count, columns);
-  const MatrixXf right = ConstMap(core(matrix, index), block.row_rank, block.column_rank) * v;
+  const MatrixXf right = ConstMap(coupling(matrix, index), block.row_rank, block.column_rank) * v;
   entries.noalias() = u.transpose() * right;
   return entries;
 }
@@ -215,7 +216,7 @@ void HierarchicalMatrix::multiply(std::uint32_t matrix, const Vectors& x, Vector
   }
 }
 
-/// The cores, and all of dense blocks.
+/// The coupling matrices, and all of dense blocks.
 void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                                          Workspace& workspace) const {
   for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
@@ -231,7 +232,7 @@ void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x,
     Vectors& to = dense ? y : workspace.received;
     // Coefficients have one block that writes them, positions several.
     const Write write = dense ? Write::kAdd : Write::kSet;
-    const float* const entries = core(matrix, b);
+    const float* const entries = coupling(matrix, b);
     product(false, rows, columns, entries, from.row(column).data(), to.row(row).data(), x.cols(),
             write);
     if (block.on_diagonal()) continue;
@@ -244,8 +245,8 @@ MatrixXf HierarchicalMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) c
   load_blas();
   MatrixXf result(x.rows(), x.cols());
 #pragma omp parallel for schedule(dynamic, 1)
-  for (Index begin = 0; begin < x.cols(); begin += kTogether) {
-    const Index width = std::min(kTogether, x.cols() - begin);
+  for (Index begin = 0; begin < x.cols(); begin += kBatchLights) {
+    const Index width = std::min(kBatchLights, x.cols() - begin);
     Vectors in = Vectors::Zero(position_count(), width), out;
     for (std::size_t k = 0; k < position_.size(); ++k) {
       in.row(static_cast<Index>(k)) = x.row(storage_.patch[k]).segment(begin, width);

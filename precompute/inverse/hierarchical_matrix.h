@@ -33,7 +33,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
 
   /// What `multiply` needs beside its vectors.
   struct Workspace {
-    Vectors sent, received;  ///< coefficients before and after the cores
+    Vectors sent, received;  ///< coefficients before and after the coupling matrices
   };
 
   /// y = matrix x on one thread, all [positions][k]; y must not be x.
@@ -57,12 +57,12 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   void multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                        Workspace& workspace) const;
   const float* basis(const HierarchicalLayout::End& end) const;
-  const float* core(std::uint32_t matrix, std::size_t block) const;
+  const float* coupling(std::uint32_t matrix, std::size_t block) const;
 
   HierarchicalStorage storage_;  ///< f32, without values
   HierarchicalLayout layout_;
   std::vector<float> bases_;                          ///< [rank][size] by cluster
-  std::vector<std::vector<float>> cores_;             ///< of each matrix: S or the entries by block
+  std::vector<std::vector<float>> couplings_;         ///< of each matrix: S or the entries by block
   std::vector<std::uint32_t> position_;               ///< [n] of each patch
   Eigen::Index low_rank_count_ = 0;                   ///< coefficients of low-rank blocks
   std::vector<std::vector<std::uint32_t>> touching_;  ///< blocks that meet a strip of positions

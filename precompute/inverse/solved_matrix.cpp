@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Index;
 
-constexpr auto kTogether = static_cast<std::size_t>(SolvedTransfer::kTogether);
+constexpr auto kBatchColumns = static_cast<std::size_t>(SolvedTransfer::kBatchColumns);
 
 /// Columns that one thread solves for, counted from the first of all.
 struct Group {
@@ -27,8 +27,8 @@ std::vector<Group> make_groups(std::span<const Cluster> panels, std::size_t patc
   for (std::uint32_t m = 0; m < matrix_count; ++m) {
     for (const Cluster& panel : panels) {
       const std::size_t end = std::min<std::size_t>(panel.begin + panel.count, patch_count);
-      for (std::size_t begin = panel.begin; begin < end; begin += kTogether) {
-        groups.push_back({m, begin - first, std::min(kTogether, end - begin)});
+      for (std::size_t begin = panel.begin; begin < end; begin += kBatchColumns) {
+        groups.push_back({m, begin - first, std::min(kBatchColumns, end - begin)});
       }
     }
   }

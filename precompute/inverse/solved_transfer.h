@@ -26,7 +26,7 @@ class SolvedTransfer {
 
   /// Right-hand sides that one thread solves side by side. More: larger matrix products, and more
   /// memory, five times as many vectors for each thread.
-  static constexpr Eigen::Index kTogether = 128;
+  static constexpr Eigen::Index kBatchColumns = 128;
 
   /// `form_factors` are G. A solution is accepted when the residual of z is `residual` of R G b.
   SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
@@ -58,8 +58,8 @@ class SolvedTransfer {
     Eigen::MatrixXf seen;  ///< entries of G, [n][k]
   };
 
-  /// The columns of Yhat that belong to `patches`, kTogether of them at most, [positions][k], on
-  /// one thread; valid until the workspace is used again. Throws Error likewise.
+  /// The columns of Yhat that belong to `patches`, kBatchColumns of them at most, [positions][k],
+  /// on one thread; valid until the workspace is used again. Throws Error likewise.
   const Vectors& columns(std::uint32_t matrix, std::span<const std::uint32_t> patches,
                          Workspace& workspace) const;
 

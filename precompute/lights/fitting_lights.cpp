@@ -11,11 +11,12 @@ namespace rebounce {
 namespace {
 
 // Measured: notes/operator.md.
-constexpr int kShapingPointCount = 128, kShapingSpotCount = 32, kShapingSunCount = 32;
-constexpr int kJudgingPointCount = 512;
+constexpr int kTrainingPointCount = 128, kTrainingSpotCount = 32, kTrainingSunCount = 32;
+constexpr int kValidationPointCount = 512;
 
-static_assert(kMostShapingLights == kShapingPointCount + kShapingSpotCount + kShapingSunCount + 1);
-static_assert(kMostJudgingLights == kJudgingPointCount + 1);
+static_assert(kMostTrainingLights ==
+              kTrainingPointCount + kTrainingSpotCount + kTrainingSunCount + 1);
+static_assert(kMostValidationLights == kValidationPointCount + 1);
 
 }  // namespace
 
@@ -26,18 +27,18 @@ DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& trace
     return random_initial_exitances(data, tracer, kind, count, seed, roles);
   };
   DrawnLights lights;
-  for (const auto& [kind, count] : {std::pair(LightKind::kPoint, kShapingPointCount),
-                                    std::pair(LightKind::kSpot, kShapingSpotCount),
-                                    std::pair(LightKind::kSky, kShapingSunCount)}) {
-    std::ranges::move(draw(kind, count), std::back_inserter(lights.shaping));
+  for (const auto& [kind, count] : {std::pair(LightKind::kPoint, kTrainingPointCount),
+                                    std::pair(LightKind::kSpot, kTrainingSpotCount),
+                                    std::pair(LightKind::kSky, kTrainingSunCount)}) {
+    std::ranges::move(draw(kind, count), std::back_inserter(lights.training));
   }
   // The scene's own lamps are sure to be used.
   std::vector<Float3> own = data.patches.emitted_exitance;
   roles.keep(PatchRoles::kSource, own);
-  lights.shaping.push_back(own);
-  lights.judging.push_back(std::move(own));
-  std::ranges::move(draw(LightKind::kPoint, kJudgingPointCount),
-                    std::back_inserter(lights.judging));
+  lights.training.push_back(own);
+  lights.validation.push_back(std::move(own));
+  std::ranges::move(draw(LightKind::kPoint, kValidationPointCount),
+                    std::back_inserter(lights.validation));
   return lights;
 }
 

@@ -14,22 +14,22 @@ namespace rebounce {
 /// Lights that the operator is fitted to, each an initial exitance [n] in lx.
 struct FittingLights {
   /// What light patches give off: errors in what such lights do weigh more than others.
-  std::span<const std::vector<Float3>> shaping;
+  std::span<const std::vector<Float3>> training;
   /// Those that the tolerance is held under. Others than the first, or the error looks smaller than
   /// it is.
-  std::span<const std::vector<Float3>> judging;
+  std::span<const std::vector<Float3>> validation;
 };
 
 /// Lights drawn to fit an operator to, each an initial exitance [n] in lx.
 struct DrawnLights {
-  std::vector<std::vector<Float3>> shaping, judging;
+  std::vector<std::vector<Float3>> training, validation;
 
   /// Valid as long as this lives and stays as it is.
-  FittingLights view() const { return {shaping, judging}; }
+  FittingLights view() const { return {training, validation}; }
 };
 
 /// How many there are at most: in an open scene, with its own lamps.
-inline constexpr std::size_t kMostShapingLights = 193, kMostJudgingLights = 513;
+inline constexpr std::size_t kMostTrainingLights = 193, kMostValidationLights = 513;
 
 /// Draws the lights that the operator of a scene is fitted to: points, spots and, where it is open,
 /// suns to shape it, other points to judge it, and for both the light of the scene's own lamps,

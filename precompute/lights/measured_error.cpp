@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "precompute/lights/error_bound.h"
-#include "precompute/lights/lit_truth.h"
 #include "precompute/lights/received_light.h"
+#include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/error.h"
@@ -65,10 +65,10 @@ std::vector<LightError> light_errors(const TransferData& data,
   ReceivedLight received;
   std::vector<std::vector<Float3>> arrived, results;
   std::vector<LightError> errors;
-  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kTogether) {
+  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kBatchLights) {
     if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
     const auto some = lights.subspan(
-        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kTogether));
+        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kBatchLights));
     auto truths = truth_of(some);
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(truths[k], some[k], area)) continue;
@@ -97,7 +97,8 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
     return measure_error(data, tracer, ReferenceSolver(data), 0, seed, progress);
   }
   const auto errors_of = [&](const Exitances& lights, const Progress&) {
-    return LitTruth(DenseMatrix(*exact, data.transfer->roles()), lights).errors(*data.transfer);
+    return ReferenceLighting(DenseMatrix(*exact, data.transfer->roles()), lights)
+        .errors(*data.transfer);
   };
   return measure(data, tracer, kLightCount, seed, errors_of, progress);
 }

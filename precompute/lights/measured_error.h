@@ -35,8 +35,8 @@ using TruthOf =
     std::function<std::vector<std::vector<Float3>>(std::span<const std::vector<Float3>>)>;
 
 /// That of data.transfer under `lights`, each what its sources give off, against `truth_of`, which
-/// is asked for ReferenceSolver::kTogether of them at a time. In their order, less those from which
-/// nothing arrives (arrives_nowhere). Throws Cancelled if asked to stop.
+/// is asked for ReferenceSolver::kBatchLights of them at a time. In their order, less those from
+/// which nothing arrives (arrives_nowhere). Throws Cancelled if asked to stop.
 std::vector<LightError> light_errors(const TransferData& data,
                                      std::span<const std::vector<Float3>> lights,
                                      const TruthOf& truth_of, const Progress& progress = {});

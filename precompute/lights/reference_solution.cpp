@@ -285,8 +285,8 @@ std::vector<std::vector<Double3>> solve(const System& system,
     if (left.size() == 1) {
       solve_together<1>(system, left, residual, quantity, solutions);
     } else {
-      solve_together<ReferenceSolver::kTogether>(
-          system, left.first(std::min<std::size_t>(ReferenceSolver::kTogether, left.size())),
+      solve_together<ReferenceSolver::kBatchLights>(
+          system, left.first(std::min<std::size_t>(ReferenceSolver::kBatchLights, left.size())),
           residual, quantity, solutions);
     }
   }

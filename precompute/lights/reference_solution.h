@@ -26,7 +26,7 @@ class ReferenceSolver {
   using Double3 = std::array<double, 3>;
 
   /// Lights for which F is read together: what is gathered for them just fills the registers.
-  static constexpr int kTogether = 8;
+  static constexpr int kBatchLights = 8;
 
   /// What is solved with: F by pairs, as links, or compressed.
   using Form =
@@ -57,7 +57,7 @@ class ReferenceSolver {
   std::vector<Double3> radiosity(std::span<const Float3> initial_exitance,
                                  double residual = 1e-10) const;
 
-  /// The same for many lights [n each], kTogether at a time: several times faster.
+  /// The same for many lights [n each], kBatchLights at a time: several times faster.
   std::vector<std::vector<Double3>> radiosities(
       std::span<const std::vector<Float3>> initial_exitances, double residual = 1e-10) const;
 

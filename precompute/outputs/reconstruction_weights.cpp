@@ -6,9 +6,9 @@
 #include <numeric>
 #include <vector>
 
-#include "precompute/outputs/giver_search.h"
 #include "precompute/outputs/local_max_entropy.h"
 #include "precompute/outputs/mean_preservation.h"
+#include "precompute/outputs/neighbour_search.h"
 #include "precompute/patches/covers.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/patch_points.h"
@@ -128,34 +128,36 @@ class ReconstructionWeights {
   void compute(const Progress& progress) {
     const std::size_t count = mesh_.position.size();
     shows_arriving_ = is_covered_;
-    const GiverSearch search(mesh_, triangles_, area_, absorbed_, tracer_);
+    const NeighbourSearch search(mesh_, triangles_, area_, absorbed_, tracer_);
     std::vector<VertexWeights> weights(count);
     for (std::size_t begin = 0; begin < count; begin += kBatch) {
       report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
       compute_batch(search, begin, std::min(begin + kBatch, count), weights);
     }
-    preserve_patch_means(mesh_, triangles_, good_patches(), {kMostNegative, kMostGivers}, weights);
+    preserve_patch_means(mesh_, triangles_, good_patches(), {kMostNegative, kMostSites}, weights);
     write_weights(weights);
   }
 
  private:
   auto is(Exposure exposure) const {
-    return [this, exposure](const Giver& giver) { return exposure_[giver.patch] == exposure; };
+    return [this, exposure](const ReconstructionSite& site) {
+      return exposure_[site.patch] == exposure;
+    };
   }
 
   /// The weights of vertices [begin, end) before the patches' means are looked after.
-  void compute_batch(const GiverSearch& search, std::size_t begin, std::size_t end,
+  void compute_batch(const NeighbourSearch& search, std::size_t begin, std::size_t end,
                      std::vector<VertexWeights>& weights) {
 #pragma omp parallel
     {
-      GiverSearch::Scratch scratch(search);
+      NeighbourSearch::Scratch scratch(search);
 #pragma omp for schedule(dynamic, 64)
       for (std::size_t v = begin; v < end; ++v) {
         if (!receivers_[v].is_shown) continue;
-        std::vector<Giver> givers = find_givers(search, v, scratch);
-        centre_weights(receivers_[v], givers);
-        if (std::ranges::all_of(givers, is(Exposure::kCovered))) shows_arriving_[v] = 1;
-        weights[v] = shows_arriving_[v] != 0 ? plain_weights(givers) : open_weights(givers);
+        std::vector<ReconstructionSite> sites = find_sites(search, v, scratch);
+        centre_weights(receivers_[v], sites);
+        if (std::ranges::all_of(sites, is(Exposure::kCovered))) shows_arriving_[v] = 1;
+        weights[v] = shows_arriving_[v] != 0 ? plain_weights(sites) : open_weights(sites);
       }
     }
   }
@@ -247,57 +249,57 @@ class ReconstructionWeights {
   /// Of a vertex in the open: patches in the open, if need be from farther away; else those that
   /// are mixed, on whose rim the vertex lies; else its own. Of one that is covered: covered
   /// patches, else mixed ones, else its own.
-  std::vector<Giver> find_givers(const GiverSearch& search, std::size_t v,
-                                 GiverSearch::Scratch& scratch) const {
+  std::vector<ReconstructionSite> find_sites(const NeighbourSearch& search, std::size_t v,
+                                             NeighbourSearch::Scratch& scratch) const {
     const auto within = [&](float reach) {
       return search.find(receivers_[v], own_patches_[v], reach, scratch);
     };
-    std::vector<Giver> near = within(receivers_[v].reach);
+    std::vector<ReconstructionSite> near = within(receivers_[v].reach);
     if (is_covered_[v] != 0) {
       for (const Exposure e : {Exposure::kCovered, Exposure::kMixed}) {
         if (std::ranges::any_of(near, is(e))) return only(near, is(e));
       }
-      return own_givers(v);
+      return own_sites(v);
     }
     if (std::ranges::any_of(near, is(Exposure::kOpen))) return only(near, is(Exposure::kOpen));
     if (std::ranges::any_of(near, is(Exposure::kMixed))) {
-      const std::vector<Giver> farther =
+      const std::vector<ReconstructionSite> farther =
           only(within(kFartherReach * receivers_[v].reach), is(Exposure::kOpen));
       if (!farther.empty()) return farther;
     }
-    return near.empty() ? own_givers(v) : near;
+    return near.empty() ? own_sites(v) : near;
   }
 
   /// A vertex's own patches, all alike.
-  std::vector<Giver> own_givers(std::size_t v) const {
-    std::vector<Giver> givers;
+  std::vector<ReconstructionSite> own_sites(std::size_t v) const {
+    std::vector<ReconstructionSite> sites;
     for (const std::uint32_t patch : own_patches_[v]) {
-      givers.push_back({patch, 1.0F, 0, receivers_[v].position, receivers_[v].normal});
+      sites.push_back({patch, 1.0F, 0, receivers_[v].position, receivers_[v].normal});
     }
-    return givers;
+    return sites;
   }
 
   template <typename Wanted>
-  static std::vector<Giver> only(std::vector<Giver> givers, const Wanted& wanted) {
-    std::erase_if(givers, [&](const Giver& g) { return !wanted(g); });
-    return givers;
+  static std::vector<ReconstructionSite> only(std::vector<ReconstructionSite> sites,
+                                              const Wanted& wanted) {
+    std::erase_if(sites, [&](const ReconstructionSite& g) { return !wanted(g); });
+    return sites;
   }
 
   /// Shifts the weights so that the centroids of the patches balance about the vertex.
-  void centre_weights(const Receiver& receiver, std::vector<Giver>& givers) const {
-    if (givers.empty() || receiver.reach <= 0) return;
+  void centre_weights(const Receiver& receiver, std::vector<ReconstructionSite>& sites) const {
+    if (sites.empty() || receiver.reach <= 0) return;
     const glm::dmat3 frame = frame_around(receiver.normal);
     std::vector<double> prior;
     std::vector<glm::dvec2> place;
-    for (const Giver& giver : givers) {
-      const glm::dvec3 offset(centroid_[giver.patch] - receiver.position);
-      prior.push_back(giver.weight);
+    for (const ReconstructionSite& site : sites) {
+      const glm::dvec3 offset(centroid_[site.patch] - receiver.position);
+      prior.push_back(site.weight);
       place.push_back(glm::dvec2(offset * frame) / static_cast<double>(receiver.reach));
     }
     const std::vector<double> weight = max_entropy_weights(prior, place, kRidge);
-    for (std::size_t k = 0; k < givers.size(); ++k)
-      givers[k].weight = static_cast<float>(weight[k]);
-    std::erase_if(givers, [](const Giver& giver) { return giver.weight < kNegligible; });
+    for (std::size_t k = 0; k < sites.size(); ++k) sites[k].weight = static_cast<float>(weight[k]);
+    std::erase_if(sites, [](const ReconstructionSite& site) { return site.weight < kNegligible; });
   }
 
   /// Those in the open, whose means can be trusted.
@@ -310,25 +312,25 @@ class ReconstructionWeights {
     return good;
   }
 
-  /// What the givers say of light in the open, of which a patch shows the part that is not
+  /// What the sites say of light in the open, of which a patch shows the part that is not
   /// absorbed.
-  VertexWeights open_weights(const std::vector<Giver>& givers) const {
+  VertexWeights open_weights(const std::vector<ReconstructionSite>& sites) const {
     double sum = 0;
-    for (const Giver& giver : givers) sum += giver.weight * (1.0 - absorbed_[giver.patch]);
+    for (const ReconstructionSite& site : sites) sum += site.weight * (1.0 - absorbed_[site.patch]);
     VertexWeights weight;
     if (sum <= 0) return weight;
-    for (const Giver& giver : givers) {
-      weight.push_back({giver.patch, giver.weight * (1.0 - absorbed_[giver.patch]) / sum});
+    for (const ReconstructionSite& site : sites) {
+      weight.push_back({site.patch, site.weight * (1.0 - absorbed_[site.patch]) / sum});
     }
     return weight;
   }
 
-  /// What the givers have under their covers.
-  static VertexWeights plain_weights(const std::vector<Giver>& givers) {
+  /// What the sites have under their covers.
+  static VertexWeights plain_weights(const std::vector<ReconstructionSite>& sites) {
     double sum = 0;
-    for (const Giver& giver : givers) sum += giver.weight;
+    for (const ReconstructionSite& site : sites) sum += site.weight;
     VertexWeights weight;
-    for (const Giver& giver : givers) weight.push_back({giver.patch, giver.weight / sum});
+    for (const ReconstructionSite& site : sites) weight.push_back({site.patch, site.weight / sum});
     return weight;
   }
 

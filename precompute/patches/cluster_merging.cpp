@@ -43,7 +43,7 @@ double joint_weight(const Cluster& a, const Cluster& b) {
 Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
   Cluster cluster;
   cluster.surface = elements.area[e];
-  cluster.area = cluster.surface * elements.importance[e];
+  cluster.area = cluster.surface * elements.density_weight[e];
   const Float3 centroid = elements.centroid(e);
   for (int k = 0; k < 3; ++k) {
     cluster.sum[k] = centroid[k];

@@ -25,7 +25,7 @@ struct Cluster {
   static constexpr std::size_t kFeatureCount = 10;
 
   double surface = 0;  ///< m²
-  double area = 0;     ///< m², each element's times its importance
+  double area = 0;     ///< m², each element's times its density_weight
   std::array<double, kFeatureCount>
       sum{};                  ///< of area x feature: place, normal, reflectance, cover
   glm::vec3 low{0}, high{0};  ///< box around it, metres

@@ -46,7 +46,7 @@ class ElementMerging {
   ElementMerging(const Elements& elements, const RayTracer& tracer, const ClusterSettings& settings)
       : scene_{elements, tracer, {}, {}}, settings_(settings) {
     const double area = std::inner_product(elements.area.begin(), elements.area.end(),
-                                           elements.importance.begin(), 0.0);
+                                           elements.density_weight.begin(), 0.0);
     size_ = settings.patch_count > 0 ? std::sqrt(area / static_cast<double>(settings.patch_count))
                                      : settings.largest;
     limits_ = {.detail = kDetail * size_,

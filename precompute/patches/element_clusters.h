@@ -27,7 +27,7 @@ struct ClusterSettings {
 
 /// Merges elements into patches, the cheapest pair first: what a pair costs is how much more its
 /// elements differ from the mean of their patch, in position, normal, reflectance and the part that
-/// is covered (covers.h), summed over their area times importance (J. H. Ward, "Hierarchical
+/// is covered (covers.h), summed over their area times density_weight (J. H. Ward, "Hierarchical
 /// grouping to optimize an objective function", 1963; over the dual graph of the mesh as in M.
 /// Garland, A. Willmott, P. S. Heckbert, "Hierarchical face clustering on polygonal surfaces",
 /// 2001). So a patch is small where surfaces turn or change colour, and detail far smaller than a

@@ -12,7 +12,7 @@ void Elements::resize(std::size_t count) {
   reflectance.resize(count);
   emits.resize(count);
   covered.resize(count);
-  importance.resize(count, 1.0F);
+  density_weight.resize(count, 1.0F);
 }
 
 Float3 Elements::centroid(std::size_t e) const {

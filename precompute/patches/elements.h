@@ -18,7 +18,7 @@ struct Elements {
   std::vector<float> area;              ///< [e] m² of what stops light, > 0
   std::vector<Float3> reflectance;      ///< [e] [0, 1]
   std::vector<std::uint8_t> emits;      ///< [e] 1 if it does
-  std::vector<float> importance;        ///< [e] (0, 1] what its area counts for
+  std::vector<float> density_weight;    ///< [e] (0, 1] what its area counts for
   std::vector<float> covered;           ///< [e] part of it above which something lies close
 
   std::size_t size() const { return area.size(); }

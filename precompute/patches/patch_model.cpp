@@ -9,9 +9,9 @@
 #include "precompute/patches/contact_cuts.h"
 #include "precompute/patches/covers.h"
 #include "precompute/patches/element_clusters.h"
+#include "precompute/patches/hemisphere_visibility.h"
 #include "precompute/patches/lit_sides.h"
 #include "precompute/patches/opacity_sampling.h"
-#include "precompute/patches/seen_part.h"
 #include "precompute/patches/texture_sampling.h"
 #include "precompute/patches/vertex_split.h"
 #include "precompute/patches/welded_positions.h"
@@ -54,7 +54,7 @@ class PatchModelBuilder {
       if (opacity.stopping_part(t) == 0) sides_[t] = {SideKind::kOpening, SideKind::kOpening};
     }
     const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
-    inherit_sides(subdivide(scene_, patches_per_triangle(), settings, importances(tracer)));
+    inherit_sides(subdivide(scene_, patches_per_triangle(), settings, density_weights(tracer)));
     refine(tracer, scene_size);
     drop_thin(0);  // what is as thin as floats can tell has lost its area by cuts
   }
@@ -101,7 +101,7 @@ class PatchModelBuilder {
 
   /// What each triangle counts for: as much as the more important of its lit sides. Nothing where
   /// patches are to have a size.
-  std::vector<float> importances(const RayTracer& tracer) const {
+  std::vector<float> density_weights(const RayTracer& tracer) const {
     if (settings_.patch_size > 0) return {};
     const double mean_area =
         std::pow(mean_patch_size(scene_, patches_per_triangle(), settings_.patch_count), 2);
@@ -112,7 +112,8 @@ class PatchModelBuilder {
       const TriangleCorners front{p, q, r}, back{p, r, q};
       if (rebounce::area_of(front) <= kSmallElement * mean_area) continue;
       const auto of = [&](const TriangleCorners& side) {
-        return static_cast<float>(importance(seen_part(side, tracer, kSightRays, t)));
+        return static_cast<float>(
+            density_weight(hemisphere_visibility(side, tracer, kSightRays, t)));
       };
       float most = 0;
       if (sides_[t].front == SideKind::kLit) most = of(front);
@@ -284,8 +285,9 @@ class PatchModelBuilder {
       elements_.covered[e] = static_cast<float>(covered_part(
           {p, q, r}, tracer, kCoverHeight * std::sqrt(patch_area_), small ? 1 : kCoverPoints));
       if (settings_.patch_size == 0) {
-        const double seen = small ? 1 : importance(seen_part({p, q, r}, tracer, kSightRays, e));
-        elements_.importance[e] =
+        const double seen =
+            small ? 1 : density_weight(hemisphere_visibility({p, q, r}, tracer, kSightRays, e));
+        elements_.density_weight[e] =
             static_cast<float>(seen * (1 - kLessCovered * elements_.covered[e]));
       }
       elements_.emits[e] =

@@ -28,11 +28,11 @@ struct QueuedEdge {
 class Subdivision {
  public:
   Subdivision(Scene& scene, std::span<const std::uint8_t> patches_per_triangle,
-              const SubdivisionSettings& settings, std::span<const float> importance)
+              const SubdivisionSettings& settings, std::span<const float> density_weight)
       : mesh_(scene),
         patches_per_triangle_(patches_per_triangle),
         settings_(settings),
-        importance_(importance) {
+        density_weight_(density_weight) {
     for (std::uint32_t t = 0; t < mesh_.triangle_count(); ++t) {
       patch_count_ += patches_per_triangle[t];
     }
@@ -57,7 +57,7 @@ class Subdivision {
         continue;
       }
       const EdgeKey longest =
-          importance_.empty() ? wanted : end_of_longest_edge_path(mesh_, wanted);
+          density_weight_.empty() ? wanted : end_of_longest_edge_path(mesh_, wanted);
       if (longest == wanted) {
         queue_.pop();
       } else {
@@ -83,15 +83,15 @@ class Subdivision {
     return enough || fine;
   }
 
-  float importance(std::uint32_t source) const {
-    return importance_.empty() ? 1 : importance_[source];
+  float density_weight(std::uint32_t source) const {
+    return density_weight_.empty() ? 1 : density_weight_[source];
   }
 
   /// Of the triangles at an edge.
-  float largest_importance(EdgeKey key) const {
+  float largest_density_weight(EdgeKey key) const {
     float largest = 0;
     for (const HalfEdge& side : mesh_.triangles(key)) {
-      largest = std::max(largest, importance(mesh_.source(side.triangle())));
+      largest = std::max(largest, density_weight(mesh_.source(side.triangle())));
     }
     return largest;
   }
@@ -100,20 +100,20 @@ class Subdivision {
   double important_patch_size(const Scene& scene) const {
     double area = 0;
     for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
-      area += importance(t) * patches_per_triangle_[t] * area_of(corners_of(scene, t));
+      area += density_weight(t) * patches_per_triangle_[t] * area_of(corners_of(scene, t));
     }
     return std::sqrt(area / static_cast<double>(std::max<std::size_t>(settings_.patch_count, 1)));
   }
 
   void enqueue(EdgeKey key) {
-    const float length_squared = mesh_.length_squared(key) * largest_importance(key);
+    const float length_squared = mesh_.length_squared(key) * largest_density_weight(key);
     if (!is_short(length_squared)) queue_.push({length_squared, key});
   }
 
   ConformingMesh mesh_;
   std::span<const std::uint8_t> patches_per_triangle_;
   const SubdivisionSettings& settings_;
-  std::span<const float> importance_;
+  std::span<const float> density_weight_;
   std::unordered_set<EdgeKey> split_before_;  ///< edges that were longer than one in the queue
   std::size_t patch_count_ = 0;
   double longest_ = 0;  ///< metres: shorter edges are split only while there are too few patches
@@ -134,8 +134,8 @@ double mean_patch_size(const Scene& scene, std::span<const std::uint8_t> patches
 std::vector<std::uint32_t> subdivide(Scene& scene,
                                      std::span<const std::uint8_t> patches_per_triangle,
                                      const SubdivisionSettings& settings,
-                                     std::span<const float> importance) {
-  Subdivision subdivision(scene, patches_per_triangle, settings, importance);
+                                     std::span<const float> density_weight) {
+  Subdivision subdivision(scene, patches_per_triangle, settings, density_weight);
   subdivision.run();
   return subdivision.finish();
 }

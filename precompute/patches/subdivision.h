@@ -39,13 +39,13 @@ double mean_patch_size(const Scene& scene, std::span<const std::uint8_t> patches
 /// `patches_per_triangle` [t] is the number of patches that a triangle is worth (1, or 2 if both
 /// of its sides are lit). Triangles that come from one keep its order, neighbours stay close.
 ///
-/// `importance` [t] in (0, 1], or empty where all have 1: with `patch_count`, an edge of triangles
-/// of importance w counts as long as its length x √w, so that their parts become larger than
-/// others. Then an edge that is to be split may not be the longest of its triangles, and those are
-/// split first (longest_edges.h).
+/// `density_weight` [t] in (0, 1], or empty where all have 1: with `patch_count`, an edge of
+/// triangles of density_weight w counts as long as its length x √w, so that their parts become
+/// larger than others. Then an edge that is to be split may not be the longest of its triangles,
+/// and those are split first (longest_edges.h).
 std::vector<std::uint32_t> subdivide(Scene& scene,
                                      std::span<const std::uint8_t> patches_per_triangle,
                                      const SubdivisionSettings& settings,
-                                     std::span<const float> importance = {});
+                                     std::span<const float> density_weight = {});
 
 }  // namespace rebounce

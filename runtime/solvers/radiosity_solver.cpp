@@ -52,7 +52,7 @@ void RadiositySolver::start_from(std::span<const Float3> radiosity) {
   cold_ = false;
 }
 
-void RadiositySolver::forget() {
+void RadiositySolver::reset() {
   std::ranges::fill(radiosity_, Float3{0, 0, 0});
   cold_ = true;
 }
@@ -113,7 +113,7 @@ SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_
   SolveResult result;
   const double norm = area_norm(initial_exitance_, area_);
   if (norm == 0) {
-    forget();
+    reset();
     result.converged = true;
     return result;
   }

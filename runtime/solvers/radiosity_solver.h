@@ -68,7 +68,7 @@ class RadiositySolver {
   void start_from(std::span<const Float3> radiosity);
 
   /// The next solve starts from nothing.
-  void forget();
+  void reset();
 
   std::size_t patch_count() const { return area_.size(); }
 

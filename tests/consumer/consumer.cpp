@@ -6,9 +6,9 @@
 #include <exception>
 #include <vector>
 
+#include "../support/thread_pool.h"
 #include "runtime/frame/engine.h"
 #include "runtime/outputs/vertex_light.h"
-#include "../support/thread_pool.h"
 #include "transfer/file/transfer_file.h"
 
 int main(int argc, char** argv) {

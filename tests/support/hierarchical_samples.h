@@ -14,8 +14,8 @@
 
 namespace rebounce::test {
 
-/// Blocks of all kinds over `patch_count` patches in a random order; f32. Nested, they have moments
-/// where they can: of each 64 positions sixteen, in two cells.
+/// Blocks of all kinds over `patch_count` patches in a random order; f32. Nested, they have cluster
+/// coefficients where they can: of each 64 positions sixteen, in two cells.
 class RandomHierarchicalStorage {
  public:
   RandomHierarchicalStorage(std::size_t patch_count, std::uint32_t matrix_count, std::uint64_t seed,
@@ -29,7 +29,7 @@ class RandomHierarchicalStorage {
     storage.patch.resize(patch_count);
     std::iota(storage.patch.begin(), storage.patch.end(), 0U);
     std::shuffle(storage.patch.begin(), storage.patch.end(), engine_);
-    if (nested_) add_moments();
+    if (nested_) add_coefficients();
     add_diagonal(0, positions_);
     values_.resize(values_.size() + HierarchicalFormat::kPadding, 0.0F);
     storage.values_f32 = SharedArray(std::move(values_));
@@ -46,19 +46,19 @@ class RandomHierarchicalStorage {
     return (count / 2 + kAlignment - 1) / kAlignment * kAlignment;
   }
 
-  void add_moments() {
-    std::uint32_t moment = positions_;
+  void add_coefficients() {
+    std::uint32_t coefficient = positions_;
     for (std::uint32_t begin = 0; begin + kNested <= positions_; begin += kNested) {
       for (const std::uint32_t rank : {5U, 11U}) {
         storage.blocks.push_back({.row_begin = begin + (rank == 5 ? 0 : kNested / 2),
                                   .row_count = kNested / 2,
-                                  .column_begin = moment,
+                                  .column_begin = coefficient,
                                   .column_count = rank,
-                                  .kind = TransferBlock::Kind::kMoments,
+                                  .kind = TransferBlock::Kind::kClusterBasis,
                                   .row_rank = rank,
-                                  .row_remainders = rank / 3});
-        moment += rank;
-        for (std::uint32_t k = 0; k < rank; ++k) storage.moment_scale.push_back(2 + uniform());
+                                  .row_residual_rank = rank / 3});
+        coefficient += rank;
+        for (std::uint32_t k = 0; k < rank; ++k) storage.coefficient_scale.push_back(2 + uniform());
         for (std::uint32_t k = 0; k < rank * kNested / 2; ++k) values_.push_back(scaled());
       }
     }
@@ -66,7 +66,7 @@ class RandomHierarchicalStorage {
 
   float scaled() { return uniform() / std::sqrt(static_cast<float>(storage.area.size())); }
 
-  /// Positions become their moments, sometimes.
+  /// Positions become their cluster coefficients, sometimes.
   void nest(std::uint32_t& begin, std::uint32_t& count) {
     if (!nested_ || begin % kNested != 0 || count % kNested != 0 || uniform() < 0.3F) return;
     begin = positions_ + begin / 4;
@@ -119,8 +119,9 @@ class RandomHierarchicalStorage {
       block.column_rank = block.on_diagonal() ? block.row_rank : random_rank(block.column_count);
       if (block.column_rank == 0) block.row_rank = 0;
       if (block.row_rank == 0) block.column_rank = 0;
-      block.row_remainders = block.row_rank / 3;
-      block.column_remainders = block.on_diagonal() ? block.row_remainders : block.column_rank / 4;
+      block.row_residual_rank = block.row_rank / 3;
+      block.column_residual_rank =
+          block.on_diagonal() ? block.row_residual_rank : block.column_rank / 4;
     }
     storage.blocks.push_back(block);
     const std::size_t begin = values_.size();
@@ -133,7 +134,7 @@ class RandomHierarchicalStorage {
     return std::min(size, static_cast<std::uint32_t>(engine_() % 20));
   }
 
-  /// Of a block on the diagonal: the entries or the cores, which end it.
+  /// Of a block on the diagonal: the entries or the coupling matrices, which end it.
   void make_symmetric(const TransferBlock& block, std::size_t begin) {
     if (!block.on_diagonal()) return;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
@@ -161,7 +162,7 @@ inline HierarchicalStorage random_hierarchical_storage(std::size_t patch_count,
   return RandomHierarchicalStorage(patch_count, matrix_count, seed, false).storage;
 }
 
-/// With moments for the positions of some blocks.
+/// With cluster coefficients for the positions of some blocks.
 inline HierarchicalStorage random_nested_storage(std::size_t patch_count,
                                                  std::uint32_t matrix_count, std::uint64_t seed) {
   return RandomHierarchicalStorage(patch_count, matrix_count, seed, true).storage;

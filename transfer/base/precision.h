@@ -13,7 +13,7 @@ enum class Precision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
 /// Of the bases of a HierarchicalOperator: IEEE numbers of 16 or 32 bits, or integers.
 enum class BasisPrecision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
 
-/// Of its coupling matrices (cores) and dense entries.
+/// Of its coupling matrices and dense entries.
 enum class CouplingPrecision : std::uint8_t { kF16, kF32 };
 
 struct HierarchicalPrecision {

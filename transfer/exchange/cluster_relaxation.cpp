@@ -213,17 +213,17 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void send_to_rows(const Plan::Products& products, std::size_t step) {
-    multiply(products.cores.at(step));
+    multiply(products.couplings.at(step));
     add_dense(products.dense.at(step), lower_);
   }
 
   void send_to_columns(const Plan::Products& products, std::size_t step) {
-    multiply(products.cores.at(step));
+    multiply(products.couplings.at(step));
     add_dense(products.dense.at(step), upper_);
   }
 
-  void multiply(std::span<const CoreBlock> cores) {
-    couplings_.multiply(cores, lanes_, 1, sent_.from(0), arrived_.to(0), taken_.data());
+  void multiply(std::span<const CouplingBlock> couplings) {
+    couplings_.multiply(couplings, lanes_, 1, sent_.from(0), arrived_.to(0), taken_.data());
   }
 
   void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
@@ -241,23 +241,23 @@ class ClusterRelaxation final : public Relaxation {
     }
     if (block.kind == TransferBlock::Kind::kDense) return relax_rows(step, direction);
     if (block.row_rank > 0) {
-      CoreBlock core = diagonal_core(step, block.row_rank, block.row_rank);
-      core.row_remainders = core.column_remainders = step.remainders;
+      CouplingBlock coupling = diagonal_coupling(step, block.row_rank, block.row_rank);
+      coupling.row_residual_rank = coupling.column_residual_rank = step.residual_rank;
       project({&step.basis, 1});
-      multiply({&core, 1});
+      multiply({&coupling, 1});
       expand({&step.basis, 1}, received_);
     }
     return relax_at_once(begin, end);
   }
 
-  static CoreBlock diagonal_core(const Plan::Step& step, std::uint32_t rows,
-                                 std::uint32_t columns) {
+  static CouplingBlock diagonal_coupling(const Plan::Step& step, std::uint32_t rows,
+                                         std::uint32_t columns) {
     return {.values = step.values,
             .rows = rows,
             .columns = columns,
             .row = step.coefficient,
             .column = step.coefficient,
-            .direction = CoreBlock::Direction::kToRows};
+            .direction = CouplingBlock::Direction::kToRows};
   }
 
   /// Relaxes positions that see nothing of each other but what has been received.
@@ -284,7 +284,7 @@ class ClusterRelaxation final : public Relaxation {
   double relax_rows(const Plan::Step& step, SweepDirection direction) {
     const std::uint32_t begin = step.diagonal.row_begin, size = step.diagonal.row_count;
     for (std::uint32_t k = 0; k < size; ++k) send(begin + k, step.coefficient + k);
-    CoreBlock row_block = diagonal_core(step, 1, size);
+    CouplingBlock row_block = diagonal_coupling(step, 1, size);
     double changed_squared = 0;
     for (std::uint32_t k = 0; k < size; ++k) {
       const std::uint32_t row = direction == SweepDirection::kForward ? k : size - 1 - k;
@@ -328,8 +328,8 @@ class ClusterRelaxation final : public Relaxation {
   Planes light_, reflectance_, radiosity_;
   std::vector<float> change_weight_;  ///< [positions] R^-2: changes are those of A^1/2 B
   Planes lower_, upper_, received_;   ///< L x, L^T x, and both and D x
-  CoefficientArray sent_, arrived_;   ///< coefficients of x, and what cores make of them
-  std::vector<float> taken_;          ///< what one of them takes
+  CoefficientArray sent_, arrived_;  ///< coefficients of x, and what coupling matrices make of them
+  std::vector<float> taken_;         ///< what one of them takes
   std::span<const float> area_;
   Known known_ = Known::kNothing;
   bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of x

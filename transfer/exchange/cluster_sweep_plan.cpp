@@ -9,14 +9,14 @@ namespace {
 constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment);
 
 using Step = ClusterSweepPlan::Step;
-using Direction = CoreBlock::Direction;
+using Direction = CouplingBlock::Direction;
 
 template <typename T>
 using StepVectors = std::vector<std::vector<T>>;
 
-/// Cores of a step are independent; those of one shape take the same branches.
-std::pair<std::uint32_t, std::uint32_t> shape(const CoreBlock& core) {
-  return {core.columns, core.rows};
+/// Coupling matrices of a step are independent; those of one shape take the same branches.
+std::pair<std::uint32_t, std::uint32_t> shape(const CouplingBlock& coupling) {
+  return {coupling.columns, coupling.rows};
 }
 
 /// Bases or products while they are gathered.
@@ -30,13 +30,13 @@ struct BasesOfSteps {
 
 struct ProductsOfSteps {
   ProductsOfSteps(std::size_t step_count, Direction to)
-      : direction(to), cores(step_count), dense(step_count) {}
+      : direction(to), couplings(step_count), dense(step_count) {}
   ClusterSweepPlan::Products made() {
-    for (std::vector<CoreBlock>& step : cores) std::ranges::stable_sort(step, {}, shape);
-    return {ClusterSweepPlan::ByStep(cores), ClusterSweepPlan::ByStep(dense)};
+    for (std::vector<CouplingBlock>& step : couplings) std::ranges::stable_sort(step, {}, shape);
+    return {ClusterSweepPlan::ByStep(couplings), ClusterSweepPlan::ByStep(dense)};
   }
   Direction direction;
-  StepVectors<CoreBlock> cores;
+  StepVectors<CouplingBlock> couplings;
   StepVectors<DenseBlock> dense;
 };
 
@@ -65,7 +65,7 @@ class Planner {
                              .basis = basis_of(blocks_[b], place.row, blocks_[b].row_rank),
                              .values = place.values,
                              .coefficient = place.row.coefficient,
-                             .remainders = place.row.remainders});
+                             .residual_rank = place.row.residual_rank});
     }
     add_missing_steps();
     std::ranges::sort(plan_.steps, {}, [](const Step& step) { return step.diagonal.row_begin; });
@@ -105,7 +105,7 @@ class Planner {
             .coefficient = cluster.coefficient,
             .position = cluster.begin,
             .first_rank = first,
-            .last_rank = first + rank + end.remainders,
+            .last_rank = first + rank + end.residual_rank,
             .first_place = 0,
             .last_place = cluster.size};
   }
@@ -176,14 +176,14 @@ class Planner {
                                       .column_out = 0,
                                       .direction = products.direction});
     } else {
-      products.cores[step].push_back({.values = place.values,
-                                      .rows = block.row_rank,
-                                      .columns = block.column_rank,
-                                      .row = place.row.coefficient,
-                                      .column = place.column.coefficient,
-                                      .direction = products.direction,
-                                      .row_remainders = place.row.remainders,
-                                      .column_remainders = place.column.remainders});
+      products.couplings[step].push_back({.values = place.values,
+                                          .rows = block.row_rank,
+                                          .columns = block.column_rank,
+                                          .row = place.row.coefficient,
+                                          .column = place.column.coefficient,
+                                          .direction = products.direction,
+                                          .row_residual_rank = place.row.residual_rank,
+                                          .column_residual_rank = place.column.residual_rank});
     }
   }
 

@@ -21,7 +21,7 @@ struct ClusterSweepPlan {
     BasisPart basis{};         ///< U^T
     std::uint64_t values = 0;  ///< S or the entries
     std::uint32_t coefficient = 0;
-    std::uint32_t remainders = 0;
+    std::uint32_t residual_rank = 0;
   };
 
   /// What is done at each step.
@@ -54,7 +54,7 @@ struct ClusterSweepPlan {
   /// Blocks below the diagonal in one direction. The products of dense ones are put in the place of
   /// the first coefficients.
   struct Products {
-    ByStep<CoreBlock> cores;
+    ByStep<CouplingBlock> couplings;
     ByStep<DenseBlock> dense;
   };
 

@@ -11,7 +11,7 @@ CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalO
   for (const std::uint32_t matrix : exchange_->storage().channel_matrix) {
     if (matrix != 0) throw Error("compressed form factors: the channels have different matrices");
   }
-  if (!exchange_->storage().moment_scale.empty()) {
+  if (!exchange_->storage().coefficient_scale.empty()) {
     throw Error("compressed form factors: their blocks have moments, which sweeps do not know");
   }
 }

@@ -13,7 +13,7 @@ namespace rebounce {
 class CompressedFormFactors final : public SweepableFormFactors {
  public:
   /// Refers to nothing but `exchange`, which it shares. Throws Error if that is null, its channels
-  /// have different matrices or its blocks moments.
+  /// have different matrices or its blocks cluster coefficients.
   explicit CompressedFormFactors(std::shared_ptr<const HierarchicalOperator> exchange);
 
   std::size_t patch_count() const override { return exchange_->patch_count(); }

@@ -50,7 +50,7 @@ inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matri
 
 /// The tensors of a hierarchical operator; `role` is null where every patch has both roles.
 struct HierarchicalTensors {
-  const char *patch, *blocks, *bases, *values, *channel_matrix, *role, *moment_scale,
+  const char *patch, *blocks, *bases, *values, *channel_matrix, *role, *coefficient_scale,
       *scale_exponent;
 };
 

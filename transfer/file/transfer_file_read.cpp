@@ -291,8 +291,8 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   storage.channel_matrix = read_channel_matrix(file, names.channel_matrix, kChannelCount);
   storage.matrix_count = 1 + std::ranges::max(storage.channel_matrix);
   storage.roles = read_roles(file, names.role, area.size());
-  if (names.moment_scale != nullptr && file.tensors().contains(names.moment_scale)) {
-    TensorReader{file}(names.moment_scale, storage.moment_scale);
+  if (names.coefficient_scale != nullptr && file.tensors().contains(names.coefficient_scale)) {
+    TensorReader{file}(names.coefficient_scale, storage.coefficient_scale);
   }
   if (names.scale_exponent != nullptr && file.tensors().contains(names.scale_exponent)) {
     const auto stored =
@@ -327,7 +327,7 @@ std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsF
     storage.basis_f32 = file.tensor<float>(tensor::kLowRankBasis, shape);
   }
   storage.rank = basis.shape[1];
-  storage.core = file.tensor<float>(tensor::kLowRankCore, {kAnySize, storage.rank, storage.rank});
+  storage.coupling = file.tensor<float>(tensor::kLowRankCore, {kAnySize, storage.rank, storage.rank});
   storage.matrix_count = static_cast<std::uint32_t>(file.info(tensor::kLowRankCore).shape[0]);
   storage.channel_matrix =
       read_channel_matrix(file, tensor::kLowRankChannelMatrix, storage.matrix_count);

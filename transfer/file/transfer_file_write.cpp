@@ -99,12 +99,13 @@ void collect_hierarchical_operator(const HierarchicalStorage& storage,
   for (const TransferBlock& b : storage.blocks) {
     blocks.push_back({b.row_begin, b.row_count, b.column_begin, b.column_count,
                       static_cast<std::uint32_t>(b.kind), b.row_rank, b.column_rank,
-                      b.row_remainders, b.column_remainders});
+                      b.row_residual_rank, b.column_residual_rank});
   }
   collector.add_made<StoredBlock>(names.blocks, blocks);
   collector(names.patch, storage.patch);
   if (!storage.roles.all_are_both()) collector(names.role, storage.roles.role);
-  if (!storage.moment_scale.empty()) collector(names.moment_scale, storage.moment_scale);
+  if (!storage.coefficient_scale.empty())
+    collector(names.coefficient_scale, storage.coefficient_scale);
   if (!storage.scale_exponent.empty()) {
     collector.add<std::int8_t>(names.scale_exponent, {storage.scale_exponent.size()},
                                storage.scale_exponent, TensorType::kI8);
@@ -130,7 +131,7 @@ void collect_low_rank_operator(const LowRankOperator::Storage& storage,
     collector.add(tensor::kLowRankBasis, shape, storage.basis_f32.span());
   }
   collector.add(tensor::kLowRankCore, {storage.matrix_count, storage.rank, storage.rank},
-                storage.core.span());
+                storage.coupling.span());
   collector.add<std::uint32_t>(tensor::kLowRankChannelMatrix, {storage.channel_matrix.size()},
                                storage.channel_matrix);
 }

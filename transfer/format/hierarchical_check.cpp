@@ -40,9 +40,10 @@ void check_exponents(std::span<const std::int8_t> exponents, std::size_t patch_c
   }
 }
 
-/// Positions of patches, with their padding, and the moments that are numbered after them.
+/// Positions of patches, with their padding, and the cluster coefficients that are numbered after
+/// them.
 struct Places {
-  std::size_t position_count, moment_count;
+  std::size_t position_count, cluster_coefficient_count;
 
   /// Whether [begin, begin + count) is a cluster's range of positions.
   bool are_positions(std::uint64_t begin, std::uint64_t count) const {
@@ -50,7 +51,7 @@ struct Places {
   }
   bool are_moments(std::uint64_t begin, std::uint64_t count) const {
     return are_aligned(begin, count) && begin >= position_count &&
-           begin + count <= position_count + moment_count;
+           begin + count <= position_count + cluster_coefficient_count;
   }
 
  private:
@@ -63,14 +64,14 @@ void check_moments(const TransferBlock& block, const Places& places) {
   if (!places.are_positions(block.row_begin, block.row_count))
     refuse("moments are of no positions");
   if (block.row_rank != block.column_count || block.row_rank > block.row_count ||
-      block.column_rank != 0 || block.row_remainders > block.row_rank ||
-      block.column_remainders != 0) {
+      block.column_rank != 0 || block.row_residual_rank > block.row_rank ||
+      block.column_residual_rank != 0) {
     refuse("the rank of moments does not fit their number");
   }
 }
 
 void check_block(const TransferBlock& block, const Places& places) {
-  if (is_moments(block)) return check_moments(block, places);
+  if (is_cluster_basis(block)) return check_moments(block, places);
   const auto is_range = [&](std::uint32_t begin, std::uint32_t count) {
     return places.are_positions(begin, count) ||
            (block.kind == TransferBlock::Kind::kLowRank && places.are_moments(begin, count));
@@ -85,8 +86,8 @@ void check_block(const TransferBlock& block, const Places& places) {
   if (misplaced) refuse("a block is neither on the diagonal nor below it");
   switch (block.kind) {
     case TransferBlock::Kind::kDense:
-      if ((block.row_rank | block.column_rank | block.row_remainders | block.column_remainders) !=
-          0) {
+      if ((block.row_rank | block.column_rank | block.row_residual_rank |
+           block.column_residual_rank) != 0) {
         refuse("a dense block has a rank");
       }
       return;
@@ -95,27 +96,30 @@ void check_block(const TransferBlock& block, const Places& places) {
           (block.on_diagonal() && block.row_rank != block.column_rank)) {
         refuse("the ranks of a block do not fit its size");
       }
-      if (block.row_remainders > block.row_rank || block.column_remainders > block.column_rank ||
-          (block.on_diagonal() && block.row_remainders != block.column_remainders)) {
+      if (block.row_residual_rank > block.row_rank ||
+          block.column_residual_rank > block.column_rank ||
+          (block.on_diagonal() && block.row_residual_rank != block.column_residual_rank)) {
         refuse("the remainders of a block do not fit its ranks");
       }
       return;
-    case TransferBlock::Kind::kMoments:
+    case TransferBlock::Kind::kClusterBasis:
       return;
   }
   refuse("a block is of an unknown kind");
 }
 
-/// Of the blocks of moments, which must be numbered in their order; their scales must be there.
+/// Of the blocks of cluster coefficients, which must be numbered in their order; their scales must
+/// be there.
 std::size_t checked_moment_count(const Storage& storage, std::size_t position_count) {
   std::uint64_t end = position_count;
   for (const TransferBlock& block : storage.blocks) {
-    if (!is_moments(block)) continue;
+    if (!is_cluster_basis(block)) continue;
     if (block.column_begin != end) refuse("moments are not numbered in the order of their blocks");
     end += block.column_count;
   }
-  if (storage.moment_scale.size() != end - position_count) refuse("not one scale for each moment");
-  if (!std::ranges::all_of(storage.moment_scale, [](float s) { return std::isfinite(s); })) {
+  if (storage.coefficient_scale.size() != end - position_count)
+    refuse("not one scale for each moment");
+  if (!std::ranges::all_of(storage.coefficient_scale, [](float s) { return std::isfinite(s); })) {
     refuse("a scale of a moment is not finite");
   }
   return end - position_count;
@@ -141,13 +145,14 @@ void check_tables(const Storage& storage) {
   const Places places{positions, checked_moment_count(storage, positions)};
   for (const TransferBlock& block : storage.blocks) {
     check_block(block, places);
-    const bool one_rank = !is_moments(block) && (block.row_rank == 0) != (block.column_rank == 0);
+    const bool one_rank =
+        !is_cluster_basis(block) && (block.row_rank == 0) != (block.column_rank == 0);
     if (one_rank && storage.order == HierarchicalStorage::Order::kStreamed) {
       refuse("a block has only one rank");
     }
     const bool rounded = storage.precision.bases == BasisPrecision::kF16 ||
                          storage.precision.bases == BasisPrecision::kQ16;
-    if (rounded && (block.row_remainders | block.column_remainders) != 0) {
+    if (rounded && (block.row_residual_rank | block.column_residual_rank) != 0) {
       refuse("a block has remainders, which are for bases in 8 bits alone");
     }
   }
@@ -163,7 +168,7 @@ std::uint64_t block_order_count(const Storage& storage) {
 /// Whether all arrays have as many values as the blocks ask for.
 bool sizes_fit(const Storage& storage) {
   const HierarchicalLayout layout(storage);
-  const std::uint64_t bases = layout.basis_value_count, couplings = layout.core_value_count;
+  const std::uint64_t bases = layout.basis_value_count, couplings = layout.coupling_value_count;
   std::map<const void*, std::uint64_t> expected;
   const auto expect = [&](std::uint64_t count) {
     return [&expected, count](const auto& array) { expected[&array] = count; };

@@ -33,15 +33,15 @@ void place_block(const HierarchicalLayout& layout, const TransferBlock& block,
   };
   if (!dense) {
     copy_basis(place.row, std::uint64_t{block.row_rank} * block.row_count);
-    if (!block.on_diagonal() && !is_moments(block)) {
+    if (!block.on_diagonal() && !is_cluster_basis(block)) {
       copy_basis(place.column, std::uint64_t{block.column_rank} * block.column_count);
     }
   }
   const std::uint64_t entries = dense ? std::uint64_t{block.row_count} * block.column_count
                                       : std::uint64_t{block.row_rank} * block.column_rank;
-  Value* const core = to + layout.basis_value_count + place.values;
+  Value* const coupling = to + layout.basis_value_count + place.values;
   for (std::uint32_t matrix = 0; matrix < matrix_count; ++matrix) {
-    for (std::uint64_t k = 0; k < entries; ++k) core[k * matrix_count + matrix] = *from++;
+    for (std::uint64_t k = 0; k < entries; ++k) coupling[k * matrix_count + matrix] = *from++;
   }
 }
 
@@ -50,7 +50,7 @@ SharedArray<Value> stream_array(const Storage& storage, const std::vector<Transf
                                 const SharedArray<Value>& values) {
   const HierarchicalLayout layout(blocks, storage.matrix_count, storage.precision.bases);
   std::vector<Value> streamed(
-      HierarchicalLayout::padded(layout.basis_value_count + layout.core_value_count));
+      HierarchicalLayout::padded(layout.basis_value_count + layout.coupling_value_count));
   const Value* from = values.data();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (has_values(blocks[b])) {
@@ -65,7 +65,8 @@ SharedArray<Value> stream_array(const Storage& storage, const std::vector<Transf
 /// positions, if there are any, as much larger.
 void fit_halves(Storage& exact) {
   if (exact.scale_exponent.empty()) return;
-  // Half of what they hold: entries of cores grow a little with the rounding of their bases.
+  // Half of what they hold: entries of coupling matrices grow a little with the rounding of their
+  // bases.
   constexpr float kMost = 65504 / HierarchicalFormat::kHalfScale / 2;
   const std::uint64_t begin = HierarchicalLayout(exact).basis_value_count;
   float largest = 0;
@@ -115,30 +116,30 @@ class Encoder {
         matrix_count_(exact.matrix_count),
         from_(exact),
         to_(rounded),
-        moment_scale_(exact.moment_scale),
+        coefficient_scale_(exact.coefficient_scale),
         bases_(bases),
         couplings_(couplings) {
     for (std::size_t b = 0; b < exact.blocks.size(); ++b) encode(exact.blocks[b], b);
   }
 
-  std::vector<float> take_moment_scale() { return std::move(moment_scale_); }
+  std::vector<float> take_moment_scale() { return std::move(coefficient_scale_); }
 
  private:
   static constexpr bool kIntegers = std::is_integral_v<Basis> && std::is_signed_v<Basis>;
 
   void encode(const TransferBlock& block, std::size_t index) {
     const Layout::Place &from = from_.places[index], &to = to_.places[index];
-    const float* core = exact_ + from_.basis_value_count + from.values;
+    const float* coupling = exact_ + from_.basis_value_count + from.values;
     Coupling* encoded = couplings_ + to.values;
     if (block.kind == TransferBlock::Kind::kDense) {
       for (std::uint64_t k = 0; k < block.value_count(matrix_count_); ++k) {
-        store_coupling(core[k], encoded[k]);
+        store_coupling(coupling[k], encoded[k]);
       }
     } else if (has_values(block)) {
       const std::vector<float> rows =
           encode_basis(from.row, to.row, block.row_rank, block.row_count);
-      if (is_moments(block)) {
-        for (const float row : rows) moment_scale_[moment_++] *= row;
+      if (is_cluster_basis(block)) {
+        for (const float row : rows) coefficient_scale_[moment_++] *= row;
         return;
       }
       const std::vector<float> columns =
@@ -146,7 +147,7 @@ class Encoder {
       for (const float row : rows) {
         for (const float column : columns) {
           for (std::uint32_t matrix = 0; matrix < matrix_count_; ++matrix) {
-            store_coupling(*core++ * row * column, *encoded++);
+            store_coupling(*coupling++ * row * column, *encoded++);
           }
         }
       }
@@ -178,8 +179,8 @@ class Encoder {
     for (const float v : rest) largest = std::max(largest, std::abs(v));
     const float step = largest / IntegerRange<Basis>::kLargest;
     put_multiples(rest, step, to, r);
-    if (r < to.remainders) {
-      put_multiples(rest, step / HierarchicalFormat::kRemainderScale, to, rank + r);
+    if (r < to.residual_rank) {
+      put_multiples(rest, step / HierarchicalFormat::kResidualScale, to, rank + r);
     }
     return step * kBasisScale<Basis>;
   }
@@ -198,7 +199,7 @@ class Encoder {
   const float* exact_;
   std::uint32_t matrix_count_;
   Layout from_, to_;
-  std::vector<float> moment_scale_;
+  std::vector<float> coefficient_scale_;
   std::size_t moment_ = 0;  ///< the next one
   Basis* bases_;
   Coupling* couplings_;
@@ -210,22 +211,23 @@ Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact)
   rounded.precision = precision;
   rounded.values_f32 = {};
   if (precision.bases != BasisPrecision::kQ8) {
-    for (TransferBlock& block : rounded.blocks) block.row_remainders = block.column_remainders = 0;
+    for (TransferBlock& block : rounded.blocks)
+      block.row_residual_rank = block.column_residual_rank = 0;
   }
   const Layout layout(rounded);
   with_bases(rounded, [&]<typename Basis>(SharedArray<Basis>& bases) {
     with_couplings(rounded, [&]<typename Coupling>(SharedArray<Coupling>& couplings) {
       const std::uint64_t basis_count = layout.basis_value_count;
       std::vector<Basis> basis_values(
-          Layout::padded(basis_count + (rounded.one_array() ? layout.core_value_count : 0)));
+          Layout::padded(basis_count + (rounded.one_array() ? layout.coupling_value_count : 0)));
       const auto encode_into = [&](Coupling* coupling_values) {
         Encoder<Basis, Coupling> encoder(exact, rounded, basis_values.data(), coupling_values);
-        rounded.moment_scale = encoder.take_moment_scale();
+        rounded.coefficient_scale = encoder.take_moment_scale();
       };
       if constexpr (std::is_same_v<Basis, Coupling>) {
         encode_into(basis_values.data() + basis_count);
       } else {
-        std::vector<Coupling> coupling_values(Layout::padded(layout.core_value_count));
+        std::vector<Coupling> coupling_values(Layout::padded(layout.coupling_value_count));
         encode_into(coupling_values.data());
         couplings = SharedArray(std::move(coupling_values));
       }
@@ -243,7 +245,7 @@ Storage stream_values(const Storage& storage) {
   Storage streamed = storage;
   streamed.order = Order::kStreamed;
   for (TransferBlock& block : streamed.blocks) {
-    if (is_moments(block)) continue;
+    if (is_cluster_basis(block)) continue;
     if (block.row_rank == 0 || block.column_rank == 0) block.row_rank = block.column_rank = 0;
   }
   with_bases(streamed, [&](auto& array) { array = stream_array(storage, streamed.blocks, array); });

@@ -25,7 +25,7 @@ bool has_bases(const TransferBlock& block) {
   return block.kind != TransferBlock::Kind::kDense && has_values(block);
 }
 
-/// visit(end, begin, size, rank, remainders) for the ends of the blocks with bases in the order of
+/// visit(end, begin, size, rank, residuals) for the ends of the blocks with bases in the order of
 /// these.
 template <typename Visit>
 void visit_ends(std::span<const TransferBlock> blocks,
@@ -33,13 +33,13 @@ void visit_ends(std::span<const TransferBlock> blocks,
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
     if (!has_bases(block)) continue;
-    visit(places[b].row, block.row_begin, block.row_count, block.row_rank, block.row_remainders);
-    if (is_moments(block)) continue;
+    visit(places[b].row, block.row_begin, block.row_count, block.row_rank, block.row_residual_rank);
+    if (is_cluster_basis(block)) continue;
     if (block.on_diagonal()) {
       places[b].column = places[b].row;
     } else {
       visit(places[b].column, block.column_begin, block.column_count, block.column_rank,
-            block.column_remainders);
+            block.column_residual_rank);
     }
   }
 }
@@ -64,15 +64,16 @@ HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
     total += block.value_count(matrix_count);
-    if (is_moments(block))
-      moment_count = checked_count(std::uint64_t{moment_count} + block.column_count);
+    if (is_cluster_basis(block))
+      cluster_coefficient_count =
+          checked_count(std::uint64_t{cluster_coefficient_count} + block.column_count);
     if (total > kMostValues) {
       throw Error("hierarchical operator: its blocks are larger than any memory");
     }
   }
   find_clusters(blocks);
   place_bases(blocks, precision);
-  place_cores(blocks, matrix_count);
+  place_couplings(blocks, matrix_count);
 }
 
 std::uint64_t HierarchicalLayout::filled_rank(const Cluster& cluster) const {
@@ -115,12 +116,12 @@ void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks,
   // First each end's place among the bases of its cluster, then that of the clusters.
   visit_ends(blocks, places,
              [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank,
-                 std::uint32_t remainders) {
+                 std::uint32_t residual_rank) {
                end.cluster = cluster_at(begin, size);
-               end.remainders = precision == BasisPrecision::kQ8 ? remainders : 0;
+               end.residual_rank = precision == BasisPrecision::kQ8 ? residual_rank : 0;
                Cluster& cluster = clusters[end.cluster];
                end.coefficient = cluster.rank;
-               cluster.rank = checked_count(std::uint64_t{cluster.rank} + rank + end.remainders);
+               cluster.rank = checked_count(std::uint64_t{cluster.rank} + rank + end.residual_rank);
              });
   for (Cluster& cluster : clusters) {
     cluster.coefficient = coefficient_count;
@@ -134,8 +135,8 @@ void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks,
              });
 }
 
-void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
-                                     std::uint32_t matrix_count) {
+void HierarchicalLayout::place_couplings(std::span<const TransferBlock> blocks,
+                                         std::uint32_t matrix_count) {
   const auto add_coefficients = [&](End& end, std::uint32_t count) {
     end.coefficient = coefficient_count;
     coefficient_count = checked_count(std::uint64_t{coefficient_count} + count);
@@ -143,16 +144,16 @@ void HierarchicalLayout::place_cores(std::span<const TransferBlock> blocks,
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
     Place& place = places[b];
-    place.values = core_value_count;
+    place.values = coupling_value_count;
     if (block.kind == TransferBlock::Kind::kDense) {
-      core_value_count += block.value_count(matrix_count);
+      coupling_value_count += block.value_count(matrix_count);
       add_coefficients(place.row, block.row_count);
       place.column = place.row;
       if (!block.on_diagonal()) add_coefficients(place.column, block.column_count);
       largest_taken = std::max(largest_taken, taken_size(block.row_count, block.column_count));
     } else {
       largest_taken = std::max(largest_taken, taken_size(block.row_rank, block.column_rank));
-      core_value_count +=
+      coupling_value_count +=
           std::uint64_t{matrix_count} * block.row_rank * std::uint64_t{block.column_rank};
     }
   }

@@ -23,9 +23,9 @@ struct HierarchicalLayout {
 
   /// One end of a block.
   struct End {
-    std::uint32_t cluster = 0;      ///< low-rank blocks only
-    std::uint32_t coefficient = 0;  ///< the first
-    std::uint32_t remainders = 0;   ///< that are stored, after the vectors of the basis
+    std::uint32_t cluster = 0;        ///< low-rank blocks only
+    std::uint32_t coefficient = 0;    ///< the first
+    std::uint32_t residual_rank = 0;  ///< that are stored, after the vectors of the basis
   };
   struct Place {
     End row, column;           ///< the same on the diagonal
@@ -47,11 +47,11 @@ struct HierarchicalLayout {
   std::vector<Cluster> clusters;  ///< by begin, then by size, the largest first
   std::vector<Place> places;      ///< by block
   std::uint64_t basis_value_count = 0;
-  std::uint64_t core_value_count = 0;  ///< cores and dense entries
+  std::uint64_t coupling_value_count = 0;  ///< coupling matrices and dense entries
   std::uint32_t coefficient_count = 0;
-  std::size_t largest_taken = 0;  ///< taken_size() of the largest core
+  std::size_t largest_taken = 0;  ///< taken_size() of the largest coupling matrix
   std::uint32_t rank_group;       ///< ranks that are kept together: 1, or of integers kRankGroup
-  std::uint32_t moment_count = 0;
+  std::uint32_t cluster_coefficient_count = 0;
 
   /// `value_count` values with the zeros that follow them.
   static std::uint64_t padded(std::uint64_t value_count);
@@ -61,14 +61,14 @@ struct HierarchicalLayout {
   void find_clusters(std::span<const TransferBlock> blocks);
   std::uint32_t cluster_at(std::uint32_t begin, std::uint32_t size) const;
   void place_bases(std::span<const TransferBlock> blocks, BasisPrecision precision);
-  void place_cores(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
+  void place_couplings(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
 };
 
 /// Whether a block has values.
 bool has_values(const TransferBlock& block);
 
-inline bool is_moments(const TransferBlock& block) {
-  return block.kind == TransferBlock::Kind::kMoments;
+inline bool is_cluster_basis(const TransferBlock& block) {
+  return block.kind == TransferBlock::Kind::kClusterBasis;
 }
 
 }  // namespace rebounce

@@ -18,15 +18,16 @@ namespace rebounce {
 ///   dense     [matrix][row_count][column_count]
 ///   low-rank  U^T [row_rank][row_count], V^T [column_rank][column_count] (not on the diagonal),
 ///             S [matrix][row_rank][column_rank]
-///   moments   W^T [row_rank][row_count]
-/// In 8 bits U^T, V^T and W^T have row_remainders and column_remainders rows more. The constants
-/// are those of HierarchicalFormat.
+///   cluster coefficients   W^T [row_rank][row_count]
+/// In 8 bits U^T, V^T and W^T have row_residual_rank and column_residual_rank rows more. The
+/// constants are those of HierarchicalFormat.
 struct HierarchicalStorage {
   enum class Order : std::uint8_t {
     /// Block by block, U^T V^T S or the entries, without holes, then kPadding values not used.
     kByBlock,
     /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
-    /// the order of their blocks, U^T before V^T; then cores and dense entries by block, the
+    /// the order of their blocks, U^T before V^T; then coupling matrices and dense entries by
+    /// block, the
     /// matrices of an entry side by side; zeros to the next multiple of 64 values, at least
     /// kPadding of them. Bases in an array of their own are followed by zeros likewise. Integers
     /// are [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster:
@@ -39,7 +40,8 @@ struct HierarchicalStorage {
   std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
   std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
   std::vector<TransferBlock> blocks;                          ///< where there is none, Yhat is 0
-  std::vector<float> moment_scale;  ///< [moments] times W^T x is a moment of light x
+  std::vector<float> coefficient_scale;  ///< [cluster coefficients] times W^T x is a cluster
+                                         ///< coefficient of light x
   /// [n] by position, R = 2^this, within +-kLargestExponent; none: R = 1.
   std::vector<std::int8_t> scale_exponent;
   PatchRoles roles;  ///< by patch; entries that no source and receiver share are of no meaning

@@ -17,20 +17,21 @@ class ValueReader {
   ValueReader(const Storage& storage, const HierarchicalLayout& layout)
       : storage_(storage),
         layout_(layout),
-        first_core_(storage.first_coupling(layout.basis_value_count)) {}
+        first_coupling_(storage.first_coupling(layout.basis_value_count)) {}
 
   /// Of one end of a block of that rank.
   double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vector,
                std::uint64_t position) const {
     const double value = stored_basis(layout_.basis_index(end, vector, position));
-    if (vector >= end.remainders) return value;
+    if (vector >= end.residual_rank) return value;
     return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
-                       double{HierarchicalFormat::kRemainderScale};
+                       double{HierarchicalFormat::kResidualScale};
   }
-  /// Of a core or a dense entry.
-  double core(std::uint64_t index) const {
-    return with_couplings(
-        storage_, [&](const auto& array) { return coupling_value(array[first_core_ + index]); });
+  /// Of a coupling matrix or a dense entry.
+  double coupling(std::uint64_t index) const {
+    return with_couplings(storage_, [&](const auto& array) {
+      return coupling_value(array[first_coupling_ + index]);
+    });
   }
 
   const Storage& storage() const { return storage_; }
@@ -43,10 +44,10 @@ class ValueReader {
 
   const Storage& storage_;
   const HierarchicalLayout& layout_;
-  std::uint64_t first_core_;
+  std::uint64_t first_coupling_;
 };
 
-/// [row_count][column_count] of one matrix, positions or moments.
+/// [row_count][column_count] of one matrix, positions or cluster coefficients.
 std::vector<double> block_entries(const ValueReader& read, const HierarchicalLayout::Place& place,
                                   const TransferBlock& block, std::uint32_t matrix) {
   const std::size_t rows = block.row_count, columns = block.column_count;
@@ -54,7 +55,7 @@ std::vector<double> block_entries(const ValueReader& read, const HierarchicalLay
   std::vector<double> entries(rows * columns, 0.0);
   if (block.kind == TransferBlock::Kind::kDense) {
     for (std::size_t k = 0; k < entries.size(); ++k) {
-      entries[k] = read.core(place.values + k * matrices + matrix);
+      entries[k] = read.coupling(place.values + k * matrices + matrix);
     }
     return entries;
   }
@@ -64,9 +65,9 @@ std::vector<double> block_entries(const ValueReader& read, const HierarchicalLay
     std::ranges::fill(right, 0.0);
     for (std::size_t k = 0; k < column_rank; ++k) {
       const std::uint64_t entry = r * column_rank + k;
-      const double core = read.core(place.values + entry * matrices + matrix);
+      const double coupling = read.coupling(place.values + entry * matrices + matrix);
       for (std::size_t j = 0; j < columns; ++j)
-        right[j] += core * read.basis(place.column, column_rank, k, j);
+        right[j] += coupling * read.basis(place.column, column_rank, k, j);
     }
     for (std::size_t i = 0; i < rows; ++i) {
       const double left = read.basis(place.row, row_rank, r, i);
@@ -86,13 +87,13 @@ std::vector<double> transposed(const std::vector<double>& entries, std::size_t c
   return result;
 }
 
-/// Positions or moments.
+/// Positions or cluster coefficients.
 struct Range {
   std::uint32_t begin, count;
 };
 
-/// Rows of entries [rows.count][columns] that are moments become rows of the positions that these
-/// are of, `positions`.
+/// Rows of entries [rows.count][columns] that are cluster coefficients become rows of the positions
+/// that these are of, `positions`.
 std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_t columns,
                                  std::vector<double> entries,
                                  std::vector<std::uint32_t>& positions) {
@@ -104,20 +105,21 @@ std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_
   }
   std::vector<double> result;
   for (std::size_t b = 0; b < storage.blocks.size(); ++b) {
-    const TransferBlock& moments = storage.blocks[b];
-    if (!is_moments(moments) || moments.column_begin < rows.begin ||
-        moments.column_begin >= rows.begin + rows.count) {
+    const TransferBlock& cluster_coefficients = storage.blocks[b];
+    if (!is_cluster_basis(cluster_coefficients) || cluster_coefficients.column_begin < rows.begin ||
+        cluster_coefficients.column_begin >= rows.begin + rows.count) {
       continue;
     }
     const HierarchicalLayout::End& end = read.layout().places[b].row;
-    const float* const scale = storage.moment_scale.data() + moments.column_begin - position_count;
-    for (std::uint32_t k = 0; k < moments.row_count; ++k) {
-      positions.push_back(moments.row_begin + k);
+    const float* const scale =
+        storage.coefficient_scale.data() + cluster_coefficients.column_begin - position_count;
+    for (std::uint32_t k = 0; k < cluster_coefficients.row_count; ++k) {
+      positions.push_back(cluster_coefficients.row_begin + k);
       std::vector<double> row(columns, 0.0);
-      for (std::uint32_t m = 0; m < moments.row_rank; ++m) {
-        const double weight = scale[m] * read.basis(end, moments.row_rank, m, k);
+      for (std::uint32_t m = 0; m < cluster_coefficients.row_rank; ++m) {
+        const double weight = scale[m] * read.basis(end, cluster_coefficients.row_rank, m, k);
         const double* const from =
-            entries.data() + (moments.column_begin - rows.begin + m) * columns;
+            entries.data() + (cluster_coefficients.column_begin - rows.begin + m) * columns;
         for (std::size_t c = 0; c < columns; ++c) row[c] += weight * from[c];
       }
       result.insert(result.end(), row.begin(), row.end());
@@ -137,7 +139,8 @@ Storage decode(const Storage& storage) {
   for_each_array(decoded, [](auto& array) { array = {}; });
   const HierarchicalLayout from(streamed), to(decoded);
   const ValueReader read(streamed, from);
-  std::vector<float> values(HierarchicalLayout::padded(to.basis_value_count + to.core_value_count));
+  std::vector<float> values(
+      HierarchicalLayout::padded(to.basis_value_count + to.coupling_value_count));
   const auto copy_basis = [&](const HierarchicalLayout::End& source,
                               const HierarchicalLayout::End& target, std::uint32_t rank,
                               std::uint32_t size) {
@@ -151,11 +154,11 @@ Storage decode(const Storage& storage) {
     const TransferBlock& block = streamed.blocks[b];
     if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
     copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_count);
-    if (block.on_diagonal() || is_moments(block)) continue;
+    if (block.on_diagonal() || is_cluster_basis(block)) continue;
     copy_basis(from.places[b].column, to.places[b].column, block.column_rank, block.column_count);
   }
-  for (std::uint64_t k = 0; k < to.core_value_count; ++k) {
-    values[to.basis_value_count + k] = static_cast<float>(read.core(k));
+  for (std::uint64_t k = 0; k < to.coupling_value_count; ++k) {
+    values[to.basis_value_count + k] = static_cast<float>(read.coupling(k));
   }
   decoded.values_f32 = SharedArray(std::move(values));
   return decoded;

@@ -14,19 +14,19 @@ struct HierarchicalFormat {
   static constexpr std::size_t kAlignment = 16;
   static constexpr std::size_t kPadding = 16;
 
-  /// In half precision, dense entries and cores are stored times this, so that small ones stay
-  /// normal numbers; bases are stored as they are. With orthonormal bases no core has an entry
-  /// above the norm of Yhat, 1 / (1 - reflectance): up to 0.99, the most that patches have, all of
-  /// them fit. Those of an equilibrated K are made to: encode_values.
+  /// In half precision, dense entries and coupling matrices are stored times this, so that small
+  /// ones stay normal numbers; bases are stored as they are. With orthonormal bases no coupling
+  /// matrix has an entry above the norm of Yhat, 1 / (1 - reflectance): up to 0.99, the most that
+  /// patches have, all of them fit. Those of an equilibrated K are made to: encode_values.
   static constexpr float kHalfScale = 512;
 
   /// In 8 bits, a basis holds its vectors times numbers of their own such that their largest
-  /// entries are +-127; cores are divided by them, with this for 1 at each end.
+  /// entries are +-127; coupling matrices are divided by them, with this for 1 at each end.
   static constexpr float kByteScale = 128;
 
-  /// Vectors that bytes are too coarse for have a remainder: what rounding left of them, times
+  /// Vectors that bytes are too coarse for have a residual: what rounding left of them, times
   /// this, as bytes again. Those of a basis follow its vectors, in their order.
-  static constexpr float kRemainderScale = 254;
+  static constexpr float kResidualScale = 254;
 
   /// In 16 bits likewise: the largest are +-kLargestShort, and kShortScale stands for 1. So few
   /// that sums of 128 products with such numbers fit 32 bits.
@@ -49,27 +49,27 @@ struct HierarchicalFormat {
 /// rows and columns the same, or all of its columns come before its rows; then it stands for its
 /// transpose too.
 ///
-/// Large blocks are of low rank over *moments* instead of positions: the light of some positions in
-/// a basis that all blocks over them share. A block of kMoments is such a basis. Moments are
-/// numbered after the positions, and the rows and the columns of a low-rank block each are of one
-/// kind.
+/// Large blocks are of low rank over *cluster coefficients* instead of positions: the light of some
+/// positions in a basis that all blocks over them share. A block of kClusterBasis is such a basis.
+/// Cluster coefficients are numbered after the positions, and the rows and the columns of a
+/// low-rank block each are of one kind.
 struct TransferBlock {
-  /// Of kMoments the rows are positions and the columns the moments that they have, in the order of
-  /// the blocks.
-  enum class Kind : std::uint32_t { kDense = 0, kLowRank = 1, kMoments = 2 };
+  /// Of kClusterBasis the rows are positions and the columns the cluster coefficients that they
+  /// have, in the order of the blocks.
+  enum class Kind : std::uint32_t { kDense = 0, kLowRank = 1, kClusterBasis = 2 };
 
   std::uint32_t row_begin = 0, row_count = 0;        ///< positions, multiples of kAlignment
   std::uint32_t column_begin = 0, column_count = 0;  ///< likewise
   Kind kind = Kind::kDense;
-  /// Of a low-rank block; 0 for a dense one; of moments as many as columns, and 0.
+  /// Of a low-rank block; 0 for a dense one; of cluster coefficients as many as columns, and 0.
   std::uint32_t row_rank = 0, column_rank = 0;
   /// So many of the first vectors of a basis are sums of two in 8 bits, which alone are too coarse
-  /// for them: see kRemainderScale. In f32 they are told but not used; in f16 and 16 bits 0.
-  std::uint32_t row_remainders = 0, column_remainders = 0;
+  /// for them: see kResidualScale. In f32 they are told but not used; in f16 and 16 bits 0.
+  std::uint32_t row_residual_rank = 0, column_residual_rank = 0;
 
   bool on_diagonal() const { return row_begin == column_begin; }
 
-  /// Values that it takes up, for `matrix_count` distinct channels, without remainders.
+  /// Values that it takes up, for `matrix_count` distinct channels, without residuals.
   std::uint64_t value_count(std::uint32_t matrix_count) const {
     const std::uint64_t rows = row_count, columns = column_count;
     if (kind == Kind::kDense) return matrix_count * rows * columns;

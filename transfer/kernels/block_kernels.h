@@ -38,9 +38,9 @@ struct BasisPart {
   std::uint32_t coefficient, position;    ///< its first ones
   std::uint32_t first_rank, last_rank;    ///< [first, last) of them
   std::uint32_t first_place, last_place;  ///< positions in the cluster, likewise
-  /// Whether the positions are moments: none is bright for what faces nothing, as they are what
-  /// arrives of the light.
-  bool moments = false;
+  /// Whether the positions are cluster coefficients: none is bright for what faces nothing, as they
+  /// are what arrives of the light.
+  bool cluster_coefficients = false;
 };
 
 /// Products with the bases of the hierarchical operator, for one instruction set. Integers stand
@@ -59,17 +59,17 @@ struct BasisKernels {
                  Coefficients<const float> coefficient, PlanarVectors<float> y);
 };
 
-/// A core S or a dense block, [rows][columns][matrix].
-struct CoreBlock {
+/// A coupling matrix S or a dense block, [rows][columns][matrix].
+struct CouplingBlock {
   enum class Direction : std::uint8_t { kBoth, kToRows, kToColumns };
 
   std::uint64_t values;
   std::uint32_t rows, columns;
   std::uint32_t row, column;  ///< first coefficients at its ends
   Direction direction;
-  /// Of the coefficients at its ends, those of remainders, after its own
-  /// (HierarchicalFormat::kRemainderScale).
-  std::uint32_t row_remainders = 0, column_remainders = 0;
+  /// Of the coefficients at its ends, those of residuals, after its own
+  /// (HierarchicalFormat::kResidualScale).
+  std::uint32_t row_residual_rank = 0, column_residual_rank = 0;
 };
 
 /// What serves the channels of an entry of kMatrices neighbouring values: lanes of four entries.
@@ -81,23 +81,24 @@ struct ChannelLanes {
   std::size_t matrix_count;
 };
 
-/// out(row) = S in(column) and out(column) = S^T in(row), as its direction says, for one core after
-/// the other and each light; what was there before is overwritten, also where `out` is `in`.
-/// Coefficients of remainders are added to those that they belong to; those that come out are
+/// out(row) = S in(column) and out(column) = S^T in(row), as its direction says, for one coupling
+/// matrix after the other and each light; what was there before is overwritten, also where `out` is
+/// `in`. Coefficients of residuals are added to those that they belong to; those that come out are
 /// written too. Sixteen values are read from the beginning of each entry. `taken` has room for
-/// taken_size() of each core.
+/// taken_size() of each coupling matrix.
 template <typename Value>
-using CoreKernel = void (*)(const Value* values, std::span<const CoreBlock> cores,
-                            const ChannelLanes& lanes, std::size_t light_count,
-                            Coefficients<const float> in, Coefficients<float> out, float* taken);
+using CouplingKernel = void (*)(const Value* values, std::span<const CouplingBlock> couplings,
+                                const ChannelLanes& lanes, std::size_t light_count,
+                                Coefficients<const float> in, Coefficients<float> out,
+                                float* taken);
 
-/// Floats that the coefficients of one end of a core take up, in whole cache lines.
+/// Floats that the coefficients of one end of a coupling matrix take up, in whole cache lines.
 constexpr std::size_t end_size(std::size_t coefficients) {
   constexpr std::size_t kOfLine = 4;
   return (coefficients + kOfLine - 1) / kOfLine * kOfLine * kChannelLanes;
 }
 
-/// Floats in which a core keeps what it takes.
+/// Floats in which a coupling matrix keeps what it takes.
 constexpr std::size_t taken_size(std::size_t rows, std::size_t columns) {
   return end_size(rows) + end_size(columns);
 }
@@ -105,7 +106,7 @@ constexpr std::size_t taken_size(std::size_t rows, std::size_t columns) {
 /// A dense block of the only matrix of an operator, [rows][columns], both multiples of
 /// HierarchicalFormat::kAlignment.
 struct DenseBlock {
-  using Direction = CoreBlock::Direction;
+  using Direction = CouplingBlock::Direction;
 
   std::uint64_t values;
   std::uint32_t rows, columns;
@@ -121,10 +122,10 @@ struct DenseEnd {
   std::uint32_t first, size;
 };
 
-/// Products with cores and dense blocks, for one instruction set.
+/// Products with coupling matrices and dense blocks, for one instruction set.
 template <typename Value>
-struct CoreKernels {
-  CoreKernel<Value> multiply;
+struct CouplingKernels {
+  CouplingKernel<Value> multiply;
 
   /// out(row_out) = S x(column) and out(column_out) = S^T x(row), as its direction says, for one
   /// block after the other and each light of x; what was there before is overwritten. Unlike
@@ -147,8 +148,8 @@ struct BlockKernels {
   BasisKernels<std::uint16_t> bases_f16;
   BasisKernels<std::int16_t> bases_q16;
   BasisKernels<std::int8_t> bases_q8;
-  CoreKernels<float> cores_f32;
-  CoreKernels<std::uint16_t> cores_f16;
+  CouplingKernels<float> couplings_f32;
+  CouplingKernels<std::uint16_t> couplings_f16;
 };
 
 }  // namespace rebounce

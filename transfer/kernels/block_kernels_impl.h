@@ -7,7 +7,7 @@
 
 #include "transfer/kernels/basis_kernels_impl.h"
 #include "transfer/kernels/block_kernels.h"
-#include "transfer/kernels/core_kernels_impl.h"
+#include "transfer/kernels/coupling_kernels_impl.h"
 #include "transfer/kernels/dense_block_kernels_impl.h"
 #include "transfer/kernels/integer_kernels_impl.h"
 
@@ -26,14 +26,14 @@ constexpr BasisKernels<Value> make_integer_kernels() {
 
 template <typename V, typename N>
 constexpr BlockKernels make_block_kernels() {
-  return {
-      make_basis_kernels<V, float>(),
-      make_basis_kernels<V, std::uint16_t>(),
-      make_integer_kernels<N, std::int16_t>(),
-      make_integer_kernels<N, std::int8_t>(),
-      {multiply_cores<V, float>, multiply_dense<V, float>, add_products<V>, add_dense<V, float>},
-      {multiply_cores<V, std::uint16_t>, multiply_dense<V, std::uint16_t>, add_products<V>,
-       add_dense<V, std::uint16_t>}};
+  return {make_basis_kernels<V, float>(),
+          make_basis_kernels<V, std::uint16_t>(),
+          make_integer_kernels<N, std::int16_t>(),
+          make_integer_kernels<N, std::int8_t>(),
+          {multiply_couplings<V, float>, multiply_dense<V, float>, add_products<V>,
+           add_dense<V, float>},
+          {multiply_couplings<V, std::uint16_t>, multiply_dense<V, std::uint16_t>, add_products<V>,
+           add_dense<V, std::uint16_t>}};
 }
 
 }  // namespace

@@ -22,9 +22,9 @@ const BasisKernels<Value>& basis_kernels(const BlockKernels& kernels) {
 
 /// The kernels for coupling matrices of a type.
 template <typename Value>
-const CoreKernels<Value>& coupling_kernels(const BlockKernels& kernels) {
-  if constexpr (std::is_same_v<Value, float>) return kernels.cores_f32;
-  if constexpr (std::is_same_v<Value, std::uint16_t>) return kernels.cores_f16;
+const CouplingKernels<Value>& coupling_kernels(const BlockKernels& kernels) {
+  if constexpr (std::is_same_v<Value, float>) return kernels.couplings_f32;
+  if constexpr (std::is_same_v<Value, std::uint16_t>) return kernels.couplings_f16;
 }
 
 /// Kernels for one type of values, and values of it.
@@ -64,8 +64,8 @@ class BasisProducts {
   float scale_ = 1;
 };
 
-/// Products with its coupling matrices and dense blocks likewise; see CoreKernels. The bases take
-/// up `basis_value_count` values.
+/// Products with its coupling matrices and dense blocks likewise; see CouplingKernels. The bases
+/// take up `basis_value_count` values.
 class CouplingProducts {
  public:
   CouplingProducts(const HierarchicalStorage& storage, std::uint64_t basis_value_count) {
@@ -76,12 +76,12 @@ class CouplingProducts {
     });
   }
 
-  void multiply(std::span<const CoreBlock> cores, const ChannelLanes& lanes,
+  void multiply(std::span<const CouplingBlock> couplings, const ChannelLanes& lanes,
                 std::size_t light_count, Coefficients<const float> in, Coefficients<float> out,
                 float* taken) const {
     std::visit(
         [&](const auto& on) {
-          on.kernels->multiply(on.values, cores, lanes, light_count, in, out, taken);
+          on.kernels->multiply(on.values, couplings, lanes, light_count, in, out, taken);
         },
         on_);
   }
@@ -103,7 +103,7 @@ class CouplingProducts {
 
  private:
   template <typename Value>
-  using On = KernelsOn<CoreKernels<Value>, Value>;
+  using On = KernelsOn<CouplingKernels<Value>, Value>;
   std::variant<On<float>, On<std::uint16_t>> on_;
   float scale_ = 1;
 };

@@ -20,8 +20,8 @@ static_assert(sizeof(IncomingLink) == 20);
 inline constexpr std::size_t kColorLanes = 4;
 using ColorLanes = std::array<float, kColorLanes>;
 
-/// Of a node: in the pull, mean light and its first moments over the area; in the push, what
-/// arrived, m² lx, and its gradients, m lx.
+/// Of a node: in the pull, mean light and its first cluster coefficients over the area; in the
+/// push, what arrived, m² lx, and its gradients, m lx.
 template <typename Lanes>
 struct LinkLightOf {
   Lanes mean;

@@ -17,7 +17,7 @@ struct Vector8 {
   static constexpr std::size_t kWidth = 8;
   static constexpr std::size_t kStrip = 16;
   static constexpr std::size_t kLights = 1;
-  static constexpr std::size_t kCoreVectors = 2;
+  static constexpr std::size_t kCouplingVectors = 2;
   __m256 v;
 
   static Vector8 load(const float* p) { return {_mm256_loadu_ps(p)}; }

@@ -18,7 +18,7 @@ struct Vector16 {
   static constexpr std::size_t kWidth = 16;
   static constexpr std::size_t kStrip = 64;
   static constexpr std::size_t kLights = 2;
-  static constexpr std::size_t kCoreVectors = 4;
+  static constexpr std::size_t kCouplingVectors = 4;
   __m512 v;
 
   static Vector16 load(const float* p) { return {_mm512_loadu_ps(p)}; }

@@ -5,11 +5,11 @@
 // `count` lanes alone, the others are read as zero; sums gives the sums over the lanes of four
 // vectors. Of vectors whose fours of lanes are the channels of something, repeat_four fills all
 // fours with one, sums_of_fours adds up those of as many vectors as there are, and
-// EntryLanes<Value>::load loads the entries of a core; entries of kWholeRows load as many vectors
-// of a row as there are with load_row. kStrip positions, the channels of kLights lights and
-// kCoreVectors vectors of a row of a core are what its registers have room for. Everything about it
-// is in an unnamed namespace, so that files compiled for different sets never share an
-// instantiation.
+// EntryLanes<Value>::load loads the entries of a coupling matrix; entries of kWholeRows load as
+// many vectors of a row as there are with load_row. kStrip positions, the channels of kLights
+// lights and kCouplingVectors vectors of a row of a coupling matrix are what its registers have
+// room for. Everything about it is in an unnamed namespace, so that files compiled for different
+// sets never share an instantiation.
 
 #include <cstddef>
 #include <cstdint>

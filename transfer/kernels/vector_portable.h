@@ -21,7 +21,7 @@ struct Vector4 {
   static constexpr std::size_t kWidth = 4;
   static constexpr std::size_t kStrip = 16;
   static constexpr std::size_t kLights = 1;
-  static constexpr std::size_t kCoreVectors = 2;
+  static constexpr std::size_t kCouplingVectors = 2;
   Floats v;
 
   static Vector4 load(const float* p) { return {read<Floats>(p)}; }

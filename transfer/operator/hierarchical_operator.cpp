@@ -21,8 +21,8 @@ constexpr std::size_t kLine = 16;
 // Positions whose light a task takes in.
 constexpr std::size_t kGathered = 1024;
 
-// Ends of dense blocks whose light a task takes, and bases of moments.
-constexpr std::size_t kDenseEndsPerTask = 64, kMomentsPerTask = 32;
+// Ends of dense blocks whose light a task takes, and bases of cluster coefficients.
+constexpr std::size_t kDenseEndsPerTask = 64, kCoefficientsPerTask = 32;
 
 // Positions ahead at which the light of a patch is asked for. A second-level cache has more loads
 // under way at a time than the nearest one.
@@ -33,13 +33,14 @@ std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
 
-/// The vectors of an apply to some lights. Positions of patches are followed by moments. What cores
-/// and dense blocks make of coefficients is written over what they take: less memory to go through.
+/// The vectors of an apply to some lights. Positions of patches are followed by cluster
+/// coefficients. What coupling matrices and dense blocks make of coefficients is written over what
+/// they take: less memory to go through.
 struct WorkVectors {
   std::size_t light_count;
   PlanarVectors<float> x;           ///< by position, times the root of the area
   Coefficients<float> coefficient;  ///< of x in the bases, and then of y
-  PlanarVectors<float> taken;       ///< by the cores of each part
+  PlanarVectors<float> taken;       ///< by the coupling matrices of each part
   PlanarVectors<float> y;           ///< by position, what arrives
 
   WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
@@ -65,7 +66,7 @@ struct WorkVectors {
   static constexpr std::size_t kParts = HierarchicalPlan::kMostParts;
 
   static std::size_t vector_size(std::size_t positions, const HierarchicalLayout& layout) {
-    return round_up(positions + layout.moment_count, kLine);
+    return round_up(positions + layout.cluster_coefficient_count, kLine);
   }
   static std::size_t coefficients_size(const HierarchicalLayout& layout) {
     return round_up(layout.coefficient_count * kChannelLanes, kLine);
@@ -90,12 +91,12 @@ std::span<const T> between(const std::vector<T>& all, std::uint32_t first, std::
 class Phases {
  public:
   Phases(const BasisProducts& bases, const CouplingProducts& couplings, const ChannelLanes& lanes,
-         std::span<const float> moment_scale, const WorkVectors& work)
+         std::span<const float> coefficient_scale, const WorkVectors& work)
       : bases_(bases),
         couplings_(couplings),
         lanes_(lanes),
         basis_scale_(bases.scale()),
-        moment_scale_(moment_scale),
+        coefficient_scale_(coefficient_scale),
         work_(work) {}
 
   void project(std::span<const BasisPart> parts) const {
@@ -110,46 +111,50 @@ class Phases {
     }
   }
 
-  /// The moments of the light, from its coefficients.
-  void take_moments(const HierarchicalPlan::Moments& moments) const {
+  /// The cluster coefficients of the light, from its coefficients.
+  void take_coefficients(const HierarchicalPlan::ClusterCoefficients& cluster_coefficients) const {
     const std::size_t stride = work_.x.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
-      float* const lane = lane_of(work_.coefficient, light * kChannelCount, moments.coefficient);
-      const float* const remainder = lane + moments.rank * kChannelLanes;
-      for (std::size_t k = 0; k < moments.remainders * kChannelLanes; ++k) {
-        lane[k] += kRemainder * remainder[k];
+      float* const lane =
+          lane_of(work_.coefficient, light * kChannelCount, cluster_coefficients.coefficient);
+      const float* const residual = lane + cluster_coefficients.rank * kChannelLanes;
+      for (std::size_t k = 0; k < cluster_coefficients.residual_rank * kChannelLanes; ++k) {
+        lane[k] += kResidual * residual[k];
       }
-      float* const x = work_.x.data + light * kChannelCount * stride + moments.position;
-      for (std::size_t k = 0; k < moments.rank; ++k) {
-        const float scale = moment_scale_[moments.scale + k] / basis_scale_;
+      float* const x =
+          work_.x.data + light * kChannelCount * stride + cluster_coefficients.position;
+      for (std::size_t k = 0; k < cluster_coefficients.rank; ++k) {
+        const float scale = coefficient_scale_[cluster_coefficients.scale + k] / basis_scale_;
         for (int c = 0; c < kChannelCount; ++c)
           x[c * stride + k] = scale * lane[k * kChannelLanes + c];
       }
     }
   }
 
-  /// The coefficients of the light that arrives, from its moments.
-  void put_moments(const HierarchicalPlan::Moments& moments) const {
+  /// The coefficients of the light that arrives, from its cluster coefficients.
+  void put_coefficients(const HierarchicalPlan::ClusterCoefficients& cluster_coefficients) const {
     const std::size_t stride = work_.y.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
-      const float* const y = work_.y.data + light * kChannelCount * stride + moments.position;
-      float* const lane = lane_of(work_.coefficient, light * kChannelCount, moments.coefficient);
-      for (std::size_t k = 0; k < moments.rank; ++k) {
-        const float scale = moment_scale_[moments.scale + k] / basis_scale_;
+      const float* const y =
+          work_.y.data + light * kChannelCount * stride + cluster_coefficients.position;
+      float* const lane =
+          lane_of(work_.coefficient, light * kChannelCount, cluster_coefficients.coefficient);
+      for (std::size_t k = 0; k < cluster_coefficients.rank; ++k) {
+        const float scale = coefficient_scale_[cluster_coefficients.scale + k] / basis_scale_;
         for (int c = 0; c < kChannelCount; ++c)
           lane[k * kChannelLanes + c] = scale * y[c * stride + k];
         lane[k * kChannelLanes + kChannelCount] = 0;
       }
-      float* const remainder = lane + moments.rank * kChannelLanes;
-      for (std::size_t k = 0; k < moments.remainders * kChannelLanes; ++k) {
-        remainder[k] = kRemainder * lane[k];
+      float* const residual = lane + cluster_coefficients.rank * kChannelLanes;
+      for (std::size_t k = 0; k < cluster_coefficients.residual_rank * kChannelLanes; ++k) {
+        residual[k] = kResidual * lane[k];
       }
     }
   }
 
   /// Those of one part.
-  void multiply(std::span<const CoreBlock> cores, std::size_t part) const {
-    couplings_.multiply(cores, lanes_, work_.light_count, constant(work_.coefficient),
+  void multiply(std::span<const CouplingBlock> couplings, std::size_t part) const {
+    couplings_.multiply(couplings, lanes_, work_.light_count, constant(work_.coefficient),
                         work_.coefficient, work_.taken.data + part * work_.taken.stride);
   }
 
@@ -170,7 +175,7 @@ class Phases {
   }
 
  private:
-  static constexpr float kRemainder = 1 / HierarchicalFormat::kRemainderScale;
+  static constexpr float kResidual = 1 / HierarchicalFormat::kResidualScale;
 
   /// Of light that goes through no bases, which other light does twice.
   float product_scale() const { return basis_scale_ * basis_scale_; }
@@ -193,7 +198,7 @@ class Phases {
   const CouplingProducts& couplings_;
   const ChannelLanes& lanes_;
   float basis_scale_;
-  std::span<const float> moment_scale_;
+  std::span<const float> coefficient_scale_;
   const WorkVectors& work_;
 };
 
@@ -245,7 +250,7 @@ struct Exchange {
   }
 };
 
-/// All that arrives at some positions or moments.
+/// All that arrives at some positions or cluster coefficients.
 void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arrival,
             const Phases& phases, const WorkVectors& work) {
   clear(work.y, arrival.begin, arrival.end);
@@ -279,10 +284,13 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
       phases.project(of_part(plan.projections, plan.projection_parts, k - dense_ends));
     }
   };
-  const std::size_t moments_in = plan.moments_in.size(), moments_out = plan.moments_out.size();
-  const auto take_moments = [&](std::size_t k) { phases.take_moments(plan.moments_in[k]); };
-  const auto project_moments = [&](std::size_t k) {
-    phases.project(of_part(plan.moment_projections, plan.moment_projection_parts, k));
+  const std::size_t coefficients_in = plan.coefficients_in.size(),
+                    coefficients_out = plan.coefficients_out.size();
+  const auto take_coefficients = [&](std::size_t k) {
+    phases.take_coefficients(plan.coefficients_in[k]);
+  };
+  const auto project_coefficients = [&](std::size_t k) {
+    phases.project(of_part(plan.cluster_projections, plan.cluster_projection_parts, k));
   };
   const std::size_t dense_parts = plan.dense_parts.size() - 1;
   const auto multiply = [&](std::size_t k) {
@@ -290,13 +298,15 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
       phases.multiply_dense(of_part(plan.dense, plan.dense_parts, k));
     } else {
       const std::size_t part = k - dense_parts;
-      phases.multiply(of_part(plan.cores, plan.core_parts, part), part);
+      phases.multiply(of_part(plan.couplings, plan.coupling_parts, part), part);
     }
   };
-  const auto arrive_at_moments = [&](std::size_t k) {
-    arrive(plan, plan.moment_arrivals[plan.moment_arrivals.size() - 1 - k], phases, work);
+  const auto arrive_at_coefficients = [&](std::size_t k) {
+    arrive(plan, plan.cluster_arrivals[plan.cluster_arrivals.size() - 1 - k], phases, work);
   };
-  const auto put_moments = [&](std::size_t k) { phases.put_moments(plan.moments_out[k]); };
+  const auto put_coefficients = [&](std::size_t k) {
+    phases.put_coefficients(plan.coefficients_out[k]);
+  };
   // The last of them first.
   const auto arrive_at_patches = [&](std::size_t k) {
     const HierarchicalPlan::Arrival& arrival = plan.arrivals[plan.arrivals.size() - 1 - k];
@@ -304,17 +314,18 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
     exchange.scatter(between(plan.targets, arrival.first_target, arrival.last_target),
                      indirect_irradiance);
   };
-  run_in_turn(scheduler,
-              {{piece_count(positions, kGathered), gather},
-               {dense_ends + plan.projection_parts.size() - 1, project},
-               {piece_count(moments_in, kMomentsPerTask),
-                on_piece(moments_in, kMomentsPerTask, take_moments)},
-               {moments_in == 0 ? 0 : plan.moment_projection_parts.size() - 1, project_moments},
-               {dense_parts + plan.core_parts.size() - 1, multiply},
-               {moments_out == 0 ? 0 : plan.moment_arrivals.size(), arrive_at_moments},
-               {piece_count(moments_out, kMomentsPerTask),
-                on_piece(moments_out, kMomentsPerTask, put_moments)},
-               {plan.arrivals.size(), arrive_at_patches}});
+  run_in_turn(
+      scheduler,
+      {{piece_count(positions, kGathered), gather},
+       {dense_ends + plan.projection_parts.size() - 1, project},
+       {piece_count(coefficients_in, kCoefficientsPerTask),
+        on_piece(coefficients_in, kCoefficientsPerTask, take_coefficients)},
+       {coefficients_in == 0 ? 0 : plan.cluster_projection_parts.size() - 1, project_coefficients},
+       {dense_parts + plan.coupling_parts.size() - 1, multiply},
+       {coefficients_out == 0 ? 0 : plan.cluster_arrivals.size(), arrive_at_coefficients},
+       {piece_count(coefficients_out, kCoefficientsPerTask),
+        on_piece(coefficients_out, kCoefficientsPerTask, put_coefficients)},
+       {plan.arrivals.size(), arrive_at_patches}});
 }
 
 }  // namespace
@@ -364,7 +375,7 @@ std::size_t HierarchicalOperator::bytes() const {
   std::size_t values = 0;
   for_each_array(*storage_, [&](const auto& array) { values += array.size_bytes(); });
   return values + storage_->blocks.size() * sizeof(TransferBlock) +
-         storage_->moment_scale.size() * sizeof(float) + storage_->scale_exponent.size() +
+         storage_->coefficient_scale.size() * sizeof(float) + storage_->scale_exponent.size() +
          storage_->patch.size() * sizeof(std::uint32_t) + storage_->roles.role.size();
 }
 
@@ -401,7 +412,7 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   }
   const BasisProducts bases(*storage_);
   const CouplingProducts couplings(*storage_, layout_->basis_value_count);
-  const Phases phases(bases, couplings, lanes, storage_->moment_scale, work);
+  const Phases phases(bases, couplings, lanes, storage_->coefficient_scale, work);
   run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance, scheduler);
 }
 
@@ -450,7 +461,7 @@ void HierarchicalOperator::expand(int channel, std::span<float> transfer) const 
                                                     std::sqrt(storage_->area[row]));
   };
   for (std::size_t b = 0; b < storage_->blocks.size(); ++b) {
-    if (is_moments(storage_->blocks[b])) continue;
+    if (is_cluster_basis(storage_->blocks[b])) continue;
     const BlockOfPositions block =
         block_of_positions(*storage_, *layout_, b, storage_->channel_matrix[channel]);
     for (std::size_t r = 0; r < block.rows.size(); ++r) {

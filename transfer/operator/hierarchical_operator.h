@@ -19,17 +19,18 @@ struct HierarchicalStorage;
 /// Yhat = A^1/2 Y A^-1/2, its patches in an order that keeps neighbours together, cut into blocks
 /// that are dense or of low rank. Of a block and its mirror image one is stored and applied twice.
 ///
-/// The channels share the bases of a low-rank block and have a core each: B_c = U S_c V^T, on the
-/// diagonal B_c = U S_c U^T. Values of a block:
+/// The channels share the bases of a low-rank block and have a coupling matrix each: B_c = U S_c
+/// V^T, on the diagonal B_c = U S_c U^T. Values of a block:
 ///   dense     [matrix][row_count][column_count]
 ///   low-rank  U^T [row_rank][row_count], V^T [column_rank][column_count] (not on the diagonal),
 ///             S [matrix][row_rank][column_rank]
-///   moments   W^T [row_rank][row_count]
-/// In 8 bits U^T, V^T and W^T have row_remainders and column_remainders rows more.
+///   cluster coefficients   W^T [row_rank][row_count]
+/// In 8 bits U^T, V^T and W^T have row_residual_rank and column_residual_rank rows more.
 ///
 /// The bases of large blocks are nested (W. Hackbusch and S. Börm, "Data-sparse approximation by
-/// adaptive H2-matrices", 2002), in one level: U = W D T, in which W has the bases of moments along
-/// its diagonal, D their scales, and T, much shorter than U, is what the block holds.
+/// adaptive H2-matrices", 2002), in one level: U = W D T, in which W has the bases of cluster
+/// coefficients along its diagonal, D their scales, and T, much shorter than U, is what the block
+/// holds.
 ///
 /// An apply streams through the values: all bases of a cluster of patches are kept together,
 /// whichever blocks they belong to, so that one pass over them takes the light of the cluster to

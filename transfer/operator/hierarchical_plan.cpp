@@ -64,17 +64,17 @@ class WantedRuns {
   std::vector<std::uint32_t> before_;
 };
 
-/// The moments that light at any of these positions has come after them.
+/// The cluster coefficients that light at any of these positions has come after them.
 WantedRuns with_moments(const HierarchicalStorage& storage, std::vector<std::uint32_t> positions,
-                        std::size_t position_count, std::size_t moment_count) {
+                        std::size_t position_count, std::size_t cluster_coefficient_count) {
   const WantedRuns wanted(positions, position_count);
   for (const TransferBlock& block : storage.blocks) {
-    if (!is_moments(block) || !wanted.any(block.row_begin, block.row_count)) continue;
+    if (!is_cluster_basis(block) || !wanted.any(block.row_begin, block.row_count)) continue;
     for (std::uint32_t m = 0; m < block.column_count; m += kAlignment) {
       positions.push_back(block.column_begin + m);
     }
   }
-  return {positions, position_count + moment_count};
+  return {positions, position_count + cluster_coefficient_count};
 }
 
 class Planner {
@@ -87,73 +87,78 @@ class Planner {
         layout_(layout),
         plan_(plan),
         positions_(HierarchicalFormat::position_count(storage.area.size())),
-        wanted_(with_moments(storage, plan.targets, positions_, layout.moment_count)),
-        lit_(with_moments(storage, source_positions(storage), positions_, layout.moment_count)),
+        wanted_(with_moments(storage, plan.targets, positions_, layout.cluster_coefficient_count)),
+        lit_(with_moments(storage, source_positions(storage), positions_,
+                          layout.cluster_coefficient_count)),
         in_(layout.coefficient_count),
         out_(layout.coefficient_count),
-        moments_in_(layout.moment_count),
-        moments_out_(layout.moment_count) {}
+        moments_in_(layout.cluster_coefficient_count),
+        moments_out_(layout.cluster_coefficient_count) {}
 
   void make() {
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       const TransferBlock& block = storage_.blocks[b];
-      if (!is_moments(block) && has_values(block)) add_core(block, layout_.places[b]);
+      if (!is_cluster_basis(block) && has_values(block)) add_coupling(block, layout_.places[b]);
     }
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
-      if (is_moments(storage_.blocks[b])) add_moments(storage_.blocks[b], layout_.places[b].row);
+      if (is_cluster_basis(storage_.blocks[b]))
+        add_coefficients(storage_.blocks[b], layout_.places[b].row);
     }
     mark_groups_in();
     for (const Layout::Cluster& cluster : layout_.clusters) add_projections(cluster);
-    const auto first_moment = static_cast<std::uint32_t>(positions_ / kAlignment);
-    add_arrivals(0, first_moment, plan_.arrivals);
-    add_arrivals(first_moment, static_cast<std::uint32_t>(wanted_.run_count()),
-                 plan_.moment_arrivals);
+    const auto first_coefficient = static_cast<std::uint32_t>(positions_ / kAlignment);
+    add_arrivals(0, first_coefficient, plan_.arrivals);
+    add_arrivals(first_coefficient, static_cast<std::uint32_t>(wanted_.run_count()),
+                 plan_.cluster_arrivals);
     count_bases();
     const auto values = [](const BasisPart& part) {
       return std::uint64_t{part.last_rank - part.first_rank} * part.size;
     };
     plan_.projection_parts = share_out(plan_.projections, values);
-    plan_.moment_projection_parts = share_out(plan_.moment_projections, values);
-    const auto entries = [](const auto& core) { return std::uint64_t{core.rows} * core.columns; };
-    plan_.core_parts = share_out(plan_.cores, entries);
+    plan_.cluster_projection_parts = share_out(plan_.cluster_projections, values);
+    const auto entries = [](const auto& coupling) {
+      return std::uint64_t{coupling.rows} * coupling.columns;
+    };
+    plan_.coupling_parts = share_out(plan_.couplings, entries);
     plan_.dense_parts = share_out(plan_.dense, entries);
   }
 
  private:
-  void add_core(const TransferBlock& block, const Layout::Place& place) {
+  void add_coupling(const TransferBlock& block, const Layout::Place& place) {
     const bool to_rows =
         leads({block.column_begin, block.column_count}, {block.row_begin, block.row_count});
     const bool to_columns = !block.on_diagonal() && leads({block.row_begin, block.row_count},
                                                           {block.column_begin, block.column_count});
     if (!to_rows && !to_columns) return;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
-    using Direction = CoreBlock::Direction;
-    const CoreBlock core{.values = place.values,
-                         .rows = dense ? block.row_count : block.row_rank,
-                         .columns = dense ? block.column_count : block.column_rank,
-                         .row = place.row.coefficient,
-                         .column = place.column.coefficient,
-                         .direction = !to_columns ? Direction::kToRows
-                                      : !to_rows  ? Direction::kToColumns
-                                                  : Direction::kBoth,
-                         .row_remainders = place.row.remainders,
-                         .column_remainders = place.column.remainders};
+    using Direction = CouplingBlock::Direction;
+    const CouplingBlock coupling{.values = place.values,
+                                 .rows = dense ? block.row_count : block.row_rank,
+                                 .columns = dense ? block.column_count : block.column_rank,
+                                 .row = place.row.coefficient,
+                                 .column = place.column.coefficient,
+                                 .direction = !to_columns ? Direction::kToRows
+                                              : !to_rows  ? Direction::kToColumns
+                                                          : Direction::kBoth,
+                                 .row_residual_rank = place.row.residual_rank,
+                                 .column_residual_rank = place.column.residual_rank};
     if (dense && storage_.matrix_count == 1) {
-      plan_.dense.push_back({.values = core.values,
-                             .rows = core.rows,
-                             .columns = core.columns,
+      plan_.dense.push_back({.values = coupling.values,
+                             .rows = coupling.rows,
+                             .columns = coupling.columns,
                              .row_position = block.row_begin,
                              .column_position = block.column_begin,
-                             .row_out = core.row,
-                             .column_out = core.column,
-                             .direction = core.direction});
+                             .row_out = coupling.row,
+                             .column_out = coupling.column,
+                             .direction = coupling.direction});
     } else {
-      plan_.cores.push_back(core);
+      plan_.couplings.push_back(coupling);
     }
-    plan_.value_count += std::uint64_t{storage_.matrix_count} * core.rows * core.columns;
-    const DenseEnd rows = whole_end(block.row_begin, core.rows + core.row_remainders, core.row);
-    const DenseEnd columns =
-        whole_end(block.column_begin, core.columns + core.column_remainders, core.column);
+    plan_.value_count += std::uint64_t{storage_.matrix_count} * coupling.rows * coupling.columns;
+    const DenseEnd rows =
+        whole_end(block.row_begin, coupling.rows + coupling.row_residual_rank, coupling.row);
+    const DenseEnd columns = whole_end(
+        block.column_begin, coupling.columns + coupling.column_residual_rank, coupling.column);
     const Positions at_rows{block.row_begin, block.row_count};
     const Positions at_columns{block.column_begin, block.column_count};
     if (to_rows) {
@@ -166,22 +171,22 @@ class Planner {
     }
   }
 
-  void add_moments(const TransferBlock& block, const Layout::End& end) {
+  void add_coefficients(const TransferBlock& block, const Layout::End& end) {
     const auto scale = static_cast<std::uint32_t>(block.column_begin - positions_);
-    const Plan::Moments moments{end.coefficient, block.row_rank, end.remainders, block.column_begin,
-                                scale};
-    const std::uint32_t count = block.row_rank + end.remainders;
+    const Plan::ClusterCoefficients cluster_coefficients{
+        end.coefficient, block.row_rank, end.residual_rank, block.column_begin, scale};
+    const std::uint32_t count = block.row_rank + end.residual_rank;
     const auto any = [&](const std::vector<bool>& marks) {
       const auto first = marks.begin() + scale;
       return std::find(first, first + block.column_count, true) != first + block.column_count;
     };
     if (any(moments_in_)) {
       mark(in_, end.coefficient, count);
-      plan_.moments_in.push_back(moments);
+      plan_.coefficients_in.push_back(cluster_coefficients);
     }
     if (any(moments_out_) && wanted_.any(block.row_begin, block.row_count)) {
       mark(out_, end.coefficient, count);
-      plan_.moments_out.push_back(moments);
+      plan_.coefficients_out.push_back(cluster_coefficients);
     }
   }
 
@@ -194,7 +199,7 @@ class Planner {
     std::uint32_t begin, count;
   };
 
-  /// The moments that a block reads and those that it adds to.
+  /// The cluster coefficients that a block reads and those that it adds to.
   void mark_moments(const Positions& from, const Positions& to) {
     const auto mark_range = [this](std::vector<bool>& marks, const Positions& range) {
       if (range.begin < positions_) return;
@@ -209,7 +214,7 @@ class Planner {
     return lit_.any(from.begin, from.count) && wanted_.any(to.begin, to.count);
   }
 
-  /// What goes into a core and comes out of it; of low rank, whatever the positions.
+  /// What goes into a coupling matrix and comes out of it; of low rank, whatever the positions.
   void add_way(bool dense, const DenseEnd& from, const DenseEnd& to) {
     if (dense) {
       if (storage_.matrix_count > 1) plan_.dense_in.push_back(from);
@@ -261,12 +266,12 @@ class Planner {
             .last_rank = last_rank,
             .first_place = first_place,
             .last_place = last_place,
-            .moments = cluster.begin >= positions_};
+            .cluster_coefficients = cluster.begin >= positions_};
   }
 
   void add_projections(const Layout::Cluster& cluster) {
     std::vector<BasisPart>& parts =
-        cluster.begin < positions_ ? plan_.projections : plan_.moment_projections;
+        cluster.begin < positions_ ? plan_.projections : plan_.cluster_projections;
     visit_marked(in_, cluster, [&](std::uint32_t first, std::uint32_t last) {
       parts.push_back(part_of(cluster, first, last, 0, cluster.size));
     });
@@ -326,7 +331,7 @@ class Planner {
     return (bounds[end] - bounds[begin]) / 2;
   }
 
-  /// Of the runs [first, last) of positions or of moments.
+  /// Of the runs [first, last) of positions or of cluster coefficients.
   void add_arrivals(std::uint32_t first_run, std::uint32_t last_run,
                     std::vector<Plan::Arrival>& arrivals) {
     if (first_run == last_run) return;
@@ -386,9 +391,10 @@ class Planner {
   const HierarchicalStorage& storage_;
   const Layout& layout_;
   Plan& plan_;
-  std::size_t positions_;       ///< of patches, before those of moments
-  WantedRuns wanted_, lit_;     ///< of both
-  std::vector<bool> in_, out_;  ///< which coefficients are needed, before and after cores
+  std::size_t positions_;    ///< of patches, before those of cluster coefficients
+  WantedRuns wanted_, lit_;  ///< of both
+  std::vector<bool> in_,
+      out_;  ///< which coefficients are needed, before and after coupling matrices
   std::vector<bool> moments_in_, moments_out_;
   std::vector<DenseEnd> dense_out_;  ///< whole
 };

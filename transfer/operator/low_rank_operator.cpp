@@ -16,7 +16,7 @@ constexpr std::size_t kTile = LowRankOperator::kTile;
 // Ranks are padded to whole vectors of the widest instruction set.
 constexpr std::size_t kVector = 16;
 
-constexpr std::size_t kRowsPerTask = 64;  // of cores
+constexpr std::size_t kRowsPerTask = 64;  // of coupling matrices
 
 [[noreturn]] void refuse(const std::string& reason) {
   throw Error("low-rank operator: " + reason + "; make the file again");
@@ -67,7 +67,7 @@ LowRankOperator::LowRankOperator(Storage storage) : storage_(std::move(storage))
   const bool half = storage_.precision == Precision::kF16;
   const std::size_t basis = half ? storage_.basis_f16.size() : storage_.basis_f32.size();
   if (basis != tile_count(n) * rank * kTile) refuse("the basis is of another size");
-  if (storage_.core.size() != storage_.matrix_count * rank * rank) {
+  if (storage_.coupling.size() != storage_.matrix_count * rank * rank) {
     refuse("the cores are of another size");
   }
   sqrt_area_.reserve(n);
@@ -77,12 +77,12 @@ LowRankOperator::LowRankOperator(Storage storage) : storage_(std::move(storage))
 
 std::size_t LowRankOperator::bytes() const {
   return storage_.basis_f32.size_bytes() + storage_.basis_f16.size_bytes() +
-         storage_.core.size_bytes();
+         storage_.coupling.size_bytes();
 }
 
 std::size_t LowRankOperator::bytes_per_apply() const {
   const std::size_t twice = storage_.basis_f32.size_bytes() + storage_.basis_f16.size_bytes();
-  return 2 * twice + storage_.core.size_bytes();
+  return 2 * twice + storage_.coupling.size_bytes();
 }
 
 std::size_t LowRankOperator::workspace_size() const {
@@ -117,16 +117,16 @@ void LowRankOperator::add_up(const float* tile_coefficient, float* coefficient) 
 void LowRankOperator::multiply_row(std::size_t channel, std::size_t row, const float* in,
                                    float* out) const {
   const std::size_t rank = storage_.rank;
-  const float* const core =
-      storage_.core.data() + (storage_.channel_matrix[channel] * rank + row) * rank;
+  const float* const coupling =
+      storage_.coupling.data() + (storage_.channel_matrix[channel] * rank + row) * rank;
   const float* const x = in + channel * rank_stride_;
   // Sums of their own for neighbouring entries, so that the loop becomes vectors.
   std::array<float, kVector> sum{};
   std::size_t j = 0;
   for (; j + kVector <= rank; j += kVector) {
-    for (std::size_t v = 0; v < kVector; ++v) sum[v] += core[j + v] * x[j + v];
+    for (std::size_t v = 0; v < kVector; ++v) sum[v] += coupling[j + v] * x[j + v];
   }
-  for (std::size_t v = 0; j + v < rank; ++v) sum[v] += core[j + v] * x[j + v];
+  for (std::size_t v = 0; j + v < rank; ++v) sum[v] += coupling[j + v] * x[j + v];
   float total = 0;
   for (const float s : sum) total += s;
   out[row * kChannelLanes + channel] = total;

@@ -16,7 +16,8 @@ namespace rebounce {
 
 /// Y of one low rank for the whole scene, in its symmetric form Yhat = A^1/2 Y A^-1/2 ~ V S V^T.
 ///
-/// The channels share the basis V, whose columns are orthonormal, and have a symmetric core S each.
+/// The channels share the basis V, whose columns are orthonormal, and have a symmetric coupling
+/// matrix S each.
 class LowRankOperator final : public TransferOperator {
  public:
   /// The basis is kept in tiles of this many patches, so that threads share the patches out.
@@ -30,7 +31,7 @@ class LowRankOperator final : public TransferOperator {
     Precision precision = Precision::kF32;                      ///< of the basis
     SharedArray<float> basis_f32;  ///< [tile_count(n)][rank][kTile], if kF32; zero past patch n
     SharedArray<std::uint16_t> basis_f16;  ///< the same as IEEE half-precision bits, if kF16
-    SharedArray<float> core;               ///< [matrix_count][rank][rank]
+    SharedArray<float> coupling;           ///< [matrix_count][rank][rank]
   };
 
   static std::size_t tile_count(std::size_t patch_count);
@@ -59,7 +60,7 @@ class LowRankOperator final : public TransferOperator {
   /// V^T x of one tile, and the sum [coefficient_size()] of all tiles'.
   void project_tile(std::size_t tile, const float* x, float* tile_coefficient) const;
   void add_up(const float* tile_coefficient, float* coefficient) const;
-  /// One row of the core of a channel.
+  /// One row of the coupling matrix of a channel.
   void multiply_row(std::size_t channel, std::size_t row, const float* in, float* out) const;
   void expand_tile(std::size_t tile, const float* coefficient, float* y) const;
 

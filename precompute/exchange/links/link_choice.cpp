@@ -47,8 +47,8 @@ class Subtree {
 class BlockFitting {
  public:
   BlockFitting(const SpreadTree& tree, const PairSource& pairs, const PatchTable& patches,
-               double price)
-      : tree_(tree), sums_(pairs, patches, tree.tree.patch), price_(price) {}
+               double multiplier)
+      : tree_(tree), sums_(pairs, patches, tree.tree.patch), multiplier_(multiplier) {}
 
   /// The links between two nodes of which the first comes before the second.
   std::vector<AffineLink> fit(const NodePair& block) {
@@ -67,7 +67,7 @@ class BlockFitting {
 
   enum class Kind : std::uint8_t { kUnknown, kNothing, kLink, kSplitA, kSplitB };
   struct Choice {
-    double cost = 0;  ///< squared error and prices
+    double cost = 0;  ///< squared error and multipliers
     Kind kind = Kind::kUnknown;
   };
 
@@ -112,9 +112,9 @@ class BlockFitting {
     Choice best{kForbidden, Kind::kLink};
     if (is_of_one_room(i, j)) {
       const double error = squared_error(i, j, pairs);
-      best.cost = error + price_;
+      best.cost = error + multiplier_;
       // A second link costs more than the first could save.
-      if (error <= price_) return best;
+      if (error <= multiplier_) return best;
     }
     if (const std::uint32_t k = a_.first_child(i); k != kNone) {
       const double split = cost(k, j) + cost(k + 1, j);
@@ -142,7 +142,7 @@ class BlockFitting {
 
   const SpreadTree& tree_;
   SummedPairs sums_;
-  const double price_;
+  const double multiplier_;
   Subtree a_, b_;
   std::vector<Choice> choice_;  ///< [a][b]
 };
@@ -202,7 +202,7 @@ std::vector<AffineLink> links_to_themselves(const SpreadTree& tree, const PairSo
 }  // namespace
 
 std::vector<std::vector<AffineLink>> choose_links(const SpreadTree& tree, const PairSource& pairs,
-                                                  const PatchTable& patches, double price,
+                                                  const PatchTable& patches, double multiplier,
                                                   const Progress& progress) {
   std::vector<NodePair> blocks;
   append_blocks(tree.tree, 0, 0, blocks);
@@ -211,7 +211,7 @@ std::vector<std::vector<AffineLink>> choose_links(const SpreadTree& tree, const 
   ParallelProgress finished(progress, blocks.size());
 #pragma omp parallel
   {
-    BlockFitting fitting(tree, pairs, patches, price);
+    BlockFitting fitting(tree, pairs, patches, multiplier);
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t k = 0; k < blocks.size(); ++k) {
       if (finished.stopped()) continue;

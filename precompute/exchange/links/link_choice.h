@@ -23,12 +23,12 @@ struct SpreadTree {
   }
 };
 
-/// The links, each the least squares of its pairs, of the least squared error plus `price` for
+/// The links, each the least squares of its pairs, of the least squared error plus `multiplier` for
 /// each, for each of the blocks that the pairs are cut into; those of patches with themselves last.
 /// Links are of nodes of one room. The same bits for any number of threads. Throws Cancelled when
 /// `progress` says so.
 std::vector<std::vector<AffineLink>> choose_links(const SpreadTree& tree, const PairSource& pairs,
-                                                  const PatchTable& patches, double price,
+                                                  const PatchTable& patches, double multiplier,
                                                   const Progress& progress);
 
 }  // namespace rebounce

@@ -132,8 +132,8 @@ FormFactorLinks without_links(const ClusterTree& tree) {
   return links;
 }
 
-void check_worth(double worth) {
-  if (!(worth > 0) || !std::isfinite(worth)) {
+void check_error_per_link(double error_per_link) {
+  if (!(error_per_link > 0) || !std::isfinite(error_per_link)) {
     throw Error("links: what each must be worth is to be above 0 and finite");
   }
 }
@@ -159,10 +159,11 @@ SpreadTree spread_tree(ClusterTree clusters, const PatchTable& patches,
 }
 
 FormFactorLinks fit(const SpreadTree& tree, const PairSource& pairs, const Totals& totals,
-                    const PatchTable& patches, double worth, const Progress& progress) {
-  const double price = worth * worth * totals.squared / static_cast<double>(patches.size());
+                    const PatchTable& patches, double error_per_link, const Progress& progress) {
+  const double multiplier =
+      error_per_link * error_per_link * totals.squared / static_cast<double>(patches.size());
   FormFactorLinks links = without_links(tree.tree);
-  for (const auto& of_block : choose_links(tree, pairs, patches, price, progress)) {
+  for (const auto& of_block : choose_links(tree, pairs, patches, multiplier, progress)) {
     for (const AffineLink& link : of_block) append_link(link, links);
   }
   scale_rows(totals.row_sum, patches.area, patches.centroid, links);
@@ -171,27 +172,27 @@ FormFactorLinks fit(const SpreadTree& tree, const PairSource& pairs, const Total
 
 }  // namespace
 
-FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patches, double worth,
-                          const Progress& progress) {
+FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patches,
+                          double error_per_link, const Progress& progress) {
   if (exchange.patch_count() != patches.size() || patches.size() == 0) {
     throw Error("links: form factors and patches differ in number");
   }
-  check_worth(worth);
+  check_error_per_link(error_per_link);
   const std::vector<std::uint32_t> room = find_rooms(exchange);
   const SpreadTree tree =
       spread_tree(build_cluster_tree(patches, 1, 1, room_groups(room)), patches, room);
   return fit(tree, SortedPairs(exchange, tree.tree.patch), totals_of(exchange, patches.area),
-             patches, worth, progress);
+             patches, error_per_link, progress);
 }
 
-FormFactorLinks fit_links(const FormFactorLinks& links, const PatchTable& patches, double worth,
-                          const Progress& progress) {
-  check_worth(worth);
+FormFactorLinks fit_links(const FormFactorLinks& links, const PatchTable& patches,
+                          double error_per_link, const Progress& progress) {
+  check_error_per_link(error_per_link);
   check_links(links, patches.size());
   // In a tree of its own a link would be cut where another's nodes end.
   const SpreadTree tree = spread_tree(tree_of(links), patches, find_rooms(links));
   return fit(tree, LinkedPairs(links, patches, tree.tree.patch), totals_of(links, patches), patches,
-             worth, progress);
+             error_per_link, progress);
 }
 
 }  // namespace rebounce

@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "precompute/base/parallel_progress.h"
+#include "precompute/exchange/pairs/adaptive_row_sampling.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
 #include "precompute/exchange/pairs/row_targets.h"
-#include "precompute/exchange/pairs/second_look.h"
 
 namespace rebounce {
 namespace {
@@ -78,7 +78,7 @@ class RawExchangeBuilder {
         all, [&](std::uint32_t i, Scratch& scratch) { compute_row(i, every, scratch, rows[i]); },
         [&](double done) { return 0.2 + 0.6 * triangle(done); });
     const std::vector<RowTarget> target = row_targets(escape, settings_.hemisphere_rays);
-    const SecondLook look(row_sums(rows, geometry_.areas()), target, row_sum_tolerance());
+    const AdaptiveRowSampling look(row_sums(rows, geometry_.areas()), target, row_sum_tolerance());
     const auto refine = [&](const std::vector<bool>& doubtful, double begin) {
       for_each_patch(
           all,

@@ -40,7 +40,8 @@ inline constexpr int kLargeFactor = 6;
 ///   exchanges, and if those do not agree either the mean of what they and the hemisphere rays say,
 ///   weighted by the inverse of their variances.
 /// - 3. A near pair of many triangles is taken from the hemisphere rays alone.
-/// - 4. Rows whose sum is off its target get more probe rays for every pair (second_look.h).
+/// - 4. Rows whose sum is off its target get more probe rays for every pair
+/// (adaptive_row_sampling.h).
 ///
 /// Rows are shared out among OpenMP threads; the bits do not depend on how many. Throws Cancelled
 /// when `progress` says so.

@@ -63,7 +63,7 @@ void IndirectSolver::iterate(std::span<const Float3> initial_exitance) {
   settings.max_sweeps = method_.sweeps;
   settings.residual = 0;
   settings.measure_residual = false;
-  if (!method_.warm) solver_->forget();
+  if (!method_.warm) solver_->reset();
   microseconds_ = solver_->solve(initial_exitance, settings).microseconds;
   form_factors_->gather(solver_->radiosity(), indirect_irradiance_, workspace_);
 }

@@ -50,9 +50,9 @@ TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
   EXPECT_LT(least, between);
   EXPECT_LE(between, (free + least) / 2);
   EXPECT_LT(between, free);
-  EXPECT_EQ(memory_of_large_transfer(build, 1), 1U);
-  EXPECT_EQ(memory_of_large_transfer(build, kPlenty) + 1,
-            memory_of_large_transfer(build, kPlenty + 1));
+  EXPECT_EQ(memory_of_matrix_free_transfer(build, 1), 1U);
+  EXPECT_EQ(memory_of_matrix_free_transfer(build, kPlenty) + 1,
+            memory_of_matrix_free_transfer(build, kPlenty + 1));
 }
 
 TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {

@@ -46,7 +46,7 @@ struct Built {
 BuildSettings settings_from_links() {
   BuildSettings settings;
   settings.subdivision.patch_count = 500;
-  settings.form_factor_kind = FormFactorKind::kLinks;
+  settings.exchange_source = ExchangeSource::kLinks;
   settings.tolerance = kTolerance;
   settings.store_links = true;
   return settings;
@@ -75,10 +75,10 @@ std::uint64_t least_memory(BuildSettings settings) {
 }
 
 /// Form factors alone.
-Built exchange_of(const std::string& scene, FormFactorKind kind, std::size_t patch_count) {
+Built exchange_of(const std::string& scene, ExchangeSource kind, std::size_t patch_count) {
   BuildSettings settings;
   settings.subdivision.patch_count = patch_count;
-  settings.form_factor_kind = kind;
+  settings.exchange_source = kind;
   settings.operator_kind = OperatorKind::kNoOperator;
   Built built;
   built.data = build_transfer_data(kScenes + scene, settings, built.report);
@@ -147,10 +147,10 @@ TEST(BuildFromLinks, KeepsNoPairsAndIsTheirLightWithTheErrorOnRecord) {
   EXPECT_LT(std::ranges::max(of_links), data.record.error_bound);
 
   // Those that are stored are fewer than those that it was made from.
-  const Built found = exchange_of("furnished_room.gltf", FormFactorKind::kLinks, 500);
+  const Built found = exchange_of("furnished_room.gltf", ExchangeSource::kLinks, 500);
   EXPECT_LT(data.links.pair.size(), found.data.links.pair.size() * 2 / 3);
 
-  const Built pairs = exchange_of("furnished_room.gltf", FormFactorKind::kPairs, 500);
+  const Built pairs = exchange_of("furnished_room.gltf", ExchangeSource::kPairs, 500);
   ASSERT_EQ(pairs.data.patches.area, data.patches.area);
   const auto of_pairs =
       errors_against(lights, ReferenceSolver(pairs.data).indirect_irradiances(lights));
@@ -162,8 +162,8 @@ TEST(BuildFromLinks, KeepsNoPairsAndIsTheirLightWithTheErrorOnRecord) {
 
 TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
   for (const std::string scene : {"furnished_room.gltf", "pavilion.gltf"}) {
-    const Built of_pairs = exchange_of(scene, FormFactorKind::kPairs, 200),
-                of_links = exchange_of(scene, FormFactorKind::kLinks, 200);
+    const Built of_pairs = exchange_of(scene, ExchangeSource::kPairs, 200),
+                of_links = exchange_of(scene, ExchangeSource::kLinks, 200);
     const TransferData &pairs = of_pairs.data, &data = of_links.data;
     const ClosureReport& closure = of_links.report.closure;
     const PatchTable& patches = data.patches;
@@ -232,10 +232,10 @@ TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
 }
 
 TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
-  const auto peak_bytes = [&](FormFactorKind kind, std::uint64_t limit) {
+  const auto peak_bytes = [&](ExchangeSource kind, std::uint64_t limit) {
     BuildSettings settings;
     settings.subdivision.patch_count = 300;
-    settings.form_factor_kind = kind;
+    settings.exchange_source = kind;
     settings.memory_limit_bytes = limit;
     std::uint64_t bytes = 0;
     BuildReport report;
@@ -246,12 +246,12 @@ TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
                  Error);
     return bytes;
   };
-  const std::uint64_t pairs = peak_bytes(FormFactorKind::kPairs, 0),
-                      links = peak_bytes(FormFactorKind::kLinks, pairs - 1);
+  const std::uint64_t pairs = peak_bytes(ExchangeSource::kPairs, 0),
+                      links = peak_bytes(ExchangeSource::kLinks, pairs - 1);
   ASSERT_NE(pairs, links);
-  EXPECT_EQ(peak_bytes(FormFactorKind::kAutomatic, 0), pairs);
-  EXPECT_EQ(peak_bytes(FormFactorKind::kAutomatic, pairs), pairs);
-  EXPECT_EQ(peak_bytes(FormFactorKind::kAutomatic, pairs - 1), links);
+  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, 0), pairs);
+  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, pairs), pairs);
+  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, pairs - 1), links);
 }
 
 }  // namespace

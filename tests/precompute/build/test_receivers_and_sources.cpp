@@ -11,7 +11,7 @@
 
 #include "precompute/build/build.h"
 #include "precompute/compression/hierarchical_transfer.h"
-#include "precompute/compression/large_transfer.h"
+#include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/random_lights.h"
@@ -39,7 +39,7 @@ struct Room {
   PatchTable patches;
   ExchangeMatrix exchange;
   std::shared_ptr<const DenseOperator> dense;
-  Lights shaping, judging, others;
+  Lights training, validation, others;
 };
 
 Room make_room(std::size_t patch_count) {
@@ -54,8 +54,8 @@ Room make_room(std::size_t patch_count) {
   const auto lights = [&](int count, std::uint64_t seed) {
     return test::unshadowed_lights(room.patches, count, seed, 1.6, 1.2);
   };
-  room.shaping = lights(16, 1);
-  room.judging = lights(12, 2);
+  room.training = lights(16, 1);
+  room.validation = lights(12, 2);
   room.others = lights(24, 3);
   return room;
 }
@@ -142,12 +142,12 @@ double mean_error(const Room& room, const TransferOperator& transfer, const Ligh
   return sum / static_cast<double>(lights.size());
 }
 
-TEST(ReceiversAndSources, EntriesAreThoseOfTheWholeAtALowPrice) {
+TEST(ReceiversAndSources, EntriesAreThoseOfTheWholeAtALowMultiplier) {
   for (const Choice& choice : {kChoices[1], kChoices[2]}) {
     SCOPED_TRACE(choice.name);
     const PatchRoles roles = roles_at(room().patches, choice.receivers, choice.sources);
     const HierarchicalOperator transfer(
-        compress_transfer(*room().dense, room().patches, room().shaping, 1e-16, {}, roles));
+        compress_transfer(*room().dense, room().patches, room().training, 1e-16, {}, roles));
     EXPECT_EQ(transfer.roles(), roles);
     EXPECT_LT(entry_error(room(), transfer), 1e-5);
   }
@@ -158,7 +158,7 @@ TEST(ReceiversAndSources, NoBlockIsStoredThatTheyDoNotShare) {
     SCOPED_TRACE(choice.name);
     const PatchRoles roles = roles_at(room().patches, choice.receivers, choice.sources);
     const auto storage =
-        compress_transfer(*room().dense, room().patches, room().shaping, 1e-8, {}, roles);
+        compress_transfer(*room().dense, room().patches, room().training, 1e-8, {}, roles);
     const auto any = [&](std::uint32_t begin, std::uint32_t count, std::uint8_t bit) {
       const std::size_t end = std::min<std::size_t>(begin + count, storage.patch.size());
       return std::any_of(storage.patch.begin() + begin,
@@ -177,7 +177,7 @@ TEST(ReceiversAndSources, NoBlockIsStoredThatTheyDoNotShare) {
 
 TEST(ReceiversAndSources, BytesFallInProportionAtTheSameTolerance) {
   const HierarchicalSettings settings{.tolerance = 0.005};
-  const FittingLights lights{room().shaping, room().judging};
+  const FittingLights lights{room().training, room().validation};
   const auto whole = build_hierarchical_transfer(*room().dense, room().patches, lights, settings);
   // Half of both have a quarter of all pairs, but half of the near ones, which take the most; where
   // only the receivers are fewer, reciprocity had stored what is left out but once.
@@ -202,7 +202,7 @@ TEST(ReceiversAndSources, SameBitsForAnyNumberOfThreads) {
     const int usual = omp_get_max_threads();
     omp_set_num_threads(threads);
     auto storage =
-        compress_transfer(*room().dense, room().patches, room().shaping, 1e-7, {}, roles);
+        compress_transfer(*room().dense, room().patches, room().training, 1e-7, {}, roles);
     omp_set_num_threads(usual);
     return storage;
   };
@@ -222,14 +222,14 @@ int panel_count(const std::filesystem::path& folder) {
 
 TEST(ReceiversAndSources, OnlyTheirColumnsAreSolvedFor) {
   const auto form_factors =
-      compress_form_factors(room().exchange, room().patches, {room().shaping, room().judging},
+      compress_form_factors(room().exchange, room().patches, {room().training, room().validation},
                             {.tolerance = 1e-3, .precision = Precision::kF32});
   const auto build = [&](const PatchRoles& roles, const std::filesystem::path& panels) {
-    LargeTransferSettings settings{.compression = {.tolerance = 0.01}};
+    MatrixFreeTransferSettings settings{.compression = {.tolerance = 0.01}};
     settings.roles = roles;
     settings.checkpoint = panels;
-    return build_large_transfer(*form_factors, room().patches, {room().shaping, room().judging},
-                                settings);
+    return build_matrix_free_transfer(*form_factors, room().patches,
+                                      {room().training, room().validation}, settings);
   };
   const test::TemporaryFolder folder;
   build({}, folder / "all");
@@ -245,10 +245,10 @@ TEST(ReceiversAndSources, OnlyTheirColumnsAreSolvedFor) {
 }
 
 /// What lamps in the first of two rooms do to the second.
-BuildSettings settings_of_rooms(FormFactorKind kind) {
+BuildSettings settings_of_rooms(ExchangeSource kind) {
   BuildSettings settings;
   settings.subdivision.patch_count = 500;
-  settings.form_factor_kind = kind;
+  settings.exchange_source = kind;
   settings.tolerance = 0.01;
   settings.sources = {"mesh:first room", "red wall"};
   settings.receivers = {"second room", "material:blue", "table"};
@@ -267,12 +267,12 @@ Built build(const BuildSettings& settings) {
 }
 
 const Built& rooms_from_pairs() {
-  static const Built built = build(settings_of_rooms(FormFactorKind::kPairs));
+  static const Built built = build(settings_of_rooms(ExchangeSource::kPairs));
   return built;
 }
 
 TEST(ReceiversAndSources, ABuildKeepsItsToleranceForThem) {
-  for (const FormFactorKind kind : {FormFactorKind::kPairs, FormFactorKind::kLinks}) {
+  for (const ExchangeSource kind : {ExchangeSource::kPairs, ExchangeSource::kLinks}) {
     const Built built = build(settings_of_rooms(kind));
     const TransferData& data = built.data;
     const PatchRoles& roles = data.transfer->roles();
@@ -355,14 +355,14 @@ TEST(ReceiversAndSources, TheFileIsTheSameForAnyNumberOfThreads) {
   save_transfer_file(folder / "usual", rooms_from_pairs().data);
   const int threads = omp_get_max_threads();
   omp_set_num_threads(threads + 1);
-  save_transfer_file(folder / "other", build(settings_of_rooms(FormFactorKind::kPairs)).data);
+  save_transfer_file(folder / "other", build(settings_of_rooms(ExchangeSource::kPairs)).data);
   omp_set_num_threads(threads);
   EXPECT_EQ(test::read_bytes(folder / "usual"), test::read_bytes(folder / "other"));
 }
 
 TEST(ReceiversAndSources, OtherOperatorsRefuseThem) {
   for (const OperatorKind kind : {OperatorKind::kDense, OperatorKind::kLowRank}) {
-    BuildSettings settings = settings_of_rooms(FormFactorKind::kPairs);
+    BuildSettings settings = settings_of_rooms(ExchangeSource::kPairs);
     settings.operator_kind = kind;
     test::expect_error([&] { build(settings); }, "hierarchical operators alone");
   }

@@ -258,9 +258,9 @@ struct CompressedRoom {
   std::unique_ptr<CompressedFormFactors> form_factors;
 
   CompressedRoom(const Room& of, double tolerance, Precision precision) : room(of) {
-    const auto shaping = radiosities(100, 132), judging = radiosities(40, 48);
+    const auto training = radiosities(100, 132), validation = radiosities(40, 48);
     form_factors = std::make_unique<CompressedFormFactors>(
-        compress_form_factors(room.exchange, room.patches, {shaping, judging},
+        compress_form_factors(room.exchange, room.patches, {training, validation},
                               {.tolerance = tolerance, .precision = precision}));
   }
 

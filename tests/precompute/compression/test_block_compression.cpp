@@ -35,7 +35,7 @@ VectorXd powers(Index count, double exponent) {
 }
 
 MatrixXd product(const LowRankBlock& block) {
-  return block.row_basis * block.cores.front() * block.column_basis.transpose();
+  return block.row_basis * block.couplings.front() * block.column_basis.transpose();
 }
 
 constexpr double kNoLimit = 1e30;
@@ -45,7 +45,7 @@ TEST(BlockCompression, SaysItsErrorAndTakesTheRankThatPays) {
     const VectorXd singular = powers(size / 2, 2);
     const WideBlock block = block_with(size, singular);
     const double enough = singular[11] * singular[11] * 1.01;
-    const CompressionCost cost{.price = enough / static_cast<double>(2 * size + 12 * 12)};
+    const CompressionCost cost{.multiplier = enough / static_cast<double>(2 * size + 12 * 12)};
     const auto attempt = compress_block(block, cost, kNoLimit, size / 8, 3);
     ASSERT_TRUE(attempt.block);
     EXPECT_GE(attempt.block->row_basis.cols(), 10) << size;
@@ -54,8 +54,8 @@ TEST(BlockCompression, SaysItsErrorAndTakesTheRankThatPays) {
     EXPECT_NEAR(attempt.block->error_squared / error, 1, 1e-6) << size;
     EXPECT_NEAR(
         cost.of(*attempt.block),
-        error + cost.price * cost.size(attempt.block->basis_values(), attempt.block->vectors(),
-                                       attempt.block->core_values()),
+        error + cost.multiplier * cost.size(attempt.block->basis_values(), attempt.block->vectors(),
+                                            attempt.block->coupling_values()),
         1e-9);
   }
 }
@@ -64,8 +64,8 @@ TEST(BlockCompression, VectorsThatCostMoreAreFewer) {
   for (const Index size : {96, 400}) {
     const WideBlock block = block_with(size, powers(size / 2, 1));
     const auto rank = [&](double vector) {
-      const auto attempt =
-          compress_block(block, {.price = 1e-4, .sizes = {.vector = vector}}, kNoLimit, size, 3);
+      const auto attempt = compress_block(block, {.multiplier = 1e-4, .sizes = {.vector = vector}},
+                                          kNoLimit, size, 3);
       return attempt.block ? attempt.block->row_basis.cols() : 0;
     };
     // Energies fall with the square of their number: of directions that take twice as much, some
@@ -79,7 +79,7 @@ TEST(BlockCompression, VectorsThatCostMoreAreFewer) {
 
 TEST(BlockCompression, RefusesWhatCostsMoreThanTheLimit) {
   const WideBlock block = block_with(200, powers(100, 1));
-  const CompressionCost cost{.price = 1e-6};
+  const CompressionCost cost{.multiplier = 1e-6};
   const auto any = compress_block(block, cost, kNoLimit, 200, 3);
   ASSERT_TRUE(any.block);
   EXPECT_FALSE(compress_block(block, cost, 0.9 * cost.of(*any.block), 200, 3).block);
@@ -97,14 +97,14 @@ TEST(BlockCompression, MoreRanksCostNoLessThanWasSaid) {
   for (const VectorXd& singular : spectra) {
     const WideBlock block = block_with(kSize, singular);
     const double energy = block.entries.squaredNorm();
-    for (const double price : {1e-4, 1e-5, 1e-6, 1e-7}) {
-      const CompressionCost cost{.price = price * energy / static_cast<double>(kSize)};
+    for (const double multiplier : {1e-4, 1e-5, 1e-6, 1e-7}) {
+      const CompressionCost cost{.multiplier = multiplier * energy / static_cast<double>(kSize)};
       const auto few = compress_block(block, cost, kNoLimit, kFew, 3);
       const auto any = compress_block(block, cost, kNoLimit, kSize, 3);
       ASSERT_TRUE(few.block && any.block);
       if (any.block->row_basis.cols() > kFew) {
         // The factor by which a sketch misses too much is one in the mean.
-        EXPECT_GE(cost.of(*any.block), 0.95 * few.least_beyond) << singular[1] << ' ' << price;
+        EXPECT_GE(cost.of(*any.block), 0.95 * few.least_beyond) << singular[1] << ' ' << multiplier;
       }
       if (few.least_beyond >= cost.of(*few.block)) ++told;
     }
@@ -114,7 +114,7 @@ TEST(BlockCompression, MoreRanksCostNoLessThanWasSaid) {
 
 TEST(BlockCompression, BlocksThatAreQuicklyTriedSayNothing) {
   const WideBlock block = block_with(128, powers(128, 1));
-  EXPECT_EQ(compress_block(block, {.price = 1e-4}, kNoLimit, 8, 3).least_beyond, 0);
+  EXPECT_EQ(compress_block(block, {.multiplier = 1e-4}, kNoLimit, 8, 3).least_beyond, 0);
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ TEST(HierarchicalTransfer, SaysWhatItMissesByItsError) {
   EXPECT_LT(error, 1e-3);
 }
 
-TEST(HierarchicalTransfer, NearlyEverythingIsExactAtALowPrice) {
+TEST(HierarchicalTransfer, NearlyEverythingIsExactAtALowMultiplier) {
   const Room& room = furnished_room();
   const HierarchicalOperator transfer(
       compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-16));
@@ -109,9 +109,9 @@ TEST(HierarchicalTransfer, NearlyEverythingIsExactAtALowPrice) {
 
 TEST(HierarchicalTransfer, EveryPairOfPositionsIsInOneBlock) {
   const Room& room = furnished_room();
-  for (const double price : {1e-5, 1e-9}) {
+  for (const double multiplier : {1e-5, 1e-9}) {
     const HierarchicalOperator transfer(
-        compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), price));
+        compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), multiplier));
     const std::size_t positions =
         HierarchicalFormat::position_count(room.patches.size()) / HierarchicalFormat::kAlignment;
     std::vector<int> covered(positions * positions, 0);
@@ -164,7 +164,8 @@ TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   const HierarchicalOperator grey(
       compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7));
   EXPECT_EQ(grey.storage().matrix_count, 1U);
-  // The same matrix three times over has the same bases, thrice the cores and dense blocks.
+  // The same matrix three times over has the same bases, thrice the coupling matrices and dense
+  // blocks.
   DenseOperator::Storage thrice = room.dense->storage();
   std::vector<float> tiles;
   for (int c = 0; c < kChannelCount; ++c) {
@@ -180,7 +181,8 @@ TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
 }
 
 TEST(HierarchicalTransfer, TheBrightestRoomFitsHalfPrecision) {
-  // Light is reflected a hundred times, and a coarse operator has it all in few, large cores.
+  // Light is reflected a hundred times, and a coarse operator has it all in few, large coupling
+  // matrices.
   for (const float reflectance : {0.9F, 0.99F}) {
     Scene scene = test::empty_scene({reflectance, reflectance, reflectance});
     test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);

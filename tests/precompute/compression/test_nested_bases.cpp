@@ -1,4 +1,4 @@
-// Moments for the positions of large blocks, on a kernel over the walls of a box.
+// Cluster coefficients for the positions of large blocks, on a kernel over the walls of a box.
 
 #include "precompute/compression/nested_bases.h"
 
@@ -105,7 +105,7 @@ std::vector<std::vector<Float3>> spots(const PatchTable& patches, int count, std
   return lights;
 }
 
-/// A box that is compressed once, without moments.
+/// A box that is compressed once, without cluster coefficients.
 struct CompressedBox {
   PatchTable patches;
   KernelMatrix matrix;
@@ -114,20 +114,20 @@ struct CompressedBox {
   CompressionCost cost;
   Storage plain;
 
-  CompressedBox(int side, double price, const PatchRoles& roles = {})
+  CompressedBox(int side, double multiplier, const PatchRoles& roles = {})
       : patches(box_of(side)),
         matrix(patches, roles),
         frame(compression_frame(matrix, patches, spots(patches, 24, 1))),
         weights(frame.weights()),
-        cost{.price = price, .sizes = {.basis_value = 0.55}} {
+        cost{.multiplier = multiplier, .sizes = {.basis_value = 0.55}} {
     const BlockTreeCompressor compressor(matrix, frame.tree, weights, cost.sizes);
-    plain = compressor.assemble(compressor.compress(compressor.pieces(), price));
+    plain = compressor.assemble(compressor.compress(compressor.pieces(), multiplier));
   }
 
-  Storage nested(double price) const {
+  Storage nested(double multiplier) const {
     const WantedBlocks wanted(frame.roles, frame.tree);
     CompressionCost own = cost;
-    own.price = price;
+    own.multiplier = multiplier;
     return nest_bases(plain, {frame.tree, weights, wanted, own});
   }
 
@@ -174,7 +174,7 @@ TEST(PartSizes, BlocksAreFewerIfEachTakesMore) {
   const CompressedBox& box = large_box();
   const auto compressed = [&](const PartSizes& sizes) {
     const BlockTreeCompressor compressor(box.matrix, box.frame.tree, box.weights, sizes);
-    return compressor.assemble(compressor.compress(compressor.pieces(), box.cost.price));
+    return compressor.assemble(compressor.compress(compressor.pieces(), box.cost.multiplier));
   };
   const Storage usual = compressed({.basis_value = 0.55});
   const Storage fewer = compressed({.basis_value = 0.55, .block = 512});
@@ -183,8 +183,8 @@ TEST(PartSizes, BlocksAreFewerIfEachTakesMore) {
 
 TEST(NestedBases, TakeFewerBytesForLittleMoreError) {
   const CompressedBox& box = large_box();
-  const Storage nested = box.nested(box.cost.price);
-  ASSERT_FALSE(nested.moment_scale.empty());
+  const Storage nested = box.nested(box.cost.multiplier);
+  ASSERT_FALSE(nested.coefficient_scale.empty());
   EXPECT_LT(bytes_of(nested), 0.85 * static_cast<double>(bytes_of(box.plain)));
   for (const Precision precision : {Precision::kF32, Precision::kF16, Precision::kQ8}) {
     const double before = box.mean_error(box.plain, precision);
@@ -193,14 +193,14 @@ TEST(NestedBases, TakeFewerBytesForLittleMoreError) {
   }
 }
 
-TEST(NestedBases, SidesHaveNoMoreVectorsThanMoments) {
-  // Moments at prices far above that of the ranks.
+TEST(NestedBases, SidesHaveNoMoreVectorsThanClusterBases) {
+  // Cluster coefficients at multipliers far above that of the ranks.
   const CompressedBox box(16, 1e-13);
   std::size_t full = 0;
   double last = 0;
   for (const double factor : {1.0, 1e6, 1e8}) {
-    const Storage nested = box.nested(factor * box.cost.price);
-    ASSERT_FALSE(nested.moment_scale.empty());
+    const Storage nested = box.nested(factor * box.cost.multiplier);
+    ASSERT_FALSE(nested.coefficient_scale.empty());
     for (const TransferBlock& block : nested.blocks) {
       ASSERT_LE(block.row_rank, block.row_count);
       ASSERT_LE(block.column_rank, block.column_count);
@@ -215,28 +215,30 @@ TEST(NestedBases, SidesHaveNoMoreVectorsThanMoments) {
   EXPECT_GE(full, 3U);  // or none of this was tried
 }
 
-TEST(NestedBases, ALowerPriceBuysMoreMomentsAndLessError) {
+TEST(NestedBases, ALowerMultiplierBuysMoreClusterBasesAndLessError) {
   const CompressedBox& box = large_box();
   const double before = box.mean_error(box.plain);
   double previous_error = 1;
-  std::size_t previous_moments = 0;
+  std::size_t previous_coefficients = 0;
   for (const double factor : {30.0, 1.0, 0.03}) {
-    const Storage nested = box.nested(factor * box.cost.price);
+    const Storage nested = box.nested(factor * box.cost.multiplier);
     const double error = box.mean_error(nested);
     EXPECT_LT(error, previous_error);
-    EXPECT_GT(nested.moment_scale.size(), previous_moments);
+    EXPECT_GT(nested.coefficient_scale.size(), previous_coefficients);
     previous_error = error;
-    previous_moments = nested.moment_scale.size();
+    previous_coefficients = nested.coefficient_scale.size();
   }
   EXPECT_LT(previous_error, 1.01 * before) << "all that the blocks have is kept";
 }
 
-TEST(NestedBases, VectorsHaveNormOneAndCoresFitHalfPrecision) {
-  // At a low price lengths of moments differ most. Vectors that are all scaled alike, by the
-  // longest of them, leave cores that half precision has as good as nothing for.
+TEST(NestedBases, VectorsHaveNormOneAndCouplingsFitHalfPrecision) {
+  // At a low multiplier lengths of cluster coefficients differ most. Vectors that are all scaled
+  // alike, by the longest of them, leave coupling matrices that half precision has as good as
+  // nothing for.
   const CompressedBox box(16, 1e-13);
-  for (const double factor : {1.0, 1e8}) {  // the second has sides with more vectors than moments
-    const Storage nested = box.nested(factor * box.cost.price);
+  for (const double factor :
+       {1.0, 1e8}) {  // the second has sides with more vectors than cluster coefficients
+    const Storage nested = box.nested(factor * box.cost.multiplier);
     const auto positions =
         static_cast<std::uint32_t>(HierarchicalFormat::position_count(box.patches.size()));
     const float* values = nested.values_f32.data();
@@ -263,16 +265,16 @@ TEST(NestedBases, VectorsHaveNormOneAndCoresFitHalfPrecision) {
 
 TEST(NestedBases, SameBitsForAnyNumberOfThreads) {
   const CompressedBox& box = large_box();
-  const auto make = [&] { return box.nested(box.cost.price); };
+  const auto make = [&] { return box.nested(box.cost.multiplier); };
   const Storage one = test::with_threads(1, make), four = test::with_threads(4, make);
   EXPECT_TRUE(std::ranges::equal(one.values_f32, four.values_f32));
-  EXPECT_EQ(one.moment_scale, four.moment_scale);
+  EXPECT_EQ(one.coefficient_scale, four.coefficient_scale);
 }
 
 TEST(NestedBases, WhereThereIsNothingToGainNothingChanges) {
   const CompressedBox box(6, 1e-7);
-  const Storage nested = box.nested(box.cost.price);
-  EXPECT_TRUE(nested.moment_scale.empty());
+  const Storage nested = box.nested(box.cost.multiplier);
+  EXPECT_TRUE(nested.coefficient_scale.empty());
   EXPECT_TRUE(std::ranges::equal(nested.values_f32, box.plain.values_f32));
 }
 
@@ -287,8 +289,8 @@ TEST(NestedBases, ServeReceiversAndSources) {
                          (source ? PatchRoles::kSource : 0));
   }
   const CompressedBox box(kSide, 3e-9, roles);
-  const Storage nested = box.nested(box.cost.price);
-  ASSERT_FALSE(nested.moment_scale.empty());
+  const Storage nested = box.nested(box.cost.multiplier);
+  ASSERT_FALSE(nested.coefficient_scale.empty());
   EXPECT_LT(bytes_of(nested), 0.9 * static_cast<double>(bytes_of(box.plain)));
   EXPECT_LT(box.mean_error(nested, Precision::kQ8),
             1.3 * box.mean_error(box.plain, Precision::kQ8));
@@ -296,14 +298,15 @@ TEST(NestedBases, ServeReceiversAndSources) {
 
 TEST(NestedBases, AreTakenForATolerance) {
   const CompressedBox& box = large_box();
-  const auto shaping = spots(box.patches, 24, 1), judging = spots(box.patches, 24, 3);
+  const auto training = spots(box.patches, 24, 1), validation = spots(box.patches, 24, 3);
   std::size_t bytes[2];
-  for (const bool moments : {false, true}) {
-    const auto op = compress_to_tolerance(box.matrix, box.patches, {shaping, judging},
-                                          {.tolerance = 0.002, .moments = moments});
-    EXPECT_EQ(op->storage().moment_scale.empty(), !moments);
+  for (const bool cluster_coefficients : {false, true}) {
+    const auto op =
+        compress_to_tolerance(box.matrix, box.patches, {training, validation},
+                              {.tolerance = 0.002, .cluster_coefficients = cluster_coefficients});
+    EXPECT_EQ(op->storage().coefficient_scale.empty(), !cluster_coefficients);
     EXPECT_LT(box.mean_error(*op), 0.002);
-    bytes[moments ? 1 : 0] = op->bytes();
+    bytes[cluster_coefficients ? 1 : 0] = op->bytes();
   }
   EXPECT_LT(bytes[1], bytes[0]);
 }

@@ -12,8 +12,8 @@
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "precompute/lights/lit_truth.h"
 #include "precompute/lights/received_light.h"
+#include "precompute/lights/reference_lighting.h"
 #include "tests/support/exchange_samples.h"
 #include "tests/support/scene_data.h"
 #include "tests/support/test_scenes.h"
@@ -61,9 +61,9 @@ void compress(Built& built, double tolerance) {
   const auto lights = [&](std::uint64_t seed) {
     return random_initial_exitances(built.data, built.tracer, LightKind::kPoint, 32, seed);
   };
-  const auto shaping = lights(kSeed + 1), judging = lights(kSeed + 2);
-  built.data.transfer = build_hierarchical_transfer(*built.dense, built.data.patches,
-                                                    {shaping, judging}, {.tolerance = tolerance});
+  const auto training = lights(kSeed + 1), validation = lights(kSeed + 2);
+  built.data.transfer = build_hierarchical_transfer(
+      *built.dense, built.data.patches, {training, validation}, {.tolerance = tolerance});
 }
 
 TEST(MeasuredError, AThousandOtherLightsOfEachKindStayBelowTheBound) {
@@ -78,7 +78,7 @@ TEST(MeasuredError, AThousandOtherLightsOfEachKindStayBelowTheBound) {
           random_initial_exitances(built.data, built.tracer, kind.kind, 1000, kOtherSeed);
       ASSERT_GT(others.size(), 300U);  // most suns shine from below
       const std::vector<double> errors =
-          LitTruth(DenseMatrix(*built.dense), others).errors(*built.data.transfer);
+          ReferenceLighting(DenseMatrix(*built.dense), others).errors(*built.data.transfer);
       const double largest = std::ranges::max(errors);
       std::printf("%s: mean %.4f max %.4f bound %.4f, others at most %.4f\n",
                   std::string(name(kind.kind)).c_str(), kind.mean, kind.max, kind.bound, largest);
@@ -142,7 +142,7 @@ TEST(LightErrors, AreThoseOfTheCheckWhateverTheTruthIsFoundWith) {
   ASSERT_EQ(by_dense.size(), lights.size() - 1) << "one is dark";
   ASSERT_EQ(by_reference.size(), by_dense.size());
   const std::vector<double> errors =
-      LitTruth(DenseMatrix(*built.dense), lights).errors(*built.data.transfer);
+      ReferenceLighting(DenseMatrix(*built.dense), lights).errors(*built.data.transfer);
   for (std::size_t k = 0; k < errors.size(); ++k) {
     EXPECT_NEAR(by_dense[k].error, errors[k], 1e-6 * errors[k]);
     EXPECT_NEAR(by_reference[k].error, errors[k], 1e-5);
@@ -153,7 +153,7 @@ TEST(LightErrors, AreThoseOfTheCheckWhateverTheTruthIsFoundWith) {
   }
 }
 
-TEST(LitTruth, LightFromWhichNothingArrivesIsLeftOut) {
+TEST(ReferenceLighting, LightFromWhichNothingArrivesIsLeftOut) {
   const Built built = build(room(), 200);
   // A patch that sees nothing, as the floor in a box that has no bottom.
   ExchangeMatrix exchange;
@@ -169,7 +169,7 @@ TEST(LitTruth, LightFromWhichNothingArrivesIsLeftOut) {
   std::vector<std::vector<Float3>> lights(3, std::vector<Float3>(n + 1, Float3{0, 0, 0}));
   lights[1][n] = {1, 1, 1};
   lights[2][0] = {1, 1, 1};
-  EXPECT_EQ(LitTruth(FormFactorMatrix(exchange, area), lights).light_count(), 1U);
+  EXPECT_EQ(ReferenceLighting(FormFactorMatrix(exchange, area), lights).light_count(), 1U);
 }
 
 /// Three patches of 1 m², of which the last gives next to nothing to the second.

@@ -113,7 +113,7 @@ TEST(ReferenceSolution, IsThatOfCholesky) {
 TEST(ReferenceSolution, LightsTogetherAreThoseAlone) {
   const Room room({0.7F, 0.5F, 0.9F});
   const ReferenceSolver solver(room.exchange, room.patches);
-  std::vector<std::vector<Float3>> lights = room.lights(ReferenceSolver::kTogether + 3);
+  std::vector<std::vector<Float3>> lights = room.lights(ReferenceSolver::kBatchLights + 3);
   std::ranges::fill(lights[2], Float3{0, 0, 0});
   const auto together = solver.radiosities(lights, 1e-12);
   const auto gathered = solver.indirect_irradiances(lights, 1e-12);
@@ -166,7 +166,7 @@ TEST(ReferenceSolution, SolvesOnCompressedFormFactorsToSinglePrecision) {
   data.patches = room.patches;
   data.compressed_form_factors = test::dense_blocks(room.exchange, room.patches.area);
   const ReferenceSolver exact(room.exchange, room.patches), compressed(data);
-  const auto lights = room.lights(ReferenceSolver::kTogether + 1);
+  const auto lights = room.lights(ReferenceSolver::kBatchLights + 1);
   const auto truths = exact.indirect_irradiances(lights),
              found = compressed.indirect_irradiances(lights);
   for (std::size_t k = 0; k < lights.size(); ++k) {
@@ -202,7 +202,7 @@ TEST(ReferenceSolution, IsTheSameWithAnyPreconditioner) {
   PatchTable darker = room.patches;
   darker.reflectance.assign(darker.size(), {0.6F, 0.6F, 0.6F});
   const std::size_t n = room.patches.size();
-  const auto lights = room.lights(ReferenceSolver::kTogether + 1);
+  const auto lights = room.lights(ReferenceSolver::kBatchLights + 1);
   const ReferenceSolver plain(room.exchange, room.patches);
   const auto truths = plain.radiosities(lights, 1e-12);
   const std::shared_ptr<const TransferOperator> operators[] = {

@@ -273,7 +273,7 @@ TEST_P(EveryMethod, ErrorShrinksAtLeastByTheLargestReflectance) {
   double bound = 1;
   for (int sweeps = 1; sweeps <= 8; ++sweeps) {
     bound *= rho;
-    solver->forget();
+    solver->reset();
     solver->solve(c.system.initial_exitance, {.max_sweeps = sweeps, .residual = 0});
     EXPECT_LE(c.error(solver->radiosity(), truth), bound) << sweeps;
   }
@@ -289,7 +289,7 @@ TEST_P(EveryMethod, WarmStartIsCheaperThanACold) {
   const int warm = solver->solve(c.system.initial_exitance, settings).sweeps;
   EXPECT_LT(warm, cold);
   EXPECT_LE(c.error(solver->radiosity(), c.system.eliminate()), 5e-5);
-  solver->forget();
+  solver->reset();
   EXPECT_EQ(solver->solve(c.system.initial_exitance, settings).sweeps, cold);
 }
 
@@ -328,7 +328,7 @@ TEST_P(EveryMethod, ASolveDoesNotAllocate) {
   const auto solver = c.solver(method());
   std::vector<Float3> radiosity(kPatchCount);
   solver->solve(c.system.initial_exitance);  // threads and their buffers are made once
-  solver->forget();
+  solver->reset();
   const int count = test::count_allocations([&] {
     solver->solve(c.system.initial_exitance, {}, radiosity);
     solver->set_reflectance(c.system.reflectance);

@@ -96,7 +96,7 @@ TEST(Parallel, DenseAndLowRankOperatorsHaveTheSameBits) {
   low_rank.rank = 40;
   low_rank.basis_f32 = SharedArray(random_values(LowRankOperator::tile_count(kPatchCount) *
                                                  low_rank.rank * LowRankOperator::kTile));
-  low_rank.core = SharedArray(random_values(low_rank.rank * low_rank.rank));
+  low_rank.coupling = SharedArray(random_values(low_rank.rank * low_rank.rank));
   expect_same_bits(LowRankOperator(std::move(low_rank)));
 }
 

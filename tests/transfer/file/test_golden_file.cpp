@@ -31,7 +31,7 @@ namespace {
 
 constexpr std::size_t kPatchCount = 100;
 
-/// Blocks of all kinds with remainders and scales, bases in bytes; form factors in 16 bits, and a
+/// Blocks of all kinds with residuals and scales, bases in bytes; form factors in 16 bits, and a
 /// few of pairs.
 TransferData sample() {
   const HierarchicalOperator::Storage nested =
@@ -112,10 +112,10 @@ TEST(GoldenFile, HoldsBlocksOfAllKinds) {
   const auto& storage = dynamic_cast<const HierarchicalOperator&>(*data.transfer).storage();
   EXPECT_EQ(storage.precision, Precision::kQ8);
   for (const auto kind : {TransferBlock::Kind::kDense, TransferBlock::Kind::kLowRank,
-                          TransferBlock::Kind::kMoments}) {
+                          TransferBlock::Kind::kClusterBasis}) {
     EXPECT_GT(std::ranges::count(storage.blocks, kind, &TransferBlock::kind), 0);
   }
-  EXPECT_TRUE(std::ranges::any_of(storage.blocks, &TransferBlock::row_remainders));
+  EXPECT_TRUE(std::ranges::any_of(storage.blocks, &TransferBlock::row_residual_rank));
   EXPECT_EQ(storage.scale_exponent.size(), kPatchCount);
 }
 

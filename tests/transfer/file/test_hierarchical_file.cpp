@@ -34,7 +34,7 @@ TransferData sample_data(Precision precision, const PatchRoles& roles = {}) {
   return data;
 }
 
-/// With moments.
+/// With cluster coefficients.
 TransferData nested_data(Precision precision) {
   TransferData data = sample_data(precision);
   data.transfer = std::make_shared<const HierarchicalOperator>(
@@ -64,7 +64,7 @@ void check_round_trip(const TransferData& data) {
   EXPECT_EQ(a.channel_matrix, b.channel_matrix);
   EXPECT_EQ(a.matrix_count, b.matrix_count);
   EXPECT_EQ(a.precision, b.precision);
-  EXPECT_EQ(a.moment_scale, b.moment_scale);
+  EXPECT_EQ(a.coefficient_scale, b.coefficient_scale);
   EXPECT_EQ(a.scale_exponent, b.scale_exponent);
   EXPECT_TRUE(std::ranges::equal(a.values_f32, b.values_f32));
   EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
@@ -78,12 +78,12 @@ void check_round_trip(const TransferData& data) {
   EXPECT_EQ(test::read_bytes(folder / "file"), test::read_bytes(folder / "again"));
 }
 
-TEST(HierarchicalFile, RoundTripsWithAndWithoutMomentsAndScales) {
+TEST(HierarchicalFile, RoundTripsWithAndWithoutClusterBasesAndScales) {
   for (const Precision precision :
        {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
     check_round_trip(sample_data(precision));
     const TransferData nested = nested_data(precision);
-    EXPECT_EQ(storage_of(nested).moment_scale.size(), 16U);
+    EXPECT_EQ(storage_of(nested).coefficient_scale.size(), 16U);
     check_round_trip(nested);
     const TransferData equilibrated = equilibrated_data(precision);
     EXPECT_EQ(storage_of(equilibrated).scale_exponent.size(), kPatchCount);
@@ -91,7 +91,7 @@ TEST(HierarchicalFile, RoundTripsWithAndWithoutMomentsAndScales) {
   }
 }
 
-TEST(HierarchicalFile, SaysNothingOfMomentsAndScalesWhereThereAreNone) {
+TEST(HierarchicalFile, SaysNothingOfClusterBasesAndScalesWhereThereAreNone) {
   const test::TemporaryFolder folder;
   save_transfer_file(folder / "file", sample_data(Precision::kQ8));
   const SafetensorsFile file(folder / "file");
@@ -289,7 +289,7 @@ TEST(HierarchicalFile, RefusesRolesThatAreNotOneForEachPatch) {
   expect_error([&] { load_transfer_file(folder / "file"); }, "transfer.hierarchical.role");
 }
 
-TEST(HierarchicalFile, RefusesMomentsThatDoNotFit) {
+TEST(HierarchicalFile, RefusesClusterBasesThatDoNotFit) {
   const auto refuses = [](const char* tensor, std::size_t entry, std::uint32_t value,
                           const char* message) {
     SCOPED_TRACE(std::string(tensor) + ": " + message);
@@ -314,10 +314,10 @@ TEST(HierarchicalFile, RefusesScalesThatDoNotFit) {
   expect_error([&] { load_transfer_file(folder / "file"); }, "beyond 2^+-24");
 }
 
-TEST(HierarchicalFile, RefusesFormFactorsWithMoments) {
-  const auto moments = std::make_shared<const HierarchicalOperator>(
+TEST(HierarchicalFile, RefusesFormFactorsWithClusterBases) {
+  const auto cluster_coefficients = std::make_shared<const HierarchicalOperator>(
       encode_values(test::random_nested_storage(kPatchCount, 1, 5), Precision::kF16));
-  expect_error([&] { CompressedFormFactors{moments}; }, "have moments");
+  expect_error([&] { CompressedFormFactors{cluster_coefficients}; }, "have moments");
 }
 
 void survive_mutations(const TransferData& data) {

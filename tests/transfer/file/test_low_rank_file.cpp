@@ -45,7 +45,7 @@ LowRankOperator::Storage sample_storage(Precision precision) {
     if (patch >= kPatchCount) basis[k] = 0;
   }
   storage.basis_f32 = SharedArray(std::move(basis));
-  storage.core = SharedArray(random_values(2 * kRank * kRank, engine));
+  storage.coupling = SharedArray(random_values(2 * kRank * kRank, engine));
   return precision == Precision::kF16 ? LowRankOperator::encode_half(storage) : storage;
 }
 
@@ -117,7 +117,7 @@ TEST(LowRankFile, RefusesTensorsThatDoNotFit) {
   const Fault faults[] = {
       {"[2,5,256]", "[5,2,256]"},  // tiles
       {"[2,5,256]", "[2,256,5]"},  // tiles
-      {"[2,5,5]", "[5,2,5]"},      // the core's rank
+      {"[2,5,5]", "[5,2,5]"},      // the coupling matrix's rank
       {"[2,5,5]", "[5,5,2]"},     {"transfer.low_rank.core", "transfer.low_rank.cord"},
   };
   for (const Fault& fault : faults) {

@@ -13,16 +13,17 @@ namespace {
 constexpr std::uint32_t kSide = 64;
 
 /// One block of low rank between two halves of the patches, with orthonormal bases (cosines) and a
-/// core of one matrix whose diagonal is `core`; remainders at its ends.
-HierarchicalStorage block_with(const std::vector<float>& core, std::uint32_t row_remainders = 0,
-                               std::uint32_t column_remainders = 0) {
-  const auto rank = static_cast<std::uint32_t>(core.size());
+/// coupling matrix of one matrix whose diagonal is `coupling`; residuals at its ends.
+HierarchicalStorage block_with(const std::vector<float>& coupling,
+                               std::uint32_t row_residual_rank = 0,
+                               std::uint32_t column_residual_rank = 0) {
+  const auto rank = static_cast<std::uint32_t>(coupling.size());
   HierarchicalStorage storage;
   storage.area.assign(2 * kSide, 1.0F);
   for (std::uint32_t p = 0; p < 2 * kSide; ++p) storage.patch.push_back(p);
   storage.matrix_count = 1;
   storage.blocks.push_back({kSide, kSide, 0, kSide, TransferBlock::Kind::kLowRank, rank, rank,
-                            row_remainders, column_remainders});
+                            row_residual_rank, column_residual_rank});
   std::vector<float> values;
   for (int end = 0; end < 2; ++end) {
     for (std::uint32_t r = 0; r < rank; ++r) {
@@ -33,7 +34,7 @@ HierarchicalStorage block_with(const std::vector<float>& core, std::uint32_t row
     }
   }
   for (std::uint32_t r = 0; r < rank; ++r) {
-    for (std::uint32_t c = 0; c < rank; ++c) values.push_back(r == c ? core[r] : 0);
+    for (std::uint32_t c = 0; c < rank; ++c) values.push_back(r == c ? coupling[r] : 0);
   }
   values.resize(values.size() + HierarchicalFormat::kPadding);
   storage.values_f32 = SharedArray(std::move(values));
@@ -51,24 +52,25 @@ double change(const HierarchicalStorage& exact, const HierarchicalStorage& encod
   return std::sqrt(sum);
 }
 
-TEST(IntegerEncoding, RemaindersAreAsGoodAsSixteenBits) {
-  const std::vector<float> core{1, 0.03F, 0.002F, 0.001F};
-  const double bytes = change(block_with(core), encode_values(block_with(core), Precision::kQ8));
+TEST(IntegerEncoding, ResidualsAreAsGoodAsSixteenBits) {
+  const std::vector<float> coupling{1, 0.03F, 0.002F, 0.001F};
+  const double bytes =
+      change(block_with(coupling), encode_values(block_with(coupling), Precision::kQ8));
   // The step of the largest vectors is 0.18 / 127.
   EXPECT_GT(bytes, 4e-3);
   EXPECT_LT(bytes, 1e-2);
-  const auto exact = block_with(core, 1, 2);
+  const auto exact = block_with(coupling, 1, 2);
   const auto encoded = encode_values(exact, Precision::kQ8);
   EXPECT_EQ(encoded.blocks.front().row_rank, 4U);
-  EXPECT_EQ(encoded.blocks.front().row_remainders, 1U);
-  EXPECT_EQ(encoded.blocks.front().column_remainders, 2U);
+  EXPECT_EQ(encoded.blocks.front().row_residual_rank, 1U);
+  EXPECT_EQ(encoded.blocks.front().column_residual_rank, 2U);
   EXPECT_LT(change(exact, encoded), 1e-3);
   // Five and six vectors instead of four at each end are eight: they come in groups of four.
-  const auto plain = encode_values(block_with(core), Precision::kQ8);
+  const auto plain = encode_values(block_with(coupling), Precision::kQ8);
   EXPECT_EQ(HierarchicalOperator(encoded).bytes(), HierarchicalOperator(plain).bytes() + 8 * kSide);
 }
 
-TEST(IntegerEncoding, RemaindersAtOneEndLeaveTheOther) {
+TEST(IntegerEncoding, ResidualsAtOneEndLeaveTheOther) {
   const auto exact = block_with({1, 0.03F}, 1, 0);
   const double one = change(exact, encode_values(exact, Precision::kQ8));
   const auto plain = block_with({1, 0.03F});
@@ -76,11 +78,11 @@ TEST(IntegerEncoding, RemaindersAtOneEndLeaveTheOther) {
   EXPECT_NEAR(one / none, std::sqrt(0.5), 0.1);
 }
 
-TEST(IntegerEncoding, OthersHaveNoRemainders) {
+TEST(IntegerEncoding, OthersHaveNoResiduals) {
   const auto exact = block_with({1, 0.03F, 0.002F, 0.001F}, 2, 2);
   for (const Precision precision : {Precision::kF16, Precision::kQ16}) {
     const auto encoded = encode_values(exact, precision);
-    EXPECT_EQ(encoded.blocks.front().row_remainders, 0U);
+    EXPECT_EQ(encoded.blocks.front().row_residual_rank, 0U);
     EXPECT_LT(change(exact, encoded), 1e-3);
   }
 }

@@ -305,27 +305,27 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
       {"dense block has a rank",
        [](Storage& s) {
          s.blocks[0].kind = Kind::kDense;
-         s.blocks[0].row_remainders = 1;
+         s.blocks[0].row_residual_rank = 1;
        }},
       {"remainders of a block",
        [](Storage& s) {
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
-         s.blocks[0].row_remainders = s.blocks[0].column_remainders = 3;
+         s.blocks[0].row_residual_rank = s.blocks[0].column_residual_rank = 3;
        }},
       {"remainders of a block",
        [](Storage& s) {
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
-         s.blocks[0].row_remainders = 1;
-         s.blocks[0].column_remainders = 0;
+         s.blocks[0].row_residual_rank = 1;
+         s.blocks[0].column_residual_rank = 0;
        }},
       {"8 bits alone",
        [](Storage& s) {
          s.precision = hierarchical_precision(Precision::kF16);
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
-         s.blocks[0].row_remainders = s.blocks[0].column_remainders = 1;
+         s.blocks[0].row_residual_rank = s.blocks[0].column_residual_rank = 1;
        }},
       {"do not go together", [](Storage& s) { s.precision.couplings = CouplingPrecision::kF16; }},
       {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
@@ -333,7 +333,8 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
       {"number of values",
        [](Storage& s) {
          s.precision = hierarchical_precision(Precision::kF16);
-         for (TransferBlock& block : s.blocks) block.row_remainders = block.column_remainders = 0;
+         for (TransferBlock& block : s.blocks)
+           block.row_residual_rank = block.column_residual_rank = 0;
        }},
   };
   for (std::size_t k = 0; k < faults.size(); ++k) {
@@ -353,7 +354,7 @@ double rounding_of(Precision precision) {
   return precision == Precision::kQ16 ? 5e-4 : precision == Precision::kQ8 ? 1e-4 : 5e-6;
 }
 
-TEST(NestedOperator, TheTestOperatorHasMomentsOnAllSides) {
+TEST(NestedOperator, TheTestOperatorHasClusterBasesOnAllSides) {
   int rows = 0, both = 0, diagonal = 0, neither = 0;
   const std::size_t positions = HierarchicalFormat::position_count(1000);
   for (const std::uint64_t seed : {1U, 6U, 11U, 12U, 1003U}) {
@@ -370,7 +371,7 @@ TEST(NestedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
   for (const std::size_t n : {64U, 500U, 1000U}) {
     for (const std::uint32_t matrices : {1U, 2U, 3U}) {
       const HierarchicalStorage storage = random_nested_storage(n, matrices, n + matrices);
-      ASSERT_FALSE(storage.moment_scale.empty());
+      ASSERT_FALSE(storage.coefficient_scale.empty());
       const std::vector<Float3> m0 = test::random_light(n, n, 100);
       const HierarchicalOperator exact(storage);
       for (const Precision precision : kPrecisions) {
@@ -384,9 +385,9 @@ TEST(NestedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
   }
 }
 
-TEST(NestedOperator, MomentsAreTheProductsThatTheyStandFor) {
-  // One block of rank one over the moments of all positions but its own mirror image's:
-  // Yhat = u v^T + v u^T with u = W D t and v = W D s, written out.
+TEST(NestedOperator, ClusterBasesAreTheProductsThatTheyStandFor) {
+  // One block of rank one over the cluster coefficients of all positions but its own mirror
+  // image's: Yhat = u v^T + v u^T with u = W D t and v = W D s, written out.
   HierarchicalStorage storage;
   storage.area.assign(64, 1.0F);
   storage.patch.resize(64);
@@ -401,11 +402,12 @@ TEST(NestedOperator, MomentsAreTheProductsThatTheyStandFor) {
                               .row_count = 32,
                               .column_begin = 64 + begin / 2,
                               .column_count = 16,
-                              .kind = TransferBlock::Kind::kMoments,
+                              .kind = TransferBlock::Kind::kClusterBasis,
                               .row_rank = 16});
     take(16 * 32, [&](float k) { return std::sin(k + static_cast<float>(begin)); });
   }
-  for (int k = 0; k < 32; ++k) storage.moment_scale.push_back(1 + 0.1F * static_cast<float>(k));
+  for (int k = 0; k < 32; ++k)
+    storage.coefficient_scale.push_back(1 + 0.1F * static_cast<float>(k));
   storage.blocks.push_back({.row_begin = 80,
                             .row_count = 16,
                             .column_begin = 64,
@@ -420,7 +422,8 @@ TEST(NestedOperator, MomentsAreTheProductsThatTheyStandFor) {
   const auto vector_of = [&](std::size_t cell) {
     std::vector<double> u(32);
     for (std::size_t m = 0; m < 16; ++m) {
-      const double t = values[2 * 512 + (1 - cell) * 16 + m] * storage.moment_scale[16 * cell + m];
+      const double t =
+          values[2 * 512 + (1 - cell) * 16 + m] * storage.coefficient_scale[16 * cell + m];
       for (std::size_t k = 0; k < 32; ++k) u[k] += t * values[cell * 512 + m * 32 + k];
     }
     return u;
@@ -469,7 +472,7 @@ TEST(NestedOperator, AllocatesNothing) {
   EXPECT_EQ(test::count_allocations([&] { op.apply(m0, h, workspace); }), 0);
 }
 
-TEST(NestedOperator, RefusesMomentsThatDoNotFit) {
+TEST(NestedOperator, RefusesClusterBasesThatDoNotFit) {
   using Storage = HierarchicalStorage;
   struct Fault {
     const char* message;
@@ -483,11 +486,11 @@ TEST(NestedOperator, RefusesMomentsThatDoNotFit) {
       {"moments are of no positions", [](Storage& s) { s.blocks[0].row_count = 24; }},
       {"rank of moments", [](Storage& s) { s.blocks[0].row_rank = 4; }},
       {"rank of moments", [](Storage& s) { s.blocks[0].column_rank = 1; }},
-      {"rank of moments", [](Storage& s) { s.blocks[0].row_remainders = 6; }},
-      {"rank of moments", [](Storage& s) { s.blocks[0].column_remainders = 1; }},
-      {"one scale for each moment", [](Storage& s) { s.moment_scale.pop_back(); }},
-      {"one scale for each moment", [](Storage& s) { s.moment_scale.push_back(1); }},
-      {"not finite", [](Storage& s) { s.moment_scale[3] = std::nanf(""); }},
+      {"rank of moments", [](Storage& s) { s.blocks[0].row_residual_rank = 6; }},
+      {"rank of moments", [](Storage& s) { s.blocks[0].column_residual_rank = 1; }},
+      {"one scale for each moment", [](Storage& s) { s.coefficient_scale.pop_back(); }},
+      {"one scale for each moment", [](Storage& s) { s.coefficient_scale.push_back(1); }},
+      {"not finite", [](Storage& s) { s.coefficient_scale[3] = std::nanf(""); }},
       {"reaches outside",
        [](Storage& s) {
          for (TransferBlock& block : s.blocks) {
@@ -767,23 +770,23 @@ void check_integer_bases(const BasisKernels<Value>& kernels, std::size_t rank, s
 
 /// Products that are written over what they are of are the same.
 template <typename Value>
-void check_in_place(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
-                    const CoreBlock& core, const ChannelLanes& lanes, std::size_t lights,
+void check_in_place(CouplingKernel<Value> multiply_couplings, const std::vector<Value>& values,
+                    const CouplingBlock& coupling, const ChannelLanes& lanes, std::size_t lights,
                     const std::vector<float>& in, const std::vector<float>& out) {
-  std::vector<float> both = in, taken(taken_size(core.rows, core.columns));
+  std::vector<float> both = in, taken(taken_size(coupling.rows, coupling.columns));
   const std::size_t stride = in.size() / lights;
-  multiply_cores(values.data(), {&core, 1}, lanes, lights, {both.data(), stride},
-                 {both.data(), stride}, taken.data());
+  multiply_couplings(values.data(), {&coupling, 1}, lanes, lights, {both.data(), stride},
+                     {both.data(), stride}, taken.data());
   for (std::size_t k = 0; k < both.size(); ++k) {
     EXPECT_EQ(both[k], out[k] == kUntouched ? in[k] : out[k]) << k;
   }
 }
 
 template <typename Value>
-void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& values,
-                const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
-                std::size_t lights, std::uint32_t matrices = 2) {
-  using Direction = CoreBlock::Direction;
+void check_coupling(CouplingKernel<Value> multiply_couplings, const std::vector<Value>& values,
+                    const std::vector<float>& plain, std::uint32_t rows, std::uint32_t columns,
+                    std::size_t lights, std::uint32_t matrices = 2) {
+  using Direction = CouplingBlock::Direction;
   constexpr std::uint32_t kRow = 3, kColumn = 99, kEnd = 200;
   const std::uint32_t last = matrices - 1;
   const std::array<std::uint32_t, 3> matrix{last, 0, last};
@@ -791,12 +794,13 @@ void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& valu
   std::vector<float> in = random.floats(lights * kEnd * kChannelLanes);
   const ChannelLanes lanes(matrix, matrices);
   for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
-    const CoreBlock core{8, rows, columns, kRow, kColumn, direction};
+    const CouplingBlock coupling{8, rows, columns, kRow, kColumn, direction};
     std::vector<float> out(lights * kEnd * kChannelLanes, kUntouched);
     std::vector<float> taken(taken_size(rows, columns));
-    multiply_cores(values.data(), {&core, 1}, lanes, lights, {in.data(), kEnd * kChannelLanes},
-                   {out.data(), kEnd * kChannelLanes}, taken.data());
-    check_in_place(multiply_cores, values, core, lanes, lights, in, out);
+    multiply_couplings(values.data(), {&coupling, 1}, lanes, lights,
+                       {in.data(), kEnd * kChannelLanes}, {out.data(), kEnd * kChannelLanes},
+                       taken.data());
+    check_in_place(multiply_couplings, values, coupling, lanes, lights, in, out);
     for (std::size_t v = 0; v < 3 * lights; ++v) {
       const auto at = [v](std::size_t k) { return (v / 3 * kEnd + k) * kChannelLanes + v % 3; };
       const auto entry = [&](std::size_t i, std::size_t j) {
@@ -827,7 +831,7 @@ void check_core(CoreKernel<Value> multiply_cores, const std::vector<Value>& valu
 template <typename Value>
 class DenseCheck {
  public:
-  DenseCheck(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+  DenseCheck(const CouplingKernels<Value>& kernels, const std::vector<Value>& values,
              std::span<const float> plain, std::size_t lights)
       : kernels_(kernels), values_(values), plain_(plain.subspan(kFirst)), lights_(lights) {
     Random random;
@@ -890,7 +894,7 @@ class DenseCheck {
     for (std::size_t k = 0; k < got.size(); ++k) EXPECT_NEAR(got[k], expected[k], kAllowed) << k;
   }
 
-  const CoreKernels<Value>& kernels_;
+  const CouplingKernels<Value>& kernels_;
   const std::vector<Value>& values_;
   std::span<const float> plain_;
   std::size_t lights_;
@@ -898,7 +902,7 @@ class DenseCheck {
 };
 
 template <typename Value>
-void check_dense(const CoreKernels<Value>& kernels, const std::vector<Value>& values,
+void check_dense(const CouplingKernels<Value>& kernels, const std::vector<Value>& values,
                  const std::vector<float>& plain, std::size_t lights) {
   using Direction = DenseBlock::Direction;
   DenseCheck<Value> dense(kernels, values, plain, lights);
@@ -926,33 +930,34 @@ void check_kernels(const BlockKernels& kernels) {
       }
       const auto rows = static_cast<std::uint32_t>(rank);
       for (const std::uint32_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
-        check_core(kernels.cores_f32.multiply, values, values, rows, columns, lights);
-        check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights);
-        check_core(kernels.cores_f32.multiply, values, values, rows, columns, lights, 1);
-        check_core(kernels.cores_f16.multiply, half, values, rows, columns, lights, 1);
+        check_coupling(kernels.couplings_f32.multiply, values, values, rows, columns, lights);
+        check_coupling(kernels.couplings_f16.multiply, half, values, rows, columns, lights);
+        check_coupling(kernels.couplings_f32.multiply, values, values, rows, columns, lights, 1);
+        check_coupling(kernels.couplings_f16.multiply, half, values, rows, columns, lights, 1);
       }
     }
-    check_dense(kernels.cores_f32, values, values, lights);
-    check_dense(kernels.cores_f16, half, values, lights);
-    check_core(kernels.cores_f32.multiply, values, values, 48, 96, lights);
-    check_core(kernels.cores_f16.multiply, half, values, 96, 32, lights);
+    check_dense(kernels.couplings_f32, values, values, lights);
+    check_dense(kernels.couplings_f16, half, values, lights);
+    check_coupling(kernels.couplings_f32.multiply, values, values, 48, 96, lights);
+    check_coupling(kernels.couplings_f16.multiply, half, values, 96, 32, lights);
   }
   check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
   check_integer_bases(kernels.bases_q8, 134, 304, 1);
 }
 
-TEST(BlockKernels, RemaindersBelongToTheFirstCoefficients) {
+TEST(BlockKernels, ResidualsBelongToTheFirstCoefficients) {
   constexpr std::uint32_t kRows = 5, kColumns = 7, kRow = 3, kColumn = 20, kEnd = 40;
-  constexpr float kScale = HierarchicalFormat::kRemainderScale;
+  constexpr float kScale = HierarchicalFormat::kResidualScale;
   Random random;
   const std::vector<float> values =
       random.floats(kRows * kColumns * 3 + HierarchicalFormat::kPadding);
   const std::vector<float> sent = random.floats(kEnd * kChannelLanes);
   const auto at = [](std::uint32_t k) { return k * kChannelLanes; };
-  const CoreBlock core{0, kRows, kColumns, kRow, kColumn, CoreBlock::Direction::kBoth, 2, 3};
-  CoreBlock plain = core;
-  plain.row_remainders = plain.column_remainders = 0;
-  std::vector<float> whole = sent;  // with what the remainders stand for
+  const CouplingBlock coupling{0, kRows, kColumns, kRow, kColumn, CouplingBlock::Direction::kBoth,
+                               2, 3};
+  CouplingBlock plain = coupling;
+  plain.row_residual_rank = plain.column_residual_rank = 0;
+  std::vector<float> whole = sent;  // with what the residuals stand for
   for (std::size_t k = 0; k < 2 * kChannelLanes; ++k)
     whole[at(kRow) + k] += sent[at(kRow + kRows) + k] / kScale;
   for (std::size_t k = 0; k < 3 * kChannelLanes; ++k)
@@ -962,14 +967,14 @@ TEST(BlockKernels, RemaindersBelongToTheFirstCoefficients) {
     SCOPED_TRACE(set->instruction_set);
     std::vector<float> expected(kEnd * kChannelLanes, kUntouched), out = expected, both = sent;
     std::vector<float> taken(taken_size(kRows, kColumns));
-    const auto multiply = [&](const CoreBlock& block, const std::vector<float>& in,
+    const auto multiply = [&](const CouplingBlock& block, const std::vector<float>& in,
                               std::vector<float>& to) {
-      set->blocks.cores_f32.multiply(values.data(), {&block, 1}, lanes, 1, {in.data(), 0},
-                                     {to.data(), 0}, taken.data());
+      set->blocks.couplings_f32.multiply(values.data(), {&block, 1}, lanes, 1, {in.data(), 0},
+                                         {to.data(), 0}, taken.data());
     };
     multiply(plain, whole, expected);
-    multiply(core, sent, out);
-    multiply(core, both, both);
+    multiply(coupling, sent, out);
+    multiply(coupling, both, both);
     for (const std::vector<float>* products : {&out, &both}) {
       for (std::uint32_t k = 0; k < kEnd; ++k) {
         const bool of_row = k >= kRow + kRows && k < kRow + kRows + 2;

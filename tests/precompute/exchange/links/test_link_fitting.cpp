@@ -38,8 +38,8 @@ Pairs pairs_of(const Scene& scene, std::size_t patch_count) {
   return {std::move(model), std::move(exchange)};
 }
 
-FormFactorLinks fitted(const Pairs& pairs, double worth = kLinkWorth) {
-  return fit_links(pairs.exchange, pairs.patches(), worth);
+FormFactorLinks fitted(const Pairs& pairs, double error_per_link = kErrorPerLink) {
+  return fit_links(pairs.exchange, pairs.patches(), error_per_link);
 }
 
 /// A room with a block on its floor; more patches than a side of the blocks that links are chosen
@@ -90,7 +90,7 @@ TEST(LinkFitting, WorthNextToNothingLinksAreThePairs) {
 
 TEST(LinkFitting, FewerAndTruerThanByRays) {
   const Pairs& pairs = furnished();
-  const FormFactorLinks by_rays = traced(pairs), links = fitted(pairs, 2.5 * kLinkWorth);
+  const FormFactorLinks by_rays = traced(pairs), links = fitted(pairs, 2.5 * kErrorPerLink);
   const double error_by_rays = error_of(pairs, by_rays), error = error_of(pairs, links);
   std::printf("links, error of F times light: %zu, %.4f by rays; %zu, %.4f fitted\n",
               by_rays.pair.size(), error_by_rays, links.pair.size(), error);
@@ -103,10 +103,10 @@ TEST(LinkFitting, WorthMoreLinksAreFewerAndLessTrue) {
   const Pairs& pairs = furnished();
   std::size_t count = pairs.exchange.column.size() + 1;
   double error = 0;
-  for (const double worth : {2e-4, 1e-3, 5e-3}) {
-    const FormFactorLinks links = fitted(pairs, worth);
-    EXPECT_LT(links.pair.size(), count) << worth;
-    EXPECT_GT(error_of(pairs, links), error) << worth;
+  for (const double error_per_link : {2e-4, 1e-3, 5e-3}) {
+    const FormFactorLinks links = fitted(pairs, error_per_link);
+    EXPECT_LT(links.pair.size(), count) << error_per_link;
+    EXPECT_GT(error_of(pairs, links), error) << error_per_link;
     count = links.pair.size();
     error = error_of(pairs, links);
   }
@@ -174,10 +174,10 @@ Pairs tilted_squares() {
 
 TEST(LinkFitting, RoundingOfGradientsIsSmallWhereNodesAreThin) {
   const Pairs pairs = tilted_squares();
-  for (const double worth : {1e-2, 3e-3}) {
-    const FormFactorLinks links = fitted(pairs, worth);
+  for (const double error_per_link : {1e-2, 3e-3}) {
+    const FormFactorLinks links = fitted(pairs, error_per_link);
     EXPECT_LT(links.pair.size(), pairs.exchange.column.size() / 2);
-    EXPECT_LE(error_of(pairs, links), 0.05) << worth;
+    EXPECT_LE(error_of(pairs, links), 0.05) << error_per_link;
   }
 }
 
@@ -225,16 +225,17 @@ TEST(LinkFitting, SameBitsForAnyNumberOfThreads) {
 
 TEST(LinkFitting, StopsWhenAskedTo) {
   const Pairs& pairs = furnished();
-  EXPECT_THROW(fit_links(pairs.exchange, pairs.patches(), kLinkWorth, [](double) { return false; }),
-               Cancelled);
+  EXPECT_THROW(
+      fit_links(pairs.exchange, pairs.patches(), kErrorPerLink, [](double) { return false; }),
+      Cancelled);
 }
 
 TEST(LinkFitting, RefusesWhatDoesNotFit) {
   const Pairs& pairs = furnished();
   test::expect_error([&] { fit_links(ExchangeMatrix(), pairs.patches()); }, "differ in number");
-  for (const double worth : {0.0, -1e-3, std::numeric_limits<double>::infinity(),
-                             std::numeric_limits<double>::quiet_NaN()}) {
-    test::expect_error([&] { fitted(pairs, worth); }, "worth");
+  for (const double error_per_link : {0.0, -1e-3, std::numeric_limits<double>::infinity(),
+                                      std::numeric_limits<double>::quiet_NaN()}) {
+    test::expect_error([&] { fitted(pairs, error_per_link); }, "worth");
   }
 }
 

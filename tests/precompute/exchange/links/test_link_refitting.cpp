@@ -99,13 +99,13 @@ TEST(LinkRefitting, WorthMoreLinksAreFewerAndLessTrue) {
   const Walls walls = two_walls(near_kernel);
   std::size_t count = walls.links.pair.size();
   double error = 1e-3;  // that of bits that gradients have not
-  for (const double worth : {0.02, 0.1, 0.3}) {
-    const FormFactorLinks fewer = fit_links(walls.links, walls.patches, worth);
+  for (const double error_per_link : {0.02, 0.1, 0.3}) {
+    const FormFactorLinks fewer = fit_links(walls.links, walls.patches, error_per_link);
     EXPECT_LT(fewer.pair.size(), count);
     EXPECT_GT(fewer.pair.size(), 1U);
     EXPECT_GT(difference(walls, fewer), error);
     // Another link would have cost more than all the error.
-    EXPECT_LE(difference(walls, fewer), worth * norm(walls) * std::sqrt(count / 32.0));
+    EXPECT_LE(difference(walls, fewer), error_per_link * norm(walls) * std::sqrt(count / 32.0));
     count = fewer.pair.size();
     error = difference(walls, fewer);
   }
@@ -153,7 +153,9 @@ struct TwoRooms {
     return model.patches.centroid[patch][0] < 3.05F;
   }
 
-  FormFactorLinks fewer(double worth) const { return fit_links(links, model.patches, worth); }
+  FormFactorLinks fewer(double error_per_link) const {
+    return fit_links(links, model.patches, error_per_link);
+  }
 
   std::vector<Float3> gathered(const FormFactorLinks& by, const std::vector<Float3>& light) const {
     return gather(LinkedFormFactors(by, model.patches.area, model.patches.centroid), light);
@@ -166,8 +168,8 @@ TEST(LinkRefitting, CarriesNothingThroughAWall) {
   for (std::size_t i = 0; i < light.size(); ++i) {
     if (rooms.is_in_first_room(i)) light[i] = {1, 1, 1};
   }
-  for (const double worth : {kLinkWorth, 1e-2, 0.2}) {
-    const FormFactorLinks coarse = rooms.fewer(worth);
+  for (const double error_per_link : {kErrorPerLink, 1e-2, 0.2}) {
+    const FormFactorLinks coarse = rooms.fewer(error_per_link);
     ASSERT_LT(coarse.pair.size(), rooms.links.pair.size());
     const std::vector<Float3> arrived = rooms.gathered(coarse, light);
     for (std::size_t i = 0; i < light.size(); ++i) {
@@ -181,8 +183,8 @@ TEST(LinkRefitting, KeepsRowSumsOfRooms) {
   const TwoRooms rooms;
   const std::vector<Float3> ones(rooms.model.patches.size(), {1, 1, 1});
   const std::vector<Float3> before = rooms.gathered(rooms.links, ones);
-  for (const double worth : {kLinkWorth, 3e-3}) {
-    const std::vector<Float3> after = rooms.gathered(rooms.fewer(worth), ones);
+  for (const double error_per_link : {kErrorPerLink, 3e-3}) {
+    const std::vector<Float3> after = rooms.gathered(rooms.fewer(error_per_link), ones);
     for (std::size_t i = 0; i < ones.size(); ++i) {
       EXPECT_NEAR(after[i][0], before[i][0], 1e-3) << i;
     }

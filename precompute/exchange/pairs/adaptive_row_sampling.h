@@ -14,10 +14,11 @@ namespace rebounce {
 /// not, and in real scenes they are many. So where there are many doubtful rows, some of them of
 /// each kind - by how far they are off - are looked at first, and the rest of a kind only if these
 /// gained by it.
-class SecondLook {
+class AdaptiveRowSampling {
  public:
   /// `sum` and `target` [n] of the rows; `tolerance` as in is_doubtful_row().
-  SecondLook(std::span<const double> sum, std::span<const RowTarget> target, double tolerance);
+  AdaptiveRowSampling(std::span<const double> sum, std::span<const RowTarget> target,
+                      double tolerance);
 
   /// [n] the rows to look at first.
   const std::vector<bool>& trial() const { return trial_; }

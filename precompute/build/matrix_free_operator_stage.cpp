@@ -6,7 +6,7 @@
 #include "precompute/build/build_record.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/compression/form_factor_compression.h"
-#include "precompute/compression/large_transfer.h"
+#include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/links/link_fitting.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/fitting_lights.h"
@@ -19,10 +19,10 @@
 namespace rebounce {
 namespace {
 
-// Lights that compressed form factors are measured under, and judging points of the operator's that
-// judge them too.
+// Lights that compressed form factors are measured under, and validation points of the operator's
+// that judge them too.
 constexpr int kTestLightCount = 16;
-constexpr std::size_t kFormFactorJudgingCount = 64;
+constexpr std::size_t kFormFactorValidationCount = 64;
 
 // Residual of the radiosities that form factors are fitted to and measured with: what light patches
 // give off matters there, not its third digit.
@@ -43,7 +43,7 @@ Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
       throw Cancelled();
     }
     const Exitances left = exitances.subspan(radiosities.size());
-    const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kTogether));
+    const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kBatchLights));
     for (const auto& solution : solver.radiosities(some, kFittingResidual)) {
       std::vector<Float3>& radiosity = radiosities.emplace_back();
       for (const auto& [r, g, b] : solution) {
@@ -67,9 +67,10 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
   lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
   const Lights tests =
       random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
-  const Exitances shaping = lights.exitances.shaping, judging = lights.exitances.judging;
-  const Exitances few = judging.first(std::min(judging.size(), 1 + kFormFactorJudgingCount));
-  const auto all = static_cast<double>(shaping.size() + few.size() + tests.size());
+  const Exitances training = lights.exitances.training, validation = lights.exitances.validation;
+  const Exitances few =
+      validation.first(std::min(validation.size(), 1 + kFormFactorValidationCount));
+  const auto all = static_cast<double>(training.size() + few.size() + tests.size());
   std::size_t before = 0;
   const auto solve = [&](Exitances some) {
     const double begin = before / all, part = some.size() / all;
@@ -77,8 +78,8 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
     return radiosities_of(solver, some,
                           [&](double done) { return !progress || progress(begin + part * done); });
   };
-  lights.radiosities.shaping = solve(shaping);
-  lights.radiosities.judging = solve(few);
+  lights.radiosities.training = solve(training);
+  lights.radiosities.validation = solve(few);
   lights.test_radiosities = solve(tests);
   return lights;
 }
@@ -88,10 +89,10 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
 double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
                      const PatchRoles& roles, std::span<const float> area) {
   ReceivedLight received;
-  for (std::size_t k = 0; k < exitances.shaping.size(); ++k) {
-    std::vector<Float3> reflected = radiosities.shaping[k];
+  for (std::size_t k = 0; k < exitances.training.size(); ++k) {
+    std::vector<Float3> reflected = radiosities.training[k];
     for (std::size_t i = 0; i < reflected.size(); ++i) {
-      for (int c = 0; c < kChannelCount; ++c) reflected[i][c] -= exitances.shaping[k][i][c];
+      for (int c = 0; c < kChannelCount; ++c) reflected[i][c] -= exitances.training[k][i][c];
     }
     const double all = area_norm(reflected, area);
     roles.keep(PatchRoles::kReceiver, reflected);
@@ -121,7 +122,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
       std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
   const ReferenceSolver reference(links, patches);
   FormFactorLinks fewer = clock.run("fewer links", [&](const Progress& part) {
-    return fit_links(data.links, patches, kLinkWorth, part);
+    return fit_links(data.links, patches, kErrorPerLink, part);
   });
   const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
     // What light patches give off matters here, not its third digit.
@@ -135,16 +136,16 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
                                  {report.form_factor_tolerance, Precision::kF16}, part);
   });
   data.transfer = clock.run("operator", [&](const Progress& part) {
-    LargeTransferSettings settings;
+    MatrixFreeTransferSettings settings;
     settings.compression = {decided.tolerance, *decided.precision};
     settings.roles = roles;
-    settings.memory_limit_bytes =
-        memory_of_large_transfer({patches.size(), data.links.pair.size(),
-                                  distinct_channels(patches.reflectance), roles, decided.tolerance},
-                                 decided.memory_limit_bytes);
+    settings.memory_limit_bytes = memory_of_matrix_free_transfer(
+        {patches.size(), data.links.pair.size(), distinct_channels(patches.reflectance), roles,
+         decided.tolerance},
+        decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;
-    return build_large_transfer(*data.compressed_form_factors, patches, lights.exitances.view(),
-                                settings, part);
+    return build_matrix_free_transfer(*data.compressed_form_factors, patches,
+                                      lights.exitances.view(), settings, part);
   });
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
     report.form_factor_error =

@@ -1,6 +1,6 @@
 // Matrices whose rows and columns are divided by scales, and operators made of them.
 
-#include "precompute/compression/balanced_matrix.h"
+#include "precompute/compression/equilibrated_matrix.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include "precompute/compression/matrix_compression.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "precompute/lights/lit_truth.h"
+#include "precompute/lights/reference_lighting.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/unshadowed_lights.h"
 
@@ -46,17 +46,17 @@ std::vector<std::int8_t> exponents(std::int8_t dark) {
   return result;
 }
 
-TEST(BalancedMatrix, IsTheMatrixOverTheScalesOfBothPatches) {
+TEST(EquilibratedMatrix, IsTheMatrixOverTheScalesOfBothPatches) {
   const DenseMatrix matrix(*room().dense);
   const std::vector<std::int8_t> exponent = exponents(7);
-  const BalancedMatrix balanced(matrix, exponent);
+  const EquilibratedMatrix equilibrated(matrix, exponent);
   std::vector<std::uint32_t> all(room().patches.size());
   std::iota(all.begin(), all.end(), 0U);
   const auto n = static_cast<Index>(all.size());
   MatrixXf before(n, n), after(n, n);
   for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) {
     matrix.entries(m, all, all, before);
-    balanced.entries(m, all, all, after);
+    equilibrated.entries(m, all, all, after);
     for (Index i = 0; i < n; ++i) {
       for (Index j = 0; j < n; ++j) {
         const int scale =
@@ -65,7 +65,7 @@ TEST(BalancedMatrix, IsTheMatrixOverTheScalesOfBothPatches) {
       }
     }
     const MatrixXf x = MatrixXf::Random(n, 3);
-    EXPECT_LT((balanced.multiply(m, x) - after * x).norm(), 1e-5 * (after * x).norm());
+    EXPECT_LT((equilibrated.multiply(m, x) - after * x).norm(), 1e-5 * (after * x).norm());
   }
 }
 
@@ -76,7 +76,7 @@ std::vector<double> single_patch_errors(const SymmetricMatrix& matrix,
   for (std::size_t p = 0; p < transfer.patch_count(); ++p) {
     lights.emplace_back(transfer.patch_count())[p] = {1, 1, 1};
   }
-  return LitTruth(matrix, lights).errors(transfer);
+  return ReferenceLighting(matrix, lights).errors(transfer);
 }
 
 double mean_where(const std::vector<double>& errors, const std::vector<std::int8_t>& exponent,
@@ -90,15 +90,15 @@ double mean_where(const std::vector<double>& errors, const std::vector<std::int8
   return sum / count;
 }
 
-TEST(BalancedMatrix, PatchesOfWhoseLightLittleArrivesAreRoundedAsWellAsOthers) {
+TEST(EquilibratedMatrix, PatchesOfWhoseLightLittleArrivesAreRoundedAsWellAsOthers) {
   // One patch in five exchanges a 64th with others, like those at the bottom of slots.
   const std::vector<std::int8_t> exponent = exponents(6);
   const DenseMatrix matrix(*room().dense);
-  const BalancedMatrix slots(matrix, exponent);
-  const auto shaping = test::unshadowed_lights(room().patches, 24, 1, 2.2, 0.7),
-             judging = test::unshadowed_lights(room().patches, 40, 2, 2.2, 0.7);
+  const EquilibratedMatrix slots(matrix, exponent);
+  const auto training = test::unshadowed_lights(room().patches, 24, 1, 2.2, 0.7),
+             validation = test::unshadowed_lights(room().patches, 40, 2, 2.2, 0.7);
   const auto transfer =
-      compress_to_tolerance(slots, room().patches, {shaping, judging}, {.tolerance = 0.01});
+      compress_to_tolerance(slots, room().patches, {training, validation}, {.tolerance = 0.01});
   const std::vector<double> errors = single_patch_errors(slots, *transfer);
   ASSERT_EQ(errors.size(), exponent.size());
   EXPECT_LT(mean_where(errors, exponent, true), 1.5 * mean_where(errors, exponent, false));

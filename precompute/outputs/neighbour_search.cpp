@@ -1,4 +1,4 @@
-#include "precompute/outputs/giver_search.h"
+#include "precompute/outputs/neighbour_search.h"
 
 #include <algorithm>
 #include <array>
@@ -24,14 +24,14 @@ constexpr std::size_t kSampleCount = 16;
 // twice that; only where surfaces are folded (a carpet, leaves) are there more.
 constexpr std::size_t kMostSamples = 512;
 
-// Candidates that are looked at for kMostGivers in sight: more only where nearly all are hidden.
-constexpr std::size_t kMostLooks = 4 * kMostGivers;
+// Candidates that are looked at for kMostSites in sight: more only where nearly all are hidden.
+constexpr std::size_t kMostLooks = 4 * kMostSites;
 
 }  // namespace
 
-GiverSearch::GiverSearch(const DisplayMesh& mesh, const PatchTriangles& triangles,
-                         std::span<const float> area, std::span<const float> absorbed,
-                         const RayTracer& tracer)
+NeighbourSearch::NeighbourSearch(const DisplayMesh& mesh, const PatchTriangles& triangles,
+                                 std::span<const float> area, std::span<const float> absorbed,
+                                 const RayTracer& tracer)
     : absorbed_(absorbed), tracer_(tracer) {
   const std::size_t n = triangles.patch_count();
   samples_.resize(n * kSampleCount);
@@ -50,28 +50,30 @@ GiverSearch::GiverSearch(const DisplayMesh& mesh, const PatchTriangles& triangle
   finder_.emplace(positions_);
 }
 
-std::vector<Giver> GiverSearch::find(const Receiver& receiver, std::span<const std::uint32_t> own,
-                                     float reach, Scratch& scratch) const {
+std::vector<ReconstructionSite> NeighbourSearch::find(const Receiver& receiver,
+                                                      std::span<const std::uint32_t> own,
+                                                      float reach, Scratch& scratch) const {
   find_candidates(receiver, reach, scratch);
-  std::vector<Giver>& candidates = scratch.candidates_;
-  std::ranges::sort(candidates, [](const Giver& a, const Giver& b) {
+  std::vector<ReconstructionSite>& candidates = scratch.candidates_;
+  std::ranges::sort(candidates, [](const ReconstructionSite& a, const ReconstructionSite& b) {
     return a.weight != b.weight ? a.weight > b.weight : a.patch < b.patch;
   });
   candidates.resize(std::min(candidates.size(), kMostLooks));
   scratch.in_sight_.assign(candidates.size(), 0);
-  std::vector<Giver> givers;
-  for (std::size_t k = 0, looked = 0; k < candidates.size() && givers.size() < kMostGivers; ++k) {
+  std::vector<ReconstructionSite> sites;
+  for (std::size_t k = 0, looked = 0; k < candidates.size() && sites.size() < kMostSites; ++k) {
     if (k == looked) {
-      looked = std::min(candidates.size(), looked + kMostGivers - givers.size());
+      looked = std::min(candidates.size(), looked + kMostSites - sites.size());
       look_at_next(receiver, k, looked, own, scratch);
     }
-    if (scratch.in_sight_[k] != 0) givers.push_back(candidates[k]);
+    if (scratch.in_sight_[k] != 0) sites.push_back(candidates[k]);
   }
-  std::ranges::sort(givers, {}, &Giver::patch);
-  return givers;
+  std::ranges::sort(sites, {}, &ReconstructionSite::patch);
+  return sites;
 }
 
-void GiverSearch::find_candidates(const Receiver& receiver, float reach, Scratch& scratch) const {
+void NeighbourSearch::find_candidates(const Receiver& receiver, float reach,
+                                      Scratch& scratch) const {
   reach = finder_->within(to_float3(receiver.position), reach, kMostSamples, scratch.found_);
   scratch.candidates_.clear();
   for (const auto& [index, distance_squared] : scratch.found_) {
@@ -81,39 +83,39 @@ void GiverSearch::find_candidates(const Receiver& receiver, float reach, Scratch
     const float height = glm::dot(sample.position - receiver.position, receiver.normal);
     if (std::abs(height) <= kPlaneReach * reach) add(sample, distance_squared, reach, scratch);
   }
-  for (const Giver& giver : scratch.candidates_) scratch.slot_[giver.patch] = kNone;
+  for (const ReconstructionSite& site : scratch.candidates_) scratch.slot_[site.patch] = kNone;
 }
 
 /// Counts a sample towards what its patch gives.
-void GiverSearch::add(const Sample& sample, float distance_squared, float reach,
-                      Scratch& scratch) const {
+void NeighbourSearch::add(const Sample& sample, float distance_squared, float reach,
+                          Scratch& scratch) const {
   std::uint32_t& slot = scratch.slot_[sample.patch];
   if (slot == kNone) {
     slot = static_cast<std::uint32_t>(scratch.candidates_.size());
     scratch.candidates_.push_back({sample.patch, 0, reach * reach, {}, {}});
   }
-  Giver& giver = scratch.candidates_[slot];
+  ReconstructionSite& site = scratch.candidates_[slot];
   const float fall = 1 - distance_squared / (reach * reach);
-  giver.weight += sample.share * fall * fall;
-  if (distance_squared > giver.distance_squared) return;
-  giver.distance_squared = distance_squared;
-  giver.position = sample.position;
-  giver.normal = sample.normal;
+  site.weight += sample.share * fall * fall;
+  if (distance_squared > site.distance_squared) return;
+  site.distance_squared = distance_squared;
+  site.position = sample.position;
+  site.normal = sample.normal;
 }
 
 /// Finds which of the candidates [begin, end) are in sight.
-void GiverSearch::look_at_next(const Receiver& receiver, std::size_t begin, std::size_t end,
-                               std::span<const std::uint32_t> own, Scratch& scratch) const {
+void NeighbourSearch::look_at_next(const Receiver& receiver, std::size_t begin, std::size_t end,
+                                   std::span<const std::uint32_t> own, Scratch& scratch) const {
   scratch.rays_.clear();
   const PatchPoint from{to_float3(receiver.inset), to_float3(receiver.normal)};
-  const auto is_own = [&](const Giver& giver) {
-    return std::ranges::find(own, giver.patch) != own.end();
+  const auto is_own = [&](const ReconstructionSite& site) {
+    return std::ranges::find(own, site.patch) != own.end();
   };
   for (std::size_t k = begin; k < end; ++k) {
-    const Giver& giver = scratch.candidates_[k];
-    if (is_own(giver)) continue;
+    const ReconstructionSite& site = scratch.candidates_[k];
+    if (is_own(site)) continue;
     for (const Ray& ray :
-         line_of_sight(from, {to_float3(giver.position), to_float3(giver.normal)}, tracer_)) {
+         line_of_sight(from, {to_float3(site.position), to_float3(site.normal)}, tracer_)) {
       scratch.rays_.push_back(ray);
     }
   }

@@ -18,11 +18,11 @@ std::vector<std::vector<Float3>> products(const SymmetricMatrix& matrix,
 /// Lights, and what a matrix, taken as exact, makes of them: what operators that are made from it
 /// are judged by. Of the lights what its sources give off, and of the truth what arrives at its
 /// receivers.
-class LitTruth {
+class ReferenceLighting {
  public:
   /// `lights`: what the matrix multiplies, initial exitances [n] in lx. Those from
   /// which nothing arrives anywhere are left out.
-  LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights);
+  ReferenceLighting(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights);
 
   std::size_t light_count() const { return lights_.size(); }
 

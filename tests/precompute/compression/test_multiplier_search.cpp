@@ -1,6 +1,6 @@
-// The search for the price against error curves of known shapes.
+// The search for the multiplier against error curves of known shapes.
 
-#include "precompute/compression/price_search.h"
+#include "precompute/compression/multiplier_search.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 namespace rebounce {
 namespace {
 
-constexpr PriceSearch::Range kWanted{0.72, 0.8};
+constexpr MultiplierSearch::Range kWanted{0.72, 0.8};
 
 // Errors of less leave more to save than is left, along kShrinking.
 constexpr double kShrinking = 0.3, kLeastGood = 0.65;
@@ -23,12 +23,12 @@ struct Found {
   int rounds = 0;
 };
 
-Found search(double first_price, const std::function<double(double)>& error_of) {
-  PriceSearch search(first_price, kWanted);
+Found search(double initial_multiplier, const std::function<double(double)>& error_of) {
+  MultiplierSearch search(initial_multiplier, kWanted);
   Found found;
   while (!search.done() && found.rounds < 50) {
-    const double price = search.price();
-    const double error = error_of(price), size = std::pow(price, -kShrinking);
+    const double multiplier = search.multiplier();
+    const double error = error_of(multiplier), size = std::pow(multiplier, -kShrinking);
     if (error <= kWanted.most && size < found.size) {
       found.error = error;
       found.size = size;
@@ -45,49 +45,51 @@ void expect_good(const Found& found, int most_rounds) {
   EXPECT_LE(found.rounds, most_rounds);
 }
 
-TEST(PriceSearch, FindsARootInOneStepFromAnywhereWithinReach) {
+TEST(MultiplierSearch, FindsARootInOneStepFromAnywhereWithinReach) {
   for (const double first : {0.001, 1.0, 500.0}) {
-    expect_good(search(first, [](double price) { return std::sqrt(price); }), 2);
+    expect_good(search(first, [](double multiplier) { return std::sqrt(multiplier); }), 2);
   }
 }
 
-TEST(PriceSearch, LearnsAnotherSlope) {
+TEST(MultiplierSearch, LearnsAnotherSlope) {
   for (const double power : {0.3, 0.4, 0.7, 0.9}) {
     for (const double first : {1e-3, 1e3}) {
       SCOPED_TRACE(power);
-      expect_good(search(first, [=](double price) { return std::pow(price, power); }), 6);
+      expect_good(search(first, [=](double multiplier) { return std::pow(multiplier, power); }), 6);
     }
   }
 }
 
-TEST(PriceSearch, CrossesManyOrdersOfMagnitude) {
-  expect_good(search(1e-12, [](double price) { return std::sqrt(price); }), 6);
-  expect_good(search(1e12, [](double price) { return std::sqrt(price); }), 6);
+TEST(MultiplierSearch, CrossesManyOrdersOfMagnitude) {
+  expect_good(search(1e-12, [](double multiplier) { return std::sqrt(multiplier); }), 6);
+  expect_good(search(1e12, [](double multiplier) { return std::sqrt(multiplier); }), 6);
 }
 
-TEST(PriceSearch, BendsWithAFloorAndACeiling) {
+TEST(MultiplierSearch, BendsWithAFloorAndACeiling) {
   // As operators do: rounding below, everything left out above.
-  const auto error = [](double price) { return std::clamp(3 * std::pow(price, 0.6), 0.2, 100.0); };
+  const auto error = [](double multiplier) {
+    return std::clamp(3 * std::pow(multiplier, 0.6), 0.2, 100.0);
+  };
   for (const double first : {1e-6, 1e-2, 1.0, 1e4}) expect_good(search(first, error), 8);
 }
 
 /// Whether a search ends at an error of 0.6 that a second trial gives, of so much of the size of
 /// the first, whose error was half of it.
 bool ends_at(double part_of_size) {
-  PriceSearch search(1, kWanted);
+  MultiplierSearch search(1, kWanted);
   search.report(0.3, 1000);
   EXPECT_FALSE(search.done());
   search.report(0.6, 1000 * part_of_size);
   return search.done();
 }
 
-TEST(PriceSearch, EndsWhereAnotherTrialWouldSaveLittle) {
+TEST(MultiplierSearch, EndsWhereAnotherTrialWouldSaveLittle) {
   EXPECT_TRUE(ends_at(0.95));
   EXPECT_FALSE(ends_at(0.6));
 }
 
-TEST(PriceSearch, DoesNotEndWhileNoErrorWasGood) {
-  PriceSearch search(1, kWanted);
+TEST(MultiplierSearch, DoesNotEndWhileNoErrorWasGood) {
+  MultiplierSearch search(1, kWanted);
   for (const double error : {5.0, 3.0, 2.0, 0.81}) {
     search.report(error, 1000);
     EXPECT_FALSE(search.done()) << error;
@@ -96,23 +98,27 @@ TEST(PriceSearch, DoesNotEndWhileNoErrorWasGood) {
   EXPECT_TRUE(search.done());
 }
 
-TEST(PriceSearch, StopsAtAJumpThatHasNoGoodError) {
-  const Found found = search(1, [](double price) { return price < 7 ? 0.1 : 5.0; });
+TEST(MultiplierSearch, StopsAtAJumpThatHasNoGoodError) {
+  const Found found = search(1, [](double multiplier) { return multiplier < 7 ? 0.1 : 5.0; });
   EXPECT_LT(found.rounds, 40);
 }
 
-TEST(PriceSearch, ForgetsWhatTheWeightsBeforeGave) {
+TEST(MultiplierSearch, ForgetsWhatTheWeightsBeforeGave) {
   // The first trial errs ten times as much as it would with the weights of all later ones.
   int round = 0;
-  const auto error = [&](double price) { return (round++ == 0 ? 10 : 1) * std::sqrt(price); };
+  const auto error = [&](double multiplier) {
+    return (round++ == 0 ? 10 : 1) * std::sqrt(multiplier);
+  };
   for (const double first : {0.01, 0.5, 20.0}) {
     round = 0;
     expect_good(search(first, error), 5);
   }
 }
 
-TEST(PriceSearch, LeavesAnErrorOfNothing) {
-  expect_good(search(1e-9, [](double price) { return price < 1e-3 ? 0 : std::sqrt(price); }), 10);
+TEST(MultiplierSearch, LeavesAnErrorOfNothing) {
+  expect_good(
+      search(1e-9, [](double multiplier) { return multiplier < 1e-3 ? 0 : std::sqrt(multiplier); }),
+      10);
 }
 
 }  // namespace

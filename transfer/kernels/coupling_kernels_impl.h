@@ -1,7 +1,7 @@
 #pragma once
 
-// Products with the cores of low-rank blocks, whose coefficients have their channels side by side;
-// written once over a vector type `V` (vector_load.h), as basis_kernels_impl.h are.
+// Products with the coupling matrices of low-rank blocks, whose coefficients have their channels
+// side by side; written once over a vector type `V` (vector_load.h), as basis_kernels_impl.h are.
 
 #include <algorithm>
 #include <cstddef>
@@ -14,9 +14,9 @@
 namespace rebounce {
 namespace {
 
-using Direction = CoreBlock::Direction;
+using Direction = CouplingBlock::Direction;
 
-/// Neighbouring entries of a row of a core, whose next ones are `step` values on.
+/// Neighbouring entries of a row of a coupling matrix, whose next ones are `step` values on.
 template <typename V, std::size_t kWide, typename Entries, typename Value>
 REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std::size_t step,
                                      V (&b)[kWide]) {
@@ -27,7 +27,7 @@ REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std
   }
 }
 
-/// What a core takes: its coefficients at both ends.
+/// What a coupling matrix takes: its coefficients at both ends.
 struct TakenEnds {
   const float *row, *column;
 };
@@ -37,21 +37,21 @@ struct TakenEnds {
 /// of as many entries as there are lanes would be two thirds empty. Lanes beyond the last column
 /// read on into the next row: what comes in there is zero, and what comes out is not stored.
 template <typename V, Direction kDirection, std::size_t kWide, typename Entries, typename Value>
-REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBlock& core,
+REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CouplingBlock& coupling,
                                              std::size_t begin, const ChannelLanes& lanes,
                                              const TakenEnds& taken, float* out) {
   constexpr bool kToRows = kDirection != Direction::kToColumns;
   constexpr bool kToColumns = kDirection != Direction::kToRows;
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes, kLast = kWide - 1;
   const Entries entry(lanes);
-  const std::size_t step = core.columns * lanes.matrix_count;
+  const std::size_t step = coupling.columns * lanes.matrix_count;
   const std::size_t last_lanes =
-      (std::min(core.columns - begin, kWide * kEntries) - kLast * kEntries) * kChannelLanes;
+      (std::min(coupling.columns - begin, kWide * kEntries) - kLast * kEntries) * kChannelLanes;
   const Value* const s = values + begin * lanes.matrix_count;
   const float* const row_in = taken.row;
   const float* const column_in = taken.column + begin * kChannelLanes;
-  float* const row_out = out + core.row * kChannelLanes;
-  float* const column_out = out + (core.column + begin) * kChannelLanes;
+  float* const row_out = out + coupling.row * kChannelLanes;
+  float* const column_out = out + (coupling.column + begin) * kChannelLanes;
   V from_columns[kWide], to_columns[kWide];
   unroll<kWide>([&](auto w) REBOUNCE_INLINE {
     to_columns[w] = V::zero();
@@ -60,7 +60,7 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBloc
   if constexpr (kToRows) {
     from_columns[kLast] = V::load_some(column_in + kLast * V::kWidth, last_lanes);
   }
-  for_each_rows<kEntries>(core.rows, [&]<std::size_t kRows>(std::size_t i) REBOUNCE_INLINE {
+  for_each_rows<kEntries>(coupling.rows, [&]<std::size_t kRows>(std::size_t i) REBOUNCE_INLINE {
     V product[kEntries];
     unroll<kEntries>([&](auto r) REBOUNCE_INLINE { product[r] = V::zero(); });
     unroll<kRows>([&](auto r) REBOUNCE_INLINE {
@@ -88,80 +88,82 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CoreBloc
 }
 
 template <typename V, Direction kDirection, typename Entries, typename Value>
-REBOUNCE_INLINE inline void multiply_core(const Value* values, const CoreBlock& core,
-                                          const ChannelLanes& lanes, const TakenEnds& taken,
-                                          float* out) {
+REBOUNCE_INLINE inline void multiply_coupling(const Value* values, const CouplingBlock& coupling,
+                                              const ChannelLanes& lanes, const TakenEnds& taken,
+                                              float* out) {
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes;
-  for_each_rows<V::kCoreVectors>((core.columns + kEntries - 1) / kEntries,
-                                 [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
-                                   multiply_columns<V, kDirection, kWide, Entries>(
-                                       values, core, first * kEntries, lanes, taken, out);
-                                 });
+  for_each_rows<V::kCouplingVectors>((coupling.columns + kEntries - 1) / kEntries,
+                                     [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
+                                       multiply_columns<V, kDirection, kWide, Entries>(
+                                           values, coupling, first * kEntries, lanes, taken, out);
+                                     });
 }
 
-// What there is of remainders is half a vector or less as a rule: masked vectors, as loops that g++
+// What there is of residuals is half a vector or less as a rule: masked vectors, as loops that g++
 // makes of such counts are mostly their beginnings and ends.
 
-/// The coefficients of an end, with what came in for remainders added to those that they belong to.
+/// The coefficients of an end, with what came in for residuals added to those that they belong to.
 /// They are where they are, unless that changes them or they are written over: then in `taken`.
 template <typename V>
 REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
-                                             std::size_t remainders, bool in_place, float* taken) {
-  if (!in_place && remainders == 0) return in;
-  const V scale = V::broadcast(1 / HierarchicalFormat::kRemainderScale);
-  const std::size_t count = rank * kChannelLanes, rest = remainders * kChannelLanes;
+                                             std::size_t residual_rank, bool in_place,
+                                             float* taken) {
+  if (!in_place && residual_rank == 0) return in;
+  const V scale = V::broadcast(1 / HierarchicalFormat::kResidualScale);
+  const std::size_t count = rank * kChannelLanes, rest = residual_rank * kChannelLanes;
   for (std::size_t k = 0; k < count; k += V::kWidth) {
     V coefficients = V::load_some(in + k, std::min(count - k, V::kWidth));
     if (k < rest) {
-      const V remainder = V::load_some(in + count + k, std::min(rest - k, V::kWidth));
-      coefficients = multiply_add(remainder, scale, coefficients);
+      const V residual = V::load_some(in + count + k, std::min(rest - k, V::kWidth));
+      coefficients = multiply_add(residual, scale, coefficients);
     }
     coefficients.store(taken + k);
   }
   return taken;
 }
 
-/// What goes out to remainders.
+/// What goes out to residuals.
 template <typename V>
-REBOUNCE_INLINE inline void spread_remainders(float* out, std::size_t rank,
-                                              std::size_t remainders) {
-  const V scale = V::broadcast(1 / HierarchicalFormat::kRemainderScale);
-  float* const remainder = out + rank * kChannelLanes;
-  const std::size_t count = remainders * kChannelLanes;
+REBOUNCE_INLINE inline void spread_residuals(float* out, std::size_t rank,
+                                             std::size_t residual_rank) {
+  const V scale = V::broadcast(1 / HierarchicalFormat::kResidualScale);
+  float* const residual = out + rank * kChannelLanes;
+  const std::size_t count = residual_rank * kChannelLanes;
   for (std::size_t k = 0; k < count; k += V::kWidth) {
     const std::size_t lanes = std::min(count - k, V::kWidth);
-    multiply(V::load_some(out + k, lanes), scale).store_some(remainder + k, lanes);
+    multiply(V::load_some(out + k, lanes), scale).store_some(residual + k, lanes);
   }
 }
 
-/// A core in its direction, with the remainders at its ends.
+/// A coupling matrix in its direction, with the residuals at its ends.
 template <typename V, Direction kDirection, typename Entries, typename Value>
-REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CoreBlock& core,
+REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CouplingBlock& coupling,
                                           const ChannelLanes& lanes, const float* in, float* out,
                                           float* taken) {
-  const std::size_t row = std::size_t{core.row} * kChannelLanes;
-  const std::size_t column = std::size_t{core.column} * kChannelLanes;
+  const std::size_t row = std::size_t{coupling.row} * kChannelLanes;
+  const std::size_t column = std::size_t{coupling.column} * kChannelLanes;
   const bool in_place = in == out;
   TakenEnds ends{};
   if constexpr (kDirection != Direction::kToColumns) {
-    ends.column = take_end<V>(in + column, core.columns, core.column_remainders, in_place, taken);
+    ends.column =
+        take_end<V>(in + column, coupling.columns, coupling.column_residual_rank, in_place, taken);
   }
   if constexpr (kDirection != Direction::kToRows) {
-    ends.row = take_end<V>(in + row, core.rows, core.row_remainders, in_place,
-                           taken + end_size(core.columns));
+    ends.row = take_end<V>(in + row, coupling.rows, coupling.row_residual_rank, in_place,
+                           taken + end_size(coupling.columns));
   }
-  multiply_core<V, kDirection, Entries>(values, core, lanes, ends, out);
+  multiply_coupling<V, kDirection, Entries>(values, coupling, lanes, ends, out);
   if constexpr (kDirection != Direction::kToColumns) {
-    spread_remainders<V>(out + row, core.rows, core.row_remainders);
+    spread_residuals<V>(out + row, coupling.rows, coupling.row_residual_rank);
   }
   if constexpr (kDirection != Direction::kToRows) {
-    spread_remainders<V>(out + column, core.columns, core.column_remainders);
+    spread_residuals<V>(out + column, coupling.columns, coupling.column_residual_rank);
   }
 }
 
-// Cores are asked for this many before their turn: sweeps and applies leave out what lies between
-// them. Most have two cache lines at most.
-constexpr std::size_t kCoresAhead = 8;
+// Coupling matrices are asked for this many before their turn: sweeps and applies leave out what
+// lies between them. Most have two cache lines at most.
+constexpr std::size_t kCouplingsAhead = 8;
 
 inline void ask_for_two_lines(const void* p) {
   constexpr std::size_t kLine = 64;
@@ -170,27 +172,27 @@ inline void ask_for_two_lines(const void* p) {
 }
 
 template <typename V, typename Entries, typename Value>
-void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
-                         const ChannelLanes& lanes, std::size_t light_count,
-                         Coefficients<const float> in, Coefficients<float> out, float* taken) {
+void multiply_couplings_with(const Value* values, std::span<const CouplingBlock> couplings,
+                             const ChannelLanes& lanes, std::size_t light_count,
+                             Coefficients<const float> in, Coefficients<float> out, float* taken) {
   for (std::size_t l = 0; l < light_count; ++l) {
     const float* const from = in.data + l * in.stride;
     float* const to = out.data + l * out.stride;
-    for (std::size_t k = 0; k < cores.size(); ++k) {
-      const CoreBlock& core = cores[k];
-      const Value* const s = values + core.values;
-      if (k + kCoresAhead < cores.size()) {
-        ask_for_two_lines(values + cores[k + kCoresAhead].values);
+    for (std::size_t k = 0; k < couplings.size(); ++k) {
+      const CouplingBlock& coupling = couplings[k];
+      const Value* const s = values + coupling.values;
+      if (k + kCouplingsAhead < couplings.size()) {
+        ask_for_two_lines(values + couplings[k + kCouplingsAhead].values);
       }
-      switch (core.direction) {
+      switch (coupling.direction) {
         case Direction::kBoth:
-          multiply_ends<V, Direction::kBoth, Entries>(s, core, lanes, from, to, taken);
+          multiply_ends<V, Direction::kBoth, Entries>(s, coupling, lanes, from, to, taken);
           break;
         case Direction::kToRows:
-          multiply_ends<V, Direction::kToRows, Entries>(s, core, lanes, from, to, taken);
+          multiply_ends<V, Direction::kToRows, Entries>(s, coupling, lanes, from, to, taken);
           break;
         case Direction::kToColumns:
-          multiply_ends<V, Direction::kToColumns, Entries>(s, core, lanes, from, to, taken);
+          multiply_ends<V, Direction::kToColumns, Entries>(s, coupling, lanes, from, to, taken);
           break;
       }
     }
@@ -198,17 +200,18 @@ void multiply_cores_with(const Value* values, std::span<const CoreBlock> cores,
 }
 
 template <typename V, typename Value>
-void multiply_cores(const Value* values, std::span<const CoreBlock> cores,
-                    const ChannelLanes& lanes, std::size_t light_count,
-                    Coefficients<const float> in, Coefficients<float> out, float* taken) {
+void multiply_couplings(const Value* values, std::span<const CouplingBlock> couplings,
+                        const ChannelLanes& lanes, std::size_t light_count,
+                        Coefficients<const float> in, Coefficients<float> out, float* taken) {
   if constexpr (V::kWidth == 16) {
     if (lanes.matrix_count == 1) {
       using Entries = typename V::OneMatrixEntries;
-      return multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out, taken);
+      return multiply_couplings_with<V, Entries>(values, couplings, lanes, light_count, in, out,
+                                                 taken);
     }
   }
   using Entries = typename V::template EntryLanes<Value>;
-  multiply_cores_with<V, Entries>(values, cores, lanes, light_count, in, out, taken);
+  multiply_couplings_with<V, Entries>(values, couplings, lanes, light_count, in, out, taken);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Which rows get more rays.
 
-#include "precompute/exchange/pairs/second_look.h"
+#include "precompute/exchange/pairs/adaptive_row_sampling.h"
 
 #include <gtest/gtest.h>
 
@@ -25,26 +25,26 @@ std::size_t count(const std::vector<bool>& rows) {
 
 const std::vector<RowTarget> kTarget(kRows, {1, 0});
 
-TEST(SecondLook, TriesSomeOfEachKind) {
-  const SecondLook look(sums(1.5e-3, 0.1), kTarget, kTolerance);
+TEST(AdaptiveRowSampling, TriesSomeOfEachKind) {
+  const AdaptiveRowSampling look(sums(1.5e-3, 0.1), kTarget, kTolerance);
   EXPECT_EQ(count(look.trial()), 32);
   for (std::size_t i = 0; i < kRows; i += 3) EXPECT_FALSE(look.trial()[i]);
 }
 
-TEST(SecondLook, GoesOnWithTheKindThatGained) {
-  const SecondLook look(sums(1.5e-3, 0.1), kTarget, kTolerance);
+TEST(AdaptiveRowSampling, GoesOnWithTheKindThatGained) {
+  const AdaptiveRowSampling look(sums(1.5e-3, 0.1), kTarget, kTolerance);
   const std::vector<bool> rest = look.rest(sums(0.5e-3, 0.09));
   ASSERT_EQ(rest.size(), kRows);
   for (std::size_t i = 0; i < kRows; ++i) EXPECT_EQ(rest[i], i % 3 == 1 && !look.trial()[i]);
 }
 
-TEST(SecondLook, EndsWhereNoKindGained) {
-  const SecondLook look(sums(1.5e-3, 0.1), kTarget, kTolerance);
+TEST(AdaptiveRowSampling, EndsWhereNoKindGained) {
+  const AdaptiveRowSampling look(sums(1.5e-3, 0.1), kTarget, kTolerance);
   EXPECT_TRUE(look.rest(sums(1.4e-3, 0.1)).empty());
 }
 
-TEST(SecondLook, LeavesRowsAloneThatAddUp) {
-  const SecondLook look(sums(0, 0), kTarget, kTolerance);
+TEST(AdaptiveRowSampling, LeavesRowsAloneThatAddUp) {
+  const AdaptiveRowSampling look(sums(0, 0), kTarget, kTolerance);
   EXPECT_EQ(count(look.trial()), 0);
   EXPECT_TRUE(look.rest(sums(0, 0)).empty());
 }

@@ -12,6 +12,6 @@ namespace rebounce {
 /// largest sixteenth of the errors, 8 at least, on (excesses over a threshold; A. C. Davison and
 /// R. L. Smith, "Models for exceedances over high thresholds", 1990). Of fewer than 32 errors it is
 /// the largest. Measured: notes/operator.md.
-double judged_error(std::span<const double> errors);
+double validation_error(std::span<const double> errors);
 
 }  // namespace rebounce

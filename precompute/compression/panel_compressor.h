@@ -14,22 +14,22 @@
 
 namespace rebounce {
 
-/// The first stage of build_large_transfer: all of Yhat, compressed finely, some panels of
+/// The first stage of build_matrix_free_transfer: all of Yhat, compressed finely, some panels of
 /// neighbouring columns at a time.
-class FirstStage {
+class PanelCompressor {
  public:
   /// Columns of a panel, and rows of the pieces that it is compressed in. Larger pieces save bytes
-  /// that the second stage saves anyway, and at so fine a price take several times as long.
+  /// that the second stage saves anyway, and at so fine a multiplier take several times as long.
   static constexpr std::uint32_t kPanelWidth = 512;
 
   /// Finds how blocks are cut and weighed, and what `checkpoint` has already. `matrix` and
   /// `checkpoint` must outlive the object. Of `panels_together` panels, > 0, the columns are there
   /// at the same time; the bits do not depend on it.
-  FirstStage(PanelMatrix& matrix, const PatchTable& patches,
-             std::span<const std::vector<Float3>> shaping, double price,
-             std::size_t panels_together, const BlockCheckpoint& checkpoint);
-  FirstStage(const FirstStage&) = delete;
-  FirstStage& operator=(const FirstStage&) = delete;
+  PanelCompressor(PanelMatrix& matrix, const PatchTable& patches,
+                  std::span<const std::vector<Float3>> training, double multiplier,
+                  std::size_t panels_together, const BlockCheckpoint& checkpoint);
+  PanelCompressor(const PanelCompressor&) = delete;
+  PanelCompressor& operator=(const PanelCompressor&) = delete;
 
   /// What is left to do, in columns that are solved for.
   double work() const { return work_of(panels_); }
@@ -52,7 +52,7 @@ class FirstStage {
   void run(std::span<Panel> panels, const Progress& progress);
 
   PanelMatrix& matrix_;
-  double price_;
+  double multiplier_;
   std::size_t panels_together_;
   const BlockCheckpoint& checkpoint_;
   CompressionFrame frame_;

@@ -14,14 +14,14 @@
 namespace rebounce {
 
 /// Patches that give to a vertex, at most.
-inline constexpr std::size_t kMostGivers = 16;
+inline constexpr std::size_t kMostSites = 16;
 
 /// A patch with less than this part of its view in the open gives nothing: what little is left of
 /// it is too noisy to show.
 inline constexpr float kMostlyCovered = 0.9F;
 
 /// What a patch gives to one vertex.
-struct Giver {
+struct ReconstructionSite {
   std::uint32_t patch;
   float weight;
   float distance_squared;  ///< of its nearest sample
@@ -40,34 +40,35 @@ struct Receiver {
 
 /// Finds the patches around vertices by points that stand for them. Immutable, usable from any
 /// number of threads.
-class GiverSearch {
+class NeighbourSearch {
  public:
   /// Room for the work of find(), one for each thread.
   class Scratch {
    public:
-    explicit Scratch(const GiverSearch& search) : slot_(search.patch_count(), kNone) {}
+    explicit Scratch(const NeighbourSearch& search) : slot_(search.patch_count(), kNone) {}
 
    private:
-    friend class GiverSearch;
+    friend class NeighbourSearch;
     std::vector<PointFinder::Found> found_;
     std::vector<std::uint32_t> slot_;  ///< [n] place of a patch among the candidates, or kNone
-    std::vector<Giver> candidates_;
+    std::vector<ReconstructionSite> candidates_;
     std::vector<Ray> rays_;
     std::vector<std::uint8_t> in_sight_;  ///< of each candidate
   };
 
   /// `area` (m²) and `absorbed` (part of the view) are of each patch. All must outlive it.
-  GiverSearch(const DisplayMesh& mesh, const PatchTriangles& triangles, std::span<const float> area,
-              std::span<const float> absorbed, const RayTracer& tracer);
+  NeighbourSearch(const DisplayMesh& mesh, const PatchTriangles& triangles,
+                  std::span<const float> area, std::span<const float> absorbed,
+                  const RayTracer& tracer);
 
   std::size_t patch_count() const { return absorbed_.size(); }
 
   /// The patches with samples within `reach` metres of a vertex that face as it does, about in its
-  /// plane and in sight (`own` patches always are): the heaviest kMostGivers of them, ascending.
+  /// plane and in sight (`own` patches always are): the heaviest kMostSites of them, ascending.
   /// The weight is area x (1 - r²/R²)². Where surfaces are folded close together the reach is less,
   /// and of what hides behind something only the heaviest is looked at.
-  std::vector<Giver> find(const Receiver& receiver, std::span<const std::uint32_t> own, float reach,
-                          Scratch& scratch) const;
+  std::vector<ReconstructionSite> find(const Receiver& receiver, std::span<const std::uint32_t> own,
+                                       float reach, Scratch& scratch) const;
 
  private:
   struct Sample {

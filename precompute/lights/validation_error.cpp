@@ -1,4 +1,4 @@
-#include "precompute/lights/judged_error.h"
+#include "precompute/lights/validation_error.h"
 
 #include <algorithm>
 #include <cmath>
@@ -32,7 +32,7 @@ double largest_of_group(std::span<const double> falling) {
 
 }  // namespace
 
-double judged_error(std::span<const double> errors) {
+double validation_error(std::span<const double> errors) {
   std::vector<double> falling(errors.begin(), errors.end());
   std::ranges::sort(falling, std::greater<>());
   const double mean =

@@ -1,6 +1,6 @@
-// What the search for the tolerance makes of the errors of its judging lights.
+// What the search for the tolerance makes of the errors of its validation lights.
 
-#include "precompute/lights/judged_error.h"
+#include "precompute/lights/validation_error.h"
 
 #include <gtest/gtest.h>
 
@@ -18,19 +18,19 @@ std::vector<double> errors(std::size_t count, double usual, const std::vector<do
   return result;
 }
 
-TEST(JudgedError, IsTheMeanOrAThirdOfTheLargestOfAFewLights) {
-  EXPECT_NEAR(judged_error(errors(12, 0.004, {})), 0.004, 1e-12);
-  EXPECT_NEAR(judged_error(errors(12, 0.004, {0.03})), 0.01, 1e-12);
-  EXPECT_NEAR(judged_error(errors(1, 0.004, {})), 0.004, 1e-12);
+TEST(ValidationError, IsTheMeanOrAThirdOfTheLargestOfAFewLights) {
+  EXPECT_NEAR(validation_error(errors(12, 0.004, {})), 0.004, 1e-12);
+  EXPECT_NEAR(validation_error(errors(12, 0.004, {0.03})), 0.01, 1e-12);
+  EXPECT_NEAR(validation_error(errors(1, 0.004, {})), 0.004, 1e-12);
 }
 
-TEST(JudgedError, IsTheMeanWhereAllErrorsAreAlike) {
+TEST(ValidationError, IsTheMeanWhereAllErrorsAreAlike) {
   for (const std::size_t count : {32, 64, 256, 1000}) {
-    EXPECT_NEAR(judged_error(errors(count, 0.004, {})), 0.004, 1e-12);
+    EXPECT_NEAR(validation_error(errors(count, 0.004, {})), 0.004, 1e-12);
   }
 }
 
-TEST(JudgedError, FindsWhatTheLargestOf64LightsIsOfAnExponentialTail) {
+TEST(ValidationError, FindsWhatTheLargestOf64LightsIsOfAnExponentialTail) {
   // 64 of them stay below s log(64 / -log 0.95) with 95 %: 7.13 s.
   for (const std::size_t count : {64, 256, 4096}) {
     double sum = 0;
@@ -40,18 +40,18 @@ TEST(JudgedError, FindsWhatTheLargestOf64LightsIsOfAnExponentialTail) {
     for (int sample = 0; sample < kSamples; ++sample) {
       std::vector<double> drawn(count);
       for (double& e : drawn) e = error(engine);
-      sum += judged_error(drawn);
+      sum += validation_error(drawn);
     }
     EXPECT_NEAR(sum / kSamples, 7.13 * 0.003 / 3, 0.08 * 7.13 * 0.003 / 3) << count << " lights";
   }
 }
 
-TEST(JudgedError, DoesNotDependOnTheOrder) {
+TEST(ValidationError, DoesNotDependOnTheOrder) {
   std::vector<double> many = errors(256, 0.003, {0.022, 0.03, 0.04, 0.05});
-  const double judged = judged_error(many);
+  const double judged = validation_error(many);
   EXPECT_GT(judged, 0.004);
   std::ranges::reverse(many);
-  EXPECT_EQ(judged_error(many), judged);
+  EXPECT_EQ(validation_error(many), judged);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 
 namespace rebounce {
 
-struct LargeTransferSettings {
+struct MatrixFreeTransferSettings {
   HierarchicalSettings compression{};  ///< of the result
   /// What the light of sources does to receivers is solved for and stored: as many columns as there
   /// are of those, whichever are the fewer.
@@ -27,8 +27,8 @@ struct LargeTransferSettings {
   std::filesystem::path checkpoint{};
 };
 
-/// How much of build_large_transfer is done at the same time.
-struct LargeTransferPlan {
+/// How much of build_matrix_free_transfer is done at the same time.
+struct MatrixFreeTransferPlan {
   int thread_count = 1;
   std::size_t panel_count = 1;  ///< of 512 columns each, solved for together
   /// At the peak, form factors not included; in proportion to the number of patches.
@@ -37,8 +37,8 @@ struct LargeTransferPlan {
 
 /// The plan with the most threads, those of OpenMP at most and one at least, that keeps to the
 /// limit of `settings`. Above it is only the plan with one thread: less cannot be done with.
-LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                      const LargeTransferSettings& settings = {});
+MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
+                                                 const MatrixFreeTransferSettings& settings = {});
 
 /// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
 /// are solved for by conjugate gradients, a panel of neighbouring patches at a time, and each panel
@@ -50,9 +50,9 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
 /// Error if the least that it can do with is above the memory limit, if F is not a passive exchange
 /// (I - R G R not positive definite), or if the checkpoint cannot be written, and Cancelled if
 /// asked to stop. The same bits for any number of threads and memory limit, and from a checkpoint.
-std::shared_ptr<const HierarchicalOperator> build_large_transfer(
+std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
     const HierarchicalOperator& form_factors, const PatchTable& patches,
-    const FittingLights& lights, const LargeTransferSettings& settings,
+    const FittingLights& lights, const MatrixFreeTransferSettings& settings,
     const Progress& progress = {});
 
 }  // namespace rebounce

@@ -1,6 +1,6 @@
 // Operators that no matrix of all pairs was made for, against the dense inverse.
 
-#include "precompute/compression/large_transfer.h"
+#include "precompute/compression/matrix_free_transfer.h"
 
 #include <gtest/gtest.h>
 #include <omp.h>
@@ -33,7 +33,7 @@ Lights lights_in(const PatchTable& patches, int count, std::uint64_t seed) {
 }
 
 /// A room of 4 x 3 x 5 m with a black box. How near its form factors are to the truth is of no
-/// importance here.
+/// density_weight here.
 struct Room {
   Room(const Float3& reflectance, std::size_t patch_count) {
     Scene scene = test::room_with_block(reflectance);
@@ -45,25 +45,25 @@ struct Room {
         compute_form_factors(model, test::make_tracer(model), with_quality(FormFactorQuality::kLow))
             .exchange;
     patches = model.patches;
-    shaping = lights_in(patches, 16, 1);
-    judging = lights_in(patches, 12, 2);
+    training = lights_in(patches, 16, 1);
+    validation = lights_in(patches, 12, 2);
   }
 
   PatchTable patches;
   ExchangeMatrix exchange;
   std::shared_ptr<const HierarchicalOperator> form_factors;  ///< exact, but for rounding
-  Lights shaping, judging;
+  Lights training, validation;
 
-  FittingLights lights() const { return {shaping, judging}; }
+  FittingLights lights() const { return {training, validation}; }
 };
 
 /// With the dense inverse, and with blocks of low rank in the form factors.
 struct ColouredRoom : Room {
   ColouredRoom() : Room({0.7F, 0.5F, 0.2F}, 700) {
-    constexpr double kExactPrice = 1e-16;
+    constexpr double kExactMultiplier = 1e-16;
     dense = build_dense_transfer(exchange, patches, Precision::kF32);
-    form_factors = std::make_shared<const HierarchicalOperator>(
-        compress_matrix(FormFactorMatrix(exchange, patches.area), patches, shaping, kExactPrice));
+    form_factors = std::make_shared<const HierarchicalOperator>(compress_matrix(
+        FormFactorMatrix(exchange, patches.area), patches, training, kExactMultiplier));
   }
 
   std::shared_ptr<const DenseOperator> dense;
@@ -98,8 +98,8 @@ constexpr HierarchicalSettings kCoarse{.tolerance = 0.02, .precision = Precision
 std::shared_ptr<const HierarchicalOperator> build(const Room& room,
                                                   const std::filesystem::path& checkpoint = {},
                                                   const Progress& progress = {}) {
-  return build_large_transfer(*room.form_factors, room.patches, room.lights(),
-                              {.compression = kCoarse, .checkpoint = checkpoint}, progress);
+  return build_matrix_free_transfer(*room.form_factors, room.patches, room.lights(),
+                                    {.compression = kCoarse, .checkpoint = checkpoint}, progress);
 }
 
 /// Of the small room, without interruption.
@@ -189,8 +189,9 @@ TEST(SolvedTransfer, ErrorsOfTheStepsAreThoseOfTheRestThatTheyFind) {
   const Eigen::MatrixXf x = Eigen::MatrixXf::Random(room.patches.size(), 20);
   const Eigen::MatrixXf exact = form_factors.multiply(0, x);
   for (const double tolerance : {0.02, 0.1}) {
-    const HierarchicalStorage coarse = compress_matrix(form_factors, room.patches, room.shaping,
-                                                       first_price(tolerance, room.patches.size()));
+    const HierarchicalStorage coarse =
+        compress_matrix(form_factors, room.patches, room.training,
+                        initial_multiplier(tolerance, room.patches.size()));
     const double off = (HierarchicalMatrix(coarse).multiply(0, x) - exact).norm() / exact.norm();
     ASSERT_GT(off, tolerance / 2);
     const SolvedTransfer solved(*room.form_factors, coarse, room.patches, 1e-5);
@@ -234,11 +235,11 @@ TEST(SolvedTransfer, RefusesFormFactorsThatGainLight) {
   test::expect_error([&] { SolvedTransfer(gaining, room.patches, 1e-4); }, "do not converge");
 }
 
-TEST(LargeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
+TEST(MatrixFreeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
   const ColouredRoom& room = coloured_room();
   const HierarchicalSettings settings{.tolerance = 0.005};
-  const auto large = build_large_transfer(*room.form_factors, room.patches, room.lights(),
-                                          {.compression = settings});
+  const auto large = build_matrix_free_transfer(*room.form_factors, room.patches, room.lights(),
+                                                {.compression = settings});
   const auto by_dense =
       build_hierarchical_transfer(*room.dense, room.patches, room.lights(), settings);
   const Lights others = lights_in(room.patches, 24, 3);
@@ -246,14 +247,14 @@ TEST(LargeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
   EXPECT_LT(static_cast<double>(large->bytes()), 1.1 * static_cast<double>(by_dense->bytes()));
 }
 
-TEST(LargeTransfer, TakesAFewPatchesAndNoLights) {
+TEST(MatrixFreeTransfer, TakesAFewPatchesAndNoLights) {
   Scene scene = test::empty_scene();
   test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);
   const PatchModel model = make_patch_model(scene, {.patch_count = 12});
   const FormFactors f = compute_form_factors(model, test::make_tracer(model));
   const HierarchicalOperator form_factors(
       compress_matrix(FormFactorMatrix(f.exchange, model.patches.area), model.patches, {}, 1e-16));
-  const auto large = build_large_transfer(form_factors, model.patches, {}, {});
+  const auto large = build_matrix_free_transfer(form_factors, model.patches, {}, {});
   const auto dense = build_dense_transfer(f.exchange, model.patches, Precision::kF32);
   const std::size_t n = model.patches.size();
   const std::vector<Float3> light(n, {1, 1, 1});
@@ -264,44 +265,45 @@ TEST(LargeTransfer, TakesAFewPatchesAndNoLights) {
   EXPECT_LT(relative_difference(result, truth, model.patches.area), 0.005);
 }
 
-TEST(LargeTransfer, SameBitsForAnyNumberOfThreadsAndAnyMemory) {
+TEST(MatrixFreeTransfer, SameBitsForAnyNumberOfThreadsAndAnyMemory) {
   const Room& room = large_room();
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
   const auto one = build(room);
   omp_set_num_threads(6);
-  const LargeTransferPlan free =
-      plan_large_transfer(room.patches.size(), 1, {.compression = kCoarse});
-  const LargeTransferPlan least = plan_large_transfer(
+  const MatrixFreeTransferPlan free =
+      plan_matrix_free_transfer(room.patches.size(), 1, {.compression = kCoarse});
+  const MatrixFreeTransferPlan least = plan_matrix_free_transfer(
       room.patches.size(), 1, {.compression = kCoarse, .memory_limit_bytes = 1});
   ASSERT_GT(room.patches.size(), 1024U) << "not four panels";
   ASSERT_EQ(free.panel_count, 2U);
   ASSERT_EQ(least.panel_count, 1U);
   const auto six = build(room);
   const auto limited =
-      build_large_transfer(*room.form_factors, room.patches, room.lights(),
-                           {.compression = kCoarse, .memory_limit_bytes = least.peak_bytes});
+      build_matrix_free_transfer(*room.form_factors, room.patches, room.lights(),
+                                 {.compression = kCoarse, .memory_limit_bytes = least.peak_bytes});
   EXPECT_EQ(omp_get_max_threads(), 6) << "left behind";
   omp_set_num_threads(before);
   expect_same(*one, *six);
   expect_same(*one, *limited);
 }
 
-TEST(LargeTransfer, MorePanelsAndThreadsForMoreMemory) {
+TEST(MatrixFreeTransfer, MorePanelsAndThreadsForMoreMemory) {
   const int before = omp_get_max_threads();
   omp_set_num_threads(16);
   for (const std::size_t matrices : {1U, 3U}) {
-    const LargeTransferPlan free = plan_large_transfer(65536, matrices),
-                            least = plan_large_transfer(65536, matrices, {.memory_limit_bytes = 1});
+    const MatrixFreeTransferPlan free = plan_matrix_free_transfer(65536, matrices),
+                                 least = plan_matrix_free_transfer(65536, matrices,
+                                                                   {.memory_limit_bytes = 1});
     EXPECT_EQ(free.thread_count, 16);
     EXPECT_EQ(free.panel_count, matrices == 1 ? 4U : 2U) << "not enough columns for all threads";
     EXPECT_EQ(least.thread_count, 1);
     EXPECT_EQ(least.panel_count, 1U);
-    LargeTransferPlan last = least;
+    MatrixFreeTransferPlan last = least;
     int narrowed = 0;
     for (std::size_t limit = least.peak_bytes; limit < free.peak_bytes; limit += 100 << 20) {
-      const LargeTransferPlan plan =
-          plan_large_transfer(65536, matrices, {.memory_limit_bytes = limit});
+      const MatrixFreeTransferPlan plan =
+          plan_matrix_free_transfer(65536, matrices, {.memory_limit_bytes = limit});
       EXPECT_LE(plan.peak_bytes, limit);
       EXPECT_GE(plan.thread_count, last.thread_count);
       EXPECT_GE(plan.panel_count, last.panel_count);
@@ -313,7 +315,7 @@ TEST(LargeTransfer, MorePanelsAndThreadsForMoreMemory) {
   omp_set_num_threads(before);
 }
 
-TEST(LargeTransfer, GoesOnFromItsFirstStageWithTheSameBits) {
+TEST(MatrixFreeTransfer, GoesOnFromItsPanelCompressorWithTheSameBits) {
   const test::TemporaryFolder folder;
   Times written = build_up_to(folder / "panel_0000");
   ASSERT_EQ(written.size(), 1U);
@@ -324,7 +326,7 @@ TEST(LargeTransfer, GoesOnFromItsFirstStageWithTheSameBits) {
   expect_same(*build(small_room(), folder.path()), uninterrupted());
 }
 
-TEST(LargeTransfer, GoesOnFromItsSecondStageWithTheSameBits) {
+TEST(MatrixFreeTransfer, GoesOnFromItsSecondStageWithTheSameBits) {
   const test::TemporaryFolder folder;
   for (const std::string part : {"round_0_part_0000", "round_1_part_0000"}) {
     const Times written = build_up_to(folder / part);
@@ -336,7 +338,7 @@ TEST(LargeTransfer, GoesOnFromItsSecondStageWithTheSameBits) {
   }
 }
 
-TEST(LargeTransfer, BeginsAnewWhereTheCheckpointIsOfSomethingElseOrDamaged) {
+TEST(MatrixFreeTransfer, BeginsAnewWhereTheCheckpointIsOfSomethingElseOrDamaged) {
   const test::TemporaryFolder folder;
   GreyRoom darker = small_room();
   for (Float3& rho : darker.patches.reflectance) rho[0] = rho[1] = rho[2] = 0.5F * rho[0];
@@ -344,10 +346,10 @@ TEST(LargeTransfer, BeginsAnewWhereTheCheckpointIsOfSomethingElseOrDamaged) {
   expect_same(*build(small_room(), folder.path()), uninterrupted());
 
   // The same first stage, but another second one.
-  GreyRoom judged_otherwise = small_room();
-  std::swap(judged_otherwise.judging.front(), judged_otherwise.judging.back());
+  GreyRoom validated_otherwise = small_room();
+  std::swap(validated_otherwise.validation.front(), validated_otherwise.validation.back());
   const Times before = times_in(folder.path());
-  build(judged_otherwise, folder.path());
+  build(validated_otherwise, folder.path());
   Times after = times_in(folder.path());
   EXPECT_EQ(after["panel_0000"], before.at("panel_0000"));
   EXPECT_NE(after["round_0_part_0000"], before.at("round_0_part_0000"));
@@ -358,7 +360,7 @@ TEST(LargeTransfer, BeginsAnewWhereTheCheckpointIsOfSomethingElseOrDamaged) {
   expect_same(*build(small_room(), folder.path()), uninterrupted());
 }
 
-TEST(LargeTransfer, StopsWhenAsked) {
+TEST(MatrixFreeTransfer, StopsWhenAsked) {
   for (const double at : {0.0, 0.3, 0.8}) {
     double last = 0;
     EXPECT_THROW(build(small_room(), {},
@@ -371,13 +373,13 @@ TEST(LargeTransfer, StopsWhenAsked) {
   }
 }
 
-TEST(LargeTransfer, RefusesWhatItCannotDo) {
+TEST(MatrixFreeTransfer, RefusesWhatItCannotDo) {
   const Room& room = small_room();
-  LargeTransferSettings settings{.compression = kCoarse, .memory_limit_bytes = 1};
-  const std::size_t least = plan_large_transfer(room.patches.size(), 1, settings).peak_bytes;
+  MatrixFreeTransferSettings settings{.compression = kCoarse, .memory_limit_bytes = 1};
+  const std::size_t least = plan_matrix_free_transfer(room.patches.size(), 1, settings).peak_bytes;
   settings.memory_limit_bytes = least - 1;
   const auto attempt = [&] {
-    build_large_transfer(*room.form_factors, room.patches, room.lights(), settings);
+    build_matrix_free_transfer(*room.form_factors, room.patches, room.lights(), settings);
   };
   test::expect_error(attempt, "raise the memory limit");
   test::expect_error(attempt, std::to_string(least >> 20) + " MiB at the least");
@@ -387,18 +389,21 @@ TEST(LargeTransfer, RefusesWhatItCannotDo) {
   test::expect_error(attempt, "checkpoints");
 }
 
-TEST(LargeTransfer, TakesMemoryInProportionToThePatches) {
-  const double at_64k = static_cast<double>(plan_large_transfer(65536, 3).peak_bytes);
-  EXPECT_NEAR(static_cast<double>(plan_large_transfer(131072, 3).peak_bytes) / at_64k, 2, 0.3);
-  EXPECT_LT(plan_large_transfer(2000, 1).peak_bytes, plan_large_transfer(4000, 1).peak_bytes);
+TEST(MatrixFreeTransfer, TakesMemoryInProportionToThePatches) {
+  const double at_64k = static_cast<double>(plan_matrix_free_transfer(65536, 3).peak_bytes);
+  EXPECT_NEAR(static_cast<double>(plan_matrix_free_transfer(131072, 3).peak_bytes) / at_64k, 2,
+              0.3);
+  EXPECT_LT(plan_matrix_free_transfer(2000, 1).peak_bytes,
+            plan_matrix_free_transfer(4000, 1).peak_bytes);
   // A finer operator takes more, one over a quarter of the patches less, but as many lights.
   PatchRoles quarter;
   for (std::size_t i = 0; i < 4000; ++i) quarter.role.push_back(i % 4 == 0 ? PatchRoles::kBoth : 0);
-  const LargeTransferSettings fine{.compression = {.tolerance = 0.001}}, part{.roles = quarter};
-  const std::size_t usual = plan_large_transfer(4000, 3).peak_bytes;
-  EXPECT_GT(plan_large_transfer(4000, 3, fine).peak_bytes, usual * 5 / 4);
-  EXPECT_LT(plan_large_transfer(4000, 3, part).peak_bytes, usual * 3 / 4);
-  EXPECT_GT(plan_large_transfer(4000, 3, part).peak_bytes, usual / 4);
+  const MatrixFreeTransferSettings fine{.compression = {.tolerance = 0.001}},
+      part{.roles = quarter};
+  const std::size_t usual = plan_matrix_free_transfer(4000, 3).peak_bytes;
+  EXPECT_GT(plan_matrix_free_transfer(4000, 3, fine).peak_bytes, usual * 5 / 4);
+  EXPECT_LT(plan_matrix_free_transfer(4000, 3, part).peak_bytes, usual * 3 / 4);
+  EXPECT_GT(plan_matrix_free_transfer(4000, 3, part).peak_bytes, usual / 4);
 }
 
 }  // namespace

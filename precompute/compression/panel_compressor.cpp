@@ -1,4 +1,4 @@
-#include "precompute/compression/first_stage.h"
+#include "precompute/compression/panel_compressor.h"
 
 #include <fmt/format.h>
 
@@ -15,22 +15,22 @@ constexpr double kCompression = 5500;
 
 }  // namespace
 
-FirstStage::FirstStage(PanelMatrix& matrix, const PatchTable& patches,
-                       std::span<const std::vector<Float3>> shaping, double price,
-                       std::size_t panels_together, const BlockCheckpoint& checkpoint)
+PanelCompressor::PanelCompressor(PanelMatrix& matrix, const PatchTable& patches,
+                                 std::span<const std::vector<Float3>> training, double multiplier,
+                                 std::size_t panels_together, const BlockCheckpoint& checkpoint)
     : matrix_(matrix),
-      price_(price),
+      multiplier_(multiplier),
       panels_together_(panels_together),
       checkpoint_(checkpoint),
-      frame_(compression_frame(matrix, patches, shaping)),
+      frame_(compression_frame(matrix, patches, training)),
       weights_(frame_.weights()),
       compressor_(matrix, frame_.tree, weights_) {
-  price_ = frame_.price_of(price);
+  multiplier_ = frame_.multiplier_for(multiplier);
   make_panels();
   for (Panel& panel : panels_) panel.part = checkpoint_.find(panel.name);
 }
 
-void FirstStage::make_panels() {
+void PanelCompressor::make_panels() {
   const std::vector<BlockPiece> pieces = block_pieces(frame_.tree, kPanelWidth);
   all_pieces_ = pieces.size();
   for (const BlockPiece& piece : pieces) {
@@ -47,11 +47,11 @@ void FirstStage::make_panels() {
   }
 }
 
-double FirstStage::compression_work(const Panel& panel) const {
+double PanelCompressor::compression_work(const Panel& panel) const {
   return kCompression * static_cast<double>(panel.pieces.size()) / static_cast<double>(all_pieces_);
 }
 
-double FirstStage::work_of(std::span<const Panel> panels) const {
+double PanelCompressor::work_of(std::span<const Panel> panels) const {
   double work = 0;
   for (const Panel& panel : panels) {
     if (panel.part) continue;
@@ -60,7 +60,7 @@ double FirstStage::work_of(std::span<const Panel> panels) const {
   return work;
 }
 
-HierarchicalStorage FirstStage::run(const Progress& progress) {
+HierarchicalStorage PanelCompressor::run(const Progress& progress) {
   const double all = work();
   for (std::size_t first = 0; first < panels_.size(); ++first) {
     std::size_t end = first;
@@ -78,7 +78,7 @@ HierarchicalStorage FirstStage::run(const Progress& progress) {
   return compressor_.assemble(std::move(whole));
 }
 
-void FirstStage::run(std::span<Panel> panels, const Progress& progress) {
+void PanelCompressor::run(std::span<Panel> panels, const Progress& progress) {
   const double all = work_of(panels);
   std::vector<Cluster> columns;
   double done = 0;
@@ -89,7 +89,7 @@ void FirstStage::run(std::span<Panel> panels, const Progress& progress) {
   matrix_.solve(frame_.tree, columns, part_of(progress, 0, done));
   for (Panel& panel : panels) {
     const double end = done + compression_work(panel) / all;
-    panel.part = compressor_.compress(panel.pieces, price_, part_of(progress, done, end));
+    panel.part = compressor_.compress(panel.pieces, multiplier_, part_of(progress, done, end));
     checkpoint_.keep(panel.name, *panel.part);
     report_progress(progress, end);
     done = end;

@@ -1,4 +1,4 @@
-#include "precompute/compression/large_transfer.h"
+#include "precompute/compression/matrix_free_transfer.h"
 
 #include <omp.h>
 
@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "precompute/base/thread_limit.h"
-#include "precompute/compression/first_stage.h"
 #include "precompute/compression/matrix_compression.h"
+#include "precompute/compression/panel_compressor.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/inverse/hierarchical_matrix.h"
 #include "precompute/inverse/solved_matrix.h"
@@ -32,8 +32,9 @@ constexpr double kResidualPart = 0.35;
 // Measured: notes/operator.md.
 constexpr double kCoarsePart = 4;
 
-// The price of a value in the first stage, in first prices of the search for the tolerance. Errors
-// go about like the root of the price: a quarter of what the second stage may do.
+// The multiplier of a value in the first stage, in first multipliers of the search for the
+// tolerance. Errors go about like the root of the multiplier: a quarter of what the second stage
+// may do.
 constexpr double kFinePart = 1.0 / 16;
 
 // For the progress alone: what is done before the first panel, and again before the first round of
@@ -42,8 +43,9 @@ constexpr double kColumnsBefore = 5500, kColumnsOfRounds = 6000;
 
 // Bytes a patch of lights: each, a copy and what it leads to; of those that shape, how they fall on
 // clusters too.
-constexpr std::size_t kLightBytes = 3 * sizeof(Float3) * (kMostShapingLights + kMostJudgingLights) +
-                                    sizeof(double) * kMostShapingLights;
+constexpr std::size_t kLightBytes =
+    3 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
+    sizeof(double) * kMostTrainingLights;
 
 // Bytes a patch, for each matrix, of the operator of the first stage and the rounds of the second:
 // an upper estimate, as they are only known later, at a tolerance, with the power by which less of
@@ -51,7 +53,8 @@ constexpr std::size_t kLightBytes = 3 * sizeof(Float3) * (kMostShapingLights + k
 constexpr double kOperatorBytes = 10.5e3, kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
 
 /// Throws Error unless the limit, if there is one, has room for a plan.
-void check_memory(std::size_t patch_count, const LargeTransferPlan& plan, std::uint64_t limit) {
+void check_memory(std::size_t patch_count, const MatrixFreeTransferPlan& plan,
+                  std::uint64_t limit) {
   if (limit == 0 || plan.peak_bytes <= limit) return;
   throw Error("an operator over " + std::to_string(patch_count) + " patches needs " +
               std::to_string(plan.peak_bytes >> 20) + " MiB at the least and may have " +
@@ -69,17 +72,17 @@ void update(ContentHash& hash, std::span<const T> values) {
 /// Form factors as the steps of columns take them.
 HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const PatchTable& patches,
                             const FittingLights& lights, double tolerance) {
-  return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, lights.shaping,
-                         first_price(kCoarsePart * tolerance, patches.size()));
+  return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, lights.training,
+                         initial_multiplier(kCoarsePart * tolerance, patches.size()));
 }
 
 /// A hash of all that the first stage depends on.
 std::string first_key(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                      const FittingLights& lights, const PatchRoles& roles, double price) {
+                      const FittingLights& lights, const PatchRoles& roles, double multiplier) {
   ContentHash hash;
   update(hash, std::span(std::string_view(version())));
   update<int>(hash, {{kFileFormatVersion}});
-  update<double>(hash, {{price, kResidualPart, kCoarsePart}});
+  update<double>(hash, {{multiplier, kResidualPart, kCoarsePart}});
   const HierarchicalStorage& f = form_factors.storage();
   update(hash, std::span(f.blocks));
   update(hash, f.values_f32.span());
@@ -92,7 +95,7 @@ std::string first_key(const HierarchicalOperator& form_factors, const PatchTable
   update<Float3>(hash, patches.normal);
   update<Float3>(hash, patches.reflectance);
   update<std::uint8_t>(hash, roles.role);
-  for (const std::vector<Float3>& light : lights.shaping) update<Float3>(hash, light);
+  for (const std::vector<Float3>& light : lights.training) update<Float3>(hash, light);
   return hash.text();
 }
 
@@ -103,23 +106,24 @@ std::string second_key(const std::string& first, const FittingLights& lights,
   update(hash, std::span(std::string_view(first)));
   update(hash, std::span(&settings.tolerance, 1));
   update(hash, std::span(std::string_view(precision_name(settings.precision))));
-  for (const std::vector<Float3>& light : lights.judging) update<Float3>(hash, light);
+  for (const std::vector<Float3>& light : lights.validation) update<Float3>(hash, light);
   return hash.text();
 }
 
 }  // namespace
 
-LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                      const LargeTransferSettings& settings) {
+MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
+                                                 const MatrixFreeTransferSettings& settings) {
   constexpr std::size_t kBlasBytes = 45'000'000;  // of OpenBLAS, for each thread that multiplies
   constexpr std::size_t kVectors = 8;             // those of the solver, coefficients, entries of F
-  constexpr std::size_t kTogether = SolvedTransfer::kTogether, kWidth = FirstStage::kPanelWidth;
-  const std::size_t group = kVectors * patch_count * kTogether * sizeof(float);
+  constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns,
+                        kWidth = PanelCompressor::kPanelWidth;
+  const std::size_t group = kVectors * patch_count * kBatchColumns * sizeof(float);
   const std::size_t panel = patch_count * kWidth * matrix_count * sizeof(float);
   const std::size_t side =
       largest_piece(static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count)));
   const std::size_t piece = side * side * matrix_count * (sizeof(float) + 3 * sizeof(double));
-  const std::size_t groups_of_panel = matrix_count * kWidth / kTogether;
+  const std::size_t groups_of_panel = matrix_count * kWidth / kBatchColumns;
   const std::uint64_t limit = settings.memory_limit_bytes;
   const double operators =
       kOperatorBytes * static_cast<double>(matrix_count) *
@@ -128,7 +132,7 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
   const std::size_t kept = patch_count * kLightBytes +
                            static_cast<std::size_t>(static_cast<double>(patch_count) * operators);
 
-  LargeTransferPlan plan;
+  MatrixFreeTransferPlan plan;
   for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
     const auto threads = static_cast<std::size_t>(plan.thread_count);
     plan.panel_count = (threads + groups_of_panel - 1) / groups_of_panel;
@@ -138,15 +142,16 @@ LargeTransferPlan plan_large_transfer(std::size_t patch_count, std::size_t matri
   }
 }
 
-std::shared_ptr<const HierarchicalOperator> build_large_transfer(
+std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
     const HierarchicalOperator& form_factors, const PatchTable& patches,
-    const FittingLights& lights, const LargeTransferSettings& settings, const Progress& progress) {
-  const LargeTransferPlan plan =
-      plan_large_transfer(patches.size(), distinct_channels(patches.reflectance), settings);
+    const FittingLights& lights, const MatrixFreeTransferSettings& settings,
+    const Progress& progress) {
+  const MatrixFreeTransferPlan plan =
+      plan_matrix_free_transfer(patches.size(), distinct_channels(patches.reflectance), settings);
   check_memory(patches.size(), plan, settings.memory_limit_bytes);
   const double tolerance = settings.compression.tolerance;
-  const double price = kFinePart * first_price(tolerance, patches.size());
-  const std::string key = first_key(form_factors, patches, lights, settings.roles, price);
+  const double multiplier = kFinePart * initial_multiplier(tolerance, patches.size());
+  const std::string key = first_key(form_factors, patches, lights, settings.roles, multiplier);
   const BlockCheckpoint panels(settings.checkpoint, key);
 
   const ThreadLimit limited(plan.thread_count);
@@ -158,7 +163,7 @@ std::shared_ptr<const HierarchicalOperator> build_large_transfer(
   HierarchicalStorage fine;
   {
     PanelMatrix matrix(solved, energies, settings.roles);
-    FirstStage stage(matrix, patches, lights.shaping, price, plan.panel_count, panels);
+    PanelCompressor stage(matrix, patches, lights.training, multiplier, plan.panel_count, panels);
     const double work = stage.work(), all = kColumnsBefore + work + work_after;
     report_progress(progress, kColumnsBefore / all);
     fine = stage.run(part_of(progress, kColumnsBefore / all, (kColumnsBefore + work) / all));

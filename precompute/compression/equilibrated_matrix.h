@@ -11,11 +11,12 @@ namespace rebounce {
 /// K of a matrix R K R: the matrix with each row and column divided by a scale of its patch, a
 /// power of two (symmetric equilibration; N. J. Higham, "Accuracy and Stability of Numerical
 /// Algorithms", 2002, section 7.3).
-class BalancedMatrix final : public SymmetricMatrix {
+class EquilibratedMatrix final : public SymmetricMatrix {
  public:
   /// `matrix` must outlive it; R is 2^`exponent` [n], by patch.
-  BalancedMatrix(const SymmetricMatrix& matrix, std::span<const std::int8_t> exponent);
-  BalancedMatrix(const SymmetricMatrix&& matrix, std::span<const std::int8_t> exponent) = delete;
+  EquilibratedMatrix(const SymmetricMatrix& matrix, std::span<const std::int8_t> exponent);
+  EquilibratedMatrix(const SymmetricMatrix&& matrix,
+                     std::span<const std::int8_t> exponent) = delete;
 
   std::span<const float> area() const override { return matrix_.area(); }
   std::uint32_t matrix_count() const override { return matrix_.matrix_count(); }

@@ -1,4 +1,4 @@
-#include "precompute/patches/seen_part.h"
+#include "precompute/patches/hemisphere_visibility.h"
 
 #include <algorithm>
 #include <vector>
@@ -9,20 +9,20 @@ namespace rebounce {
 namespace {
 
 // What sees less than the first counts less; nothing counts less than the second.
-constexpr double kFullView = 0.25, kLeastImportance = 1.0 / 64;
+constexpr double kFullView = 0.25, kLeastDensityWeight = 1.0 / 64;
 
 }  // namespace
 
-double seen_part(const TriangleCorners& corners, const RayTracer& tracer, std::uint32_t count,
-                 std::uint64_t seed) {
+double hemisphere_visibility(const TriangleCorners& corners, const RayTracer& tracer,
+                             std::uint32_t count, std::uint64_t seed) {
   std::vector<Ray> rays(count);
   make_hemisphere_rays(corners, front_normal(corners), tracer, mix_bits(seed), rays);
   tracer.occluded(rays);
   return static_cast<double>(std::ranges::count_if(rays, is_occluded)) / count;
 }
 
-double importance(double seen_part) {
-  return std::clamp(seen_part / kFullView, kLeastImportance, 1.0);
+double density_weight(double hemisphere_visibility) {
+  return std::clamp(hemisphere_visibility / kFullView, kLeastDensityWeight, 1.0);
 }
 
 }  // namespace rebounce

@@ -2,7 +2,7 @@
 
 #include <Eigen/QR>
 
-#include "precompute/compression/basis_remainders.h"
+#include "precompute/compression/residual_ranks.h"
 
 namespace rebounce {
 namespace {
@@ -13,17 +13,18 @@ using Eigen::VectorXd;
 
 constexpr Index kSize = 64;
 
-/// Bases of random orthonormal vectors, one matrix whose core is `core` on its diagonal.
-LowRankBlock block_with(const VectorXd& core, bool on_diagonal = false) {
+/// Bases of random orthonormal vectors, one matrix whose coupling matrix is `coupling` on
+/// its diagonal.
+LowRankBlock block_with(const VectorXd& coupling, bool on_diagonal = false) {
   std::srand(3);
   const auto basis = [&] {
-    const Eigen::HouseholderQR<MatrixXd> qr(MatrixXd::Random(kSize, core.size()));
-    return MatrixXd(qr.householderQ() * MatrixXd::Identity(kSize, core.size()));
+    const Eigen::HouseholderQR<MatrixXd> qr(MatrixXd::Random(kSize, coupling.size()));
+    return MatrixXd(qr.householderQ() * MatrixXd::Identity(kSize, coupling.size()));
   };
   LowRankBlock block;
   block.row_basis = basis();
   block.column_basis = on_diagonal ? MatrixXd(kSize, 0) : basis();
-  block.cores.push_back(core.asDiagonal());
+  block.couplings.push_back(coupling.asDiagonal());
   return block;
 }
 
@@ -38,44 +39,45 @@ MatrixXd random_errors(Index count) {
   return MatrixXd::Random(count, kSize);
 }
 
-TEST(BasisRemainders, GoToTheLargestEntriesFirst) {
+TEST(ResidualRanks, GoToTheLargestEntriesFirst) {
   const ClusterWeight even = weight(1, 0);
   const LowRankBlock block = block_with(VectorXd{{1, 0.1, 0.01}});
   // A vector is off by some (0.4 / 127)²/12 of its energy at each of 64 positions.
-  for (const auto& [price, expected] :
+  for (const auto& [multiplier, expected] :
        {std::pair(1e-4, 0), std::pair(1e-7, 1), std::pair(2e-9, 2), std::pair(1e-12, 3)}) {
-    const BasisRemainders found = find_remainders(block, {&even, &even}, {.price = price});
-    EXPECT_EQ(found.row, expected) << price;
-    EXPECT_EQ(found.column, expected) << price;
+    const ResidualRanks found =
+        find_residual_ranks(block, {&even, &even}, {.multiplier = multiplier});
+    EXPECT_EQ(found.row, expected) << multiplier;
+    EXPECT_EQ(found.column, expected) << multiplier;
   }
 }
 
-TEST(BasisRemainders, AreThoseOfTheFirstVectors) {
+TEST(ResidualRanks, AreThoseOfTheFirstVectors) {
   const ClusterWeight even = weight(1, 0);
   const LowRankBlock block = block_with(VectorXd{{0.001, 0.001, 1, 0.001}});
-  EXPECT_EQ(find_remainders(block, {&even, &even}, {.price = 1e-7}).row, 3);
+  EXPECT_EQ(find_residual_ranks(block, {&even, &even}, {.multiplier = 1e-7}).row, 3);
 }
 
-TEST(BasisRemainders, OnTheDiagonalBothEndsAreOne) {
+TEST(ResidualRanks, OnTheDiagonalBothEndsAreOne) {
   const ClusterWeight even = weight(1, 0);
   const LowRankBlock block = block_with(VectorXd{{1, 0.1, 0.01}}, true);
-  const BasisRemainders found = find_remainders(block, {&even, &even}, {.price = 1e-7});
+  const ResidualRanks found = find_residual_ranks(block, {&even, &even}, {.multiplier = 1e-7});
   EXPECT_EQ(found.row, 1);
   EXPECT_EQ(found.column, 1);
 }
 
-TEST(BasisRemainders, WhereLightIsStrongThereAreMore) {
+TEST(ResidualRanks, WhereLightIsStrongThereAreMore) {
   const ClusterWeight even = weight(1, 0), strong = weight(30, 0);
   const LowRankBlock block = block_with(VectorXd{{1, 0.1, 0.01}});
-  const CompressionCost cost{.price = 1e-7};
-  EXPECT_EQ(find_remainders(block, {&even, &even}, cost).row, 1);
-  EXPECT_EQ(find_remainders(block, {&strong, &even}, cost).row, 2);
-  EXPECT_EQ(find_remainders(block, {&even, &strong}, cost).row, 2);
+  const CompressionCost cost{.multiplier = 1e-7};
+  EXPECT_EQ(find_residual_ranks(block, {&even, &even}, cost).row, 1);
+  EXPECT_EQ(find_residual_ranks(block, {&strong, &even}, cost).row, 2);
+  EXPECT_EQ(find_residual_ranks(block, {&even, &strong}, cost).row, 2);
 }
 
-TEST(BasisRemainders, NoneWhereNothingIsWanted) {
+TEST(ResidualRanks, NoneWhereNothingIsWanted) {
   const LowRankBlock block = block_with(VectorXd{{1, 0.1}});
-  EXPECT_EQ(find_remainders(block, {}, {.price = 1e-12}).row, 0);
+  EXPECT_EQ(find_residual_ranks(block, {}, {.multiplier = 1e-12}).row, 0);
 }
 
 TEST(ClusterWeights, SquaredNormIsThatOfTheMatrix) {

@@ -1,10 +1,11 @@
-#include "precompute/compression/balanced_matrix.h"
+#include "precompute/compression/equilibrated_matrix.h"
 
 #include <cmath>
 
 namespace rebounce {
 
-BalancedMatrix::BalancedMatrix(const SymmetricMatrix& matrix, std::span<const std::int8_t> exponent)
+EquilibratedMatrix::EquilibratedMatrix(const SymmetricMatrix& matrix,
+                                       std::span<const std::int8_t> exponent)
     : SymmetricMatrix(matrix.roles()),
       matrix_(matrix),
       inverse_(static_cast<Eigen::Index>(exponent.size())) {
@@ -13,9 +14,9 @@ BalancedMatrix::BalancedMatrix(const SymmetricMatrix& matrix, std::span<const st
   }
 }
 
-void BalancedMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
-                             std::span<const std::uint32_t> columns,
-                             Eigen::Ref<Eigen::MatrixXf> entries) const {
+void EquilibratedMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                                 std::span<const std::uint32_t> columns,
+                                 Eigen::Ref<Eigen::MatrixXf> entries) const {
   matrix_.entries(matrix, rows, columns, entries);
   for (std::size_t j = 0; j < columns.size(); ++j) {
     const float of_column = inverse_[columns[j]];
@@ -26,7 +27,7 @@ void BalancedMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t
   }
 }
 
-Eigen::MatrixXf BalancedMatrix::multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const {
+Eigen::MatrixXf EquilibratedMatrix::multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const {
   return inverse_.asDiagonal() * matrix_.multiply(matrix, inverse_.asDiagonal() * x);
 }
 

@@ -1,6 +1,6 @@
 // What sees little of the scene gets few patches.
 
-#include "precompute/patches/seen_part.h"
+#include "precompute/patches/hemisphere_visibility.h"
 
 #include <gtest/gtest.h>
 
@@ -21,20 +21,20 @@ Scene room_in_shell() {
   return scene;
 }
 
-TEST(SeenPart, OfTheInsideIsAllAndOfTheOutsideNothing) {
+TEST(HemisphereVisibility, OfTheInsideIsAllAndOfTheOutsideNothing) {
   const Scene scene = room_in_shell();
   const RayTracer tracer(scene.position, scene.triangle);
   for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
-    EXPECT_EQ(seen_part(corners_of(scene, t), tracer, 64, t),
+    EXPECT_EQ(hemisphere_visibility(corners_of(scene, t), tracer, 64, t),
               scene.triangle_material[t] == 0 ? 1 : 0);
   }
-  EXPECT_EQ(importance(1), 1);
-  EXPECT_EQ(importance(0.25), 1);
-  EXPECT_DOUBLE_EQ(importance(0.125), 0.5);
-  EXPECT_GT(importance(0), 0);
+  EXPECT_EQ(density_weight(1), 1);
+  EXPECT_EQ(density_weight(0.25), 1);
+  EXPECT_DOUBLE_EQ(density_weight(0.125), 0.5);
+  EXPECT_GT(density_weight(0), 0);
 }
 
-TEST(SeenPart, WhatSeesNothingGetsFewPatches) {
+TEST(HemisphereVisibility, WhatSeesNothingGetsFewPatches) {
   const PatchModel model = make_patch_model(room_in_shell(), {.patch_count = 1000});
   EXPECT_NEAR(static_cast<double>(model.patches.size()), 1000, 100);
   std::vector<std::uint8_t> outside(model.patches.size());
@@ -54,15 +54,15 @@ TEST(SeenPart, WhatSeesNothingGetsFewPatches) {
   EXPECT_GT(count_outside, 0U);
 }
 
-TEST(SeenPart, ImportantTrianglesAreSplitMore) {
+TEST(HemisphereVisibility, ImportantTrianglesAreSplitMore) {
   Scene scene = test::empty_scene();
   for (const double x : {0.0, 1.0}) {  // they share an edge
     const std::vector<glm::dvec3> square = {{x, 0, 0}, {x, 0, 1}, {x + 1, 0, 1}, {x + 1, 0, 0}};
     test::add_polygon(scene, square);
   }
-  const std::vector<float> importance = {1, 1, 1.0F / 16, 1.0F / 16};
+  const std::vector<float> density_weight = {1, 1, 1.0F / 16, 1.0F / 16};
   const std::vector<std::uint32_t> source =
-      subdivide(scene, std::vector<std::uint8_t>(4, 1), {.patch_count = 1000}, importance);
+      subdivide(scene, std::vector<std::uint8_t>(4, 1), {.patch_count = 1000}, density_weight);
   double area = 0;
   std::size_t important = 0;
   for (std::uint32_t t = 0; t < source.size(); ++t) {

@@ -1,4 +1,4 @@
-#include "precompute/lights/lit_truth.h"
+#include "precompute/lights/reference_lighting.h"
 
 #include <algorithm>
 #include <cmath>
@@ -47,7 +47,8 @@ std::vector<std::vector<Float3>> products(const SymmetricMatrix& matrix, Lights 
   return results;
 }
 
-LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights)
+ReferenceLighting::ReferenceLighting(const SymmetricMatrix& matrix,
+                                     std::span<const std::vector<Float3>> lights)
     : area_(matrix.area().begin(), matrix.area().end()) {
   for (const std::vector<Float3>& light : lights) {
     matrix.roles().keep(PatchRoles::kSource, lights_.emplace_back(light));
@@ -58,7 +59,7 @@ LitTruth::LitTruth(const SymmetricMatrix& matrix, std::span<const std::vector<Fl
   keep_received(matrix.roles());
 }
 
-void LitTruth::keep_received(const PatchRoles& roles) {
+void ReferenceLighting::keep_received(const PatchRoles& roles) {
   for (std::vector<Float3>& truth : truths_) {
     const double all = area_norm(truth, area_);
     roles.keep(PatchRoles::kReceiver, truth);
@@ -66,7 +67,7 @@ void LitTruth::keep_received(const PatchRoles& roles) {
   }
 }
 
-void LitTruth::leave_out_dark() {
+void ReferenceLighting::leave_out_dark() {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
     if (arrives_nowhere(truths_[k], lights_[k], area_)) continue;
@@ -79,7 +80,7 @@ void LitTruth::leave_out_dark() {
   truths_.resize(kept);
 }
 
-std::vector<double> LitTruth::errors(const TransferOperator& transfer) const {
+std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) const {
   std::vector<double> errors;
   errors.reserve(lights_.size());
   for (std::size_t k = 0; k < lights_.size(); ++k) {
@@ -89,8 +90,8 @@ std::vector<double> LitTruth::errors(const TransferOperator& transfer) const {
   return errors;
 }
 
-Eigen::MatrixXd LitTruth::normalised_lights(std::span<const std::uint32_t> patch,
-                                            std::size_t position_count) const {
+Eigen::MatrixXd ReferenceLighting::normalised_lights(std::span<const std::uint32_t> patch,
+                                                     std::size_t position_count) const {
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(position_count),
                                                  static_cast<Eigen::Index>(lights_.size()));
   for (std::size_t k = 0; k < lights_.size(); ++k) {

@@ -1,4 +1,4 @@
-#include "precompute/exchange/pairs/second_look.h"
+#include "precompute/exchange/pairs/adaptive_row_sampling.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,8 +16,8 @@ constexpr double kWorthwhile = 0.25;
 
 }  // namespace
 
-SecondLook::SecondLook(std::span<const double> sum, std::span<const RowTarget> target,
-                       double tolerance)
+AdaptiveRowSampling::AdaptiveRowSampling(std::span<const double> sum,
+                                         std::span<const RowTarget> target, double tolerance)
     : target_(target), tolerance_(tolerance), trial_(sum.size()) {
   error_.reserve(sum.size());
   std::array<std::vector<std::uint32_t>, kKinds> rows;
@@ -33,7 +33,7 @@ SecondLook::SecondLook(std::span<const double> sum, std::span<const RowTarget> t
   }
 }
 
-std::vector<bool> SecondLook::rest(std::span<const double> sum) const {
+std::vector<bool> AdaptiveRowSampling::rest(std::span<const double> sum) const {
   std::array<double, kKinds> before{}, after{};
   for (const std::uint32_t i : doubtful_) {
     if (!trial_[i]) continue;
@@ -51,7 +51,7 @@ std::vector<bool> SecondLook::rest(std::span<const double> sum) const {
 }
 
 /// By how many times the error is what is tolerated.
-std::size_t SecondLook::kind_of(std::size_t row) const {
+std::size_t AdaptiveRowSampling::kind_of(std::size_t row) const {
   const double allowed = tolerance_ + 3 * target_[row].deviation;
   const double doublings = std::log2(std::max(1.0, error_[row] / allowed));
   return std::min(kKinds - 1, static_cast<std::size_t>(doublings));

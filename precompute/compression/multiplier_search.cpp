@@ -1,0 +1,96 @@
+#include "precompute/compression/multiplier_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rebounce {
+namespace {
+
+// Logarithm of the error against that of the multiplier: about 1/2 far from the ends, and less
+// where the error has its floor or everything is left out. Bounds keep a step outwards bold but
+// finite.
+constexpr double kUsualSlope = 0.5, kLeastSlope = 0.2, kMostSlope = 1;
+
+// Minus the logarithm of the size against that of the multiplier: 0.2 to 0.5 where applies count,
+// 0.05 to 0.2 in form factors. Measured: notes/operator.md.
+constexpr double kUsualShrinking = 0.3, kLeastShrinking = 0.05, kMostShrinking = 1;
+
+// A step outwards is at most this, in the logarithm of the multiplier: a factor of a thousand.
+constexpr double kLongestStep = 6.9;
+
+// Of a bracket, at least this part is cut off by a step inside.
+constexpr double kMargin = 0.1;
+
+// Errors, in the logarithm, that differ by this much more or less than their multipliers explain
+// are not of the same curve.
+constexpr double kUneven = 0.1;
+
+// Trials that are forgotten for it; after that, the curve itself must jump.
+constexpr std::size_t kMostForgotten = 4;
+
+// Multipliers this close together, in the logarithm, give the same operator or nearly so.
+constexpr double kNarrow = 0.02;
+
+}  // namespace
+
+void MultiplierSearch::report(double error, double size) {
+  const Trial trial{std::log(multiplier_),
+                    std::log(std::max(error, std::numeric_limits<double>::min())), std::log(size)};
+  if (error <= wanted_.most) smallest_ = std::min(smallest_, trial.size);
+  if (forgotten_ < kMostForgotten) {
+    forgotten_ += std::erase_if(trials_, [&](const Trial& old) { return contradicts(trial, old); });
+  }
+  const auto place = std::ranges::upper_bound(trials_, trial.multiplier, {}, &Trial::multiplier);
+  trials_.insert(place, trial);
+
+  // Errors need not be quite monotonic: the bracket is where they first pass the aim.
+  const double aim = std::log(wanted_.aim);
+  const auto high = std::ranges::find_if(trials_, [&](const Trial& t) { return t.error > aim; });
+  const bool bracketed = high != trials_.begin() && high != trials_.end();
+  const Next next = bracketed                 ? inside(*(high - 1), *high)
+                    : high == trials_.begin() ? outside(trials_.front())
+                                              : outside(trials_.back());
+  multiplier_ = std::exp(next.multiplier);
+  const bool narrow = bracketed && high->multiplier - (high - 1)->multiplier < kNarrow;
+  done_ = narrow || next.size > smallest_ + std::log1p(-kLeastSaving);
+}
+
+bool MultiplierSearch::contradicts(const Trial& trial, const Trial& old) {
+  const double step = trial.multiplier - old.multiplier;
+  const double rise = step > 0 ? trial.error - old.error : old.error - trial.error;
+  return rise < -kUneven || rise > kMostSlope * std::abs(step) + kUneven;
+}
+
+/// The size at `multiplier`, along the line through two trials.
+double MultiplierSearch::size_at(double multiplier, const Trial& from, const Trial& to) {
+  const double shrinking = (from.size - to.size) / (to.multiplier - from.multiplier);
+  return from.size -
+         std::clamp(shrinking, kLeastShrinking, kMostShrinking) * (multiplier - from.multiplier);
+}
+
+MultiplierSearch::Next MultiplierSearch::inside(const Trial& low, const Trial& high) const {
+  const double part = (std::log(wanted_.aim) - low.error) / (high.error - low.error);
+  const auto multiplier = [&](double of_bracket) {
+    return low.multiplier + of_bracket * (high.multiplier - low.multiplier);
+  };
+  return {multiplier(std::clamp(part, kMargin, 1 - kMargin)), size_at(multiplier(part), low, high)};
+}
+
+MultiplierSearch::Next MultiplierSearch::outside(const Trial& nearest) const {
+  const double left = std::log(wanted_.aim) - nearest.error;
+  const auto reached = [&](double slope) {
+    return nearest.multiplier + std::clamp(left / slope, -kLongestStep, kLongestStep);
+  };
+  if (trials_.size() == 1) {
+    const double multiplier = reached(kUsualSlope);
+    return {multiplier, nearest.size - kUsualShrinking * (multiplier - nearest.multiplier)};
+  }
+  const bool front = &nearest == &trials_.front();
+  const Trial& next = front ? trials_[1] : trials_[trials_.size() - 2];
+  const double slope = (next.error - nearest.error) / (next.multiplier - nearest.multiplier);
+  const double multiplier = reached(std::clamp(slope, kLeastSlope, kMostSlope));
+  return {multiplier, size_at(multiplier, nearest, next)};
+}
+
+}  // namespace rebounce

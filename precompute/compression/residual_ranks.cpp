@@ -1,0 +1,74 @@
+#include "precompute/compression/residual_ranks.h"
+
+namespace rebounce {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+// What a value of a residual has to remove, in multipliers of a value of a coupling matrix.
+// Measured: notes/operator.md.
+constexpr double kResidualWorth = 1;
+
+constexpr double kLargestByte = 127;
+
+struct BasisEnd {
+  const MatrixXd& basis;
+  const ClusterWeight* weight;
+};
+
+/// Inner products of the vectors of a basis under its weight.
+MatrixXd weighted_gram(const BasisEnd& end) {
+  MatrixXd weighted = end.basis;
+  if (end.weight != nullptr) end.weight->put_left(weighted);
+  return weighted.transpose() * weighted;
+}
+
+/// For the end whose vectors are the rows of `couplings`. `other` is the other end.
+Index residual_rank_of(const BasisEnd& end, const BasisEnd& other,
+                       const std::vector<MatrixXd>& couplings, const CompressionCost& cost) {
+  const auto size = static_cast<double>(end.basis.rows());
+  const MatrixXd gram = weighted_gram(other);
+  const double to_other = end.weight != nullptr ? end.weight->squared_norm() : 0;
+  const double from_other = other.weight != nullptr ? size : 0;
+  return worthwhile_residual_rank(end.basis, cost.multiplier, [&](Index r) {
+    double effect = 0;
+    for (const MatrixXd& coupling : couplings) {
+      effect += to_other * coupling.row(r).squaredNorm() +
+                from_other * coupling.row(r).dot(gram * coupling.row(r).transpose());
+    }
+    return effect;
+  });
+}
+
+}  // namespace
+
+Index worthwhile_residual_rank(const MatrixXd& vectors, double multiplier,
+                               const std::function<double(Index)>& effect) {
+  const double worth = kResidualWorth * multiplier * static_cast<double>(vectors.rows());
+  Index count = 0;
+  for (Index k = 0; k < vectors.cols(); ++k) {
+    const double step = vectors.col(k).cwiseAbs().maxCoeff() / kLargestByte;
+    if (step * step / 12 * effect(k) > worth) count = k + 1;
+  }
+  return count;
+}
+
+ResidualRanks find_residual_ranks(const LowRankBlock& block, const BlockWeights& weights,
+                                  const CompressionCost& cost) {
+  const bool on_diagonal = block.column_basis.cols() == 0 && block.row_basis.cols() > 0;
+  const BasisEnd row{block.row_basis, weights.row};
+  const BasisEnd column{on_diagonal ? block.row_basis : block.column_basis, weights.column};
+  ResidualRanks residual_rank;
+  residual_rank.row = residual_rank_of(row, column, block.couplings, cost);
+  if (on_diagonal) {
+    residual_rank.column = residual_rank.row;
+    return residual_rank;
+  }
+  std::vector<MatrixXd> transposed;
+  for (const MatrixXd& coupling : block.couplings) transposed.push_back(coupling.transpose());
+  residual_rank.column = residual_rank_of(column, row, transposed, cost);
+  return residual_rank;
+}
+
+}  // namespace rebounce
