@@ -15,6 +15,7 @@
 #include "precompute/lights/reference_lighting.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/unshadowed_lights.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce {
 namespace {

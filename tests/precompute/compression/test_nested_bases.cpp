@@ -15,6 +15,7 @@
 #include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/format/hierarchical_storage.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce {
 namespace {

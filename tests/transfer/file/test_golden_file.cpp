@@ -23,6 +23,7 @@
 #include "tests/support/plain_data.h"
 #include "tests/support/temporary_folder.h"
 #include "transfer/file/transfer_file.h"
+#include "transfer/format/hierarchical_encoding.h"
 #include "transfer/operator/hierarchical_operator.h"
 #include "transfer/operator/transfer_operator.h"
 
@@ -34,15 +35,15 @@ constexpr std::size_t kPatchCount = 100;
 /// Blocks of all kinds with residuals and scales, bases in bytes; form factors in 16 bits, and a
 /// few of pairs.
 TransferData sample() {
-  const HierarchicalOperator::Storage nested =
+  const HierarchicalStorage nested =
       test::equilibrated(test::random_nested_storage(kPatchCount, 2, 5), 6);
   TransferData data = test::plain_data(nested.area);
-  data.transfer = std::make_shared<const HierarchicalOperator>(
-      HierarchicalOperator::encode(nested, Precision::kQ8));
-  HierarchicalOperator::Storage plain = test::random_hierarchical_storage(kPatchCount, 1, 7);
+  data.transfer =
+      std::make_shared<const HierarchicalOperator>(encode_values(nested, Precision::kQ8));
+  HierarchicalStorage plain = test::random_hierarchical_storage(kPatchCount, 1, 7);
   plain.area = nested.area;
   data.compressed_form_factors =
-      std::make_shared<const HierarchicalOperator>(HierarchicalOperator::encode_half(plain));
+      std::make_shared<const HierarchicalOperator>(encode_values(plain, Precision::kF16));
   std::vector<std::uint64_t> row_begin(kPatchCount + 1, 3);
   row_begin[0] = 0;
   row_begin[1] = 2;
@@ -110,7 +111,7 @@ void expect_product(const TransferOperator& op, const Expected& expected) {
 TEST(GoldenFile, HoldsBlocksOfAllKinds) {
   const TransferData data = load_transfer_file(golden_file());
   const auto& storage = dynamic_cast<const HierarchicalOperator&>(*data.transfer).storage();
-  EXPECT_EQ(storage.precision, Precision::kQ8);
+  EXPECT_EQ(storage.precision, hierarchical_precision(Precision::kQ8));
   for (const auto kind : {TransferBlock::Kind::kDense, TransferBlock::Kind::kLowRank,
                           TransferBlock::Kind::kClusterBasis}) {
     EXPECT_GT(std::ranges::count(storage.blocks, kind, &TransferBlock::kind), 0);
