@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "precompute/compression/matrix_compression.h"
+#include "precompute/compression/tolerance_search.h"
 #include "precompute/exchange/links/linked_matrix.h"
 #include "precompute/lights/random_lights.h"
 #include "transfer/base/area_norm.h"

@@ -1,6 +1,7 @@
 #include "precompute/compression/hierarchical_transfer.h"
 
 #include "precompute/compression/matrix_compression.h"
+#include "precompute/compression/tolerance_search.h"
 #include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce {

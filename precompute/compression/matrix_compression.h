@@ -1,16 +1,18 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "precompute/base/progress.h"
 #include "precompute/base/symmetric_matrix.h"
 #include "precompute/compression/block_checkpoint.h"
-#include "precompute/compression/hierarchical_settings.h"
+#include "precompute/compression/block_tree.h"
+#include "precompute/compression/equilibrated_matrix.h"
 #include "precompute/compression/light_weights.h"
-#include "precompute/lights/fitting_lights.h"
+#include "precompute/lights/reference_lighting.h"
 #include "precompute/patches/cluster_tree.h"
 #include "transfer/format/hierarchical_storage.h"
 
@@ -41,20 +43,49 @@ struct CompressionFrame {
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
                                    std::span<const std::vector<Float3>> training);
 
-/// What a value per patch is worth at the tolerance: that with which searches begin, or near it.
-double initial_multiplier(double tolerance, std::size_t patch_count);
+/// Beyond blocks of low rank.
+struct CompressionOptions {
+  bool equilibrated = false, nested = false;
+};
+
+/// Where what is done of a compression is kept, and under which names.
+struct KeptParts {
+  const BlockCheckpoint& checkpoint;
+  std::string prefix;
+};
+
+/// A compressor of one matrix with all that it looks at.
+class MatrixCompression {
+ public:
+  /// `matrix` must outlive the object; `training` are its training lights.
+  MatrixCompression(const SymmetricMatrix& matrix, const PatchTable& patches,
+                    std::span<const std::vector<Float3>> training, const PartSizes& sizes = {},
+                    const CompressionOptions& options = {});
+
+  /// The operator (f32) at a multiplier > 0, as found in `kept` or kept there. Throws Cancelled if
+  /// asked to stop.
+  HierarchicalStorage at(double multiplier, const KeptParts& kept,
+                         const Progress& progress = {}) const;
+
+  /// CompressionFrame::multiplier_for.
+  double multiplier_for(double usual) const { return frame_.multiplier_for(usual); }
+
+  /// Gives the training lights weight by the errors that they have with `transfer`.
+  void emphasise(const TransferOperator& transfer);
+
+ private:
+  const SymmetricMatrix& matrix_;
+  PartSizes sizes_;
+  bool nested_;
+  ReferenceLighting truth_;
+  CompressionFrame frame_;
+  std::vector<std::int8_t> exponent_;  ///< by position, as EquilibratedMatrix has them
+  std::optional<EquilibratedMatrix> equilibrated_;
+};
 
 /// Compresses `matrix` as compress_transfer does. `patches` are those of the matrix.
 HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
                                     std::span<const std::vector<Float3>> training,
                                     double multiplier, const Progress& progress = {});
-
-/// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. What each round of the
-/// search does is kept in `checkpoint`, made for all that is given here, and taken from there: the
-/// bits are the same.
-std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
-    const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
-    const HierarchicalSettings& settings, const Progress& progress = {},
-    const BlockCheckpoint& checkpoint = {});
 
 }  // namespace rebounce

@@ -5,8 +5,8 @@
 #include <glm/glm.hpp>
 #include <span>
 
+#include "runtime/lights/lamp_kind.h"
 #include "runtime/lights/lamp_mesh.h"
-#include "runtime/lights/prepared_light.h"
 
 namespace rebounce {
 

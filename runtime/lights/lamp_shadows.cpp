@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "runtime/lights/light_sampling.h"
 #include "runtime/rays/float3_glm.h"
 
 namespace rebounce {

@@ -7,7 +7,7 @@
 #include <glm/glm.hpp>
 #include <span>
 
-#include "runtime/lights/prepared_light.h"
+#include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/ray_tracer.h"
 
 namespace rebounce {

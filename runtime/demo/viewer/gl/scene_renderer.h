@@ -13,7 +13,7 @@
 #include "runtime/demo/viewer/gl/gpu_bodies.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
 #include "runtime/demo/viewer/gl/shadow_map.h"
-#include "runtime/lights/prepared_light.h"
+#include "runtime/lights/lamp_kind.h"
 
 namespace rebounce {
 

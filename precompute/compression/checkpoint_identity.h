@@ -1,0 +1,23 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "precompute/compression/hierarchical_settings.h"
+#include "precompute/lights/fitting_lights.h"
+#include "transfer/file/transfer_data.h"
+#include "transfer/operator/hierarchical_operator.h"
+
+namespace rebounce {
+
+/// A hash of all that the panels of build_matrix_free_transfer depend on; `numbers`: what it has
+/// chosen itself.
+std::string identity_of_panels(const HierarchicalOperator& form_factors, const PatchTable& patches,
+                               const FittingLights& lights, const PatchRoles& roles,
+                               std::span<const double> numbers);
+
+/// A hash of all that the rounds of its search depend on; `panels`: identity_of_panels.
+std::string identity_of_rounds(const std::string& panels, const FittingLights& lights,
+                               const HierarchicalSettings& settings);
+
+}  // namespace rebounce

@@ -1,0 +1,73 @@
+#include "precompute/compression/matrix_free_plan.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "precompute/compression/block_tree.h"
+#include "precompute/compression/panel_compressor.h"
+#include "precompute/inverse/solved_transfer.h"
+#include "precompute/lights/fitting_lights.h"
+#include "precompute/patches/patch_selection.h"
+#include "transfer/base/error.h"
+#include "transfer/format/hierarchical_storage.h"
+
+namespace rebounce {
+namespace {
+
+// Bytes a patch of lights: each, a copy and what it leads to; of those that shape, how they fall on
+// clusters too.
+constexpr std::size_t kLightBytes =
+    3 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
+    sizeof(double) * kMostTrainingLights;
+
+// Bytes a patch, for each matrix, of the operator of the first stage and the rounds of the second:
+// an upper estimate, as they are only known later, at a tolerance, with the power by which less of
+// that takes more.
+constexpr double kOperatorBytes = 10.5e3, kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
+
+}  // namespace
+
+MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
+                                                 const MatrixFreeTransferSettings& settings) {
+  constexpr std::size_t kBlasBytes = 45'000'000;  // of OpenBLAS, for each thread that multiplies
+  constexpr std::size_t kVectors = 8;             // those of the solver, coefficients, entries of F
+  constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns,
+                        kWidth = PanelCompressor::kPanelWidth;
+  const std::size_t group = kVectors * patch_count * kBatchColumns * sizeof(float);
+  const std::size_t panel = patch_count * kWidth * matrix_count * sizeof(float);
+  const std::size_t side =
+      largest_piece(static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count)));
+  const std::size_t piece = side * side * matrix_count * (sizeof(float) + 3 * sizeof(double));
+  const std::size_t groups_of_panel = matrix_count * kWidth / kBatchColumns;
+  const std::uint64_t limit = settings.memory_limit_bytes;
+  const double operators =
+      kOperatorBytes * static_cast<double>(matrix_count) *
+      wanted_part(settings.roles, patch_count) *
+      std::pow(kOperatorTolerance / settings.compression.tolerance, kOperatorGrowth);
+  const std::size_t kept = patch_count * kLightBytes +
+                           static_cast<std::size_t>(static_cast<double>(patch_count) * operators);
+
+  MatrixFreeTransferPlan plan;
+  for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
+    const auto threads = static_cast<std::size_t>(plan.thread_count);
+    plan.panel_count = (threads + groups_of_panel - 1) / groups_of_panel;
+    plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) +
+                      threads * kBlasBytes + kept;
+    if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
+  }
+}
+
+void check_memory(std::size_t patch_count, const MatrixFreeTransferPlan& plan,
+                  const MatrixFreeTransferSettings& settings) {
+  const std::uint64_t limit = settings.memory_limit_bytes;
+  if (limit == 0 || plan.peak_bytes <= limit) return;
+  throw Error("an operator over " + std::to_string(patch_count) + " patches needs " +
+              std::to_string(plan.peak_bytes >> 20) + " MiB at the least and may have " +
+              std::to_string(limit >> 20) +
+              " MiB; raise the memory limit or ask for fewer patches");
+}
+
+}  // namespace rebounce

@@ -1,0 +1,141 @@
+#include "precompute/compression/tolerance_search.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <vector>
+
+#include "precompute/compression/matrix_compression.h"
+#include "precompute/compression/multiplier_search.h"
+#include "precompute/lights/reference_lighting.h"
+#include "precompute/lights/validation_error.h"
+#include "transfer/format/hierarchical_encoding.h"
+
+namespace rebounce {
+namespace {
+
+// The search for the multiplier aims at this part of the tolerance, and ends at kMost at most:
+// other lights than those that it sees may do a little worse.
+constexpr int kMostRounds = 8;
+constexpr double kAim = 0.76, kMost = 0.8;
+
+// Rounds that the search takes as a rule.
+constexpr int kUsualRounds = 4;
+
+// What one value per patch is worth at the tolerance, to begin the search with: measured over
+// scenes and sizes, notes/operator.md.
+constexpr double kInitialMultiplier = 2.5;
+
+// Operators with cluster coefficients mostly end far above it. Their search begins higher by this
+// power of how many times so many patches they have, and by so much at most. Measured:
+// notes/operator.md.
+constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
+
+// Those without, form factors, end at 2.5 to 22 times it as a rule.
+constexpr double kPlainStart = 2;
+
+// What a vector and a block take of an apply beside their values, in values, in operators of so
+// many patches, and in part in smaller ones: coefficients that the nearest caches do not hold, and
+// loops that begin. Measured: notes/operator.md.
+constexpr double kVectorSize = 9, kBlockSize = 96, kSizedPatches = 16384;
+
+/// The truth of a uniform light stands in for validation lights from which nothing arrives.
+ReferenceLighting validation_truth(const SymmetricMatrix& matrix,
+                                   std::span<const std::vector<Float3>> lights) {
+  ReferenceLighting truth(matrix, lights);
+  if (truth.light_count() > 0) return truth;
+  const std::vector<Float3> uniform(matrix.area().size(), Float3{1, 1, 1});
+  return ReferenceLighting(matrix, std::span(&uniform, 1));
+}
+
+/// The part of the whole search that some rounds are: all alike as far as usual, and each beyond
+/// that half of what is left.
+double part_of_search(int rounds) {
+  constexpr double kEach = 1.0 / kUsualRounds;
+  return rounds < kUsualRounds ? rounds * kEach : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
+}
+
+/// What parts of an operator take. In bytes, with the residuals of some, a value of a basis is
+/// beside halves. One with cluster coefficients is for applies, whose time counts too.
+PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_count) {
+  PartSizes sizes;
+  sizes.basis_value =
+      hierarchical_precision(settings.precision).bases == BasisPrecision::kQ8 ? 0.55 : 1;
+  if (settings.cluster_coefficients) {
+    const double part = std::min(1.0, static_cast<double>(patch_count) / kSizedPatches);
+    sizes.vector += kVectorSize * part;
+    sizes.block += kBlockSize * part;
+  }
+  return sizes;
+}
+
+/// Bases in integers have one step for all patches of a cluster; sweeps work on the light at
+/// positions, and do not know cluster coefficients.
+CompressionOptions options_of(const HierarchicalSettings& settings) {
+  return {.equilibrated = are_integers(hierarchical_precision(settings.precision).bases) ||
+                          settings.cluster_coefficients,
+          .nested = settings.cluster_coefficients};
+}
+
+/// The best operator that the search has met: the smallest within the limit, or the most exact.
+class Best {
+ public:
+  explicit Best(double limit) : limit_(limit) {}
+
+  void offer(std::shared_ptr<const HierarchicalOperator> candidate, double error) {
+    const bool within = error <= limit_, best_within = best_ && error_ <= limit_;
+    const bool better = within && best_within ? candidate->bytes() < best_->bytes()
+                                              : within || (!best_within && error < error_);
+    if (best_ && !better) return;
+    best_ = std::move(candidate);
+    error_ = error;
+  }
+
+  std::shared_ptr<const HierarchicalOperator> take() { return std::move(best_); }
+
+ private:
+  double limit_, error_ = 0;
+  std::shared_ptr<const HierarchicalOperator> best_;
+};
+
+/// The multiplier that a search begins with.
+double search_start(const HierarchicalSettings& settings, std::size_t patch_count) {
+  const double usual = initial_multiplier(settings.tolerance, patch_count);
+  if (!settings.cluster_coefficients) return kPlainStart * usual;
+  const double times = static_cast<double>(patch_count) / kStartPatches;
+  return usual * std::clamp(std::pow(times, kStartGrowth), 1.0, kHighestStart);
+}
+
+}  // namespace
+
+double initial_multiplier(double tolerance, std::size_t patch_count) {
+  return kInitialMultiplier * tolerance * tolerance / static_cast<double>(patch_count);
+}
+
+std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
+    const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
+    const HierarchicalSettings& settings, const Progress& progress,
+    const BlockCheckpoint& checkpoint) {
+  const ReferenceLighting validation = validation_truth(matrix, lights.validation);
+  MatrixCompression compression(matrix, patches, lights.training,
+                                part_sizes(settings, patches.size()), options_of(settings));
+  const double tolerance = settings.tolerance;
+  MultiplierSearch search(compression.multiplier_for(search_start(settings, patches.size())),
+                          {kAim * tolerance, kMost * tolerance});
+  Best best(kMost * tolerance);
+  for (int round = 0; round < kMostRounds && !search.done(); ++round) {
+    const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
+    const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
+    const auto candidate = std::make_shared<const HierarchicalOperator>(
+        encode_values(compression.at(search.multiplier(), kept, part), settings.precision));
+    const double error = validation_error(validation.errors(*candidate));
+    best.offer(candidate, error);
+    search.report(error, static_cast<double>(candidate->bytes()));
+    if (!search.done()) compression.emphasise(*candidate);
+  }
+  return best.take();
+}
+
+}  // namespace rebounce
