@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "transfer/base/error.h"
-#include "transfer/kernels/block_kernels.h"
+#include "transfer/format/channel_lanes.h"
 
 namespace rebounce {
 namespace {

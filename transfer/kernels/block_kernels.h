@@ -6,6 +6,7 @@
 #include <span>
 
 #include "transfer/base/types.h"
+#include "transfer/format/channel_lanes.h"
 
 namespace rebounce {
 
@@ -16,9 +17,6 @@ struct PlanarVectors {
   T* data;
   std::size_t stride, count;
 };
-
-/// A coefficient of the three channels and one float more, so that they are a vector.
-inline constexpr std::size_t kChannelLanes = 4;
 
 /// Coefficients of light in bases, its channels side by side: coefficient r of light l is the
 /// kChannelLanes floats from l times `stride` + r times kChannelLanes, of which the last is not
@@ -91,17 +89,6 @@ using CouplingKernel = void (*)(const Value* values, std::span<const CouplingBlo
                                 const ChannelLanes& lanes, std::size_t light_count,
                                 Coefficients<const float> in, Coefficients<float> out,
                                 float* taken);
-
-/// Floats that the coefficients of one end of a coupling matrix take up, in whole cache lines.
-constexpr std::size_t end_size(std::size_t coefficients) {
-  constexpr std::size_t kOfLine = 4;
-  return (coefficients + kOfLine - 1) / kOfLine * kOfLine * kChannelLanes;
-}
-
-/// Floats in which a coupling matrix keeps what it takes.
-constexpr std::size_t taken_size(std::size_t rows, std::size_t columns) {
-  return end_size(rows) + end_size(columns);
-}
 
 /// A dense block of the only matrix of an operator, [rows][columns], both multiples of
 /// HierarchicalFormat::kAlignment.

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+
+namespace rebounce {
+
+/// A coefficient of the three channels and one float more, so that they are a vector.
+inline constexpr std::size_t kChannelLanes = 4;
+
+/// Floats that the coefficients of one end of a coupling matrix take up, in whole cache lines.
+constexpr std::size_t end_size(std::size_t coefficients) {
+  constexpr std::size_t kOfLine = 4;
+  return (coefficients + kOfLine - 1) / kOfLine * kOfLine * kChannelLanes;
+}
+
+/// Floats in which a coupling matrix keeps what it takes.
+constexpr std::size_t taken_size(std::size_t rows, std::size_t columns) {
+  return end_size(rows) + end_size(columns);
+}
+
+}  // namespace rebounce
