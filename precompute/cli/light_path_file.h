@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "runtime/demo/viewer/window/viewer.h"
+#include "runtime/demo/viewer/window/viewer_setup.h"
 
 namespace rebounce::cli {
 

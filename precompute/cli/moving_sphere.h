@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/demo/viewer/window/viewer.h"
+#include "runtime/demo/viewer/window/viewer_setup.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 

@@ -13,6 +13,7 @@
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/picture_options.h"
 #include "precompute/lights/reference_solution.h"
+#include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/key_light.h"
 #include "runtime/demo/viewer/window/viewer.h"
 #include "runtime/frame/engine.h"

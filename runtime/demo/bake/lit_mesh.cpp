@@ -8,8 +8,8 @@
 #include "runtime/demo/bake/lit_texture.h"
 #include "runtime/demo/bake/subdivided_mesh.h"
 #include "runtime/demo/image/tone_curve.h"
-#include "runtime/demo/shading/sample_sequence.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sample_sequence.h"
 #include "transfer/base/error.h"
 
 namespace rebounce {

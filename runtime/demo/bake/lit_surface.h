@@ -9,7 +9,7 @@
 #include "runtime/demo/shading/direct_light.h"
 #include "runtime/demo/shading/display_surface.h"
 #include "runtime/demo/shading/emitters.h"
-#include "runtime/demo/shading/vertex_light.h"
+#include "runtime/demo/shading/picture_light.h"
 
 namespace rebounce {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "runtime/demo/shading/sample_sequence.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sample_sequence.h"
 
 namespace rebounce {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "runtime/demo/image/srgb.h"
-#include "runtime/demo/shading/sample_sequence.h"
+#include "runtime/rays/sample_sequence.h"
 
 namespace rebounce {
 

@@ -4,16 +4,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "runtime/demo/picture/picture.h"
+#include "runtime/demo/image/images.h"
 
 namespace rebounce {
-
-/// 8-bit sRGB, rows from the top.
-struct ScreenImage {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint8_t> rgb{};  ///< [height][width][3]
-};
 
 /// Brings a picture to the screen's range: exposure, tone curve (tone_curve.h), sRGB encoding.
 ScreenImage tone_map(const Picture& picture);

@@ -13,11 +13,9 @@
 #include "runtime/demo/shading/direct_light.h"
 #include "runtime/demo/shading/display_surface.h"
 #include "runtime/demo/shading/emitters.h"
-#include "runtime/demo/shading/sample_sequence.h"
-#include "runtime/demo/shading/vertex_light.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/solvers/solve_radiosity.h"
+#include "runtime/rays/sample_sequence.h"
 #include "transfer/base/error.h"
 
 namespace rebounce {
@@ -375,10 +373,6 @@ float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
   small.camera = camera;
   small.samples_per_axis = 2;
   return renderer.render(light, small).exposure;
-}
-
-std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
-  return gather(*make_form_factors(SolveMethod::kGathering, data), data.patches.emitted_exitance);
 }
 
 }  // namespace rebounce

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
-#include <vector>
 
+#include "runtime/demo/image/images.h"
+#include "runtime/demo/shading/picture_light.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 
@@ -29,27 +29,6 @@ struct PictureSettings {
   int samples_per_axis = 4;  ///< camera rays per pixel = its square; more: smoother edges, slower
   int emitter_samples = 64;  ///< per pixel; more: less grain in the shadows of emitters, slower
   float error_top = 0;       ///< the number at the top of the colour map; 0: the largest one
-};
-
-/// The light to draw with. Per-patch arrays have n entries or none (zero everywhere).
-struct PictureLight {
-  std::span<const Light> lights{};
-  Sky sky{};
-  std::span<const Float3> indirect_irradiance{};  ///< H = F B in lx, what the operator gives
-  /// F M_e in lx: the part of H that comes straight from emitters. The picture finds it anew in
-  /// every pixel, with sharp shadows, and takes only the rest of H from the patches.
-  std::span<const Float3> emitted_irradiance{};
-  std::span<const float> error{};  ///< >= 0, drawn by Show::kError
-};
-
-/// Linear Rec.709, rows from the top. Emitters and sky are drawn no brighter than twice what the
-/// exposure takes to white, so that their edges are smooth.
-struct Picture {
-  int width = 0;
-  int height = 0;
-  std::vector<Float3> pixel{};    ///< [height][width] cd/m², or a colour in [0, 1]
-  float exposure = 0;             ///< stops: pixel x 2^exposure is what the tone curve takes
-  bool display_referred = false;  ///< pixels are colours (patches, error): no exposure, no curve
 };
 
 /// Draws pictures of one scene; keeps its decoded textures from one to the next.
@@ -80,8 +59,5 @@ Picture render_picture(const TransferData& data, const RayTracer& tracer, const 
 /// Stops that suit a picture of the scene from `camera`, found from a small one.
 float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
                    const Camera& camera);
-
-/// F M_e [n] in lx: what arrives straight from the scene's own emitters, for PictureLight.
-std::vector<Float3> irradiance_from_emitters(const TransferData& data);
 
 }  // namespace rebounce

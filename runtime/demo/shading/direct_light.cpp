@@ -4,11 +4,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/demo/shading/sample_sequence.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/lights/light_sampling.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/polygon_form_factor.h"
+#include "runtime/rays/sample_sequence.h"
 
 namespace rebounce {
 namespace {

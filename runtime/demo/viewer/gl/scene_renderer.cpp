@@ -14,21 +14,11 @@
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {
 
-constexpr int kSamples = 4;         // per pixel
 constexpr float kNearPart = 2e-4F;  // of the scene's diagonal
-
-void check_complete() {
-  if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-    throw Error(
-        "viewer: this OpenGL has no 16-bit float pictures of four samples a pixel; try "
-        "another driver");
-  }
-}
 
 glm::vec3 background(const FrameSettings& frame) {
   if (frame.show == Show::kPatches || frame.show == Show::kError) return glm::vec3(0.02F);
@@ -71,30 +61,6 @@ SceneRenderer::SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh)
   glEnable(GL_TEXTURE_CUBE_MAP_SEAMLESS);
 }
 
-void SceneRenderer::resize(int width, int height) {
-  if (width == width_ && height == height_) return;
-  width_ = width;
-  height_ = height;
-  glBindRenderbuffer(GL_RENDERBUFFER, multisampled_color_.name());
-  glRenderbufferStorageMultisample(GL_RENDERBUFFER, kSamples, GL_RGBA16F, width, height);
-  glBindRenderbuffer(GL_RENDERBUFFER, multisampled_depth_.name());
-  glRenderbufferStorageMultisample(GL_RENDERBUFFER, kSamples, GL_DEPTH_COMPONENT32F, width, height);
-  glBindFramebuffer(GL_FRAMEBUFFER, multisampled_.name());
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER,
-                            multisampled_color_.name());
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
-                            multisampled_depth_.name());
-  check_complete();
-  glBindTexture(GL_TEXTURE_2D, resolved_color_.name());
-  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA16F, width, height, 0, GL_RGBA, GL_FLOAT, nullptr);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MAG_FILTER, GL_NEAREST);
-  glBindFramebuffer(GL_FRAMEBUFFER, resolved_.name());
-  glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D,
-                         resolved_color_.name(), 0);
-  check_complete();
-}
-
 void SceneRenderer::set_bodies(BodyMesh spheres, bool keeps_places, std::span<const Light> lamps) {
   if (!keeps_places) ++spheres_version_;
   spheres_.upload(std::move(spheres));
@@ -115,9 +81,9 @@ void SceneRenderer::update_shadows(std::span<const Light> lights) {
 }
 
 void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
-  resize(frame.width, frame.height);
-  glBindFramebuffer(GL_FRAMEBUFFER, multisampled_.name());
-  glViewport(0, 0, width_, height_);
+  target_.resize(frame.width, frame.height);
+  glBindFramebuffer(GL_FRAMEBUFFER, target_.framebuffer());
+  glViewport(0, 0, frame.width, frame.height);
   glEnable(GL_DEPTH_TEST);
   glEnable(GL_CULL_FACE);
   glDisable(GL_BLEND);
@@ -126,8 +92,8 @@ void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
   const glm::vec3 behind = background(frame);
   glClearColor(behind.r, behind.g, behind.b, 1);
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-  const glm::mat4 view =
-      view_of(frame.camera, static_cast<float>(width_) / static_cast<float>(height_), bounds_);
+  const glm::mat4 view = view_of(
+      frame.camera, static_cast<float>(frame.width) / static_cast<float>(frame.height), bounds_);
   const bool patches = frame.show == Show::kPatches || frame.show == Show::kError;
   if (patches) {
     draw_patches(frame, view);
@@ -136,30 +102,28 @@ void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
     draw_light(frame, view);
   }
 
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, multisampled_.name());
-  glBindFramebuffer(GL_DRAW_FRAMEBUFFER, resolved_.name());
-  glBlitFramebuffer(0, 0, width_, height_, 0, 0, width_, height_, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+  const GLuint light = target_.resolve();
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer);
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
   screen_.use();
   screen_.set("light", 0);
   screen_.set("display_referred", patches ? 1 : 0);
-  screen_.set("height", height_);
+  screen_.set("height", frame.height);
   glActiveTexture(GL_TEXTURE0);
-  glBindTexture(GL_TEXTURE_2D, resolved_color_.name());
+  glBindTexture(GL_TEXTURE_2D, light);
   glBindVertexArray(empty_.name());
   glDrawArrays(GL_TRIANGLES, 0, 3);
-  if (frame.split) draw_divider(split_column(frame));
+  if (frame.split) draw_divider(frame);
 }
 
 int SceneRenderer::split_column(const FrameSettings& frame) const {
-  return static_cast<int>(std::lround(*frame.split * static_cast<float>(width_)));
+  return static_cast<int>(std::lround(*frame.split * static_cast<float>(frame.width)));
 }
 
-void SceneRenderer::draw_divider(int column) const {
+void SceneRenderer::draw_divider(const FrameSettings& frame) const {
   glEnable(GL_SCISSOR_TEST);
-  glScissor(column - 1, 0, 2, height_);
+  glScissor(split_column(frame) - 1, 0, 2, frame.height);
   glClearColor(1, 1, 1, 1);
   glClear(GL_COLOR_BUFFER_BIT);
   glDisable(GL_SCISSOR_TEST);
@@ -173,9 +137,9 @@ void SceneRenderer::for_each_side(const FrameSettings& frame, const Draw& draw) 
   }
   const int left = split_column(frame);
   glEnable(GL_SCISSOR_TEST);
-  glScissor(0, 0, left, height_);
+  glScissor(0, 0, left, frame.height);
   draw(Side::kFirst);
-  glScissor(left, 0, width_ - left, height_);
+  glScissor(left, 0, frame.width - left, frame.height);
   draw(Side::kSecond);
   glDisable(GL_SCISSOR_TEST);
 }
@@ -184,7 +148,7 @@ void SceneRenderer::draw_sky(const FrameSettings& frame) const {
   if (!frame.sky.distribution || frame.show == Show::kIndirect) return;
   const Camera& camera = frame.camera;
   const float half_height = std::tan(0.5F * camera.vertical_fov);
-  const glm::vec2 size(width_, height_);
+  const glm::vec2 size(frame.width, frame.height);
   sky_.use();
   sky_.set("right", half_height * size.x / size.y * to_glm(camera.right));
   sky_.set("up", half_height * to_glm(camera.up));
@@ -280,28 +244,6 @@ void SceneRenderer::draw_patches(const FrameSettings& frame, const glm::mat4& vi
   patch_.set("shading_direction",
              0.6F * to_glm(frame.camera.backward) + 0.8F * to_glm(frame.camera.up));
   for_each_side(frame, [&](Side side) { scene_.draw_patches(patch_, side); });
-}
-
-OffscreenTarget::OffscreenTarget(int width, int height) : width_(width), height_(height) {
-  glBindRenderbuffer(GL_RENDERBUFFER, color_.name());
-  glRenderbufferStorage(GL_RENDERBUFFER, GL_RGBA8, width, height);
-  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
-  glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, color_.name());
-  check_complete();
-}
-
-ScreenImage OffscreenTarget::read() const {
-  ScreenImage image{.width = width_, .height = height_};
-  const std::size_t row = 3 * static_cast<std::size_t>(width_);
-  std::vector<std::uint8_t> upside_down(row * static_cast<std::size_t>(height_));
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, width_, height_, GL_RGB, GL_UNSIGNED_BYTE, upside_down.data());
-  for (std::size_t y = static_cast<std::size_t>(height_); y-- > 0;) {
-    const auto begin = upside_down.begin() + static_cast<std::ptrdiff_t>(y * row);
-    image.rgb.insert(image.rgb.end(), begin, begin + static_cast<std::ptrdiff_t>(row));
-  }
-  return image;
 }
 
 }  // namespace rebounce

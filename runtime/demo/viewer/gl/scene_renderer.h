@@ -6,12 +6,12 @@
 #include <span>
 #include <vector>
 
-#include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/picture.h"
 #include "runtime/demo/viewer/gl/gl_objects.h"
 #include "runtime/demo/viewer/gl/gl_program.h"
 #include "runtime/demo/viewer/gl/gpu_bodies.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
+#include "runtime/demo/viewer/gl/render_targets.h"
 #include "runtime/demo/viewer/gl/shadow_map.h"
 #include "runtime/lights/lamp_kind.h"
 
@@ -49,7 +49,6 @@ class SceneRenderer {
   void draw(const FrameSettings& frame, GLuint framebuffer);
 
  private:
-  void resize(int width, int height);
   void draw_sky(const FrameSettings& frame) const;
   void draw_light(const FrameSettings& frame, const glm::mat4& view);
   void draw_lamp_surfaces() const;
@@ -57,7 +56,7 @@ class SceneRenderer {
   void set_lamp_surface(const PreparedLight& lamp) const;
   void draw_patches(const FrameSettings& frame, const glm::mat4& view);
   int split_column(const FrameSettings& frame) const;
-  void draw_divider(int column) const;
+  void draw_divider(const FrameSettings& frame) const;
   template <typename Draw>
   void for_each_side(const FrameSettings& frame, const Draw& draw) const;
 
@@ -68,23 +67,7 @@ class SceneRenderer {
   GlProgram ambient_, lamp_, patch_, shadow_, screen_, sky_;
   GlVertexArray empty_;
   std::vector<std::unique_ptr<ShadowMap>> shadow_maps_;
-  int width_ = 0, height_ = 0;
-  GlFramebuffer multisampled_, resolved_;
-  GlRenderbuffer multisampled_color_, multisampled_depth_;
-  GlTexture resolved_color_;
-};
-
-/// A picture that is drawn without a window.
-class OffscreenTarget {
- public:
-  OffscreenTarget(int width, int height);
-  GLuint framebuffer() const { return framebuffer_.name(); }
-  ScreenImage read() const;
-
- private:
-  int width_, height_;
-  GlFramebuffer framebuffer_;
-  GlRenderbuffer color_;
+  MultisampledTarget target_;
 };
 
 }  // namespace rebounce

@@ -7,7 +7,7 @@
 
 #include "runtime/demo/shading/display_surface.h"
 #include "runtime/demo/shading/patch_errors.h"
-#include "runtime/demo/shading/vertex_light.h"
+#include "runtime/demo/shading/picture_light.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/outputs/probe_irradiance.h"
 #include "runtime/outputs/probe_light.h"

@@ -10,7 +10,7 @@
 
 #include "runtime/demo/motion/indirect_solver.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
-#include "runtime/demo/viewer/window/viewer.h"
+#include "runtime/demo/viewer/window/viewer_setup.h"
 #include "runtime/frame/engine.h"
 
 namespace rebounce {

@@ -4,8 +4,10 @@
 #include <imgui.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "runtime/demo/viewer/gl/headless_context.h"
+#include "runtime/demo/viewer/gl/render_targets.h"
 #include "runtime/demo/viewer/window/controls.h"
 #include "runtime/demo/viewer/window/frame_drawer.h"
 #include "runtime/demo/viewer/window/panels.h"

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "runtime/demo/motion/fly_camera.h"
-#include "runtime/demo/viewer/window/viewer.h"
+#include "runtime/demo/viewer/window/viewer_setup.h"
 
 namespace rebounce {
 

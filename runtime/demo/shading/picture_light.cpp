@@ -1,10 +1,11 @@
-#include "runtime/demo/shading/vertex_light.h"
+#include "runtime/demo/shading/picture_light.h"
 
 #include <string>
 
 #include "runtime/demo/shading/display_surface.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/error.h"
 
 namespace rebounce {
@@ -29,6 +30,10 @@ VertexLight light_at_vertices(const TransferData& data, const PictureLight& ligh
     bounced[i] = glm::max(bounced[i], glm::vec3(0));
   }
   return {reconstruct_at_vertices(data.mesh, sky), reconstruct_at_vertices(data.mesh, bounced)};
+}
+
+std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
+  return gather(*make_form_factors(SolveMethod::kGathering, data), data.patches.emitted_exitance);
 }
 
 }  // namespace rebounce

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "transfer/base/types.h"
+
+namespace rebounce {
+
+/// Linear Rec.709, rows from the top. Emitters and sky are drawn no brighter than twice what the
+/// exposure takes to white, so that their edges are smooth.
+struct Picture {
+  int width = 0;
+  int height = 0;
+  std::vector<Float3> pixel{};    ///< [height][width] cd/m², or a colour in [0, 1]
+  float exposure = 0;             ///< stops: pixel x 2^exposure is what the tone curve takes
+  bool display_referred = false;  ///< pixels are colours (patches, error): no exposure, no curve
+};
+
+/// 8-bit sRGB, rows from the top.
+struct ScreenImage {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> rgb{};  ///< [height][width][3]
+};
+
+}  // namespace rebounce

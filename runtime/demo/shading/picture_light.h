@@ -1,0 +1,37 @@
+#pragma once
+
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// The light to draw with. Per-patch arrays have n entries or none (zero everywhere).
+struct PictureLight {
+  std::span<const Light> lights{};
+  Sky sky{};
+  std::span<const Float3> indirect_irradiance{};  ///< H = F B in lx, what the operator gives
+  /// F M_e in lx: the part of H that comes straight from emitters. The picture finds it anew in
+  /// every pixel, with sharp shadows, and takes only the rest of H from the patches.
+  std::span<const Float3> emitted_irradiance{};
+  std::span<const float> error{};  ///< >= 0, drawn by Show::kError
+};
+
+/// The light of one picture as values at the vertices [v], in lx.
+struct VertexLight {
+  std::vector<glm::vec3> sky;
+  std::vector<glm::vec3> bounced;  ///< H without the emitters' first flight
+};
+
+/// Throws Error if an array of `light` has neither no entries nor one for each patch.
+VertexLight light_at_vertices(const TransferData& data, const PictureLight& light);
+
+/// F M_e [n] in lx: what arrives straight from the scene's own emitters, for PictureLight.
+std::vector<Float3> irradiance_from_emitters(const TransferData& data);
+
+/// Throws Error if `length` is neither 0 nor `patch_count`.
+void check_length(std::size_t length, std::size_t patch_count, const char* name);
+
+}  // namespace rebounce
