@@ -12,6 +12,7 @@
 #include "bench/process_cost.h"
 #include "bench/program.h"
 #include "precompute/compression/form_factor_compression.h"
+#include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/exchange/links/linked_matrix.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/inverse/dense_transfer.h"

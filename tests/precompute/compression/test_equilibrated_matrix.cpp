@@ -9,7 +9,7 @@
 #include <numeric>
 #include <random>
 
-#include "precompute/compression/matrix_compression.h"
+#include "precompute/compression/tolerance_search.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/reference_lighting.h"

@@ -10,7 +10,9 @@
 #include <filesystem>
 #include <map>
 
+#include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/compression/matrix_compression.h"
+#include "precompute/compression/tolerance_search.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/inverse/hierarchical_matrix.h"

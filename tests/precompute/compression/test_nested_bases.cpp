@@ -11,6 +11,7 @@
 
 #include "precompute/compression/block_tree.h"
 #include "precompute/compression/matrix_compression.h"
+#include "precompute/compression/tolerance_search.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_encoding.h"
