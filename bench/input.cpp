@@ -1,5 +1,6 @@
 #include "bench/input.h"
 
+#include "precompute/patches/winding.h"
 #include "transfer/file/transfer_file.h"
 
 namespace rebounce::bench {

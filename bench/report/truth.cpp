@@ -10,6 +10,7 @@
 #include "precompute/build/build.h"
 #include "precompute/lights/reference_solution.h"
 #include "precompute/patches/lit_sides.h"
+#include "precompute/patches/winding.h"
 #include "runtime/frame/engine.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/error.h"

@@ -19,6 +19,7 @@
 #include "precompute/cli/console.h"
 #include "precompute/cli/light_file.h"
 #include "precompute/patches/lit_sides.h"
+#include "precompute/patches/winding.h"
 #include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/camera.h"
 #include "runtime/demo/picture/picture.h"

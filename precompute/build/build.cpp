@@ -4,19 +4,16 @@
 #include <cmath>
 #include <optional>
 
+#include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
+#include "precompute/build/exchange_stage.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/build/phase_clock.h"
-#include "precompute/exchange/links/link_fitting.h"
-#include "precompute/exchange/links/links.h"
-#include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/import/import_gltf.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/outputs/reconstruction_weights.h"
 #include "precompute/patches/patch_model.h"
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
-#include "transfer/base/error.h"
 #include "transfer/base/version.h"
 
 namespace rebounce {
@@ -37,63 +34,6 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
   report.patch_size_median = size[size.size() / 2];
   report.patch_size_max = size.back();
   report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
-}
-
-/// The kind of an operator from pairs, if that was left open.
-OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& model) {
-  if (settings.operator_kind != OperatorKind::kAutomatic) return settings.operator_kind;
-  const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
-  return restricted_roles || model.patches.size() > kDensePatchCount ? OperatorKind::kHierarchical
-                                                                     : OperatorKind::kDense;
-}
-
-/// What the operator is to be made from, if that was left open.
-ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
-  const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
-                          settings.operator_kind == OperatorKind::kHierarchical;
-  if (settings.exchange_source == ExchangeSource::kLinks && !from_links &&
-      settings.operator_kind != OperatorKind::kNoOperator) {
-    throw Error("from links only a hierarchical operator is made; ask for that, or for pairs");
-  }
-  if (settings.exchange_source != ExchangeSource::kAutomatic) return settings.exchange_source;
-  const std::size_t n = model.patches.size();
-  const bool too_many =
-      n > kPairsPatchCount ||
-      peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
-                          kind_from_pairs(settings, model)) > memory_limit_bytes(settings);
-  return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
-}
-
-/// The settings with what was left open decided.
-BuildSettings decide(BuildSettings settings, const PatchModel& model) {
-  settings.memory_limit_bytes = memory_limit_bytes(settings);
-  settings.exchange_source = choose_form_factors(settings, model);
-  const bool links = settings.exchange_source == ExchangeSource::kLinks;
-  const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
-  if (settings.operator_kind == OperatorKind::kAutomatic) {
-    settings.operator_kind = links ? OperatorKind::kHierarchical : kind_from_pairs(settings, model);
-  }
-  const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
-  if (restricted_roles && !hierarchical) {
-    throw Error("receivers and sources are for hierarchical operators alone; ask for one");
-  }
-  if (!settings.precision) {
-    const bool dense = settings.operator_kind == OperatorKind::kDense;
-    settings.precision = hierarchical ? Precision::kQ8 : dense ? Precision::kF32 : Precision::kF16;
-  }
-  if (are_integers(hierarchical_precision(*settings.precision).bases) && !hierarchical) {
-    throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
-  }
-  if (!hierarchical) settings.tolerance = 0;
-  double& link_epsilon = settings.form_factors.link_epsilon;
-  if (!links && link_epsilon > 0) {
-    throw Error("the error of a link is for form factors from links; ask for these");
-  }
-  if (links && link_epsilon == 0) link_epsilon = kLinkEpsilon;
-  if (links && settings.form_factor_tolerance == 0 && !restricted_roles) {
-    settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
-  }
-  return settings;
 }
 
 Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
@@ -151,8 +91,16 @@ class TransferBuild {
   /// Finds what patches exchange; afterwards the patches and the mesh are the data's.
   void find_exchange() {
     if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
-    EscapedLight escaped =
-        decided_.exchange_source == ExchangeSource::kLinks ? find_links_alone() : find_pairs();
+    const bool links = decided_.exchange_source == ExchangeSource::kLinks;
+    const auto find = links ? find_links : find_pairs;
+    EscapedLight escaped = find(model_, *tracer_, decided_, data_, report_, clock_);
+    if (links && decided_.operator_kind != OperatorKind::kNoOperator) {
+      const LinkedBuild known{model_.patches.size(), report_.link_count,
+                              distinct_channels(model_.patches.reflectance), roles_,
+                              decided_.tolerance};
+      announce(report_.estimate_after_links.emplace(
+          estimate_after_links(known, decided_.memory_limit_bytes)));
+    }
     data_.patches = std::move(model_.patches);
     data_.patches.sky_visibility = std::move(escaped.sky_visibility);
     data_.patches.absorbed = std::move(escaped.absorbed);
@@ -203,13 +151,7 @@ class TransferBuild {
   void forecast_pairs() {
     tracer_.emplace(make_surface_tracer(model_.mesh));
     clock_.run("estimate", [&](const Progress& part) {
-      CostEstimate& estimate = report_.estimate;
-      estimate.form_factor_seconds =
-          forecast_form_factors(model_, *tracer_, decided_.form_factors, part).seconds;
-      if (decided_.operator_kind == OperatorKind::kNoOperator) return true;
-      estimate.inverse_seconds = forecast_dense_transfer(
-          estimate.patch_count, distinct_channels(model_.patches.reflectance),
-          arithmetic_of(decided_.operator_kind));
+      sample_pairs(model_, *tracer_, decided_, part, report_.estimate);
       return true;
     });
   }
@@ -218,43 +160,6 @@ class TransferBuild {
   void announce(const CostEstimate& estimate) {
     if (on_estimate_) on_estimate_(estimate);
     refuse_if_too_large(estimate, decided_.memory_limit_bytes, report_.triangle_count);
-  }
-
-  EscapedLight find_pairs() {
-    FormFactors form_factors = clock_.run("form factors", [&](const Progress& part) {
-      return compute_form_factors(model_, *tracer_, settings_.form_factors, part);
-    });
-    report_.ray_count = form_factors.ray_count;
-    report_.pair_count = form_factors.pair_count;
-    report_.form_factor_count = form_factors.exchange.column.size();
-    report_.closure = form_factors.closure;
-    if (settings_.store_links) {
-      data_.links = clock_.run("links", [&](const Progress& part) {
-        return fit_links(form_factors.exchange, model_.patches, kErrorPerLink, part);
-      });
-      report_.link_count = data_.links.pair.size();
-    }
-    data_.exchange = std::move(form_factors.exchange);
-    return form_factors;
-  }
-
-  EscapedLight find_links_alone() {
-    LinkBuild build = clock_.run("form factors", [&](const Progress& part) {
-      return build_links(model_, *tracer_, decided_.form_factors, {}, part);
-    });
-    report_.ray_count = build.ray_count;
-    report_.pair_count = build.candidate_count;
-    report_.link_count = build.links.pair.size();
-    report_.closure = build.closure;
-    if (decided_.operator_kind != OperatorKind::kNoOperator) {
-      const LinkedBuild known{model_.patches.size(), report_.link_count,
-                              distinct_channels(model_.patches.reflectance), roles_,
-                              decided_.tolerance};
-      announce(report_.estimate_after_links.emplace(
-          estimate_after_links(known, decided_.memory_limit_bytes)));
-    }
-    data_.links = std::move(build.links);
-    return build;
   }
 
   const BuildSettings& settings_;
@@ -270,12 +175,6 @@ class TransferBuild {
 };
 
 }  // namespace
-
-Scene import_usable(const std::filesystem::path& path, double scale) {
-  Scene scene = import_gltf(path, scale);
-  make_double_sided(scene, find_inside_out(scene));
-  return scene;
-}
 
 TransferData build_transfer_data(const std::filesystem::path& scene_path,
                                  const BuildSettings& settings, BuildReport& report,

@@ -7,9 +7,10 @@
 #include <cmath>
 
 #include "precompute/build/operator_stage.h"
-#include "precompute/compression/matrix_free_transfer.h"
+#include "precompute/compression/matrix_free_plan.h"
 #include "precompute/exchange/links/link_refinement.h"
 #include "precompute/exchange/pairs/closure.h"
+#include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "transfer/base/error.h"
 #include "transfer/exchange/linked_form_factors.h"
@@ -121,6 +122,16 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
         std::max(estimate.peak_bytes, peak_bytes_after_links(build, decided.memory_limit_bytes));
   }
   return estimate;
+}
+
+void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildSettings& decided,
+                  const Progress& progress, CostEstimate& estimate) {
+  estimate.form_factor_seconds =
+      forecast_form_factors(model, tracer, decided.form_factors, progress).seconds;
+  if (decided.operator_kind == OperatorKind::kNoOperator) return;
+  estimate.inverse_seconds =
+      forecast_dense_transfer(estimate.patch_count, distinct_channels(model.patches.reflectance),
+                              arithmetic_of(decided.operator_kind));
 }
 
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {

@@ -3,9 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "precompute/base/progress.h"
 #include "precompute/build/build_report.h"
 #include "precompute/build/build_settings.h"
 #include "precompute/patches/patch_model.h"
+#include "runtime/rays/ray_tracer.h"
 #include "transfer/data/patch_roles.h"
 
 namespace rebounce {
@@ -41,7 +43,12 @@ std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
                            const BuildSettings& decided);
 
-/// The same of what comes after links.
+/// Adds the time that form factors and a dense inverse from pairs take, by short samples of either.
+/// Throws Cancelled if asked to stop.
+void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildSettings& decided,
+                  const Progress& progress, CostEstimate& estimate);
+
+/// The memory of what comes after links.
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
 /// Throws Error if an estimate is above `limit_bytes`.

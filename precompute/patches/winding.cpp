@@ -10,6 +10,7 @@
 
 #include "precompute/base/disjoint_sets.h"
 #include "precompute/base/edge_table.h"
+#include "precompute/import/import_gltf.h"
 #include "precompute/patches/welded_positions.h"
 #include "precompute/sampling/hemisphere_rays.h"
 #include "runtime/rays/ray_tracer.h"
@@ -247,6 +248,12 @@ void make_double_sided(Scene& scene, std::span<const InsideOutPiece> pieces) {
       fmt::format("{} triangles are seen from behind only and were taken as double-sided; check "
                   "their winding",
                   triangle_count));
+}
+
+Scene import_usable(const std::filesystem::path& path, double scale) {
+  Scene scene = import_gltf(path, scale);
+  make_double_sided(scene, find_inside_out(scene));
+  return scene;
 }
 
 }  // namespace rebounce

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <vector>
 
@@ -35,5 +36,9 @@ std::vector<InsideOutPiece> find_inside_out(const Scene& scene);
 /// Gives the triangles of `pieces` double-sided copies of their materials, and the scene a warning
 /// where there are any.
 void make_double_sided(Scene& scene, std::span<const InsideOutPiece> pieces);
+
+/// The scene of a file as the offline stage takes it: pieces that are plainly seen from behind are
+/// double-sided (find_inside_out). Throws Error as import_gltf does.
+Scene import_usable(const std::filesystem::path& path, double scale);
 
 }  // namespace rebounce

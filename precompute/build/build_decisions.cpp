@@ -1,0 +1,70 @@
+#include "precompute/build/build_decisions.h"
+
+#include "precompute/build/build_estimate.h"
+#include "precompute/build/operator_stage.h"
+#include "precompute/exchange/links/links.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+/// The kind of an operator from pairs, if that was left open.
+OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& model) {
+  if (settings.operator_kind != OperatorKind::kAutomatic) return settings.operator_kind;
+  const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
+  return restricted_roles || model.patches.size() > kDensePatchCount ? OperatorKind::kHierarchical
+                                                                     : OperatorKind::kDense;
+}
+
+/// What the operator is to be made from, if that was left open.
+ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
+  const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
+                          settings.operator_kind == OperatorKind::kHierarchical;
+  if (settings.exchange_source == ExchangeSource::kLinks && !from_links &&
+      settings.operator_kind != OperatorKind::kNoOperator) {
+    throw Error("from links only a hierarchical operator is made; ask for that, or for pairs");
+  }
+  if (settings.exchange_source != ExchangeSource::kAutomatic) return settings.exchange_source;
+  const std::size_t n = model.patches.size();
+  const bool too_many =
+      n > kPairsPatchCount ||
+      peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
+                          kind_from_pairs(settings, model)) > memory_limit_bytes(settings);
+  return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
+}
+
+}  // namespace
+
+BuildSettings decide(BuildSettings settings, const PatchModel& model) {
+  settings.memory_limit_bytes = memory_limit_bytes(settings);
+  settings.exchange_source = choose_form_factors(settings, model);
+  const bool links = settings.exchange_source == ExchangeSource::kLinks;
+  const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
+  if (settings.operator_kind == OperatorKind::kAutomatic) {
+    settings.operator_kind = links ? OperatorKind::kHierarchical : kind_from_pairs(settings, model);
+  }
+  const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
+  if (restricted_roles && !hierarchical) {
+    throw Error("receivers and sources are for hierarchical operators alone; ask for one");
+  }
+  if (!settings.precision) {
+    const bool dense = settings.operator_kind == OperatorKind::kDense;
+    settings.precision = hierarchical ? Precision::kQ8 : dense ? Precision::kF32 : Precision::kF16;
+  }
+  if (are_integers(hierarchical_precision(*settings.precision).bases) && !hierarchical) {
+    throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
+  }
+  if (!hierarchical) settings.tolerance = 0;
+  double& link_epsilon = settings.form_factors.link_epsilon;
+  if (!links && link_epsilon > 0) {
+    throw Error("the error of a link is for form factors from links; ask for these");
+  }
+  if (links && link_epsilon == 0) link_epsilon = kLinkEpsilon;
+  if (links && settings.form_factor_tolerance == 0 && !restricted_roles) {
+    settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
+  }
+  return settings;
+}
+
+}  // namespace rebounce
