@@ -52,17 +52,16 @@ Float3 above(const SurfacePoint& point, const RayTracer& tracer) {
   return tracer.offset_point(to_float3(point.position), to_float3(point.geometric_normal));
 }
 
-Ray ray_to_lamp(const Light& light, const IncidentLight& incident, const Float3& origin) {
-  const LampKind& kind = lamp_kind(light.type);
-  if (kind.surface != nullptr || !kind.has_place()) {
+Ray ray_to_lamp(const PreparedLight& lamp, const UnitLight& light, const Float3& origin) {
+  if (lamp.has_area() || !lamp.kind->has_place()) {
     return {.origin = origin,
             .t_near = 0,
-            .direction = incident.direction,
-            .t_far = shadow_ray_length(incident.distance)};
+            .direction = to_float3(light.direction),
+            .t_far = shadow_ray_length(light.distance)};
   }
   return {.origin = origin,
           .t_near = 0,
-          .direction = to_float3(to_glm(light.position) - to_glm(origin)),
+          .direction = to_float3(lamp.position - to_glm(origin)),
           .t_far = 1};
 }
 
@@ -70,10 +69,18 @@ Ray ray_to_lamp(const Light& light, const IncidentLight& incident, const Float3&
 constexpr std::uint32_t kPlacesPerSample = 4;
 
 // Place k of those, spread over all of the samples of a pixel.
-Float2 place_on_lamp(const CameraSample& sample, std::uint32_t k) {
+glm::vec2 place_on_lamp(const CameraSample& sample, std::uint32_t k) {
   const glm::vec2 shift(hash_to_unit(sample.pixel, 5), hash_to_unit(sample.pixel, 6));
-  const glm::vec2 place = r2_point(kPlacesPerSample * sample.index + k, shift);
-  return {place.x, place.y};
+  return r2_point(kPlacesPerSample * sample.index + k, shift);
+}
+
+// What arrives at the sample from place k, or from a lamp without places.
+UnitLight light_of(const PreparedLight& lamp, const CameraSample& sample, std::uint32_t k) {
+  if (!lamp.has_area()) return lamp.evaluate(sample.point.position);
+  const glm::vec2 place = place_on_lamp(sample, k);
+  UnitLight light;
+  lamp.evaluate_places(sample.point.position, {&place, 1}, {&light, 1});
+  return light;
 }
 
 float form_factor(const SurfacePoint& receiver, const EmitterPiece& piece) {
@@ -121,17 +128,17 @@ void add_punctual_light(std::span<CameraSample> samples, std::span<const Light> 
                         const RayTracer& tracer) {
   ShadowRays shadow_rays;
   for (const Light& light : lights) {
-    const std::uint32_t places = is_area_light(light.type) ? kPlacesPerSample : 1;
+    const PreparedLight lamp(light);
+    const glm::vec3 intensity = to_glm(light.color) * light.intensity;
+    const std::uint32_t places = lamp.has_area() ? kPlacesPerSample : 1;
     for (CameraSample& sample : samples) {
       for (std::uint32_t k = 0; k < places; ++k) {
-        const IncidentLight incident =
-            evaluate_light(light, to_float3(sample.point.position), place_on_lamp(sample, k));
-        const float cosine = receiving_cosine(sample.point, to_glm(incident.direction));
+        const UnitLight unit = light_of(lamp, sample, k);
+        const float cosine = receiving_cosine(sample.point, unit.direction);
         const glm::vec3 arriving =
-            to_glm(incident.illuminance) * (cosine / static_cast<float>(places));
+            intensity * unit.illuminance * (cosine / static_cast<float>(places));
         if (arriving == glm::vec3(0)) continue;
-        shadow_rays.add(sample, ray_to_lamp(light, incident, above(sample.point, tracer)),
-                        arriving);
+        shadow_rays.add(sample, ray_to_lamp(lamp, unit, above(sample.point, tracer)), arriving);
       }
     }
     shadow_rays.deliver(tracer);

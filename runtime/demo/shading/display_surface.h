@@ -73,13 +73,4 @@ void intersect_visible(const RayTracer& tracer, const DisplaySurface& surface, s
 void intersect_visible(const RayTracer& tracer, const DisplayMesh& mesh, std::span<Ray> rays,
                        std::span<Hit> hits);
 
-/// Values at the vertices from values of the patches; zero where a vertex has no weights or
-/// `patch_value` is empty.
-std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,
-                                               std::span<const glm::vec3> patch_value);
-
-/// The vertex values interpolated at `point`.
-glm::vec3 interpolate(const DisplayMesh& mesh, std::span<const glm::vec3> vertex_value,
-                      const SurfacePoint& point);
-
 }  // namespace rebounce

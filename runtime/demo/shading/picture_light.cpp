@@ -2,7 +2,6 @@
 
 #include <string>
 
-#include "runtime/demo/shading/display_surface.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/solvers/solve_radiosity.h"
@@ -30,6 +29,26 @@ VertexLight light_at_vertices(const TransferData& data, const PictureLight& ligh
     bounced[i] = glm::max(bounced[i], glm::vec3(0));
   }
   return {reconstruct_at_vertices(data.mesh, sky), reconstruct_at_vertices(data.mesh, bounced)};
+}
+
+std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,
+                                               std::span<const glm::vec3> patch_value) {
+  std::vector<glm::vec3> value(mesh.position.size(), glm::vec3(0));
+  if (patch_value.empty() || mesh.weight_begin.empty()) return value;
+  for (std::size_t v = 0; v < value.size(); ++v) {
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      value[v] += mesh.weight[k] * patch_value[mesh.weight_patch[k]];
+    }
+    value[v] = glm::max(value[v], glm::vec3(0));  // some weights are negative
+  }
+  return value;
+}
+
+glm::vec3 interpolate(const DisplayMesh& mesh, std::span<const glm::vec3> vertex_value,
+                      const SurfacePoint& point) {
+  const Uint3& corner = mesh.triangle[point.triangle];
+  return point.weight.x * vertex_value[corner[0]] + point.weight.y * vertex_value[corner[1]] +
+         point.weight.z * vertex_value[corner[2]];
 }
 
 std::vector<Float3> irradiance_from_emitters(const TransferData& data) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "runtime/demo/shading/display_surface.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
@@ -27,6 +28,15 @@ struct VertexLight {
 
 /// Throws Error if an array of `light` has neither no entries nor one for each patch.
 VertexLight light_at_vertices(const TransferData& data, const PictureLight& light);
+
+/// Values at the vertices from values of the patches; zero where a vertex has no weights or
+/// `patch_value` is empty.
+std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,
+                                               std::span<const glm::vec3> patch_value);
+
+/// The vertex values interpolated at `point`.
+glm::vec3 interpolate(const DisplayMesh& mesh, std::span<const glm::vec3> vertex_value,
+                      const SurfacePoint& point);
 
 /// F M_e [n] in lx: what arrives straight from the scene's own emitters, for PictureLight.
 std::vector<Float3> irradiance_from_emitters(const TransferData& data);

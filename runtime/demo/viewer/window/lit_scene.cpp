@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/demo/shading/display_surface.h"
 #include "runtime/demo/shading/patch_errors.h"
 #include "runtime/demo/shading/picture_light.h"
 #include "runtime/lights/sky_light.h"
