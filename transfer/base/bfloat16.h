@@ -5,13 +5,13 @@
 
 namespace rebounce {
 
-/// The upper half of a float: its sign, its exponent and 7 bits of its mantissa; exact.
+/// Converts bfloat16 bits, the upper half of a float (sign, exponent, 7 bits of mantissa). Exact.
 inline float bfloat16_to_float(std::uint16_t bits) {
   return std::bit_cast<float>(std::uint32_t{bits} << 16);
 }
 
-/// The nearest such number (ties to even) to a finite value, within 2^-8 of it; infinity where the
-/// value is within that of the largest float.
+/// The nearest bfloat16 number to a finite value (ties to even), within a relative 2^-8. Infinity
+/// near the largest float.
 inline std::uint16_t float_to_bfloat16(float value) {
   const auto bits = std::bit_cast<std::uint32_t>(value);
   return static_cast<std::uint16_t>((bits + 0x7FFFU + ((bits >> 16) & 1U)) >> 16);

@@ -7,13 +7,13 @@
 
 namespace rebounce {
 
-/// Numbers by groups, those of a group in the order in which they were given. `Index` counts all
-/// of them.
+/// Lists of numbers, one list per group, in one array. A group keeps the order in which its numbers
+/// were added. `Index` can hold the total count.
 template <typename Index>
 class Grouped {
  public:
-  /// `give`(add) calls add(group, number) for each number, groups below `group_count`. It is called
-  /// twice and must do the same both times.
+  /// `give`(add) calls add(group, number) for each number; groups are < `group_count`. The
+  /// constructor calls it twice, and both calls must add the same numbers.
   template <typename Give>
   Grouped(std::size_t group_count, const Give& give) : begin_(group_count + 1, 0) {
     give([&](std::size_t group, std::uint32_t /*number*/) { ++begin_[group + 1]; });
@@ -24,13 +24,13 @@ class Grouped {
   }
 
   std::size_t group_count() const { return begin_.size() - 1; }
-  std::size_t size() const { return number_.size(); }  ///< of all groups together
+  std::size_t size() const { return number_.size(); }  ///< numbers of all groups
 
   std::span<const std::uint32_t> operator[](std::size_t group) const {
     return {number_.data() + begin_[group], number_.data() + begin_[group + 1]};
   }
 
-  /// [groups + 1] Where each group begins in a list of all numbers, group by group.
+  /// [groups + 1] index of each group's first number; the last entry is size()
   const std::vector<Index>& offsets() const { return begin_; }
 
  private:

@@ -5,18 +5,18 @@
 
 namespace rebounce {
 
-/// IEEE 754 half-precision bits as a float; exact.
+/// Converts IEEE 754 half-precision bits to a float. Exact.
 inline float half_to_float(std::uint16_t half) {
   const std::uint32_t sign = (half & 0x8000U) << 16;
   const std::uint32_t magnitude = half & 0x7FFFU;
   if (magnitude >= 0x7C00U) return std::bit_cast<float>(sign | 0x7F800000U | (magnitude << 13));
-  // Shifted into place, the exponent is too small by 127 - 15: a product with 2^112 mends it, and
-  // makes subnormal halves normal on the way.
+  // After the shift the exponent is 127 - 15 too small. A product with 2^112 corrects it and makes
+  // subnormal halves normal.
   const float scaled = std::bit_cast<float>(magnitude << 13) * 0x1p112F;
   return std::bit_cast<float>(sign | std::bit_cast<std::uint32_t>(scaled));
 }
 
-/// The nearest half-precision number (ties to even) as bits; infinity beyond 65,504.
+/// The bits of the nearest half-precision number (ties to even); infinity beyond 65,504.
 inline std::uint16_t float_to_half(float value) {
   const std::uint32_t bits = std::bit_cast<std::uint32_t>(value);
   const auto sign = static_cast<std::uint16_t>((bits >> 16) & 0x8000U);
@@ -24,7 +24,7 @@ inline std::uint16_t float_to_half(float value) {
   if (magnitude >= 0x7F800000U) {
     return sign | (magnitude > 0x7F800000U ? 0x7E00U : 0x7C00U);
   }
-  if (magnitude < 0x38800000U) {  // subnormal half: let the float adder round at 2^-24
+  if (magnitude < 0x38800000U) {  // subnormal half: the addition of floats rounds at 2^-24
     const float rounded = std::bit_cast<float>(magnitude) + 0.5F;
     return sign | static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(rounded) - 0x3F000000U);
   }

@@ -8,7 +8,7 @@ void run_here(const ParallelLoop& loop) {
 }
 
 #ifdef _OPENMP
-/// All loops in one parallel region: threads meet after each of them, but start only once.
+/// Runs all loops in one parallel region: the threads start once and meet after each loop.
 void run_with_openmp(std::initializer_list<ParallelLoop> loops) {
 #pragma omp parallel
   for (const ParallelLoop& loop : loops) {

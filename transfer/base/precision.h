@@ -6,14 +6,14 @@
 
 namespace rebounce {
 
-/// How values are stored. kQ16 and kQ8, the bases of a HierarchicalOperator as integers of 16 or 8
-/// bits and the rest as kF16, are for that alone.
+/// How the values of an operator are stored. kQ16 and kQ8 are for hierarchical operators only:
+/// bases as integers of 16 or 8 bits, everything else as kF16.
 enum class Precision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
 
-/// Of the bases of a HierarchicalOperator: IEEE numbers of 16 or 32 bits, or integers.
+/// How the bases of a HierarchicalOperator are stored: IEEE numbers of 16 or 32 bits, or integers.
 enum class BasisPrecision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
 
-/// Of its coupling matrices and dense entries.
+/// How the coupling matrices and dense entries of a HierarchicalOperator are stored.
 enum class CouplingPrecision : std::uint8_t { kF16, kF32 };
 
 struct HierarchicalPrecision {
@@ -23,11 +23,11 @@ struct HierarchicalPrecision {
   bool operator==(const HierarchicalPrecision&) const = default;
 };
 
-/// A precision as the command line offers it.
+/// A precision that the command line offers.
 struct OfferedPrecision {
   Precision precision;
   const char* name;
-  HierarchicalPrecision hierarchical;  ///< of a HierarchicalOperator
+  HierarchicalPrecision hierarchical;  ///< what it means for a HierarchicalOperator
 };
 inline constexpr std::array<OfferedPrecision, 4> kOfferedPrecisions{{
     {Precision::kF16, "f16", {BasisPrecision::kF16, CouplingPrecision::kF16}},
@@ -36,21 +36,21 @@ inline constexpr std::array<OfferedPrecision, 4> kOfferedPrecisions{{
     {Precision::kQ8, "q8", {BasisPrecision::kQ8, CouplingPrecision::kF16}},
 }};
 
-/// Whether bases are integers, which have an order of their own.
+/// Whether bases of this precision are integers. Integers have an order of their own.
 constexpr bool are_integers(BasisPrecision precision) {
   return precision == BasisPrecision::kQ16 || precision == BasisPrecision::kQ8;
 }
 
-/// What `precision` is for a HierarchicalOperator.
+/// What `precision` means for a HierarchicalOperator.
 HierarchicalPrecision hierarchical_precision(Precision precision);
 
-/// Whether some precision on offer is this one.
+/// Whether the command line offers this combination.
 bool is_offered(const HierarchicalPrecision& precision);
 
-/// As the command line names it: "f16", "f32", "q16", "q8".
+/// The name on the command line: "f16", "f32", "q16", "q8".
 std::string precision_name(Precision precision);
 
-/// Likewise. `precision` must be on offer.
+/// The name on the command line. `precision` must be one that is offered.
 std::string precision_name(const HierarchicalPrecision& precision);
 
 }  // namespace rebounce

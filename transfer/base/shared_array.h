@@ -8,8 +8,8 @@
 
 namespace rebounce {
 
-/// A read-only array that keeps its memory alive: a vector that was built, or a part of a mapped
-/// file. Copies share the memory.
+/// A read-only array that keeps its memory alive: a vector, or part of a mapped file. Copies share
+/// the memory.
 template <typename T>
 class SharedArray {
  public:
@@ -31,7 +31,7 @@ class SharedArray {
   auto end() const { return view_.end(); }
   std::span<const T> span() const { return view_; }
 
-  /// What keeps the memory alive, for arrays that are parts of this one.
+  /// The owner of the memory, for arrays that are parts of this one.
   const std::shared_ptr<const void>& owner() const { return owner_; }
 
  private:

@@ -6,7 +6,7 @@
 
 namespace rebounce {
 
-/// The shortest decimal that reads back as the same number, in any locale.
+/// The shortest decimal that reads back as the same number, independent of the locale.
 template <typename Number>
 std::string shortest_decimal(Number value) {
   std::array<char, 32> buffer;
