@@ -4,10 +4,10 @@
 
 namespace rebounce {
 
-/// Consecutive columns that FormFactorBlocks keeps together.
+/// Consecutive columns of F that FormFactorBlocks stores as one block.
 inline constexpr std::size_t kFormFactorBlock = 8;
 
-/// `count`, rounded up to whole blocks.
+/// `count`, rounded up to a multiple of kFormFactorBlock.
 constexpr std::size_t in_whole_blocks(std::size_t count) {
   return (count + kFormFactorBlock - 1) / kFormFactorBlock * kFormFactorBlock;
 }

@@ -40,12 +40,12 @@ void check_exponents(std::span<const std::int8_t> exponents, std::size_t patch_c
   }
 }
 
-/// Positions of patches, with their padding, and the cluster coefficients that are numbered after
-/// them.
+/// The index ranges of an operator: the positions of patches with their padding, then the cluster
+/// coefficients.
 struct Places {
   std::size_t position_count, cluster_coefficient_count;
 
-  /// Whether [begin, begin + count) is a cluster's range of positions.
+  /// Whether [begin, begin + count) is an aligned, non-empty range of positions.
   bool are_positions(std::uint64_t begin, std::uint64_t count) const {
     return are_aligned(begin, count) && begin + count <= position_count;
   }
@@ -108,8 +108,8 @@ void check_block(const TransferBlock& block, const Places& places) {
   refuse("a block is of an unknown kind");
 }
 
-/// Of the blocks of cluster coefficients, which must be numbered in their order; their scales must
-/// be there.
+/// Returns the number of cluster coefficients. Checks that they are numbered in the order of their
+/// blocks and that each has a finite scale.
 std::size_t checked_moment_count(const Storage& storage, std::size_t position_count) {
   std::uint64_t end = position_count;
   for (const TransferBlock& block : storage.blocks) {
@@ -165,7 +165,7 @@ std::uint64_t block_order_count(const Storage& storage) {
   return count;
 }
 
-/// Whether all arrays have as many values as the blocks ask for.
+/// Whether each array has exactly the number of values that the blocks need.
 bool sizes_fit(const Storage& storage) {
   const HierarchicalLayout layout(storage);
   const std::uint64_t bases = layout.basis_value_count, couplings = layout.coupling_value_count;
@@ -195,7 +195,7 @@ void check_hierarchical_storage(const Storage& storage) {
     refuse("integers are for streamed values alone");
   }
   if (!sizes_fit(storage)) refuse("the number of values does not fit the blocks");
-  // Sums of their products must not overflow.
+  // Otherwise sums of products could overflow 32 bits.
   constexpr std::int16_t kLargest = HierarchicalFormat::kLargestShort;
   const auto too_large = [](std::int16_t value) { return value > kLargest || value < -kLargest; };
   if (std::ranges::any_of(storage.bases_q16.span(), too_large)) {

@@ -4,7 +4,7 @@
 
 namespace rebounce {
 
-/// Throws Error if the tables or the number of values are not those of an operator.
+/// Throws Error if the tables or the number of values do not describe a valid operator.
 void check_hierarchical_storage(const HierarchicalStorage& storage);
 
 }  // namespace rebounce

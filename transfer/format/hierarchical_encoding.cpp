@@ -21,7 +21,7 @@ using Layout = HierarchicalLayout;
 
 using Order = HierarchicalStorage::Order;
 
-/// Copies the values of one block from where it begins to where they belong.
+/// Copies the values of one block from the order kByBlock to their indices in the order kStreamed.
 template <typename Value>
 void place_block(const HierarchicalLayout& layout, const TransferBlock& block,
                  const HierarchicalLayout::Place& place, std::uint32_t matrix_count,
@@ -61,12 +61,12 @@ SharedArray<Value> stream_array(const Storage& storage, const std::vector<Transf
   return SharedArray(std::move(streamed));
 }
 
-/// Makes all entries so much smaller by powers of four that halves hold them, and scales of
-/// positions, if there are any, as much larger.
+/// Divides all entries by the smallest power of four that brings them into the range of halves, and
+/// multiplies the scales of positions to match. Does nothing if the operator has no such scales.
 void fit_halves(Storage& exact) {
   if (exact.scale_exponent.empty()) return;
-  // Half of what they hold: entries of coupling matrices grow a little with the rounding of their
-  // bases.
+  // Half of the range of a half: rounding the bases makes entries of coupling matrices a little
+  // larger.
   constexpr float kMost = 65504 / HierarchicalFormat::kHalfScale / 2;
   const std::uint64_t begin = HierarchicalLayout(exact).basis_value_count;
   float largest = 0;
@@ -83,7 +83,8 @@ void fit_halves(Storage& exact) {
   exact.values_f32 = SharedArray(std::move(values));
 }
 
-/// Values in f32, which can be rounded, in the order kStreamed.
+/// The operator in the order kStreamed. Throws Error unless its values are in f32: others cannot be
+/// rounded again.
 Storage stream_exact(const Storage& storage) {
   Storage streamed = stream_values(storage);
   if (streamed.precision != hierarchical_precision(Precision::kF32)) {
@@ -93,7 +94,7 @@ Storage stream_exact(const Storage& storage) {
   return streamed;
 }
 
-/// Integers that bases are rounded to: their largest magnitude.
+/// The largest magnitude of the integers that bases are rounded to.
 template <typename Basis>
 struct IntegerRange;
 template <>
@@ -105,12 +106,12 @@ struct IntegerRange<std::int16_t> {
   static constexpr float kLargest = HierarchicalFormat::kLargestShort;
 };
 
-/// Writes an operator in f32 in other precisions. Where bases become integers, coupling matrices
-/// make up for the scales of their vectors.
+/// Writes an operator in f32 in another precision. Where bases become integers, the scales of their
+/// vectors are multiplied into the coupling matrices.
 template <typename Basis, typename Coupling>
 class Encoder {
  public:
-  /// `bases` and `couplings` have room for all values, and are zero.
+  /// `bases` and `couplings` have room for all values and hold zeros.
   Encoder(const Storage& exact, const Storage& rounded, Basis* bases, Coupling* couplings)
       : exact_(exact.values_f32.data()),
         matrix_count_(exact.matrix_count),
@@ -154,7 +155,7 @@ class Encoder {
     }
   }
 
-  /// Returns what each vector must be multiplied by, over the integer that stands for 1.
+  /// Returns, for each vector, its step times the integer that stands for 1.
   std::vector<float> encode_basis(const Layout::End& from, const Layout::End& to, std::size_t rank,
                                   std::size_t size) {
     std::vector<float> scales(rank, 1.0F);
@@ -185,7 +186,7 @@ class Encoder {
     return step * kBasisScale<Basis>;
   }
 
-  /// Stores a vector in multiples of `step`, and leaves what they are off.
+  /// Stores a vector as integer multiples of `step` and replaces it by the rounding error.
   void put_multiples(std::span<float> vector, float step, const Layout::End& to, std::size_t rank) {
     constexpr float kLargest = IntegerRange<Basis>::kLargest;
     if (step == 0) return;
@@ -200,12 +201,12 @@ class Encoder {
   std::uint32_t matrix_count_;
   Layout from_, to_;
   std::vector<float> coefficient_scale_;
-  std::size_t moment_ = 0;  ///< the next one
+  std::size_t moment_ = 0;  ///< index of the next cluster coefficient
   Basis* bases_;
   Coupling* couplings_;
 };
 
-/// Values in f32 and in the order kStreamed in another precision.
+/// Rounds `exact`, in f32 and in the order kStreamed, to `precision`.
 Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact) {
   Storage rounded = exact;
   rounded.precision = precision;

@@ -4,14 +4,14 @@
 
 namespace rebounce {
 
-/// The same operator with its values in the order kStreamed. A low-rank block that has only one
-/// rank loses it. Throws Error if the tables or the number of values are not those of an operator.
+/// The same operator with its values in the order kStreamed. A low-rank block with only one rank
+/// above zero gets rank zero. Throws Error if the tables or the number of values are not valid.
 HierarchicalStorage stream_values(const HierarchicalStorage& storage);
 
-/// Values in f32 as `precision` has them, in the order kStreamed; in 8 bits with the residuals
-/// that its blocks ask for. Where there are scales of positions, all of them grow as far as entries
-/// would be beyond the range of halves. Throws Error if the values are not in f32 or one is still
-/// beyond it, and as stream_values does.
+/// Rounds values in f32 to `precision` and writes them in the order kStreamed. In 8 bits the result
+/// has the residuals that its blocks ask for. If the operator has scales of positions, these grow
+/// as far as is needed to bring all entries into the range of halves. Throws Error if the values
+/// are not in f32, if an entry is still out of range, or as stream_values does.
 HierarchicalStorage encode_values(const HierarchicalStorage& storage, Precision precision);
 
 }  // namespace rebounce

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t kStrip = HierarchicalFormat::kStrip;
 
-// More values than any memory holds: sums of block sizes stay far from the end of 64 bits.
+// No memory holds more values. The limit keeps sums of block sizes far below 2^64.
 constexpr std::uint64_t kMostValues = std::uint64_t{1} << 48;
 
 using Cluster = HierarchicalLayout::Cluster;
@@ -25,8 +25,8 @@ bool has_bases(const TransferBlock& block) {
   return block.kind != TransferBlock::Kind::kDense && has_values(block);
 }
 
-/// visit(end, begin, size, rank, residuals) for the ends of the blocks with bases in the order of
-/// these.
+/// Calls visit(end, begin, size, rank, residual_rank) for each end of each block that has bases, in
+/// the order of the blocks.
 template <typename Visit>
 void visit_ends(std::span<const TransferBlock> blocks,
                 std::vector<HierarchicalLayout::Place>& places, const Visit& visit) {
@@ -113,7 +113,7 @@ std::uint32_t HierarchicalLayout::cluster_at(std::uint32_t begin, std::uint32_t 
 
 void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks,
                                      BasisPrecision precision) {
-  // First each end's place among the bases of its cluster, then that of the clusters.
+  // First the offset of each end within its cluster, then the offsets of the clusters.
   visit_ends(blocks, places,
              [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank,
                  std::uint32_t residual_rank) {

@@ -8,52 +8,54 @@
 
 namespace rebounce {
 
-/// Where the values and the coefficients of a hierarchical operator lie in the order kStreamed.
-/// Coefficients are numbered like the rows of the bases: those of a cluster one after the other, up
-/// to a multiple of `rank_group`. Those of dense blocks, whose bases are the identity, follow.
+/// Offsets of the values and the coefficients of a hierarchical operator in the order kStreamed.
+/// Coefficients are numbered like the rows of the bases: cluster by cluster, each cluster padded to
+/// a multiple of `rank_group`. The coefficients of dense blocks, whose bases are the identity,
+/// follow.
 struct HierarchicalLayout {
-  /// All bases over one cluster of positions: [rank][size], or in 16 bits in strips and groups of
-  /// ranks, the last of which is filled up with zeros (HierarchicalStorage::Order).
+  /// All bases over one cluster of positions: [rank][size]. Integers are stored in strips and
+  /// groups of ranks, and the last group is filled up with zeros (HierarchicalStorage::Order).
   struct Cluster {
     std::uint32_t begin = 0, size = 0;  ///< positions
     std::uint32_t rank = 0;
-    std::uint32_t coefficient = 0;  ///< the first
-    std::uint64_t values = 0;       ///< where they begin
+    std::uint32_t coefficient = 0;  ///< index of the first coefficient
+    std::uint64_t values = 0;       ///< index of the first value
   };
 
-  /// One end of a block.
+  /// The rows or the columns of a block.
   struct End {
     std::uint32_t cluster = 0;        ///< low-rank blocks only
-    std::uint32_t coefficient = 0;    ///< the first
-    std::uint32_t residual_rank = 0;  ///< that are stored, after the vectors of the basis
+    std::uint32_t coefficient = 0;    ///< index of the first coefficient
+    std::uint32_t residual_rank = 0;  ///< residual vectors, stored after those of the basis
   };
   struct Place {
-    End row, column;           ///< the same on the diagonal
-    std::uint64_t values = 0;  ///< where S or the entries begin, after the bases
+    End row, column;           ///< equal for blocks on the diagonal
+    std::uint64_t values = 0;  ///< index of S or of the entries, counted from the end of the bases
   };
 
-  /// The blocks must be checked. Throws Error if they hold more values than any memory.
+  /// The blocks must be valid (check_hierarchical_storage). Throws Error if they hold more values
+  /// than any memory.
   HierarchicalLayout(std::span<const TransferBlock> blocks, std::uint32_t matrix_count,
                      BasisPrecision precision);
 
-  /// Of the blocks of an operator.
+  /// The layout of the blocks of `storage`.
   explicit HierarchicalLayout(const HierarchicalStorage& storage)
       : HierarchicalLayout(storage.blocks, storage.matrix_count, storage.precision.bases) {}
 
-  /// Where the value of a basis is: a rank of one end of a low-rank block, at a position of its
-  /// cluster.
+  /// The index of one basis value: vector `rank` of one end of a low-rank block, at `position`
+  /// counted from the beginning of its cluster.
   std::uint64_t basis_index(const End& end, std::uint64_t rank, std::uint64_t position) const;
 
-  std::vector<Cluster> clusters;  ///< by begin, then by size, the largest first
-  std::vector<Place> places;      ///< by block
+  std::vector<Cluster> clusters;  ///< by begin, then by descending size
+  std::vector<Place> places;      ///< one for each block
   std::uint64_t basis_value_count = 0;
-  std::uint64_t coupling_value_count = 0;  ///< coupling matrices and dense entries
+  std::uint64_t coupling_value_count = 0;  ///< of coupling matrices and dense blocks
   std::uint32_t coefficient_count = 0;
-  std::size_t largest_taken = 0;  ///< taken_size() of the largest coupling matrix
-  std::uint32_t rank_group;       ///< ranks that are kept together: 1, or of integers kRankGroup
+  std::size_t largest_taken = 0;  ///< the largest taken_size() of all coupling matrices
+  std::uint32_t rank_group;  ///< ranks that are interleaved: kRankGroup for integers, otherwise 1
   std::uint32_t cluster_coefficient_count = 0;
 
-  /// `value_count` values with the zeros that follow them.
+  /// The size of an array of `value_count` values with its padding.
   static std::uint64_t padded(std::uint64_t value_count);
 
  private:
@@ -64,7 +66,7 @@ struct HierarchicalLayout {
   void place_couplings(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
 };
 
-/// Whether a block has values.
+/// Whether a block has values: it is dense or its rank is above zero.
 bool has_values(const TransferBlock& block);
 
 inline bool is_cluster_basis(const TransferBlock& block) {

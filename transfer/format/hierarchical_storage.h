@@ -14,50 +14,53 @@
 
 namespace rebounce {
 
-/// What a HierarchicalOperator is made of: tables and values. Values of a block:
-///   dense     [matrix][row_count][column_count]
-///   low-rank  U^T [row_rank][row_count], V^T [column_rank][column_count] (not on the diagonal),
-///             S [matrix][row_rank][column_rank]
-///   cluster coefficients   W^T [row_rank][row_count]
-/// In 8 bits U^T, V^T and W^T have row_residual_rank and column_residual_rank rows more. The
-/// constants are those of HierarchicalFormat.
+/// The tables and values of a HierarchicalOperator. A block has these values:
+///
+///   dense          [matrix][row_count][column_count]
+///   low-rank       U^T [row_rank][row_count], V^T [column_rank][column_count],
+///                  S [matrix][row_rank][column_rank]; no V^T on the diagonal
+///   cluster basis  W^T [row_rank][row_count]
+///
+/// In 8 bits U^T, V^T and W^T have row_residual_rank or column_residual_rank more rows. The
+/// constants are in HierarchicalFormat.
 struct HierarchicalStorage {
   enum class Order : std::uint8_t {
-    /// Block by block, U^T V^T S or the entries, without holes, then kPadding values not used.
+    /// Block after block, U^T V^T S or the entries, without gaps, then kPadding unused values.
     kByBlock,
-    /// First the bases by cluster (begin ascending, then size descending), those of a cluster in
-    /// the order of their blocks, U^T before V^T; then coupling matrices and dense entries by
-    /// block, the
-    /// matrices of an entry side by side; zeros to the next multiple of 64 values, at least
-    /// kPadding of them. Bases in an array of their own are followed by zeros likewise. Integers
-    /// are [strip][rank / kRankGroup][position / 2][kRankGroup][2 positions] in each cluster:
-    /// strips of kStrip positions or what is left of it, the last ranks filled up with zeros.
+    /// First the bases, cluster by cluster (by begin, then by descending size). Within a cluster
+    /// they keep the order of their blocks, U^T before V^T. Then the coupling matrices and dense
+    /// entries, block by block, with the values of all matrices for one entry next to each other.
+    /// Zeros fill the array up to a multiple of 64 values, with at least kPadding of them. Bases in
+    /// an array of their own are padded in the same way. Integers are [strip][rank /
+    /// kRankGroup][position / 2][kRankGroup][2 positions] in each cluster. A strip has kStrip
+    /// positions, the last one fewer; the last group of ranks is filled up with zeros.
     kStreamed,
   };
 
   std::vector<float> area;                                    ///< [n] m², by patch
   std::vector<std::uint32_t> patch;                           ///< [n] patch at each position
-  std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix a channel uses
+  std::array<std::uint32_t, kChannelCount> channel_matrix{};  ///< which matrix each channel uses
   std::uint32_t matrix_count = 0;                             ///< 1, 2 or 3
   std::vector<TransferBlock> blocks;                          ///< where there is none, Yhat is 0
-  std::vector<float> coefficient_scale;  ///< [cluster coefficients] times W^T x is a cluster
-                                         ///< coefficient of light x
-  /// [n] by position, R = 2^this, within +-kLargestExponent; none: R = 1.
+  std::vector<float> coefficient_scale;  ///< [cluster coefficients]; a cluster coefficient of light
+                                         ///< x is this times W^T x
+  /// [n] by position: R = 2^this, within +-kLargestExponent. Empty: R = 1.
   std::vector<std::int8_t> scale_exponent;
-  PatchRoles roles;  ///< by patch; entries that no source and receiver share are of no meaning
+  PatchRoles roles;  ///< by patch; entries that no receiver and source share are arbitrary
   Order order = Order::kByBlock;  ///< of the values
   HierarchicalPrecision precision;
-  /// Bases are in the array of their type, and so are coupling matrices and dense entries: after
-  /// the bases if both are of one type. The other arrays are empty.
+  /// Bases are in the array of their type, and so are coupling matrices and dense entries. If both
+  /// have the same type, the bases come first in one array. The other arrays are empty.
   SharedArray<float> values_f32;
-  SharedArray<std::uint16_t> values_f16;  ///< IEEE half-precision bits
+  SharedArray<std::uint16_t> values_f16;  ///< bits of IEEE half-precision numbers
   SharedArray<std::int16_t> bases_q16;
   SharedArray<std::int8_t> bases_q8;
 
-  /// Whether bases and coupling matrices are in one array.
+  /// Whether bases and coupling matrices share one array.
   bool one_array() const;
 
-  /// Where coupling matrices begin in their array, with bases of `basis_value_count` values.
+  /// The index of the first coupling value in its array; `basis_value_count`: number of basis
+  /// values.
   std::uint64_t first_coupling(std::uint64_t basis_value_count) const {
     return one_array() ? basis_value_count : 0;
   }
@@ -68,7 +71,7 @@ struct HierarchicalStorage {
   }
 };
 
-/// Returns work(array) with the array of `storage`, constant or not, that the bases are in.
+/// Returns work(array), where `array` is the one that holds the bases; `storage` may be const.
 template <typename Storage, typename Work>
 decltype(auto) with_bases(Storage& storage, const Work& work) {
   switch (storage.precision.bases) {
@@ -84,7 +87,7 @@ decltype(auto) with_bases(Storage& storage, const Work& work) {
   return work(storage.values_f32);
 }
 
-/// Likewise with that of coupling matrices and dense entries.
+/// Returns work(array), where `array` is the one that holds coupling matrices and dense entries.
 template <typename Storage, typename Work>
 decltype(auto) with_couplings(Storage& storage, const Work& work) {
   switch (storage.precision.couplings) {

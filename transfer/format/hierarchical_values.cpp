@@ -11,7 +11,7 @@ namespace {
 
 using Storage = HierarchicalStorage;
 
-/// Reads values of any precision as what they stand for.
+/// Reads stored values of any precision as real numbers.
 class ValueReader {
  public:
   ValueReader(const Storage& storage, const HierarchicalLayout& layout)
@@ -19,7 +19,8 @@ class ValueReader {
         layout_(layout),
         first_coupling_(storage.first_coupling(layout.basis_value_count)) {}
 
-  /// Of one end of a block of that rank.
+  /// Entry `position` of vector `vector` of the basis at `end`, residual included; `rank`: the rank
+  /// of that end.
   double basis(const HierarchicalLayout::End& end, std::uint64_t rank, std::uint64_t vector,
                std::uint64_t position) const {
     const double value = stored_basis(layout_.basis_index(end, vector, position));
@@ -27,7 +28,7 @@ class ValueReader {
     return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
                        double{HierarchicalFormat::kResidualScale};
   }
-  /// Of a coupling matrix or a dense entry.
+  /// An entry of a coupling matrix or of a dense block.
   double coupling(std::uint64_t index) const {
     return with_couplings(storage_, [&](const auto& array) {
       return coupling_value(array[first_coupling_ + index]);
@@ -47,7 +48,7 @@ class ValueReader {
   std::uint64_t first_coupling_;
 };
 
-/// [row_count][column_count] of one matrix, positions or cluster coefficients.
+/// The entries [row_count][column_count] of one matrix, over positions or cluster coefficients.
 std::vector<double> block_entries(const ValueReader& read, const HierarchicalLayout::Place& place,
                                   const TransferBlock& block, std::uint32_t matrix) {
   const std::size_t rows = block.row_count, columns = block.column_count;
@@ -77,7 +78,7 @@ std::vector<double> block_entries(const ValueReader& read, const HierarchicalLay
   return entries;
 }
 
-/// Entries [rows][columns] the other way around.
+/// The transpose of `entries` [rows][columns].
 std::vector<double> transposed(const std::vector<double>& entries, std::size_t columns) {
   std::vector<double> result(entries.size());
   const std::size_t rows = entries.size() / columns;
@@ -87,13 +88,13 @@ std::vector<double> transposed(const std::vector<double>& entries, std::size_t c
   return result;
 }
 
-/// Positions or cluster coefficients.
+/// A range of positions or of cluster coefficients.
 struct Range {
   std::uint32_t begin, count;
 };
 
-/// Rows of entries [rows.count][columns] that are cluster coefficients become rows of the positions
-/// that these are of, `positions`.
+/// Expands the rows of `entries` [rows.count][columns] from cluster coefficients to positions, and
+/// appends these to `positions`. Rows that are positions already stay as they are.
 std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_t columns,
                                  std::vector<double> entries,
                                  std::vector<std::uint32_t>& positions) {

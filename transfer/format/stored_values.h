@@ -8,9 +8,9 @@
 
 namespace rebounce {
 
-// What the values of a HierarchicalOperator stand for, by the type that a precision is stored in.
+// Conversions between the stored values of a HierarchicalOperator and real numbers, by stored type.
 
-/// What stands for 1 in bases.
+/// The stored number that stands for 1 in bases.
 template <typename Basis>
 inline constexpr float kBasisScale = 1;
 template <>
@@ -18,7 +18,7 @@ inline constexpr float kBasisScale<std::int16_t> = HierarchicalFormat::kShortSca
 template <>
 inline constexpr float kBasisScale<std::int8_t> = HierarchicalFormat::kByteScale;
 
-/// What stands for 1 in coupling matrices and dense blocks.
+/// The stored number that stands for 1 in coupling matrices and dense blocks.
 template <typename Coupling>
 inline constexpr float kCouplingScale = 1;
 template <>
@@ -49,7 +49,7 @@ double coupling_value(Coupling stored) {
   return as_number(stored) / double{kCouplingScale<Coupling>};
 }
 
-/// Stores such an entry. Throws Error if it is beyond the range of the type.
+/// Stores an entry of a coupling matrix or of a dense block. Throws Error if it is out of range.
 inline void store_coupling(float value, float& stored) {
   stored = value;
 }
