@@ -14,8 +14,8 @@ namespace {
 constexpr std::size_t kTile = DenseOperator::kTile;
 constexpr std::size_t kTileSize = kTile * kTile;
 
-// Partial sums go into this many slots whatever the number of threads, so that the order of
-// additions, and with it every bit, is always the same.
+// Partial sums go into this many slots for any number of threads. The order of additions, and so
+// the bits of the result, never change.
 constexpr std::size_t kSlotCount = 16;
 
 std::size_t tiles_per_side(std::size_t patch_count) {
@@ -26,7 +26,7 @@ std::size_t padded_size(std::size_t patch_count) {
   return tiles_per_side(patch_count) * kTile;
 }
 
-/// Row and column of the tile at `index` in the order (0,0) (1,0) (1,1) (2,0) ...
+/// Row and column of tile number `index` in the order (0,0) (1,0) (1,1) (2,0) ...
 struct TilePosition {
   std::size_t row, column;
 
@@ -44,8 +44,8 @@ struct TilePosition {
   }
 };
 
-/// Adds the product of one tile with the three planar vectors x [3][stride] to y [3][stride], for
-/// the channels that use matrix `matrix`.
+/// Adds the product of one tile with the planar vectors x [3][stride] to y [3][stride], for the
+/// channels that use matrix `matrix`.
 template <typename Value>
 void apply_tile(const TileKernels<Value>& kernels, const Value* tile, const TilePosition& at,
                 const std::array<std::uint32_t, kChannelCount>& channel_matrix,
@@ -63,7 +63,7 @@ void apply_tile(const TileKernels<Value>& kernels, const Value* tile, const Tile
   }
 }
 
-/// The tiles of one matrix that one slot works on, counted within the matrix.
+/// The tiles of one matrix that one slot multiplies, numbered within the matrix.
 struct SlotPart {
   std::size_t begin, end;
 
@@ -76,7 +76,7 @@ struct SlotPart {
     end = within(total * (slot + 1) / kSlotCount);
   }
 
-  /// Entries [0, extent) of y are all that these tiles add to: they reach down to their last row.
+  /// These tiles add to entries [0, extent) of y only: their last row ends there.
   std::size_t extent() const { return begin == end ? 0 : (TilePosition(end - 1).row + 1) * kTile; }
 };
 
@@ -104,7 +104,7 @@ void apply_tiles(const TileKernels<Value>& kernels, const Value* tiles,
   });
 }
 
-/// Adds up what the slots hold of one channel, in their order, into sum [stride].
+/// Adds up the slots of one channel, in order, into sum [stride].
 void add_slots(const DenseOperator::Storage& storage, int channel, const float* slots,
                std::size_t stride, float* sum) {
   const std::size_t per_matrix = DenseOperator::tile_count(storage.area.size());
@@ -176,7 +176,7 @@ void DenseOperator::apply(std::span<const Float3> initial_exitance,
 
   const float scale = half ? 1.0F / kHalfScale : 1.0F;
   for (int c = 0; c < kChannelCount; ++c) {
-    float* const sum = x + c * stride;  // x has done its work
+    float* const sum = x + c * stride;  // x is no longer needed
     add_slots(storage_, c, slots, stride, sum);
     for (std::size_t i = 0; i < n; ++i) {
       indirect_irradiance[i][c] = sum[i] * scale / sqrt_area_[i];

@@ -15,17 +15,17 @@
 namespace rebounce {
 namespace {
 
-// Of the vectors in the workspace, in floats: a cache line.
+// The vectors in the workspace begin at multiples of this many floats, a cache line.
 constexpr std::size_t kLine = 16;
 
-// Positions whose light a task takes in.
+// Positions that one task gathers.
 constexpr std::size_t kGathered = 1024;
 
-// Ends of dense blocks whose light a task takes, and bases of cluster coefficients.
+// Ends of dense blocks, and cluster bases, that one task handles.
 constexpr std::size_t kDenseEndsPerTask = 64, kCoefficientsPerTask = 32;
 
-// Positions ahead at which the light of a patch is asked for. A second-level cache has more loads
-// under way at a time than the nearest one.
+// The light of a patch is prefetched this many positions ahead, to the second-level cache: it can
+// have more loads in flight than the first-level cache.
 constexpr std::size_t kPatchesAhead = 64;
 constexpr int kToRead = 0, kToWrite = 1, kSecondLevel = 2;
 
@@ -33,15 +33,15 @@ std::size_t round_up(std::size_t size, std::size_t multiple) {
   return (size + multiple - 1) / multiple * multiple;
 }
 
-/// The vectors of an apply to some lights. Positions of patches are followed by cluster
-/// coefficients. What coupling matrices and dense blocks make of coefficients is written over what
-/// they take: less memory to go through.
+/// The vectors of an apply to some lights. The positions of patches come first, then cluster
+/// coefficients. Coupling matrices and dense blocks write their products over their input, which
+/// saves memory traffic.
 struct WorkVectors {
   std::size_t light_count;
-  PlanarVectors<float> x;           ///< by position, times the root of the area
-  Coefficients<float> coefficient;  ///< of x in the bases, and then of y
-  PlanarVectors<float> taken;       ///< by the coupling matrices of each part
-  PlanarVectors<float> y;           ///< by position, what arrives
+  PlanarVectors<float> x;           ///< [positions] exitance times the root of the area
+  Coefficients<float> coefficient;  ///< of x in the bases, later of y
+  PlanarVectors<float> taken;       ///< input copies of the coupling matrices, for each part
+  PlanarVectors<float> y;           ///< [positions] what arrives
 
   WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
               float* buffer)
@@ -81,7 +81,7 @@ Coefficients<const float> constant(const Coefficients<float>& coefficients) {
   return {coefficients.data, coefficients.stride};
 }
 
-/// Entries [first, last).
+/// Entries [first, last) of `all`.
 template <typename T>
 std::span<const T> between(const std::vector<T>& all, std::uint32_t first, std::uint32_t last) {
   return std::span(all).subspan(first, last - first);
@@ -111,7 +111,7 @@ class Phases {
     }
   }
 
-  /// The cluster coefficients of the light, from its coefficients.
+  /// Computes the cluster coefficients of the light from its coefficients in a cluster basis.
   void take_coefficients(const HierarchicalPlan::ClusterCoefficients& cluster_coefficients) const {
     const std::size_t stride = work_.x.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
@@ -131,7 +131,8 @@ class Phases {
     }
   }
 
-  /// The coefficients of the light that arrives, from its cluster coefficients.
+  /// Computes the coefficients of the arriving light in a cluster basis from its cluster
+  /// coefficients.
   void put_coefficients(const HierarchicalPlan::ClusterCoefficients& cluster_coefficients) const {
     const std::size_t stride = work_.y.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
@@ -152,7 +153,7 @@ class Phases {
     }
   }
 
-  /// Those of one part.
+  /// Multiplies with the coupling matrices of one part.
   void multiply(std::span<const CouplingBlock> couplings, std::size_t part) const {
     couplings_.multiply(couplings, lanes_, work_.light_count, constant(work_.coefficient),
                         work_.coefficient, work_.taken.data + part * work_.taken.stride);
@@ -177,10 +178,11 @@ class Phases {
  private:
   static constexpr float kResidual = 1 / HierarchicalFormat::kResidualScale;
 
-  /// Of light that goes through no bases, which other light does twice.
+  /// The scale of products with dense blocks. Light in low-rank blocks meets a basis twice, this
+  /// light meets none.
   float product_scale() const { return basis_scale_ * basis_scale_; }
 
-  /// The coefficients of a channel of a light, kChannelLanes floats from one to the next.
+  /// The coefficients of one channel of one light; they are kChannelLanes floats apart.
   static float* lane_of(const Coefficients<float>& coefficients, std::size_t v, std::size_t first) {
     return coefficients.data + v / kChannelCount * coefficients.stride + first * kChannelLanes +
            v % kChannelCount;
@@ -209,9 +211,9 @@ void clear(const PlanarVectors<float>& vectors, std::size_t begin, std::size_t e
   }
 }
 
-/// Takes the light of the patches into x and what arrives out of y.
+/// Copies the light of the patches to x, and what arrives from y to the patches.
 struct Exchange {
-  std::span<const std::uint32_t> patch;                ///< [n] at each position
+  std::span<const std::uint32_t> patch;                ///< [n] patch at each position
   std::span<const float> gather_scale, scatter_scale;  ///< [n] by position
   const WorkVectors& work;
 
@@ -232,7 +234,7 @@ struct Exchange {
     clear(work.x, std::max(begin, last), end);
   }
 
-  /// At the positions `targets`.
+  /// Writes the light at the positions `targets`.
   void scatter(std::span<const std::uint32_t> targets, std::span<Float3> light) const {
     const std::size_t n = patch.size(), stride = work.y.stride;
     for (std::size_t v = 0; v < work.y.count; v += kChannelCount) {
@@ -250,7 +252,7 @@ struct Exchange {
   }
 };
 
-/// All that arrives at some positions or cluster coefficients.
+/// Computes all that arrives at a range of positions or cluster coefficients.
 void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arrival,
             const Phases& phases, const WorkVectors& work) {
   clear(work.y, arrival.begin, arrival.end);
@@ -258,7 +260,7 @@ void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arriv
   phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
 }
 
-/// Of the entries of a part of a step.
+/// The entries of one part of a phase.
 template <typename Entry>
 std::span<const Entry> of_part(const std::vector<Entry>& entries,
                                const std::vector<std::uint32_t>& parts, std::size_t part) {
@@ -273,7 +275,7 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
     const std::size_t begin = k * kGathered;
     exchange.gather(initial_exitance, begin, std::min(begin + kGathered, positions));
   };
-  // Light goes to dense blocks of several matrices while it is projected for others.
+  // Dense blocks of several matrices get their input in the same loop as the projections.
   const std::size_t dense_ends = piece_count(plan.dense_in.size(), kDenseEndsPerTask);
   const auto take_light = [&](std::size_t k) { phases.take_light(plan.dense_in[k]); };
   const auto take_piece = on_piece(plan.dense_in.size(), kDenseEndsPerTask, take_light);
@@ -307,7 +309,7 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
   const auto put_coefficients = [&](std::size_t k) {
     phases.put_coefficients(plan.coefficients_out[k]);
   };
-  // The last of them first.
+  // In descending order.
   const auto arrive_at_patches = [&](std::size_t k) {
     const HierarchicalPlan::Arrival& arrival = plan.arrivals[plan.arrivals.size() - 1 - k];
     arrive(plan, arrival, phases, work);
@@ -398,7 +400,8 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   assert(initial_exitance.size() == light_count * patch_count());
   assert(indirect_irradiance.size() == light_count * patch_count());
   assert(workspace.size() >= batch_workspace_size(light_count));
-  // The workspace has room for one line more than its vectors, so that they may begin with one.
+  // The workspace has room for one cache line more than its vectors, so that they can begin with
+  // one.
   const std::size_t misplaced = reinterpret_cast<std::uintptr_t>(workspace.data()) / sizeof(float);
   float* const aligned = workspace.data() + (kLine - misplaced % kLine) % kLine;
   const WorkVectors work(HierarchicalFormat::position_count(patch_count()), *layout_, light_count,

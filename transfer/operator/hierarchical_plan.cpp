@@ -10,7 +10,8 @@ constexpr std::uint32_t kAlignment = HierarchicalFormat::kAlignment;
 
 constexpr std::uint64_t kMostParts = HierarchicalPlan::kMostParts;
 
-/// Bounds of kMostParts runs of entries of about equal total weight.
+/// Cuts `entries` into kMostParts runs of about equal total weight and returns the bounds of the
+/// runs.
 template <typename Entry, typename Weight>
 std::vector<std::uint32_t> share_out(const std::vector<Entry>& entries, const Weight& weight) {
   std::uint64_t total = 0, done = 0;
@@ -33,7 +34,7 @@ std::vector<std::uint32_t> source_positions(const HierarchicalStorage& storage) 
   return positions;
 }
 
-/// Which runs of kAlignment positions are wanted, and how many of them there are before each.
+/// Marks the runs of kAlignment positions that are wanted, and counts the marked runs before each.
 class WantedRuns {
  public:
   WantedRuns(std::span<const std::uint32_t> positions, std::size_t position_count)
@@ -44,7 +45,7 @@ class WantedRuns {
   bool any(std::uint32_t begin, std::uint32_t count) const {
     return before_[(begin + count) / kAlignment] > before_[begin / kAlignment];
   }
-  /// visit(first, last) for the longest wanted intervals within [begin, end).
+  /// Calls visit(first, last) for the longest wanted intervals within [begin, end).
   template <typename Visit>
   void visit_intervals(std::uint32_t begin, std::uint32_t end, const Visit& visit) const {
     for (std::uint32_t at = begin; at < end;) {
@@ -64,7 +65,7 @@ class WantedRuns {
   std::vector<std::uint32_t> before_;
 };
 
-/// The cluster coefficients that light at any of these positions has come after them.
+/// Marks `positions` and the cluster coefficients of the clusters that contain one of them.
 WantedRuns with_moments(const HierarchicalStorage& storage, std::vector<std::uint32_t> positions,
                         std::size_t position_count, std::size_t cluster_coefficient_count) {
   const WantedRuns wanted(positions, position_count);
@@ -199,7 +200,7 @@ class Planner {
     std::uint32_t begin, count;
   };
 
-  /// The cluster coefficients that a block reads and those that it adds to.
+  /// Marks the cluster coefficients that a block reads and those that it adds to.
   void mark_moments(const Positions& from, const Positions& to) {
     const auto mark_range = [this](std::vector<bool>& marks, const Positions& range) {
       if (range.begin < positions_) return;
@@ -209,12 +210,12 @@ class Planner {
     mark_range(moments_out_, to);
   }
 
-  /// Whether a source is here and a target there.
+  /// Whether `from` contains a source and `to` a target.
   bool leads(const Positions& from, const Positions& to) const {
     return lit_.any(from.begin, from.count) && wanted_.any(to.begin, to.count);
   }
 
-  /// What goes into a coupling matrix and comes out of it; of low rank, whatever the positions.
+  /// Records the input and the output of a coupling matrix or dense block in one direction.
   void add_way(bool dense, const DenseEnd& from, const DenseEnd& to) {
     if (dense) {
       if (storage_.matrix_count > 1) plan_.dense_in.push_back(from);
@@ -229,7 +230,7 @@ class Planner {
     std::fill_n(marks.begin() + begin, count, true);
   }
 
-  /// Ranks whose values are interleaved are projected together.
+  /// Ranks with interleaved values are projected together.
   void mark_groups_in() {
     const std::uint32_t group = layout_.rank_group;
     for (std::uint32_t c = 0; c < layout_.coefficient_count; c += group) {
@@ -239,7 +240,7 @@ class Planner {
     }
   }
 
-  /// visit(first, last) for the longest runs of ranks of a cluster with marked coefficients.
+  /// Calls visit(first, last) for the longest runs of ranks of a cluster with marked coefficients.
   template <typename Visit>
   static void visit_marked(const std::vector<bool>& marks, const Layout::Cluster& cluster,
                            const Visit& visit) {
@@ -277,7 +278,7 @@ class Planner {
     });
   }
 
-  /// Work of bringing light to each run of positions.
+  /// The work of expanding coefficients at each run of positions.
   std::vector<std::uint64_t> arrival_weights() const {
     std::vector<std::uint64_t> weight(wanted_.run_count());
     for (const Layout::Cluster& cluster : layout_.clusters) {
@@ -292,7 +293,7 @@ class Planner {
     return weight;
   }
 
-  /// Ranks of the clusters that end in two where the positions are cut before each run.
+  /// For each run, the ranks of the clusters that a cut before this run divides.
   std::vector<std::uint64_t> cut_ranks() const {
     std::vector<std::uint64_t> ranks(wanted_.run_count());
     for (const Layout::Cluster& cluster : layout_.clusters) {
@@ -303,8 +304,9 @@ class Planner {
     return ranks;
   }
 
-  /// Runs in [first, last) at which the arrivals begin and end: shares of about equal work, moved
-  /// to where the least is cut, as coefficients are prepared anew in each part of a cluster.
+  /// Cuts the runs [first, last) into shares of about equal work. Each bound moves to the nearby
+  /// cut that divides the fewest ranks, because the coefficients of a cluster are prepared anew in
+  /// each share.
   std::vector<std::uint32_t> arrival_bounds(std::uint32_t first_run, std::uint32_t last_run) const {
     std::vector<std::uint64_t> weight = arrival_weights(), cut = cut_ranks();
     const auto keep_runs = [&](std::vector<std::uint64_t>& runs) {
@@ -331,7 +333,7 @@ class Planner {
     return (bounds[end] - bounds[begin]) / 2;
   }
 
-  /// Of the runs [first, last) of positions or of cluster coefficients.
+  /// Adds the arrivals at the runs [first, last) of positions or of cluster coefficients.
   void add_arrivals(std::uint32_t first_run, std::uint32_t last_run,
                     std::vector<Plan::Arrival>& arrivals) {
     if (first_run == last_run) return;
@@ -391,12 +393,13 @@ class Planner {
   const HierarchicalStorage& storage_;
   const Layout& layout_;
   Plan& plan_;
-  std::size_t positions_;    ///< of patches, before those of cluster coefficients
-  WantedRuns wanted_, lit_;  ///< of both
-  std::vector<bool> in_,
-      out_;  ///< which coefficients are needed, before and after coupling matrices
+  std::size_t positions_;  ///< number of positions; cluster coefficients follow
+  /// Runs with targets, runs with sources; cluster coefficients included.
+  WantedRuns wanted_, lit_;
+  /// [coefficients] whether the input, the output of coupling matrices is needed.
+  std::vector<bool> in_, out_;
   std::vector<bool> moments_in_, moments_out_;
-  std::vector<DenseEnd> dense_out_;  ///< whole
+  std::vector<DenseEnd> dense_out_;  ///< not yet cut at the arrivals
 };
 
 }  // namespace

@@ -10,19 +10,18 @@
 
 namespace rebounce {
 
-/// What an apply of a hierarchical operator does, in three phases that each stream through its
-/// values: the light of the clusters to its coefficients in the bases; coupling matrices and dense
-/// blocks; coefficients back to the light that arrives. Where there are cluster coefficients, some
-/// of the coefficients are the light that others are of, so that the first and the last phase have
-/// two steps. Within a step all tasks write to places of their own, whatever thread works on them:
-/// no sum depends on the number of threads.
+/// The steps of an apply of a hierarchical operator. Three phases stream through its values:
+/// project light to coefficients in the bases, multiply with coupling matrices and dense blocks,
+/// expand coefficients to the light that arrives. With nested bases, the first and the last phase
+/// have two steps: the cluster coefficients are input or output of other bases. Within a step every
+/// task writes to memory of its own, so no sum depends on the number of threads.
 class HierarchicalPlan {
  public:
-  /// Parts of a step at most: enough for the threads of a desktop to share it evenly.
+  /// The largest number of parts of a step: enough to balance the threads of a desktop machine.
   static constexpr std::uint64_t kMostParts = 16;
 
-  /// Positions or cluster coefficients that one thread works out from the first addition to the
-  /// last.
+  /// A range of positions or of cluster coefficients whose light one task computes alone, from the
+  /// first addition to the last.
   struct Arrival {
     std::uint32_t begin, end;  ///< multiples of kAlignment
     std::uint32_t first_expansion, last_expansion;
@@ -32,36 +31,36 @@ class HierarchicalPlan {
     std::uint32_t target_count() const { return last_target - first_target; }
   };
 
-  /// Cluster coefficients of one block, and the coefficients in its basis that they are times their
-  /// scales.
+  /// The cluster coefficients of one cluster basis. They are the coefficients in this basis times
+  /// their scales.
   struct ClusterCoefficients {
     std::uint32_t coefficient, rank, residual_rank;
-    std::uint32_t position;  ///< of the first, after those of patches
-    std::uint32_t scale;     ///< of the first
+    std::uint32_t position;  ///< of the first cluster coefficient, numbered after the patches'
+    std::uint32_t scale;     ///< index of the first scale
   };
 
-  /// Everything that it takes to write the positions `targets`, ascending, and to leave the patches
-  /// `dark` without light.
+  /// Plans an apply that writes the positions `targets`, in ascending order, and sets the patches
+  /// `dark` to 0.
   HierarchicalPlan(const HierarchicalStorage& storage, const HierarchicalLayout& layout,
                    std::vector<std::uint32_t> targets, std::vector<std::uint32_t> dark);
 
-  std::vector<BasisPart> projections;          ///< of the light at positions
+  std::vector<BasisPart> projections;          ///< of light at positions
   std::vector<BasisPart> cluster_projections;  ///< of cluster coefficients
   std::vector<ClusterCoefficients> coefficients_in, coefficients_out;
   std::vector<CouplingBlock> couplings;
-  std::vector<DenseBlock>
-      dense;  ///< where there is one matrix; of several they are among the coupling matrices
+  std::vector<DenseBlock> dense;  ///< only if there is one matrix; with several, dense blocks are
+                                  ///< among the coupling matrices
   std::vector<BasisPart> expansions;
-  std::vector<DenseEnd> dense_in,
-      dense_out;  ///< those in of coupling matrices; those out cut at the arrivals
+  /// dense_in: inputs of dense blocks among `couplings`; dense_out: outputs, cut at the arrivals.
+  std::vector<DenseEnd> dense_in, dense_out;
   std::vector<std::uint32_t> targets;
   std::vector<std::uint32_t> dark;
   std::vector<Arrival> arrivals;          ///< at positions
   std::vector<Arrival> cluster_arrivals;  ///< at cluster coefficients, without targets
-  /// [first, last) of the parts of about equal work that threads take in turn.
+  /// Bounds of parts of about equal work: part k is [bound k, bound k + 1).
   std::vector<std::uint32_t> projection_parts, cluster_projection_parts, coupling_parts,
       dense_parts;
-  std::uint64_t value_count = 0;  ///< that are read, each counted once
+  std::uint64_t value_count = 0;  ///< values that an apply reads, each counted once
 };
 
 }  // namespace rebounce

@@ -16,13 +16,13 @@ constexpr std::size_t kTile = LowRankOperator::kTile;
 // Ranks are padded to whole vectors of the widest instruction set.
 constexpr std::size_t kVector = 16;
 
-constexpr std::size_t kRowsPerTask = 64;  // of coupling matrices
+constexpr std::size_t kRowsPerTask = 64;  // rows of coupling matrices
 
 [[noreturn]] void refuse(const std::string& reason) {
   throw Error("low-rank operator: " + reason + "; make the file again");
 }
 
-/// The basis of one tile of patches as the kernels have it.
+/// The basis of one tile of patches, as the kernels expect it.
 BasisPart basis_of_tile(std::size_t tile, std::size_t rank) {
   constexpr auto kSize = static_cast<std::uint32_t>(LowRankOperator::kTile);
   const auto ranks = static_cast<std::uint32_t>(rank);
@@ -48,7 +48,7 @@ LowRankOperator::Storage LowRankOperator::encode_half(const Storage& storage) {
   half.precision = Precision::kF16;
   half.basis_f32 = {};
   std::vector<std::uint16_t> values(storage.basis_f32.size());
-  // A basis is orthonormal: no entry is above 1.
+  // No entry of an orthonormal basis exceeds 1.
   std::ranges::transform(storage.basis_f32, values.begin(), float_to_half);
   half.basis_f16 = SharedArray(std::move(values));
   return half;
@@ -120,7 +120,7 @@ void LowRankOperator::multiply_row(std::size_t channel, std::size_t row, const f
   const float* const coupling =
       storage_.coupling.data() + (storage_.channel_matrix[channel] * rank + row) * rank;
   const float* const x = in + channel * rank_stride_;
-  // Sums of their own for neighbouring entries, so that the loop becomes vectors.
+  // Neighbouring entries have separate sums, so that the compiler vectorises the loop.
   std::array<float, kVector> sum{};
   std::size_t j = 0;
   for (; j + kVector <= rank; j += kVector) {
