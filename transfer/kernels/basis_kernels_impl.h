@@ -1,12 +1,12 @@
 #pragma once
 
-// Products with bases of floats and halves, written once over a vector type `V`
-// (vector_load.h). Included by one file per instruction set; everything is in an unnamed namespace
-// so that no two sets share an instantiation.
+// Products with bases in f32 and f16, written once over a vector type `V` (vector_load.h). One file
+// per instruction set includes this. Everything is in an unnamed namespace, so that no two sets
+// share an instantiation.
 //
-// Twelve sums are kept in registers wherever possible: enough to hide the latency of the
-// multiply-adds, and as many as AVX2 has room for. A value that was loaded and widened serves the
-// three channels of a light, and of two lights where the registers suffice.
+// Wherever possible twelve sums are kept in registers: enough to hide the latency of multiply-adds,
+// and as many as AVX2 has room for. Each loaded value is used for the three channels of a light, or
+// of two lights if there are enough registers.
 
 #include <cstddef>
 #include <cstdint>
@@ -21,8 +21,8 @@ namespace {
 
 constexpr std::size_t kChannels = kChannelCount;
 
-/// Calls work.template operator()<vectors>(first) for groups of vectors: the channels of two
-/// lights where V has room for their sums, else of one.
+/// Calls work.template operator()<vectors>(first) for groups of vectors: the channels of two lights
+/// if V has registers for their sums, otherwise of one.
 template <typename V, typename Work>
 REBOUNCE_INLINE inline void for_each_group(std::size_t vector_count, const Work& work) {
   std::size_t v = 0;
@@ -34,7 +34,7 @@ REBOUNCE_INLINE inline void for_each_group(std::size_t vector_count, const Work&
   for (; v < vector_count; v += kChannels) work.template operator()<kChannels>(v);
 }
 
-/// The sums over the lanes of kCount vectors, four at most, in the first lanes.
+/// Returns the sums over the lanes of kCount <= 4 vectors, in the first kCount lanes.
 template <std::size_t kCount, typename V>
 REBOUNCE_INLINE inline auto sums_of(const V (&sum)[kCount]) {
   if constexpr (kCount == 4) {
@@ -48,7 +48,8 @@ REBOUNCE_INLINE inline auto sums_of(const V (&sum)[kCount]) {
   }
 }
 
-/// Stores the sums over the lanes of kRows vectors of three channels, those of a row side by side.
+/// Stores the sums over the lanes of kRows vectors for three channels; the channels of a row are
+/// neighbours.
 template <std::size_t kRows, typename V>
 REBOUNCE_INLINE inline void store_sums_side_by_side(const V (&red)[kRows], const V (&green)[kRows],
                                                     const V (&blue)[kRows], float* p) {
@@ -59,19 +60,19 @@ REBOUNCE_INLINE inline void store_sums_side_by_side(const V (&red)[kRows], const
   }
 }
 
-/// Where the coefficient of vector v, a channel of a light, is among those of a rank.
+/// Offset of vector v, one channel of one light, among the coefficients of a rank.
 constexpr std::size_t lane_of(std::size_t v, std::size_t light_stride) {
   return v / kChannels * light_stride + v % kChannels;
 }
 
-/// Values that are read in order, as those of bases and dense blocks are.
+/// Loads values of bases and dense blocks, which are read in order.
 template <typename V, typename Value>
 REBOUNCE_INLINE inline V load_ahead(const Value* values) {
   ask_ahead<V::kWidth * sizeof(float)>(values);
   return load_values<V>(values);
 }
 
-/// Products of kRows rows of `size` values with kVectors vectors, not yet added up over the lanes.
+/// Multiplies kRows rows of `size` values with kVectors vectors. Lanes are not yet summed.
 template <typename V, std::size_t kRows, std::size_t kVectors, typename Value>
 REBOUNCE_INLINE inline void multiply_rows(const Value* rows, std::size_t size, const float* x,
                                           std::size_t x_stride, V (&sum)[kVectors][kRows]) {
@@ -120,11 +121,11 @@ void project(const Value* values, std::span<const BasisPart> parts, PlanarVector
   }
 }
 
-/// Whether what comes out is added to what was there, a multiple of it is, or it takes its place.
+/// Whether the result is added to the output, added times a scale, or replaces it.
 enum class Output : std::uint8_t { kAdd, kAddScaled, kSet };
 
-/// y of kSize positions, where at(v, r) points to the coefficient of vector v and rank r; ranks are
-/// dealt out among kSplit sums, so that there are twelve of them or more.
+/// Computes y at kSize positions; at(v, r) points to the coefficient of vector v and rank r. Ranks
+/// are divided among kSplit partial sums, so that at least twelve sums are independent.
 template <typename V, std::size_t kSize, std::size_t kVectors, Output kOutput, typename Value,
           typename At>
 REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, std::size_t size,
@@ -169,7 +170,7 @@ REBOUNCE_INLINE inline void expand_strip(const Value* basis, std::size_t rank, s
   });
 }
 
-/// y of all strips of `size` values within [k, end).
+/// Computes y in [k, end); `size`: values in a row of the basis.
 template <typename V, std::size_t kVectors, Output kOutput, typename Value, typename At>
 REBOUNCE_INLINE inline void expand_strips(const Value* basis, std::size_t rank, std::size_t size,
                                           const At& at, std::size_t k, std::size_t end, float* y,

@@ -10,49 +10,49 @@
 
 namespace rebounce {
 
-/// Vectors that are worked on together, planar: vector v begins at v times `stride`. Three for each
-/// light, its channels.
+/// Vectors in planar order: vector v begins at v times `stride`. Each light has three, one per
+/// channel.
 template <typename T>
 struct PlanarVectors {
   T* data;
   std::size_t stride, count;
 };
 
-/// Coefficients of light in bases, its channels side by side: coefficient r of light l is the
-/// kChannelLanes floats from l times `stride` + r times kChannelLanes, of which the last is not
-/// used.
+/// Coefficients of light in bases, with neighbouring channels. Coefficient r of light l is at l
+/// times `stride` + r times kChannelLanes; its last float is unused.
 template <typename T>
 struct Coefficients {
   T* data;
   std::size_t stride;
 };
 
-/// Ranks and positions of the bases over a cluster, [rank][size]; integers in the order of
-/// integer_kernels_impl.h. Sizes and positions are multiples of
+/// A range of ranks and positions of the bases over one cluster. Floats are [rank][size], integers
+/// in the order of integer_kernels_impl.h. Sizes and positions are multiples of
 /// HierarchicalFormat::kAlignment.
 struct BasisPart {
-  std::uint64_t values;                   ///< where the bases of the cluster begin
-  std::uint32_t rank, size;               ///< of the cluster
-  std::uint32_t coefficient, position;    ///< its first ones
-  std::uint32_t first_rank, last_rank;    ///< [first, last) of them
-  std::uint32_t first_place, last_place;  ///< positions in the cluster, likewise
-  /// Whether the positions are cluster coefficients: none is bright for what faces nothing, as they
-  /// are what arrives of the light.
+  std::uint64_t values;                 ///< index of the first value of the cluster's bases
+  std::uint32_t rank, size;             ///< of the whole cluster
+  std::uint32_t coefficient, position;  ///< its first coefficient and position
+  std::uint32_t first_rank, last_rank;  ///< the ranks [first, last)
+  /// The positions [first, last), counted from the cluster's first.
+  std::uint32_t first_place, last_place;
+  /// Whether the bases are over cluster coefficients instead of positions. These are never uneven
+  /// in the sense of the integer kernels.
   bool cluster_coefficients = false;
 };
 
-/// Products with the bases of the hierarchical operator, for one instruction set. Integers stand
-/// for themselves: their scale is elsewhere.
+/// Products with the bases of the hierarchical operator, for one instruction set. Stored integers
+/// are used unscaled; the caller applies their scale.
 template <typename Value>
 struct BasisKernels {
-  /// coefficient[r] = sum over k of basis[r][k] x[k] for the lights of x and the ranks of each
-  /// part, over all positions of its cluster. Of integers, ranks begin with a multiple of
-  /// HierarchicalFormat::kRankGroup, and coefficients are written up to the next one.
+  /// coefficient[r] = sum over k of basis[r][k] x[k], for the lights of x and the ranks of each
+  /// part, over all positions of its cluster. With integers, first_rank is a multiple of
+  /// HierarchicalFormat::kRankGroup, and coefficients are written up to the next multiple.
   void (*project)(const Value* values, std::span<const BasisPart> parts,
                   PlanarVectors<const float> x, Coefficients<float> coefficient);
 
-  /// y[k] += sum over r of basis[r][k] coefficient[r] for the lights of y, the ranks and the
-  /// positions of one part after the other.
+  /// y[k] += sum over r of basis[r][k] coefficient[r], for the lights of y, part by part, with the
+  /// ranks and positions of each part.
   void (*expand)(const Value* values, std::span<const BasisPart> parts,
                  Coefficients<const float> coefficient, PlanarVectors<float> y);
 };
@@ -63,34 +63,36 @@ struct CouplingBlock {
 
   std::uint64_t values;
   std::uint32_t rows, columns;
-  std::uint32_t row, column;  ///< first coefficients at its ends
+  std::uint32_t row, column;  ///< first coefficients of its rows and columns
   Direction direction;
-  /// Of the coefficients at its ends, those of residuals, after its own
+  /// Residual coefficients of its rows and columns. They follow the coefficients themselves
   /// (HierarchicalFormat::kResidualScale).
   std::uint32_t row_residual_rank = 0, column_residual_rank = 0;
 };
 
-/// What serves the channels of an entry of kMatrices neighbouring values: lanes of four entries.
+/// For each lane of a vector of four entries, which of the entry's values belongs to the lane's
+/// channel.
 struct ChannelLanes {
   ChannelLanes(const std::array<std::uint32_t, kChannelCount>& channel_matrix,
                std::uint32_t matrices);
 
-  alignas(32) std::array<std::uint16_t, 16> value;  ///< of [entry][lane]; the last lane is blue's
+  alignas(32) std::array<std::uint16_t,
+                         16> value;  ///< of [entry][lane]; the last lane of an entry repeats blue
   std::size_t matrix_count;
 };
 
-/// out(row) = S in(column) and out(column) = S^T in(row), as its direction says, for one coupling
-/// matrix after the other and each light; what was there before is overwritten, also where `out` is
-/// `in`. Coefficients of residuals are added to those that they belong to; those that come out are
-/// written too. Sixteen values are read from the beginning of each entry. `taken` has room for
-/// taken_size() of each coupling matrix.
+/// out(row) = S in(column) and out(column) = S^T in(row), in the directions of each coupling
+/// matrix, for each matrix and light in turn. Overwrites the output, also where `out` is `in`.
+/// Input coefficients of residuals are added to the coefficients they belong to; output
+/// coefficients of residuals are written too. Reads sixteen values from the beginning of each
+/// entry, so the array must be padded. `taken` has room for taken_size() of each coupling matrix.
 template <typename Value>
 using CouplingKernel = void (*)(const Value* values, std::span<const CouplingBlock> couplings,
                                 const ChannelLanes& lanes, std::size_t light_count,
                                 Coefficients<const float> in, Coefficients<float> out,
                                 float* taken);
 
-/// A dense block of the only matrix of an operator, [rows][columns], both multiples of
+/// A dense block of an operator with one matrix: [rows][columns], both multiples of
 /// HierarchicalFormat::kAlignment.
 struct DenseBlock {
   using Direction = CouplingBlock::Direction;
@@ -98,12 +100,12 @@ struct DenseBlock {
   std::uint64_t values;
   std::uint32_t rows, columns;
   std::uint32_t row_position, column_position;
-  std::uint32_t row_out, column_out;  ///< coefficients in whose places the products are put
+  std::uint32_t row_out, column_out;  ///< first coefficients that the products overwrite
   Direction direction;
 };
 
-/// Positions at an end of a dense block, whose bases are the identity: `count` of the `size` that
-/// it has, from `first` on.
+/// A range of positions at one end of a dense block: `count` of its `size` positions, from number
+/// `first` on. The bases of a dense block are the identity.
 struct DenseEnd {
   std::uint32_t position, count, coefficient;
   std::uint32_t first, size;
@@ -114,17 +116,18 @@ template <typename Value>
 struct CouplingKernels {
   CouplingKernel<Value> multiply;
 
-  /// out(row_out) = S x(column) and out(column_out) = S^T x(row), as its direction says, for one
-  /// block after the other and each light of x; what was there before is overwritten. Unlike
-  /// coefficients they are [channel][rows] and [channel][columns].
+  /// out(row_out) = S x(column) and out(column_out) = S^T x(row), in the directions of each block,
+  /// for each block and light in turn. Overwrites the output, which is [channel][rows] and
+  /// [channel][columns], unlike coefficients.
   void (*multiply_dense)(const Value* values, std::span<const DenseBlock> blocks,
                          PlanarVectors<const float> x, Coefficients<float> out);
 
-  /// y(position) += scale times what multiply_dense has put at each end, for each light of y.
+  /// y(position) += scale times the products of multiply_dense at each end, for each light of y.
   void (*add_products)(std::span<const DenseEnd> ends, Coefficients<const float> products,
                        float scale, PlanarVectors<float> y);
 
-  /// y(row) += scale S x(column) and y(column) += scale S^T x(row) likewise, of one light.
+  /// y(row) += scale S x(column) and y(column) += scale S^T x(row) in the directions of each block,
+  /// for one light.
   void (*add_dense)(const Value* values, std::span<const DenseBlock> blocks,
                     PlanarVectors<const float> x, float scale, PlanarVectors<float> y);
 };

@@ -1,7 +1,7 @@
 #pragma once
 
-// All kernels of blocks for one instruction set, whose file includes this: `V` is its vector of
-// floats (vector_load.h), `N` of integers.
+// All block kernels for one instruction set. The file of the set includes this; `V` is its vector
+// of floats (vector_load.h), `N` its vector of integers (integer_kernels_impl.h).
 
 #include <cstdint>
 

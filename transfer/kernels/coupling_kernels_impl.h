@@ -1,7 +1,7 @@
 #pragma once
 
-// Products with the coupling matrices of low-rank blocks, whose coefficients have their channels
-// side by side; written once over a vector type `V` (vector_load.h), as basis_kernels_impl.h are.
+// Products with the coupling matrices of low-rank blocks; the channels of a coefficient are
+// neighbours. Written once over a vector type `V` (vector_load.h), like basis_kernels_impl.h.
 
 #include <algorithm>
 #include <cstddef>
@@ -16,7 +16,7 @@ namespace {
 
 using Direction = CouplingBlock::Direction;
 
-/// Neighbouring entries of a row of a coupling matrix, whose next ones are `step` values on.
+/// Loads kWide vectors of neighbouring entries of a row of a coupling matrix, `step` values apart.
 template <typename V, std::size_t kWide, typename Entries, typename Value>
 REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std::size_t step,
                                      V (&b)[kWide]) {
@@ -27,15 +27,15 @@ REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std
   }
 }
 
-/// What a coupling matrix takes: its coefficients at both ends.
+/// The input coefficients of a coupling matrix.
 struct TakenEnds {
   const float *row, *column;
 };
 
-/// Columns from `begin` on, as many as fill kWide vectors or are left, for one light. The lanes of
-/// a vector are the channels of neighbouring entries of a row: ranks are 5 in the mean, and vectors
-/// of as many entries as there are lanes would be two thirds empty. Lanes beyond the last column
-/// read on into the next row: what comes in there is zero, and what comes out is not stored.
+/// Multiplies the columns from `begin` on, as many as fill kWide vectors or are left, for one
+/// light. The lanes of a vector are the channels of neighbouring entries of a row. The mean rank is
+/// 5, so vectors with one entry per lane would be mostly empty. Lanes beyond the last column read
+/// into the next row; their input is zero and their output is not stored.
 template <typename V, Direction kDirection, std::size_t kWide, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CouplingBlock& coupling,
                                              std::size_t begin, const ChannelLanes& lanes,
@@ -99,11 +99,11 @@ REBOUNCE_INLINE inline void multiply_coupling(const Value* values, const Couplin
                                      });
 }
 
-// What there is of residuals is half a vector or less as a rule: masked vectors, as loops that g++
-// makes of such counts are mostly their beginnings and ends.
+// Residuals rarely fill more than half a vector. Masked vectors are faster here than loops that the
+// compiler vectorises.
 
-/// The coefficients of an end, with what came in for residuals added to those that they belong to.
-/// They are where they are, unless that changes them or they are written over: then in `taken`.
+/// Returns the input coefficients of one end, with those of residuals added. It copies them to
+/// `taken` if residuals change them or the product overwrites them; otherwise it returns `in`.
 template <typename V>
 REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
                                              std::size_t residual_rank, bool in_place,
@@ -122,7 +122,7 @@ REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
   return taken;
 }
 
-/// What goes out to residuals.
+/// Writes the output coefficients of residuals.
 template <typename V>
 REBOUNCE_INLINE inline void spread_residuals(float* out, std::size_t rank,
                                              std::size_t residual_rank) {
@@ -135,7 +135,7 @@ REBOUNCE_INLINE inline void spread_residuals(float* out, std::size_t rank,
   }
 }
 
-/// A coupling matrix in its direction, with the residuals at its ends.
+/// Multiplies a coupling matrix in one or both directions, with the residuals of its ends.
 template <typename V, Direction kDirection, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CouplingBlock& coupling,
                                           const ChannelLanes& lanes, const float* in, float* out,
@@ -161,8 +161,8 @@ REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CouplingBlo
   }
 }
 
-// Coupling matrices are asked for this many before their turn: sweeps and applies leave out what
-// lies between them. Most have two cache lines at most.
+// Coupling matrices are prefetched this many ahead: those that a sweep or an apply skips break the
+// processor's own prefetching. Most fill at most two cache lines.
 constexpr std::size_t kCouplingsAhead = 8;
 
 inline void ask_for_two_lines(const void* p) {

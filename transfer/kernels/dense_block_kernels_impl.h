@@ -1,8 +1,8 @@
 #pragma once
 
-// Products with dense blocks of the only matrix of an operator, on light by position, one channel
-// after the other: a block is worked on like a basis, S x as light is projected and S^T x as it is
-// expanded. Written once over a vector type `V` (vector_load.h), as basis_kernels_impl.h are.
+// Products with dense blocks of an operator with one matrix, on light by position in planar order.
+// A block is multiplied like a basis: S x as in a projection, S^T x as in an expansion. Written
+// once over a vector type `V` (vector_load.h), like basis_kernels_impl.h.
 
 #include <cstddef>
 #include <span>
@@ -15,7 +15,7 @@
 namespace rebounce {
 namespace {
 
-/// Where the products of a dense block with a light are put.
+/// The output of a dense block for one light.
 struct DenseOutput {
   PlanarVectors<float> rows, columns;
   float scale;
@@ -30,8 +30,8 @@ REBOUNCE_INLINE inline void put(const Sums& sums, float* to, float scale) {
   }
 }
 
-/// Sums over the columns of as many rows as V is wide; multiply(r, sum) makes the vectors of four
-/// rows from r on, not yet added up over the lanes.
+/// Writes the sums over the columns, for as many rows at a time as V has lanes. multiply(r, sum)
+/// computes four rows from r on, with the lanes not yet summed.
 template <typename V, Output kOutput, typename Multiply>
 REBOUNCE_INLINE inline void put_row_sums(const Multiply& multiply, std::size_t row_count,
                                          const DenseOutput& out) {
@@ -62,7 +62,8 @@ REBOUNCE_INLINE inline void put_row_sums(const Multiply& multiply, std::size_t r
   }
 }
 
-/// Both ways at once, where the sums over rows stay in registers.
+/// Multiplies in both directions at once, for blocks so narrow that the sums over rows fit
+/// registers.
 template <typename V, std::size_t kWide, Output kOutput, typename Value>
 REBOUNCE_INLINE inline void multiply_narrow_block(const Value* values, const DenseBlock& block,
                                                   PlanarVectors<const float> x,
@@ -102,8 +103,8 @@ REBOUNCE_INLINE inline void multiply_narrow_block(const Value* values, const Den
   });
 }
 
-/// One light: sums over columns as light is projected, sums over rows as it is expanded. A block is
-/// in the nearest cache when it is read for the second.
+/// Multiplies a block for one light: sums over columns as in a projection, then sums over rows as
+/// in an expansion. The second pass reads the block from the first-level cache.
 template <typename V, Output kOutput, typename Value>
 REBOUNCE_INLINE inline void multiply_dense_block(const Value* values, const DenseBlock& block,
                                                  PlanarVectors<const float> x,

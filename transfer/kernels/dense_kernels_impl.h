@@ -1,7 +1,7 @@
 #pragma once
 
-// The tile kernels, written once over a vector type `V` (vector_load.h). Included by one file per
-// instruction set; everything is in an unnamed namespace so that no two sets share an
+// The tile kernels, written once over a vector type `V` (vector_load.h). One file per instruction
+// set includes this. Everything is in an unnamed namespace, so that no two sets share an
 // instantiation.
 
 #include <cstddef>
@@ -32,7 +32,7 @@ template <typename V, typename Value>
 void multiply_off_diagonal(const Value* tile, const float* x_column, const float* x_row,
                            float* y_row, float* y_column) {
   constexpr std::size_t kSize = kDenseTile;
-  // Columns in strips of eight vectors, so that the strip's y stays in registers.
+  // Strips of eight vectors of columns, so that the y of a strip stays in registers.
   constexpr std::size_t kVectors = kSize / V::kWidth < 8 ? kSize / V::kWidth : 8;
   constexpr std::size_t kStrip = kVectors * V::kWidth;
   for (std::size_t begin = 0; begin < kSize; begin += kStrip) {

@@ -1,8 +1,8 @@
 #pragma once
 
 // The kernels on rows of F, written once over a vector type `V` with kWidth floats: load, store,
-// zero, broadcast, add, multiply_add, sum. Included by one file per instruction set; everything is
-// in an unnamed namespace so that no two share an instantiation.
+// zero, broadcast, add, multiply_add, sum. One file per instruction set includes this. Everything
+// is in an unnamed namespace, so that no two sets share an instantiation.
 
 #include <algorithm>
 #include <cstddef>
@@ -18,12 +18,13 @@ template <typename V>
 void gather_blocks(const FormFactorBlock* values, const std::uint32_t* position, std::size_t count,
                    const float* x, std::size_t stride, float* sum) {
   constexpr std::size_t kVectors = kFormFactorBlock / V::kWidth;
-  // Sums of sums: a lane adds at most this many numbers, so that rounding stays near one unit.
+  // Sums of partial sums: a lane adds at most this many blocks at a time, which keeps rounding
+  // errors small.
   constexpr std::size_t kBlocksOfSum = 64;
   V total[kChannelCount] = {V::zero(), V::zero(), V::zero()};
   for (std::size_t begin = 0; begin < count; begin += kBlocksOfSum) {
     const std::size_t end = std::min(begin + kBlocksOfSum, count);
-    // Two sums for each channel, so that one addition need not wait for the one before.
+    // Two independent sums per channel, to hide the latency of additions.
     V even[kChannelCount] = {V::zero(), V::zero(), V::zero()};
     V odd[kChannelCount] = {V::zero(), V::zero(), V::zero()};
     const auto add_block = [&](std::size_t k, V* part) {

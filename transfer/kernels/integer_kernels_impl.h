@@ -1,31 +1,30 @@
 #pragma once
 
-// Products with bases of integers of 16 or 8 bits, written once over a vector type `N` of integers.
-// Included by one file per instruction set; everything is in an unnamed namespace so that no two
+// Products with bases in 16-bit or 8-bit integers, written once over a vector type `N` of integers.
+// One file per instruction set includes this. Everything is in an unnamed namespace, so that no two
 // sets share an instantiation.
 //
 // One instruction multiplies neighbouring pairs of 16-bit integers and adds the two products to a
-// sum of 32 bits: twice the products of a multiply-add of floats. Bytes are widened to 16 bits as
-// they are loaded. The light is rounded to integers for it, with a scale for each channel of a
-// chunk of positions; so are the coefficients on the way back. The scale is the largest with which
-// no sum of products can overflow: 15 bits with bytes; with values of 16 bits, 11 where the light
-// is even over a chunk of 128 and up to 15 where it is not.
+// 32-bit sum: twice the products of a float multiply-add. 8-bit values are widened as they are
+// loaded. Light is rounded to integers, with one scale per channel and chunk of positions;
+// coefficients are rounded in the same way on the way back. The scale is the largest for which no
+// sum of products can overflow. With 8-bit values this leaves 15 bits; with 16-bit values 11 bits
+// where the light is even over a chunk of 128, up to 15 where it is not.
 //
-// A basis is [strip of 64 positions][rank / 4][position / 2][4 ranks][2 positions]: both ways read
-// it from the first value to the last. Coefficients are sums over positions, and their pairs are
-// neighbours as they are. Light is a sum over ranks: a shuffle within 128 bits makes (4 ranks)(2
-// positions) into (2 positions)(4 ranks). Neither way is left with sums over all the lanes of a
-// vector, which cost as much as the products where clusters are small.
+// A basis is [strip of 64 positions][rank / 4][position / 2][4 ranks][2 positions]; projection and
+// expansion both read it from the first value to the last. Coefficients are sums over positions:
+// pairs of positions are neighbours already. Light is a sum over ranks: a shuffle within 128 bits
+// turns (4 ranks)(2 positions) into (2 positions)(4 ranks). Neither needs sums over all lanes of a
+// vector, which would cost as much as the products in small clusters.
 //
-// `N` is kWidth integers of 16 bits or half as many sums of 32: load, zero, repeat_four (four ranks
-// of a channel for every position), by_position (that shuffle), add_products, add. Around the
-// products it has magnitudes_of_planes and magnitudes_of_lanes, round_positions (of 16 positions)
-// and CoefficientRounding, which make integers, and store_coefficients and add_positions, which
-// make floats of sums. kStrip positions are what its registers have room for, kLeastSums what hides
-// the latency of a sum.
+// `N` is kWidth 16-bit integers or half as many 32-bit sums. Products: load, zero, repeat_four
+// (four ranks of a channel, repeated for every position), by_position (that shuffle), add_products,
+// add. Rounding: magnitudes_of_planes, magnitudes_of_lanes, round_positions (16 positions) and
+// CoefficientRounding. Results as floats: store_coefficients and add_positions. kStrip: positions
+// whose sums fit the registers. kLeastSums: independent sums that hide the latency of add_products.
 //
-// Integer sums do not depend on their order, and floats are converted, scaled and added in the same
-// one everywhere: all instruction sets give the same bits.
+// Integer sums do not depend on their order. Floats are converted, scaled and added in one fixed
+// order. So all instruction sets give the same bits.
 
 #include <algorithm>
 #include <array>
@@ -45,26 +44,26 @@ namespace {
 constexpr std::size_t kRankGroup = HierarchicalFormat::kRankGroup;
 constexpr std::size_t kBasisStrip = HierarchicalFormat::kStrip;
 
-// Positions or ranks whose products are added as integers.
+// Positions or ranks whose products are summed in integers.
 constexpr std::size_t kChunk = 128;
 
-/// A number for each channel; the last is not used.
+/// One number per channel; the last is unused.
 using ChannelFloats = std::array<float, kChannelLanes>;
 
-/// Of the light in a chunk, the largest magnitude and the sum of all.
+/// The largest magnitude in a chunk of light, and the sum of all magnitudes.
 struct Magnitudes {
   ChannelFloats largest, sum;
 };
 
-/// The sum of magnitudes, as a power of two, with which no sum of products with values of bases can
-/// overflow 32 bits.
+/// Base-2 logarithm of the largest sum of magnitudes for which no sum of products with basis values
+/// can overflow 32 bits.
 template <typename Value>
 constexpr std::uint32_t kLargestSum = 19;  // values up to 2^12
 template <>
 constexpr std::uint32_t kLargestSum<std::int8_t> = 24;
 
-/// Powers of two by which light becomes integers, and which bring it back: with the largest of them
-/// below 2^15 and their sum below 2^kLargestSum, sums of products stay below 2^31.
+/// Powers of two that scale light to integers and back. The largest integer stays below 2^15 and
+/// the sum of all below 2^kLargestSum, so sums of products stay below 2^31.
 struct IntegerScales {
   ChannelFloats to, back;
 
@@ -84,16 +83,16 @@ struct IntegerScales {
   }
 };
 
-/// The light of a chunk of positions: of each channel (pair of positions)(4 times the pair).
+/// Rounded light of a chunk of positions; each channel holds every pair of positions four times.
 struct IntegerLight {
   alignas(64) std::int16_t value[kChannelCount][kChunk * kRankGroup];
   ChannelFloats to, back;
-  bool uneven;  ///< what rounding left may matter
+  bool uneven;  ///< whether the rounding error may matter
 };
 
-// Light whose largest magnitude is more than this many times the mean is uneven: where the
-// brightest patches of a chunk face nothing but the sky, what arrives comes from others, of which
-// rounding to 2^-15 of the largest leaves little. notes/operator.md.
+// Light is uneven if its largest magnitude exceeds this many times the mean. The brightest patches
+// of a chunk may see only the sky; then the others send all that arrives, and rounding to 2^-15 of
+// the largest value leaves few bits of them. See notes/operator.md.
 constexpr float kUneven = 8;
 
 inline bool is_uneven(const Magnitudes& light, std::size_t count) {
@@ -119,7 +118,7 @@ REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std:
   }
 }
 
-/// What rounding left of the light of a chunk: exact, as powers of two scale it.
+/// The rounding error of the light of a chunk; exact, because the scales are powers of two.
 struct LightRest {
   alignas(64) float value[kChannelCount * kChunk];
 
@@ -133,15 +132,15 @@ struct LightRest {
   }
 };
 
-/// Part of a basis within a strip: the values of a group of ranks, those of the next one
-/// `group_step` later.
+/// Part of a basis within a strip: the values of one group of ranks. The next group is `group_step`
+/// values later.
 template <typename Value>
 struct StripBasis {
   const Value* values;
   std::size_t group_step;
 };
 
-/// From a position of a cluster on, all groups of ranks from `group` on.
+/// The part of a basis from a position of the cluster on, beginning with rank group `group`.
 template <typename Value>
 inline StripBasis<Value> strip_at(const Value* values, const BasisPart& part, std::size_t position,
                                   std::size_t group) {
@@ -152,18 +151,18 @@ inline StripBasis<Value> strip_at(const Value* values, const BasisPart& part, st
           width * kRankGroup};
 }
 
-/// Values of a basis.
+/// Loads values of a basis, and prefetches those that follow later.
 template <typename N, typename Value>
 REBOUNCE_INLINE inline N load_basis(const Value* values) {
   ask_ahead<N::kWidth * sizeof(std::int16_t)>(values);
   return N::load(values);
 }
 
-// The next functions are not inlined: their sums need all registers, which g++ 12 would otherwise
-// share out among the constants of everything around them.
+// The next functions are not inlined: their sums need all registers. g++ 12 would use some of them
+// for constants of the surrounding code.
 
-/// kGroups groups of ranks of `count` positions, a chunk at most, whose strips begin with `first`
-/// and `second`.
+/// Projects kGroups groups of ranks over `count` positions, at most a chunk; `first` and `second`
+/// are its two strips.
 template <typename N, std::size_t kGroups, typename Value>
 [[gnu::noinline]] void project_groups(StripBasis<Value> first, StripBasis<Value> second,
                                       std::size_t count, const IntegerLight& light, bool add_to,
@@ -191,7 +190,7 @@ template <typename N, std::size_t kGroups, typename Value>
   N::template store_coefficients<kGroups>(sum[0], sum[1], sum[2], light.back, add_to, coefficient);
 }
 
-/// Positions of a cluster whose light is rounded together.
+/// Positions of a cluster that are rounded with one scale.
 struct LightChunk {
   std::size_t begin, count;
 };
@@ -237,12 +236,12 @@ void project_integers(const Value* values, std::span<const BasisPart> parts,
   }
 }
 
-/// Ranks within a chunk.
+/// Ranks [begin, end) within a chunk.
 struct RankRange {
   std::size_t begin, end;
 };
 
-/// The coefficients of a chunk of ranks: of each group (channel)(rank).
+/// Rounded coefficients of a chunk of ranks; each group is (channel)(rank).
 struct IntegerCoefficients {
   static constexpr std::size_t kGroupSize = kRankGroup * kChannelLanes;
   alignas(64) std::int16_t value[kChunk / kRankGroup * kGroupSize];
@@ -250,7 +249,7 @@ struct IntegerCoefficients {
   std::size_t group_count;
 };
 
-/// Of the ranks within a chunk; those of its groups that are not among them are zero.
+/// Rounds the coefficients of `ranks`; the other ranks of their groups become zero.
 template <typename N, typename Value>
 REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange ranks,
                                                IntegerCoefficients& to) {
@@ -275,8 +274,8 @@ REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange rank
   }
 }
 
-/// y of kWide vectors of positions; groups of ranks are dealt out among kSplit sums, so that there
-/// are N::kLeastSums of them or more.
+/// Computes y at kWide vectors of positions. Groups of ranks are divided among kSplit partial sums,
+/// so that at least N::kLeastSums sums are independent.
 template <typename N, std::size_t kWide, typename Value>
 [[gnu::noinline]] void expand_integer_strip(StripBasis<Value> strip,
                                             const IntegerCoefficients& coefficient, float* y,
@@ -317,7 +316,7 @@ template <typename N, std::size_t kWide, typename Value>
   });
 }
 
-/// The chunk of ranks from `first_rank` on.
+/// Expands the chunk of ranks from `first_rank` on.
 template <typename N, typename Value>
 REBOUNCE_INLINE inline void expand_chunk(const Value* values, const BasisPart& part,
                                          std::size_t first_rank,

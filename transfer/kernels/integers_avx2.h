@@ -17,7 +17,7 @@ namespace {
 struct Shorts16 {
   static constexpr std::size_t kWidth = 16;
   static constexpr std::size_t kStrip = 8;
-  static constexpr std::size_t kLeastSums = 1;  ///< an addition is one cycle
+  static constexpr std::size_t kLeastSums = 1;  ///< an addition takes one cycle
   __m256i v;
 
   static Shorts16 zero() { return {_mm256_setzero_si256()}; }
@@ -30,7 +30,7 @@ struct Shorts16 {
   static Shorts16 repeat_four(const std::int16_t* p) {
     return {_mm256_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))};
   }
-  /// (4 ranks)(2 positions) as (2 positions)(4 ranks).
+  /// Shuffles (4 ranks)(2 positions) to (2 positions)(4 ranks).
   Shorts16 by_position() const {
     const __m256i order = _mm256_broadcastsi128_si256(
         _mm_setr_epi8(0, 1, 4, 5, 8, 9, 12, 13, 2, 3, 6, 7, 10, 11, 14, 15));
@@ -41,7 +41,7 @@ struct Shorts16 {
   }
   friend Shorts16 add(Shorts16 a, Shorts16 b) { return {_mm256_add_epi32(a.v, b.v)}; }
 
-  /// Of three planes of `count` floats.
+  /// Magnitudes of three planes of `count` floats.
   static Magnitudes magnitudes_of_planes(const float* x, std::size_t stride, std::size_t count) {
     Running r, g, b;
     for (std::size_t k = 0; k < count; k += 16) {
@@ -51,7 +51,7 @@ struct Shorts16 {
     }
     return rebounce::magnitudes_of_planes(r.fours(), g.fours(), b.fours());
   }
-  /// Of each channel among `count` floats of coefficients.
+  /// Magnitudes of each channel among `count` floats of coefficients.
   static Magnitudes magnitudes_of_lanes(const float* x, std::size_t count) {
     Running running;
     for (; count >= 16; count -= 16, x += 16)
@@ -63,7 +63,7 @@ struct Shorts16 {
 
   static void round_positions(const float* x, float scale, std::int16_t* to) {
     const __m256 by = _mm256_set1_ps(scale);
-    // Of positions 0 to 3, 8 to 11, 4 to 7, 12 to 15.
+    // Positions 0 to 3, 8 to 11, 4 to 7, 12 to 15.
     const __m256i pairs =
         _mm256_packs_epi32(wide(_mm256_loadu_ps(x), by), wide(_mm256_loadu_ps(x + 8), by));
     store_lanes(to, _mm256_permutevar8x32_epi32(pairs, lane_order(0, 1)));
@@ -90,14 +90,14 @@ struct Shorts16 {
     });
   }
 
-  /// Rounds a group of coefficients: (rank)(channel) to (channel)(rank).
+  /// Rounds a group of coefficients from (rank)(channel) to (channel)(rank).
   struct CoefficientRounding {
     explicit CoefficientRounding(const ChannelFloats& scales)
         : scale(_mm256_broadcast_ps(reinterpret_cast<const __m128*>(scales.data()))) {}
     void operator()(const float* from, std::int16_t* to) const {
       round(_mm256_loadu_ps(from), _mm256_loadu_ps(from + 8), to);
     }
-    /// Ranks that are not wanted become zero.
+    /// Rounds only the wanted ranks; the others become zero.
     void some(const float* from, RankRange wanted, std::int16_t* to) const {
       const __m256i rank = _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1);
       const auto load = [&](int first) {
@@ -119,7 +119,7 @@ struct Shorts16 {
     __m256 scale;
   };
 
-  /// y[k] += the sums of neighbouring lanes times `back`.
+  /// y[k] += `back` times the sums of neighbouring lanes.
   template <std::size_t kWide>
   REBOUNCE_INLINE static void add_positions(const Shorts16 (&sum)[kWide], float back, float* y) {
     unroll<kWide / 2>([&](auto w) REBOUNCE_INLINE {
@@ -134,7 +134,7 @@ struct Shorts16 {
   static void store_lanes(std::int16_t* to, __m256i lanes) {
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), lanes);
   }
-  /// Magnitudes by lanes, of sixteen floats at a time. All instruction sets add up in this order.
+  /// Magnitudes by lane, for sixteen floats at a time. All instruction sets add in this order.
   struct Running {
     __m256 largest = _mm256_setzero_ps(), first_sum = largest, second_sum = largest;
 
@@ -155,7 +155,7 @@ struct Shorts16 {
   static __m256i wide(__m256 x, __m256 scale) {
     return _mm256_cvtps_epi32(_mm256_mul_ps(x, scale));
   }
-  /// Four times lane a, four times lane b.
+  /// Four times lane a, then four times lane b.
   static __m256i lane_order(int a, int b) { return _mm256_setr_epi32(a, a, a, a, b, b, b, b); }
   static __m128 scaled(Shorts16 sum, float back) {
     const __m128i four =

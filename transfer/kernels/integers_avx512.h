@@ -17,13 +17,14 @@ namespace {
 struct Shorts32 {
   static constexpr std::size_t kWidth = 32;
   static constexpr std::size_t kStrip = 64;
-  static constexpr std::size_t kLeastSums = 12;  ///< a product is four cycles in its sum
+  /// A product takes four cycles until the next can use its sum.
+  static constexpr std::size_t kLeastSums = 12;
   __m512i v;
 
   static Shorts32 zero() { return {_mm512_setzero_si512()}; }
   static Shorts32 load(const std::int16_t* p) {
     __m512i loaded = _mm512_loadu_si512(p);
-    asm("" : "+v"(loaded));  // else g++ 12 loads it again for each of its products
+    asm("" : "+v"(loaded));  // otherwise g++ 12 loads the value again for each product
     return {loaded};
   }
   static Shorts32 load(const std::int8_t* p) {
@@ -34,20 +35,20 @@ struct Shorts32 {
   static Shorts32 repeat_four(const std::int16_t* p) {
     return {_mm512_broadcastq_epi64(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(p)))};
   }
-  /// (4 ranks)(2 positions) as (2 positions)(4 ranks).
+  /// Shuffles (4 ranks)(2 positions) to (2 positions)(4 ranks).
   Shorts32 by_position() const {
     const __m512i order =
         _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 4, 5, 8, 9, 12, 13, 2, 3, 6, 7, 10, 11, 14, 15));
     return {_mm512_shuffle_epi8(v, order)};
   }
   friend Shorts32 add_products(Shorts32 sum, Shorts32 a, Shorts32 b) {
-    // Of the intrinsic, g++ 12 makes two more moves for each product.
+    // With the intrinsic, g++ 12 emits two more moves for each product.
     asm("vpdpwssd %2, %1, %0" : "+v"(sum.v) : "v"(a.v), "v"(b.v));
     return sum;
   }
   friend Shorts32 add(Shorts32 a, Shorts32 b) { return {_mm512_add_epi32(a.v, b.v)}; }
 
-  /// Of three planes of `count` floats.
+  /// Magnitudes of three planes of `count` floats.
   static Magnitudes magnitudes_of_planes(const float* x, std::size_t stride, std::size_t count) {
     Running r, g, b;
     for (std::size_t k = 0; k < count; k += 16) {
@@ -57,7 +58,7 @@ struct Shorts32 {
     }
     return rebounce::magnitudes_of_planes(r.fours(), g.fours(), b.fours());
   }
-  /// Of each channel among `count` floats of coefficients.
+  /// Magnitudes of each channel among `count` floats of coefficients.
   static Magnitudes magnitudes_of_lanes(const float* x, std::size_t count) {
     Running running;
     std::size_t k = 0;
@@ -97,12 +98,12 @@ struct Shorts32 {
     });
   }
 
-  /// Rounds a group of coefficients: (rank)(channel) to (channel)(rank).
+  /// Rounds a group of coefficients from (rank)(channel) to (channel)(rank).
   struct CoefficientRounding {
     explicit CoefficientRounding(const ChannelFloats& scales)
         : scale(_mm512_broadcast_f32x4(_mm_loadu_ps(scales.data()))) {}
     void operator()(const float* from, std::int16_t* to) const { round(_mm512_loadu_ps(from), to); }
-    /// Ranks that are not wanted become zero.
+    /// Rounds only the wanted ranks; the others become zero.
     void some(const float* from, RankRange wanted, std::int16_t* to) const {
       const unsigned below = 1U << (4 * wanted.begin), up_to = 1U << (4 * wanted.end);
       round(_mm512_maskz_loadu_ps(static_cast<__mmask16>(up_to - below), from), to);
@@ -116,7 +117,7 @@ struct Shorts32 {
     __m512 scale;
   };
 
-  /// y[k] += the sums of neighbouring lanes times `back`.
+  /// y[k] += `back` times the sums of neighbouring lanes.
   template <std::size_t kWide>
   REBOUNCE_INLINE static void add_positions(const Shorts32 (&sum)[kWide], float back, float* y) {
     unroll<kWide / 2>([&](auto w) REBOUNCE_INLINE {
@@ -132,7 +133,7 @@ struct Shorts32 {
   }
 
  private:
-  /// Magnitudes by lanes. All instruction sets add up in this order.
+  /// Magnitudes by lane. All instruction sets add in this order.
   struct Running {
     __m512 largest = _mm512_setzero_ps(), sum = largest;
 
@@ -152,7 +153,7 @@ struct Shorts32 {
   static __m512 scaled(__m512i sums, float back) {
     return _mm512_mul_ps(_mm512_cvtepi32_ps(sums), _mm512_set1_ps(back));
   }
-  /// Of up to four vectors the sums over their 128-bit lanes, one after the other.
+  /// The sums over the 128-bit lanes of up to four vectors, one vector after the other.
   template <std::size_t kGroups>
   REBOUNCE_INLINE static __m512i sums_of_fours(const Shorts32 (&sum)[kGroups]) {
     __m512i v[4];

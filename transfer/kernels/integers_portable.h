@@ -19,7 +19,7 @@
 namespace rebounce {
 namespace {
 
-/// Eight integers of 16 bits, or four sums of 32, as GCC's and Clang's vector extension has them.
+/// Eight 16-bit integers or four 32-bit sums, with the vector extension of GCC and Clang.
 struct Shorts8 {
   using Shorts = std::int16_t __attribute__((vector_size(16)));
   using Sums = std::int32_t __attribute__((vector_size(16)));
@@ -46,7 +46,7 @@ struct Shorts8 {
     using Pair = std::int64_t __attribute__((vector_size(16)));
     return {std::bit_cast<Sums>(Pair{four, four})};
   }
-  /// (4 ranks)(2 positions) as (2 positions)(4 ranks).
+  /// Shuffles (4 ranks)(2 positions) to (2 positions)(4 ranks).
   Shorts8 by_position() const {
     const auto s = std::bit_cast<Shorts>(v);
     return {std::bit_cast<Sums>(__builtin_shufflevector(s, s, 0, 2, 4, 6, 1, 3, 5, 7))};
@@ -56,7 +56,7 @@ struct Shorts8 {
   }
   friend Shorts8 add(const Shorts8& a, const Shorts8& b) { return {a.v + b.v}; }
 
-  /// Of three planes of `count` floats.
+  /// Magnitudes of three planes of `count` floats.
   static Magnitudes magnitudes_of_planes(const float* x, std::size_t stride, std::size_t count) {
     Magnitudes result{};
     for (std::size_t c = 0; c < kChannelCount; ++c) {
@@ -67,8 +67,8 @@ struct Shorts8 {
     }
     return result;
   }
-  /// Of each channel among `count` floats of coefficients, or of every fourth float. All
-  /// instruction sets add up in this order.
+  /// Magnitudes of each channel among `count` floats of coefficients. All instruction sets add in
+  /// this order.
   static Magnitudes magnitudes_of_lanes(const float* x, std::size_t count) {
     std::array<float, 16> largest{}, sum{};
     for (std::size_t k = 0; k < count; ++k) {
@@ -107,11 +107,11 @@ struct Shorts8 {
     }
   }
 
-  /// Rounds a group of coefficients: (rank)(channel) to (channel)(rank).
+  /// Rounds a group of coefficients from (rank)(channel) to (channel)(rank).
   struct CoefficientRounding {
     explicit CoefficientRounding(const ChannelFloats& scales) : scale(scales) {}
     void operator()(const float* from, std::int16_t* to) const { some(from, {0, kRankGroup}, to); }
-    /// Ranks that are not wanted become zero.
+    /// Rounds only the wanted ranks; the others become zero.
     void some(const float* from, RankRange wanted, std::int16_t* to) const {
       std::fill_n(to, IntegerCoefficients::kGroupSize, std::int16_t{0});
       for (std::size_t c = 0; c < kChannelLanes; ++c) {
@@ -123,7 +123,7 @@ struct Shorts8 {
     ChannelFloats scale;
   };
 
-  /// y[k] += the sums of neighbouring lanes times `back`.
+  /// y[k] += `back` times the sums of neighbouring lanes.
   template <std::size_t kWide>
   static void add_positions(const Shorts8 (&sum)[kWide], float back, float* y) {
     for (std::size_t w = 0; w < kWide; ++w) {
@@ -133,7 +133,7 @@ struct Shorts8 {
   }
 
  private:
-  /// The sums of the products of neighbours.
+  /// Sums of the products of neighbouring pairs.
   static Sums products(const Shorts8& a, const Shorts8& b) {
 #if defined(__SSE2__)
     return std::bit_cast<Sums>(
@@ -143,7 +143,7 @@ struct Shorts8 {
     return low + (a.v >> 16) * (b.v >> 16);
 #endif
   }
-  /// To the nearest, ties to even.
+  /// Rounds to the nearest integer, ties to even.
   static std::int16_t rounded(float x) {
     return static_cast<std::int16_t>(std::lrint(std::clamp(x, -32768.0F, 32767.0F)));
   }

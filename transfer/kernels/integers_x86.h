@@ -1,6 +1,6 @@
 #pragma once
 
-// What the vector types of the integer kernels share for AVX2 and AVX-512.
+// What the integer vector types of AVX2 and AVX-512 share.
 
 #include <immintrin.h>
 
@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-/// Magnitudes by fours of lanes.
+/// Magnitudes of every fourth lane.
 struct FourMagnitudes {
   __m128 largest, sum;
 
@@ -27,7 +27,7 @@ struct FourMagnitudes {
   }
 };
 
-/// Over the lanes of three planes.
+/// Sums up the lanes of three planes.
 inline Magnitudes magnitudes_of_planes(const FourMagnitudes& red, const FourMagnitudes& green,
                                        const FourMagnitudes& blue) {
   __m128 m[] = {red.largest, green.largest, blue.largest, _mm_setzero_ps()};

@@ -11,13 +11,13 @@ namespace rebounce {
 namespace {
 
 #if defined(__x86_64__)
-// By hand: __builtin_cpu_supports of Clang before 18 does not know the name.
+// Reads CPUID itself: __builtin_cpu_supports of Clang before 18 does not know the name.
 bool cpu_supports_f16c() {
   unsigned a = 0, b = 0, c = 0, d = 0;
   return __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_F16C) != 0;
 }
 
-/// How many of the sets, narrowest first, this processor runs.
+/// The number of sets, narrowest first, that this processor can run.
 std::size_t runnable_count() {
   if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
       __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vnni")) {

@@ -9,8 +9,8 @@
 
 namespace rebounce {
 
-/// All kernels for one instruction set. Each set is made in a file of its own, the only one that is
-/// compiled with these instructions.
+/// All kernels for one instruction set. Each set has a file of its own, the only one that is
+/// compiled for these instructions.
 struct KernelSet {
   const char* instruction_set;  ///< "portable", "avx2", "avx512"
   DenseKernels dense;
@@ -20,10 +20,11 @@ struct KernelSet {
 };
 
 extern const KernelSet kKernelsPortable;
-extern const KernelSet kKernelsAvx2;    ///< with FMA and F16C
-extern const KernelSet kKernelsAvx512;  ///< AVX-512F, BW, VL, VNNI: since Cascade Lake and Zen 4
+extern const KernelSet kKernelsAvx2;  ///< with FMA and F16C
+extern const KernelSet
+    kKernelsAvx512;  ///< AVX-512 F, BW, VL and VNNI: Cascade Lake, Zen 4 and later
 
-/// The kernels that this processor runs, narrowest first, and the widest of them.
+/// The sets that this processor can run, narrowest first; kernels() is the widest of them.
 std::span<const KernelSet* const> kernel_sets();
 const KernelSet& kernels();
 

@@ -1,4 +1,4 @@
-// Compiled with AVX2, FMA and F16C; called only on processors that have them.
+// Compiled with AVX2, FMA and F16C; only called on processors that have them.
 
 #include "transfer/kernels/integers_avx2.h"
 #include "transfer/kernels/kernels_impl.h"

@@ -1,4 +1,4 @@
-// Compiled with AVX-512F, BW, VL and VNNI; called only on processors that have them.
+// Compiled with AVX-512 F, BW, VL and VNNI; only called on processors that have them.
 
 #include "transfer/kernels/integers_avx512.h"
 #include "transfer/kernels/kernels_impl.h"

@@ -1,7 +1,7 @@
 #pragma once
 
-// All kernels for one instruction set, whose file includes this: `V` is its vector of floats
-// (vector_load.h), `N` of integers (integer_kernels_impl.h).
+// All kernels for one instruction set. The file of the set includes this; `V` is its vector of
+// floats (vector_load.h), `N` its vector of integers (integer_kernels_impl.h).
 
 #include "transfer/kernels/block_kernels_impl.h"
 #include "transfer/kernels/dense_kernels_impl.h"

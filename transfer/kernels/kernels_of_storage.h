@@ -11,7 +11,7 @@
 
 namespace rebounce {
 
-/// The kernels for bases of a type.
+/// The kernels for bases of type `Value`.
 template <typename Value>
 const BasisKernels<Value>& basis_kernels(const BlockKernels& kernels) {
   if constexpr (std::is_same_v<Value, float>) return kernels.bases_f32;
@@ -20,22 +20,22 @@ const BasisKernels<Value>& basis_kernels(const BlockKernels& kernels) {
   if constexpr (std::is_same_v<Value, std::int8_t>) return kernels.bases_q8;
 }
 
-/// The kernels for coupling matrices of a type.
+/// The kernels for coupling matrices of type `Value`.
 template <typename Value>
 const CouplingKernels<Value>& coupling_kernels(const BlockKernels& kernels) {
   if constexpr (std::is_same_v<Value, float>) return kernels.couplings_f32;
   if constexpr (std::is_same_v<Value, std::uint16_t>) return kernels.couplings_f16;
 }
 
-/// Kernels for one type of values, and values of it.
+/// Kernels for one type of values, with an array of such values.
 template <typename Kernels, typename Value>
 struct KernelsOn {
   const Kernels* kernels;
   const Value* values;
 };
 
-/// Products with the bases of an operator, by the widest kernels for their precision; see
-/// BasisKernels. The storage must outlive it.
+/// Products with the bases of an operator, with the widest kernels for their precision
+/// (BasisKernels). The storage must outlive the object.
 class BasisProducts {
  public:
   explicit BasisProducts(const HierarchicalStorage& storage) {
@@ -54,7 +54,7 @@ class BasisProducts {
     std::visit([&](const auto& on) { on.kernels->expand(on.values, parts, coefficient, y); }, on_);
   }
 
-  /// What stands for 1 in the bases.
+  /// The stored number that stands for 1 in the bases.
   float scale() const { return scale_; }
 
  private:
@@ -64,8 +64,8 @@ class BasisProducts {
   float scale_ = 1;
 };
 
-/// Products with its coupling matrices and dense blocks likewise; see CouplingKernels. The bases
-/// take up `basis_value_count` values.
+/// Products with the coupling matrices and dense blocks of an operator (CouplingKernels). The
+/// storage has `basis_value_count` values of bases and must outlive the object.
 class CouplingProducts {
  public:
   CouplingProducts(const HierarchicalStorage& storage, std::uint64_t basis_value_count) {
@@ -98,7 +98,7 @@ class CouplingProducts {
     std::visit([&](const auto& on) { on.kernels->add_dense(on.values, blocks, x, scale, y); }, on_);
   }
 
-  /// What stands for 1 in the coupling matrices.
+  /// The stored number that stands for 1 in the coupling matrices.
   float scale() const { return scale_; }
 
  private:
@@ -108,7 +108,7 @@ class CouplingProducts {
   float scale_ = 1;
 };
 
-/// What products of stored values must be multiplied by.
+/// The factor that turns products of stored values into products of real ones.
 inline float product_scale(const BasisProducts& bases, const CouplingProducts& couplings) {
   return 1 / (couplings.scale() * bases.scale() * bases.scale());
 }

@@ -5,15 +5,15 @@
 
 namespace rebounce {
 
-// Static: each file has its own, for the instructions that it is compiled with.
+// These functions are static: each file compiles its own copy for its instruction set.
 
-/// Adds `factor` times `from` to `to`, arrays of as many numbers.
+/// to += factor * from, lane by lane.
 template <typename Lanes>
 static inline void add_scaled(Lanes& to, float factor, const Lanes& from) {
   for (std::size_t lane = 0; lane < to.size(); ++lane) to[lane] += factor * from[lane];
 }
 
-/// GatherAlongLinks in plain C++, for light of any precision and number of channels.
+/// GatherAlongLinks in plain C++, for any number type and number of channels.
 template <typename Lanes>
 static inline LinkLightOf<Lanes> gather_along_links(const IncomingLink* link, std::size_t count,
                                                     const LinkLightOf<Lanes>* light) {

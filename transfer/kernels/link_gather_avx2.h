@@ -1,7 +1,7 @@
 #pragma once
 
-// Gathering along links with AVX2 and FMA. The light of a node is two registers, a colour in each
-// of their halves.
+// Gathering along links with AVX2 and FMA. The light of a node is two registers; each half is a
+// colour.
 
 #include <immintrin.h>
 
@@ -11,7 +11,7 @@ namespace rebounce {
 namespace {
 
 LinkLight gather_avx2(const IncomingLink* link, std::size_t count, const LinkLight* light) {
-  // Lane by lane the gradient, of the six that a link has, that its half is multiplied by.
+  // For each lane, the index of the gradient component that multiplies it; a link has six.
   const __m256i from_x = _mm256_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0);
   const __m256i from_yz = _mm256_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2);
   const __m256i to_x = _mm256_setr_epi32(0, 0, 0, 0, 3, 3, 3, 3);
@@ -20,7 +20,7 @@ LinkLight gather_avx2(const IncomingLink* link, std::size_t count, const LinkLig
   __m256 along[2] = {_mm256_setzero_ps(), _mm256_setzero_ps()};
   __m256 across[2] = {_mm256_setzero_ps(), _mm256_setzero_ps()};
   for (std::size_t l = 0; l < count; ++l) {
-    // Both gradients and the two halves of `from`, which no lane takes.
+    // Both gradients and the two halves of `from`, which no lane uses.
     const __m128i bits = _mm_loadu_si128(reinterpret_cast<const __m128i*>(link + l));
     const __m256 gradient = _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(bits), 16));
     const auto* from = reinterpret_cast<const float*>(light + link[l].from);

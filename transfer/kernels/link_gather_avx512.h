@@ -1,7 +1,7 @@
 #pragma once
 
-// Gathering along links with AVX-512F, BW and VL. The light of a node is one register, a colour in
-// each of its quarters.
+// Gathering along links with AVX-512 F, BW and VL. The light of a node is one register; each
+// quarter is a colour.
 
 #include <immintrin.h>
 
@@ -14,12 +14,12 @@ namespace {
 constexpr __mmask16 kFirst = 0x000F, kOthers = 0xFFF0;
 
 LinkLight gather_avx512(const IncomingLink* link, std::size_t count, const LinkLight* light) {
-  // Lane by lane the gradient, of the six that a link has, that its quarter is multiplied by.
+  // For each lane, the index of the gradient component that multiplies it; a link has six.
   const __m512i from_lanes = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2);
   const __m512i to_lanes = _mm512_setr_epi32(0, 0, 0, 0, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5);
   __m512 along = _mm512_setzero_ps(), across = _mm512_setzero_ps();
   for (std::size_t l = 0; l < count; ++l) {
-    // Both gradients and the two halves of `from`, which no lane takes.
+    // Both gradients and the two halves of `from`, which no lane uses.
     const __m128i bits = _mm_loadu_si128(reinterpret_cast<const __m128i*>(link + l));
     const __m512 gradient = _mm512_castps256_ps512(
         _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(bits), 16)));

@@ -39,7 +39,7 @@ struct Vector8 {
     const __m256 four = _mm256_hadd_ps(_mm256_hadd_ps(a.v, b.v), _mm256_hadd_ps(c.v, d.v));
     return {_mm_add_ps(_mm256_castps256_ps128(four), _mm256_extractf128_ps(four, 1))};
   }
-  /// Of two vectors the sums over their fours of lanes, one after the other.
+  /// The sums over each four lanes of two vectors, one vector after the other.
   static Vector8 sums_of_fours(const Vector8 (&a)[2]) {
     return {_mm256_add_ps(_mm256_permute2f128_ps(a[0].v, a[1].v, 0x20),
                           _mm256_permute2f128_ps(a[0].v, a[1].v, 0x31))};

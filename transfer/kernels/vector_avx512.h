@@ -1,6 +1,6 @@
 #pragma once
 
-// The vector type of the AVX-512 kernels; see vector_load.h. Needs AVX-512F, BW and VL.
+// The vector type of the AVX-512 kernels; see vector_load.h. Needs AVX-512 F, BW and VL.
 
 #include <immintrin.h>
 
@@ -48,14 +48,14 @@ struct Vector16 {
                       _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(four), 1)));
     return {_mm_add_ps(_mm256_castps256_ps128(two), _mm256_extractf128_ps(two, 1))};
   }
-  /// Of four vectors the sums over their fours of lanes, one after the other.
+  /// The sums over each four lanes of four vectors, one vector after the other.
   static Vector16 sums_of_fours(const Vector16 (&a)[4]) {
     const auto halves = [](__m512 x, __m512 y) REBOUNCE_INLINE {
       return _mm512_add_ps(_mm512_shuffle_f32x4(x, y, 0x88), _mm512_shuffle_f32x4(x, y, 0xDD));
     };
     return {halves(halves(a[0].v, a[1].v), halves(a[2].v, a[3].v))};
   }
-  /// Sums over every fourth lane of four vectors, which are in the lanes of each four.
+  /// Sums every fourth lane of four vectors; vector k is in lane k of each four.
   static Vector16 sums_in_fours(const Vector16 (&a)[4]) {
     const auto pair = [](__m512 x, __m512 y) REBOUNCE_INLINE {
       return _mm512_add_ps(_mm512_unpacklo_ps(x, y), _mm512_unpackhi_ps(x, y));
@@ -115,7 +115,8 @@ class Vector16::EntryLanes<std::uint16_t> {
   explicit EntryLanes(const ChannelLanes& lanes)
       : lane_(_mm512_cvtepu16_epi32(
             _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())))) {}
-  // Converted as they come from memory, which takes one operation less than what was permuted.
+  // Halves are converted straight from memory: this saves one operation against converting permuted
+  // values.
   Vector16 load(const std::uint16_t* p) const {
     return {_mm512_permutexvar_ps(lane_, load_half(p).v)};
   }
@@ -124,7 +125,7 @@ class Vector16::EntryLanes<std::uint16_t> {
   __m512i lane_;
 };
 
-/// Where the channels share a matrix, the sixteen entries of four vectors are converted once.
+/// With one matrix for all channels, the sixteen entries of four vectors are converted once.
 class Vector16::OneMatrixEntries {
  public:
   static constexpr bool kWholeRows = true;

@@ -1,34 +1,37 @@
 #pragma once
 
-// Kernels are written over a vector type `V` of kWidth floats, one per instruction set: load,
-// load_half, store, zero, broadcast, multiply_add, sum; load_some and store_some touch the first
-// `count` lanes alone, the others are read as zero; sums gives the sums over the lanes of four
-// vectors. Of vectors whose fours of lanes are the channels of something, repeat_four fills all
-// fours with one, sums_of_fours adds up those of as many vectors as there are, and
-// EntryLanes<Value>::load loads the entries of a coupling matrix; entries of kWholeRows load as
-// many vectors of a row as there are with load_row. kStrip positions, the channels of kLights
-// lights and kCouplingVectors vectors of a row of a coupling matrix are what its registers have
-// room for. Everything about it is in an unnamed namespace, so that files compiled for different
-// sets never share an instantiation.
+// Kernels are written over a vector type `V` of kWidth floats, one per instruction set. Basics:
+// load, load_half, store, zero, broadcast, multiply_add, sum. load_some and store_some use only the
+// first `count` lanes; load_some sets the others to zero. sums returns the sums over the lanes of
+// four vectors.
+//
+// Some vectors hold groups of four lanes, each with the channels of one coefficient. repeat_four
+// fills all groups with one coefficient, and sums_of_fours sums each group. EntryLanes<Value>::load
+// loads entries of a coupling matrix; entries with kWholeRows load several vectors of a row at once
+// with load_row.
+//
+// Three constants are limited by the number of registers: kStrip positions, the channels of kLights
+// lights, and kCouplingVectors vectors of a row of a coupling matrix. Everything is in an unnamed
+// namespace, so that files compiled for different sets never share an instantiation.
 
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
 #include <utility>
 
-// On functions and lambdas alike: arrays of vectors are kept in registers only if all that touches
-// them is one function.
+// For functions and lambdas. The compiler keeps arrays of vectors in registers only if all code
+// that uses them is one function.
 #define REBOUNCE_INLINE __attribute__((always_inline))
 
 namespace rebounce {
 namespace {
 
-/// Asks for values that are read in order before their turn. Only registers of kRegister bytes that
-/// are whole cache lines do: others would ask too often. They are brought to the second-level cache
-/// alone: the nearest one has too few loads under way at a time for all that memory can give.
+/// Prefetches values that are read in order. Only registers of kRegister bytes that fill whole
+/// cache lines do so; others would prefetch too often. The values go to the second-level cache
+/// only: the first-level cache has too few loads in flight to use the full memory bandwidth.
 template <std::size_t kRegister, typename Value>
 REBOUNCE_INLINE inline void ask_ahead(const Value* values) {
-  // The processor itself looks no farther than the end of a page. Measured: notes/operator.md.
+  // The processor's own prefetching stops at the end of a page. See notes/operator.md.
   constexpr std::size_t kLine = 64, kAhead = 16384;
   constexpr int kToRead = 0, kSecondLevel = 2;
   if constexpr (kRegister == kLine) {
@@ -46,7 +49,7 @@ inline V load_values(const std::uint16_t* p) {
   return V::load_half(p);
 }
 
-/// Calls work(index) for 0 to kCount - 1 as constants, so that arrays indexed by them are
+/// Calls work(index) for 0 to kCount - 1 as constants, so that arrays indexed by them stay in
 /// registers.
 template <std::size_t kCount, typename Work>
 REBOUNCE_INLINE inline void unroll(const Work& work) {
@@ -56,7 +59,7 @@ REBOUNCE_INLINE inline void unroll(const Work& work) {
   (std::make_index_sequence<kCount>{});
 }
 
-/// Calls work.template operator()<rows>(first) for groups of kMost rows, and for what is left.
+/// Calls work.template operator()<rows>(first) for groups of kMost rows, then for the rest.
 template <std::size_t kMost, typename Work>
 REBOUNCE_INLINE inline void for_each_rows(std::size_t rows, const Work& work) {
   std::size_t r = 0;

@@ -13,8 +13,8 @@
 namespace rebounce {
 namespace {
 
-/// Four floats as GCC's and Clang's vector extension has them: SSE2 on x86-64, NEON on AArch64,
-/// whatever there is elsewhere.
+/// Four floats with the vector extension of GCC and Clang: SSE2 on x86-64, NEON on AArch64,
+/// otherwise what the compiler chooses.
 struct Vector4 {
   using Floats = float __attribute__((vector_size(16)));
   using Bits = std::uint32_t __attribute__((vector_size(16)));
@@ -25,7 +25,7 @@ struct Vector4 {
   Floats v;
 
   static Vector4 load(const float* p) { return {read<Floats>(p)}; }
-  /// half_to_float of four.
+  /// half_to_float of four numbers.
   static Vector4 load_half(const std::uint16_t* p) {
     using Halves = std::uint16_t __attribute__((vector_size(8)));
     const Bits half = __builtin_convertvector(read<Halves>(p), Bits);
@@ -62,7 +62,7 @@ struct Vector4 {
     return {a.v * b.v + c.v};
   }
 
-  /// Loads entries with their channels side by side.
+  /// Loads entries of a coupling matrix; the channels of an entry are neighbours.
   template <typename Value>
   class EntryLanes {
    public:
@@ -87,7 +87,8 @@ struct Vector4 {
   }
 };
 
-/// Stores the first kCount lanes of three channels, those of a lane side by side in four floats.
+/// Stores the first kCount lanes of three channels; the channels of a lane are neighbours among
+/// four floats.
 template <std::size_t kCount>
 inline void store_side_by_side(const Vector4& red, const Vector4& green, const Vector4& blue,
                                float* p) {

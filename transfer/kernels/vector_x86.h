@@ -17,7 +17,8 @@ struct FourSums {
   }
 };
 
-/// Stores the first kCount sums of three channels, those of a lane side by side in four floats.
+/// Stores the first kCount sums of three channels; the channels of a lane are neighbours among four
+/// floats.
 template <std::size_t kCount>
 inline void store_side_by_side(FourSums red, FourSums green, FourSums blue, float* p) {
   static_assert(kCount >= 1 && kCount <= 4);
