@@ -1,13 +1,14 @@
-// Gauss-Seidel on a symmetric hierarchical matrix of which the lower half is stored. With L that
-// half off the diagonal, D its diagonal blocks and x = A^1/2 B, a forward sweep is
-//   x' = A^1/2 M0 + rho (L x' + D x + L^T x), a backward sweep the same with L and L^T exchanged.
-// L x' of a forward sweep is what the backward sweep after it needs as its "values before", and the
-// other way round: V. Conrad, Y. Wallach, "Alternating methods for sets of linear equations", 1979.
-// A forward sweep after a forward one finds L^T x as it goes: a column of blocks is multiplied with
-// the values before of its rows right before its own positions are relaxed, and with what became of
-// them right after, so that it is read from the nearer caches the second time.
+// Gauss-Seidel on a symmetric hierarchical matrix with a stored lower half. L is this half without
+// the diagonal blocks, D the diagonal blocks, and x = A^1/2 B. A forward sweep computes
+//   x' = A^1/2 M0 + rho (L x' + D x + L^T x);
+// a backward sweep exchanges L and L^T. A forward sweep leaves L x', and this is the product with
+// the old values that a following backward sweep needs, and vice versa (V. Conrad, Y. Wallach,
+// "Alternating methods for sets of linear equations", 1979). A forward sweep after another one
+// computes L^T x as it goes: it multiplies a column of blocks with the old values of its rows just
+// before it relaxes the column's positions, and with the new values just after. The second product
+// reads the column from cache.
 //
-// Of equilibrated patches, G = R K R, the unknown is R x, with rho R^2 for rho and K for G.
+// For equilibrated patches, G = R K R: the unknown is R x, K replaces G, and rho R^2 replaces rho.
 
 #include "transfer/exchange/cluster_relaxation.h"
 
@@ -26,7 +27,7 @@ namespace {
 
 constexpr std::size_t kAlignment = HierarchicalFormat::kAlignment;
 
-/// Three vectors, one to each channel, with room for whole vectors at the end.
+/// Three vectors, one per channel, padded to whole registers.
 class Planes {
  public:
   explicit Planes(std::size_t size)
@@ -49,7 +50,7 @@ class Planes {
   std::vector<float> values_;
 };
 
-/// Coefficients of three channels.
+/// Coefficients with three channels each.
 class CoefficientArray {
  public:
   explicit CoefficientArray(std::size_t size) : values_(size * kChannelLanes) {}
@@ -125,14 +126,14 @@ class ClusterRelaxation final : public Relaxation {
  private:
   using Plan = ClusterSweepPlan;
 
-  /// Which product with the present radiosity there is.
+  /// Which product with the current radiosity is available.
   enum class Known : std::uint8_t { kNothing, kLower, kUpper };
 
   std::size_t positions() const {
     return HierarchicalFormat::position_count(exchange_.area.size());
   }
 
-  /// What x at a position is of the radiosity there.
+  /// The factor between radiosity and x at a position: R A^1/2.
   float scaled_root(std::size_t position) const {
     return exchange_.position_scale(position) * std::sqrt(area_[exchange_.patch[position]]);
   }
@@ -155,8 +156,8 @@ class ClusterRelaxation final : public Relaxation {
     return pass_backward();
   }
 
-  /// lower = L x, diagonal block after diagonal block; `visit` may change what a step holds of x
-  /// once all that it receives is there. Returns the sum of what it returns.
+  /// lower = L x, diagonal block after diagonal block. `visit`(step) may change x in the step's
+  /// block; it is called when lower is complete there. Returns the sum of the returned values.
   template <typename Visit>
   double pass_forward(const Visit& visit) {
     lower_.clear();
@@ -170,7 +171,7 @@ class ClusterRelaxation final : public Relaxation {
     return sum;
   }
 
-  /// upper = L^T x' of what becomes of x, from the last diagonal block to the first.
+  /// upper = L^T x' of the relaxed x', from the last diagonal block to the first.
   double pass_backward() {
     upper_.clear();
     double sum = 0;
@@ -183,7 +184,8 @@ class ClusterRelaxation final : public Relaxation {
     return sum;
   }
 
-  /// upper = L^T x and lower = L x' of what becomes of x; what the rows send of x must be there.
+  /// upper = L^T x and lower = L x' of the relaxed x'. The coefficients of x at row ends must be in
+  /// sent_.
   double pass_both_ways() {
     lower_.clear();
     upper_.clear();
@@ -230,7 +232,7 @@ class ClusterRelaxation final : public Relaxation {
     couplings_.add_dense(blocks, radiosity_.from(0), dense_scale_, to.to(0));
   }
 
-  /// Relaxes the positions of a block on the diagonal.
+  /// Relaxes the positions of a diagonal block.
   double relax(const Plan::Step& step, SweepDirection direction) {
     const TransferBlock& block = step.diagonal;
     const std::size_t begin = block.row_begin, end = begin + block.row_count;
@@ -260,11 +262,11 @@ class ClusterRelaxation final : public Relaxation {
             .direction = CouplingBlock::Direction::kToRows};
   }
 
-  /// Relaxes positions that see nothing of each other but what has been received.
+  /// Relaxes positions independently of each other.
   double relax_at_once(std::size_t begin, std::size_t end) {
     double changed_squared = 0;
     for (int c = 0; c < kChannelCount; ++c) {
-      std::array<float, kAlignment> squares{};  // sums of their own, so that they are vectors
+      std::array<float, kAlignment> squares{};  // separate sums, which vectorise
       for (std::size_t k = begin; k < end; k += kAlignment) {
         const float *light = &light_.at(c, k), *reflectance = &reflectance_.at(c, k);
         const float *received = &received_.at(c, k), *weight = &change_weight_[k];
@@ -296,14 +298,14 @@ class ClusterRelaxation final : public Relaxation {
     return changed_squared;
   }
 
-  /// Within a dense block, radiosity as it is for a coefficient.
+  /// Within a dense block the coefficients are the radiosities themselves.
   void send(std::size_t position, std::size_t coefficient) {
     for (int c = 0; c < kChannelCount; ++c) {
       sent_.at(c, coefficient) = radiosity_.at(c, position);
     }
   }
 
-  /// `inside`: the coefficient that has come from within its block.
+  /// `inside`: the coefficient with the product of the position's own diagonal block.
   double relax_position(std::size_t position, std::size_t inside) {
     double changed_squared = 0;
     for (int c = 0; c < kChannelCount; ++c) {
@@ -321,18 +323,19 @@ class ClusterRelaxation final : public Relaxation {
   BasisProducts bases_;
   CouplingProducts couplings_;
   ChannelLanes lanes_{{0, 0, 0}, 1};  ///< one matrix for all channels
-  float value_scale_;                 ///< what a product with stored values is to be multiplied by
-  float dense_scale_;  ///< of one with dense entries, which other light meets in both bases
+  float value_scale_;  ///< turns products of stored values into products of real ones
+  float dense_scale_;  ///< the same for dense entries, relative to value_scale_: they meet no basis
   ClusterSweepPlan plan_;
-  /// R A^1/2 M0, R^2 rho x value_scale, R A^1/2 B.
+  /// R A^1/2 M0, R^2 rho times value_scale_, and R A^1/2 B.
   Planes light_, reflectance_, radiosity_;
-  std::vector<float> change_weight_;  ///< [positions] R^-2: changes are those of A^1/2 B
-  Planes lower_, upper_, received_;   ///< L x, L^T x, and both and D x
-  CoefficientArray sent_, arrived_;  ///< coefficients of x, and what coupling matrices make of them
-  std::vector<float> taken_;         ///< what one of them takes
+  std::vector<float> change_weight_;  ///< [positions] R^-2, to measure changes of A^1/2 B
+  Planes lower_, upper_, received_;   ///< L x, L^T x, and L x + L^T x + D x
+  /// Coefficients of x, and their products with coupling matrices.
+  CoefficientArray sent_, arrived_;
+  std::vector<float> taken_;  ///< input copies of one coupling matrix
   std::span<const float> area_;
   Known known_ = Known::kNothing;
-  bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of x
+  bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of the current x
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace rebounce {
 
 /// Gauss-Seidel sweeps over the first matrix of `exchange`, a symmetric matrix G = A^1/2 F A^-1/2
-/// in hierarchical form, which must outlive them. See CompressedFormFactors::make_relaxation.
+/// in hierarchical form. `exchange` must outlive them. See CompressedFormFactors::make_relaxation.
 std::unique_ptr<Relaxation> make_cluster_relaxation(const HierarchicalStorage& exchange);
 
 }  // namespace rebounce

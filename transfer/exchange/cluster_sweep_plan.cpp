@@ -14,12 +14,12 @@ using Direction = CouplingBlock::Direction;
 template <typename T>
 using StepVectors = std::vector<std::vector<T>>;
 
-/// Coupling matrices of a step are independent; those of one shape take the same branches.
+/// Coupling matrices of one step are independent. Sorting them by shape makes branches predictable.
 std::pair<std::uint32_t, std::uint32_t> shape(const CouplingBlock& coupling) {
   return {coupling.columns, coupling.rows};
 }
 
-/// Bases or products while they are gathered.
+/// Collects the bases of all steps.
 struct BasesOfSteps {
   explicit BasesOfSteps(std::size_t step_count) : beginning(step_count), ending(step_count) {}
   ClusterSweepPlan::Bases made() const {
@@ -76,7 +76,7 @@ class Planner {
     }
   }
 
-  /// Positions that no diagonal block holds are relaxed too.
+  /// Positions without a diagonal block get steps too: they must be relaxed.
   void add_missing_steps() {
     std::vector<bool> held(step_at_.size(), false);
     for (const Step& step : plan_.steps) {
@@ -93,7 +93,7 @@ class Planner {
     }
   }
 
-  /// The basis at an end of a block, which begins where the cluster's does or later.
+  /// The basis at one end of a block, a range of ranks of its cluster.
   BasisPart basis_of(const TransferBlock& block, const HierarchicalLayout::End& end,
                      std::uint32_t rank) const {
     if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) return {};
@@ -147,7 +147,7 @@ class Planner {
     return has_values(block) && !block.on_diagonal();
   }
 
-  /// In which positions begin and end.
+  /// The steps that contain the first and the last position of a range.
   struct Steps {
     std::uint32_t first, last;
   };
@@ -192,7 +192,7 @@ class Planner {
     add_basis(bases.ending[steps.last], basis);
   }
 
-  /// Joins bases that follow each other.
+  /// Joins `basis` to the one whose ranks end where its own begin.
   static void add_basis(std::vector<BasisPart>& all, const BasisPart& basis) {
     for (BasisPart& before : all) {
       if (before.coefficient == basis.coefficient && before.last_rank == basis.first_rank) {
@@ -206,7 +206,7 @@ class Planner {
   const std::vector<TransferBlock>& blocks_;
   HierarchicalLayout layout_;
   ClusterSweepPlan& plan_;
-  std::vector<std::uint32_t> step_at_;  ///< of each kAlignment positions
+  std::vector<std::uint32_t> step_at_;  ///< [positions / kAlignment]
 };
 
 }  // namespace

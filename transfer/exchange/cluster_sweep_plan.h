@@ -10,21 +10,20 @@
 
 namespace rebounce {
 
-/// What a Gauss-Seidel sweep over a symmetric hierarchical matrix does, diagonal block after
-/// diagonal block. Of the blocks below the diagonal, those to the left of it receive what earlier
-/// positions send in a forward sweep, and send in a backward one; those below it the other way
-/// round.
+/// The steps of a Gauss-Seidel sweep over a symmetric hierarchical matrix, one for each diagonal
+/// block. In a forward sweep, the blocks to the left of a diagonal block receive what earlier
+/// positions send; in a backward sweep they send. The blocks below it do the reverse.
 struct ClusterSweepPlan {
-  /// A block on the diagonal.
+  /// A diagonal block.
   struct Step {
     TransferBlock diagonal;
     BasisPart basis{};         ///< U^T
-    std::uint64_t values = 0;  ///< S or the entries
+    std::uint64_t values = 0;  ///< index of S or of the entries
     std::uint32_t coefficient = 0;
     std::uint32_t residual_rank = 0;
   };
 
-  /// What is done at each step.
+  /// Entries of type `T`, grouped by step.
   template <typename T>
   class ByStep {
    public:
@@ -45,14 +44,13 @@ struct ClusterSweepPlan {
     std::vector<std::size_t> last_;
   };
 
-  /// Bases of the row ends or of the column ends of blocks, at the steps in which their clusters
-  /// begin, and at those in which they end; those that follow each other are joined.
+  /// Bases at the row ends or at the column ends of blocks: at the steps in which their clusters
+  /// begin, and at those in which they end. Neighbouring ranges of ranks are joined.
   struct Bases {
     ByStep<BasisPart> beginning, ending;
   };
 
-  /// Blocks below the diagonal in one direction. The products of dense ones are put in the place of
-  /// the first coefficients.
+  /// Blocks below the diagonal, in one direction.
   struct Products {
     ByStep<CouplingBlock> couplings;
     ByStep<DenseBlock> dense;
@@ -60,14 +58,14 @@ struct ClusterSweepPlan {
 
   explicit ClusterSweepPlan(const HierarchicalStorage& storage);
 
-  std::vector<Step> steps;  ///< by position
+  std::vector<Step> steps;  ///< in the order of the positions
   Bases row_bases, column_bases;
   Products to_beginning_rows;     ///< at the step in which their rows begin
   Products to_beginning_columns;  ///< at the step in which their columns begin
   Products to_ending_columns;     ///< at the step in which their columns end
-  Products from_ending_columns;   ///< to rows, likewise
+  Products from_ending_columns;   ///< products with rows, at the step in which the columns end
   std::uint32_t coefficient_count = 0;
-  std::size_t largest_taken = 0;  ///< as HierarchicalLayout has it
+  std::size_t largest_taken = 0;  ///< as in HierarchicalLayout
 };
 
 }  // namespace rebounce

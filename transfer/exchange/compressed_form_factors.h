@@ -7,13 +7,13 @@
 
 namespace rebounce {
 
-/// F as a hierarchical matrix: G = A^1/2 F A^-1/2, which is symmetric, in the blocks of
-/// HierarchicalOperator, one matrix for the three channels. Of a block and its mirror image one is
-/// stored; gathering applies both while it is in cache.
+/// F as a hierarchical matrix: the symmetric G = A^1/2 F A^-1/2 in the blocks of a
+/// HierarchicalOperator, one matrix for the three channels. Only one of a block and its mirror
+/// image is stored; gathering uses it for both while it is in cache.
 class CompressedFormFactors final : public SweepableFormFactors {
  public:
-  /// Refers to nothing but `exchange`, which it shares. Throws Error if that is null, its channels
-  /// have different matrices or its blocks cluster coefficients.
+  /// Shares `exchange` and refers to nothing else. Throws Error if it is null, if its channels have
+  /// different matrices, or if its bases are nested.
   explicit CompressedFormFactors(std::shared_ptr<const HierarchicalOperator> exchange);
 
   std::size_t patch_count() const override { return exchange_->patch_count(); }
@@ -23,14 +23,14 @@ class CompressedFormFactors final : public SweepableFormFactors {
   void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
               const Scheduler& scheduler = {}) const override;
 
-  /// Block Gauss-Seidel in the order of the clusters. Dense blocks on the diagonal are relaxed
-  /// patch by patch, so that it is sequential Gauss-Seidel but for diagonal blocks of low rank,
-  /// inside of which the values before the sweep are used. One thread.
+  /// Block Gauss-Seidel in the order of the clusters, on one thread. Dense diagonal blocks are
+  /// relaxed patch by patch, as in sequential Gauss-Seidel. Within low-rank diagonal blocks the
+  /// values before the sweep are used.
   ///
-  /// A sweep needs the products of both halves of the matrix, each when other patches have their
-  /// newest values, so that it reads the stored half twice; sweeps that change direction each time
-  /// find one of the two still there from the sweep before, and read it once. (V. Conrad, Y.
-  /// Wallach, "Alternating methods for sets of linear equations", 1979.)
+  /// A sweep needs the products with both halves of the matrix, each at a different state of the
+  /// patches, so it reads the stored half twice. A sweep in the opposite direction of the one
+  /// before reads it once: one of the products is left from that sweep (V. Conrad, Y. Wallach,
+  /// "Alternating methods for sets of linear equations", 1979).
   std::unique_ptr<Relaxation> make_relaxation() const override;
 
   const HierarchicalOperator& exchange() const { return *exchange_; }

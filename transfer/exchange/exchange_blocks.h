@@ -11,18 +11,18 @@
 
 namespace rebounce {
 
-/// Sparse F by its symmetry: the exchange areas S = A F below the diagonal, by rows, in blocks of
-/// eight consecutive columns. Each is read once and used twice, for S(i,j) and for S(j,i): half the
-/// bytes of FormFactorBlocks for the same F.
+/// Sparse F that uses its symmetry: the exchange areas S = A F below the diagonal, by rows, in
+/// blocks of eight consecutive columns. Each value is read once and used for S(i,j) and S(j,i). It
+/// takes half the bytes of FormFactorBlocks.
 ///
-/// Rows are shared out among a fixed number of sums whatever the number of threads, and these are
-/// added up in order. Vectors are planes, [3][plane_size()], zero past patch n.
+/// Rows are divided among a fixed number of partial sums, which are added in order, for any number
+/// of threads. Vectors are planes [3][plane_size()], zero beyond patch n.
 class ExchangeBlocks final : public SweepableFormFactors {
  public:
-  /// Gauss-Seidel takes this many rows at a time.
+  /// Rows per group of Gauss-Seidel.
   static constexpr std::size_t kGroup = FormFactorBlocks::kGroup;
 
-  /// Sums among which rows are shared out.
+  /// Partial sums that the rows are divided among.
   static constexpr std::size_t kSlotCount = 8;
 
   /// `area` has n entries in m². Throws Error if the sizes do not agree.
@@ -43,7 +43,7 @@ class ExchangeBlocks final : public SweepableFormFactors {
   /// n, rounded up to whole blocks.
   std::size_t plane_size() const { return in_whole_blocks(patch_count()); }
 
-  /// The blocks of one row: those with columns below `row`'s group, then those inside of it.
+  /// The blocks of one row: those with columns before the row's group, then those within it.
   struct Row {
     const FormFactorBlock* blocks;
     const std::uint32_t* position;
@@ -56,11 +56,12 @@ class ExchangeBlocks final : public SweepableFormFactors {
 
  private:
   std::vector<float> area_, diagonal_;
-  std::vector<std::uint64_t> row_begin_;     ///< [n + 1] index of a row's first block
-  std::vector<std::uint64_t> inside_begin_;  ///< [n] of its first block inside its group: the last
-  std::vector<std::uint32_t> position_;      ///< [blocks] first column / kFormFactorBlock
-  std::vector<FormFactorBlock> block_;       ///< [blocks]
-  std::array<std::size_t, kSlotCount + 1> slot_row_{};  ///< where the rows of each sum begin
+  std::vector<std::uint64_t> row_begin_;  ///< [n + 1] index of a row's first block
+  /// [n] index of a row's first block within its group; these blocks come last.
+  std::vector<std::uint64_t> inside_begin_;
+  std::vector<std::uint32_t> position_;  ///< [blocks] first column / kFormFactorBlock
+  std::vector<FormFactorBlock> block_;   ///< [blocks]
+  std::array<std::size_t, kSlotCount + 1> slot_row_{};  ///< first row of each partial sum
 };
 
 }  // namespace rebounce

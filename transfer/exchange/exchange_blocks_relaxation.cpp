@@ -1,7 +1,7 @@
-// Gauss-Seidel on the half of a symmetric matrix. With L the half that is stored by rows, a forward
-// sweep gathers L x of the newest values and finds L^T x, of the values before, as the backward
-// sweep before it has spread it; that sweep in turn finds L x as the forward one gathered it.
-// V. Conrad, Y. Wallach, "Alternating methods for sets of linear equations", 1979.
+// Gauss-Seidel on half of a symmetric matrix. L is the half that is stored by rows. A forward sweep
+// gathers L x of the new values. It needs L^T x of the old values; the backward sweep before it
+// left that product. The backward sweep in turn uses the L x of the forward sweep (V. Conrad, Y.
+// Wallach, "Alternating methods for sets of linear equations", 1979).
 
 #include <algorithm>
 
@@ -44,7 +44,7 @@ class ExchangeRelaxation final : public Relaxation {
   }
 
  private:
-  /// Which product with the present radiosity there is.
+  /// Which product with the current radiosity is available.
   enum class Known : std::uint8_t { kNothing, kLower, kUpper };
 
   double sweep_forward(const Scheduler& scheduler) {
@@ -118,7 +118,7 @@ class ExchangeRelaxation final : public Relaxation {
     for (int c = 0; c < kChannelCount; ++c) lower_[c * stride_ + i] += sum[c];
   }
 
-  /// Each slot takes its share of the group's rows.
+  /// Spreads the group's rows to columns before the group, with one partial sum per slot.
   void spread_outside(std::size_t begin, std::size_t end, const Scheduler& scheduler) {
     parallel_for(scheduler, kSlotCount, [&](std::size_t s) {
       for (std::size_t i = begin + s; i < end; i += kSlotCount) {
@@ -166,7 +166,7 @@ class ExchangeRelaxation final : public Relaxation {
   RelaxationProblem problem_;
   std::vector<float> radiosity_;  ///< B, in planes
   std::vector<float> lower_;      ///< L B, in planes
-  std::vector<float> upper_;      ///< L^T B in as many parts as there are slots, each in planes
+  std::vector<float> upper_;      ///< L^T B as one partial sum per slot, each in planes
   Known known_ = Known::kNothing;
 };
 

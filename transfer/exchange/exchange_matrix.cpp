@@ -83,7 +83,7 @@ FormFactorRows::FormFactorRows(const ExchangeMatrix& exchange, std::span<const f
     column_[k] = static_cast<std::uint32_t>(j);
     form_factor_[k] = exchange_area / area[i];
   };
-  // Row i of the upper triangle comes after every (j, i) with j < i, so columns ascend.
+  // Row i of the upper triangle comes after all (j, i) with j < i, so columns ascend.
   for (std::size_t i = 0; i < n; ++i) {
     for (std::uint64_t k = exchange.row_begin[i]; k < exchange.row_begin[i + 1]; ++k) {
       append(i, exchange.column[k], exchange.exchange_area[k]);

@@ -13,25 +13,24 @@ namespace rebounce {
 
 /// The form factors as exchange areas S(i,j) = area(i) F(i,j) in m².
 ///
-/// S is symmetric (reciprocity), so only the upper triangle is kept, by rows: one stored number
-/// serves F(i,j) = S/area(i) and F(j,i) = S/area(j), and reciprocity holds to the bit. Pairs that
-/// do not see each other are absent, and so is the diagonal of patches that do not see themselves,
-/// as flat ones do not.
+/// S is symmetric (reciprocity), so only the upper triangle is stored, by rows. One value gives
+/// F(i,j) = S/area(i) and F(j,i) = S/area(j), so reciprocity is exact. Pairs that do not see each
+/// other are absent, and so are the diagonal entries of flat patches, which do not see themselves.
 struct ExchangeMatrix {
   SharedArray<std::uint64_t> row_begin;  ///< [n + 1], row_begin[n] = number of entries
   SharedArray<std::uint32_t> column;     ///< ascending in each row, row <= column < n
   SharedArray<float> exchange_area;      ///< m², > 0
 
-  bool empty() const { return row_begin.empty(); }  ///< pairs are not kept
+  bool empty() const { return row_begin.empty(); }  ///< no pairs are stored
   std::size_t patch_count() const { return empty() ? 0 : row_begin.size() - 1; }
 };
 
-/// Form factors by full rows, ready for gathering: row i lists every j with F(i,j) > 0.
-///
-/// Twice the entries of the ExchangeMatrix it is made from, in exchange for row access.
+/// Form factors by full rows, for gathering: row i lists every j with F(i,j) > 0. Has twice the
+/// entries of the ExchangeMatrix it is made from.
 class FormFactorRows final : public SweepableFormFactors {
  public:
-  /// Expands `exchange`. `area` has n entries in m². Throws Error if the sizes do not agree.
+  /// Expands `exchange`. `area` has n entries in m². Throws Error if the sizes do not agree or
+  /// `exchange` is empty.
   FormFactorRows(const ExchangeMatrix& exchange, std::span<const float> area);
 
   std::size_t patch_count() const override { return row_begin_.size() - 1; }
@@ -44,7 +43,7 @@ class FormFactorRows final : public SweepableFormFactors {
   std::size_t bytes() const override;
   std::size_t workspace_size() const override { return 0; }
 
-  /// Rows are summed in double precision and shared out among threads; no workspace is used.
+  /// Sums rows in double precision, in parallel. Uses no workspace.
   void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
               const Scheduler& scheduler = {}) const override;
   void gather(std::span<const Float3> in, std::span<Float3> out) const { gather(in, out, {}); }

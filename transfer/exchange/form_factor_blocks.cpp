@@ -19,7 +19,7 @@ bool same_group(std::size_t row, std::size_t column) {
   return row / FormFactorBlocks::kGroup == column / FormFactorBlocks::kGroup;
 }
 
-/// Counts the blocks of `row`: those outside its group, those inside.
+/// Counts the blocks of `row`: outside its group, and within it.
 std::array<std::uint64_t, 2> count_blocks(std::span<const std::uint32_t> columns, std::size_t row) {
   std::array<std::uint64_t, 2> count{0, 0};
   std::uint32_t last = kNone;

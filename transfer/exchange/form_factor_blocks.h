@@ -11,23 +11,26 @@
 
 namespace rebounce {
 
-/// Sparse F by rows, in blocks of eight consecutive columns: the form that iterates fastest.
+/// Sparse F by rows, in blocks of eight consecutive columns: the fastest form for sweeps in one
+/// direction.
 ///
-/// Patches that are neighbours in space are neighbours in number, so what a patch sees comes in
-/// long runs, and a block that has one non-zero has most of them. A block is 32 bytes of values and
-/// 4 of position: 4.5 bytes per form factor when full, against 8 with an index each, and the eight
-/// are one wide load instead of eight scattered ones.
+/// Neighbours in space are neighbours in number, so the patches that a patch sees form long runs,
+/// and most entries of a stored block are not zero. A block has 32 bytes of values and 4 of
+/// position. A full block takes 4.5 bytes per form factor; an index for each would make it 8. The
+/// eight values are one wide load.
 ///
-/// Vectors are "planes": [3][plane_size()], one channel after another, zero past patch n.
+/// Vectors are planes [3][plane_size()], one channel after another, zero beyond patch n.
 class FormFactorBlocks final : public SweepableFormFactors {
  public:
-  /// Gauss-Seidel takes this many rows at a time: a multiple of the block, so that a block is
-  /// wholly inside or outside a group. More: fewer synchronisations, a longer serial part.
+  /// Rows per group of Gauss-Seidel: a multiple of kFormFactorBlock, so that a block lies entirely
+  /// within a group or outside of it. Larger groups need fewer synchronisations but have a longer
+  /// serial part.
   static constexpr std::size_t kGroup = 256;
 
   explicit FormFactorBlocks(const FormFactorRows& rows);
 
-  /// Expands `exchange`; `area` has n entries in m². Throws Error if the sizes do not agree.
+  /// Expands `exchange`. `area` has n entries in m². Throws Error if the sizes do not agree or
+  /// `exchange` is empty.
   FormFactorBlocks(const ExchangeMatrix& exchange, std::span<const float> area);
 
   std::size_t patch_count() const override { return row_begin_.size() - 1; }
@@ -36,23 +39,23 @@ class FormFactorBlocks final : public SweepableFormFactors {
   void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
               const Scheduler& scheduler = {}) const override;
 
-  /// Sequential Gauss-Seidel in the order of the patches, to the letter, on any number of threads:
-  /// rows are taken in groups of kGroup; what they gather from outside the group is found in
-  /// parallel, what they gather from each other one after another. That costs two synchronisations
-  /// and a serial part of kGroup² form factors per group, and nothing in convergence.
+  /// Exact sequential Gauss-Seidel in the order of the patches, on any number of threads. Rows are
+  /// relaxed in groups of kGroup. The part of a row outside the group is gathered in parallel, the
+  /// part within it serially. Each group costs two synchronisations and a serial part of kGroup²
+  /// form factors; convergence is unchanged.
   std::unique_ptr<Relaxation> make_relaxation() const override;
 
-  /// The part of the values that is not zero: 1 when every block is full.
+  /// The fraction of the values that are not zero: 1 when every block is full.
   double fill() const;
 
   /// n, rounded up to whole blocks.
   std::size_t plane_size() const { return in_whole_blocks(patch_count()); }
 
-  /// Copies [n][3] into planes, and back.
+  /// Copies values [n] into planes, and back.
   void to_planes(std::span<const Float3> values, std::span<float> planes) const;
   void from_planes(std::span<const float> planes, std::span<Float3> values) const;
 
-  /// Gathers one row from planes: all columns; those outside the row's group; those inside.
+  /// Gathers one row from planes: all columns, those outside the row's group, those within it.
   Float3 gather_row(std::size_t row, std::span<const float> planes) const;
   Float3 gather_outside_group(std::size_t row, std::span<const float> planes) const;
   Float3 gather_inside_group(std::size_t row, std::span<const float> planes) const;
@@ -62,10 +65,11 @@ class FormFactorBlocks final : public SweepableFormFactors {
 
   void fill_row(const FormFactorRows& rows, std::size_t row);
 
-  std::vector<std::uint64_t> row_begin_;     ///< [n + 1] index of a row's first block
-  std::vector<std::uint64_t> inside_begin_;  ///< [n] of its first block inside its group: the last
-  std::vector<std::uint32_t> position_;      ///< [blocks] first column / kFormFactorBlock
-  std::vector<FormFactorBlock> block_;       ///< [blocks]
+  std::vector<std::uint64_t> row_begin_;  ///< [n + 1] index of a row's first block
+  /// [n] index of a row's first block within its group; these blocks come last.
+  std::vector<std::uint64_t> inside_begin_;
+  std::vector<std::uint32_t> position_;  ///< [blocks] first column / kFormFactorBlock
+  std::vector<FormFactorBlock> block_;   ///< [blocks]
   std::uint64_t entry_count_ = 0;
 };
 

@@ -18,10 +18,10 @@ namespace {
   throw Error("links: " + reason + "; make them again");
 }
 
-// Nodes that a task pulls or pushes light through, and nodes that it gathers at.
+// Nodes per task of pull and push, and of gathering.
 constexpr std::size_t kNodesPerTask = 2048, kGatheredPerTask = 128;
 
-/// What gathers along links, many lights with the widest instructions that there are.
+/// The fastest function that gathers `Columns` along links on this processor.
 template <typename Columns>
 GatherAlongLinks<Columns> fastest_gather() {
   if constexpr (std::is_same_v<Columns, ManyFloats>) {
@@ -46,7 +46,8 @@ IncomingLink seen_from(std::uint32_t node, const FormFactorLinks& links, std::ui
   return {of_a, of_b, a, exchange};
 }
 
-/// Children follow each other level by level, and are as large as their parent together.
+/// Checks that the nodes are in order of levels, that siblings are neighbours, and that the
+/// children of a node together have as many patches as the node.
 void check_tree(const FormFactorLinks& links, std::size_t n) {
   const std::size_t m = links.first_child.size();
   if (n == 0 || m != 2 * n - 1 || links.count.size() != m || links.count[0] != n) {
@@ -121,7 +122,7 @@ std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
 
 static_assert(LinkedFormFactors::kBytesPerLink == 2 * sizeof(IncomingLink));
 
-/// The nodes and their links in the order in which a gather goes through them.
+/// The nodes and their links, in the order in which a gather visits them.
 class LinkedFormFactors::Tree {
  public:
   Tree(const FormFactorLinks& links, std::span<const float> area, std::span<const Float3> centroid);
@@ -130,7 +131,7 @@ class LinkedFormFactors::Tree {
   std::size_t node_count() const { return node_.size(); }
   std::size_t bytes() const;
 
-  /// Pulls, gathers and pushes; `light` and `arrived` are [m].
+  /// Pulls, gathers and pushes; `light` and `arrived` are workspace [m].
   template <typename Columns, typename Lanes>
   void gather(std::span<const Columns> in, std::span<Columns> out, LinkLightOf<Lanes>* light,
               LinkLightOf<Lanes>* arrived, GatherAlongLinks<Lanes> gather_node,
@@ -139,10 +140,10 @@ class LinkedFormFactors::Tree {
  private:
   struct Node {
     std::uint32_t first_child = kNone;
-    std::uint32_t patch = kNone;  ///< of a leaf
+    std::uint32_t patch = kNone;  ///< leaves only
     float area = 0;
-    float part = 1;        ///< of its parent's area
-    Float3 from_parent{};  ///< its centre less that of its parent, metres
+    float part = 1;        ///< fraction of the parent's area
+    Float3 from_parent{};  ///< centre minus the parent's centre, metres
   };
 
   void build_tree(const FormFactorLinks& links, std::span<const float> area,
@@ -157,11 +158,11 @@ class LinkedFormFactors::Tree {
   template <typename Lanes, typename Columns>
   void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out, const Scheduler& scheduler) const;
 
-  std::vector<Node> node_;                     ///< level by level
-  std::vector<std::uint32_t> level_begin_;     ///< first node of each level, and their number
+  std::vector<Node> node_;                  ///< level by level
+  std::vector<std::uint32_t> level_begin_;  ///< first node of each level, then the number of nodes
   std::vector<std::uint64_t> incoming_begin_;  ///< [m + 1]
-  std::vector<IncomingLink> incoming_;         ///< every link twice, by the node that gathers
-  std::vector<float> scale_;                   ///< [n]
+  std::vector<IncomingLink> incoming_;  ///< every link twice, sorted by the node that gathers
+  std::vector<float> scale_;            ///< [n]
 };
 
 LinkedFormFactors::Tree::Tree(const FormFactorLinks& links, std::span<const float> area,
@@ -173,13 +174,13 @@ LinkedFormFactors::Tree::Tree(const FormFactorLinks& links, std::span<const floa
   sort_links(links);
 }
 
-/// Lays out the nodes, and their areas and centres.
+/// Sets areas and centres of the nodes, and their levels.
 void LinkedFormFactors::Tree::build_tree(const FormFactorLinks& links, std::span<const float> area,
                                          std::span<const Float3> centroid) {
   const std::size_t m = links.first_child.size();
   const std::vector<std::uint32_t> begin = first_positions(links);
   node_.resize(m);
-  std::vector<std::array<double, 4>> sum(m);  // area times centroid, area
+  std::vector<std::array<double, 4>> sum(m);  // area times centroid; area
   for (std::size_t k = m; k-- > 0;) {
     Node& node = node_[k];
     node.first_child = links.first_child[k];
@@ -198,8 +199,8 @@ void LinkedFormFactors::Tree::build_tree(const FormFactorLinks& links, std::span
   find_levels();
 }
 
-/// Where children lie in their parent; `sum` has the area times the centre of each node, and the
-/// area.
+/// Sets the children's positions relative to their parent. `sum` [m] has the area times the centre
+/// of each node, then the area.
 void LinkedFormFactors::Tree::place_children(std::span<const std::array<double, 4>> sum) {
   for (std::size_t k = 0; k < node_.size(); ++k) {
     if (node_[k].patch != kNone) continue;
@@ -213,7 +214,7 @@ void LinkedFormFactors::Tree::place_children(std::span<const std::array<double, 
   }
 }
 
-/// The root, then its children, then theirs.
+/// Finds the first node of each level.
 void LinkedFormFactors::Tree::find_levels() {
   level_begin_ = {0, 1};
   while (level_begin_.back() < node_.size()) {
@@ -226,7 +227,7 @@ void LinkedFormFactors::Tree::find_levels() {
   }
 }
 
-/// Every link twice, once for each of its nodes, by the node that gathers.
+/// Sorts the links by the node that gathers: each link once for each of its two nodes.
 void LinkedFormFactors::Tree::sort_links(const FormFactorLinks& links) {
   const LinksByNode of_node =
       links_by_node(node_.size(), links.pair.size(), [&](std::size_t k) { return links.pair[k]; });

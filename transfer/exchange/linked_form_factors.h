@@ -13,42 +13,44 @@ namespace rebounce {
 
 /// Form factors as links between nodes of a binary tree of patches, in flat arrays.
 ///
-/// A link (a, b) stands for every pair of a patch of a and a patch of b. Between points x and y of
-/// them the kernel is taken as
-///   (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b)
-/// where a node's centre is the area-weighted mean of its patches' centroids. It holds both ways.
+/// A link (a, b) stands for all pairs of a patch of a and a patch of b. Between points x of a and y
+/// of b it approximates the kernel by
+///   (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b),
+/// where the centre of a node is the area-weighted mean of its patches' centroids. A link works in
+/// both directions.
 struct FormFactorLinks {
   std::vector<std::uint32_t> patch;        ///< [n] patch at each position
-  std::vector<std::uint32_t> first_child;  ///< [m] kNone for a single patch; the second follows
-  std::vector<std::uint32_t> count;        ///< [m] positions of a node
+  std::vector<std::uint32_t> first_child;  ///< [m] kNone for a leaf; the second child is the next
+  std::vector<std::uint32_t> count;        ///< [m] patches of a node
   std::vector<std::array<std::uint32_t, 2>> pair;  ///< [l] nodes a and b
   std::vector<float> exchange_area;                ///< [l] m²
   std::vector<std::array<float, 6>> gradient;      ///< [l] m: gradient_a, gradient_b
-  /// [n] F(i,j) is that of the links times scale(i) scale(j), so that rows add up to what they
-  /// should; 0 for a patch that exchanges nothing.
+  /// [n] F(i,j) is that of the links times scale(i) scale(j), which corrects the row sums; 0 for a
+  /// patch that exchanges nothing.
   std::vector<float> scale;
 
   bool empty() const { return patch.empty(); }
 };
 
 /// Throws Error if `links` are not a tree whose leaves are `patch_count` patches, level by level,
-/// and links between its nodes.
+/// or if a link does not join two nodes of it.
 void check_links(const FormFactorLinks& links, std::size_t patch_count);
 
-/// [m] The position in `links`, which must be checked, of the first patch of each node.
+/// [m] position of the first patch of each node. `links` must be valid (check_links).
 std::vector<std::uint32_t> first_positions(const FormFactorLinks& links);
 
 /// Gathers with links: pulls light up the tree, gathers it at every level along the links, and
 /// pushes what arrived down again (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical
-/// radiosity algorithm", SIGGRAPH 1991), with a mean and a first moment for each node. The cost is
-/// that of the links, not of the pairs of patches; area times F is symmetric.
+/// radiosity algorithm", SIGGRAPH 1991). In addition to the paper, each node has first moments of
+/// its light. The cost grows with the number of links, not of pairs of patches. Area times F is
+/// symmetric.
 class LinkedFormFactors final : public FormFactorOperator {
  public:
-  /// A link is stored once for each of its two nodes.
+  /// Bytes per link: each is stored for both of its nodes.
   static constexpr std::size_t kBytesPerLink = 40;
 
   /// `area` [n] in m², `centroid` [n] in metres. Throws Error if `links` are not a tree over n
-  /// patches and links between its nodes.
+  /// patches with links between its nodes.
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                     std::span<const Float3> centroid);
 
@@ -59,8 +61,8 @@ class LinkedFormFactors final : public FormFactorOperator {
   void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
               const Scheduler& scheduler = {}) const override;
 
-  /// The same for several lights at once: `Columns` is an array of 3 or 24 floats or doubles, the
-  /// channels of one or of eight lights, and so is what is added up. Allocates its workspace.
+  /// Gathers several lights at once. `Columns` is an array of 3 or 24 floats or doubles: the
+  /// channels of one or of eight lights; sums have the same type. Allocates its workspace.
   template <typename Columns>
   void gather(std::span<const Columns> in, std::span<Columns> out) const;
 

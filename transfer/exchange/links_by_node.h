@@ -9,8 +9,8 @@ namespace rebounce {
 
 using LinksByNode = Grouped<std::uint64_t>;
 
-/// Which links each node has; a link between two nodes is with both. `ends`(k) are the two nodes of
-/// link k, as an array.
+/// The links of each node. A link is listed at both of its nodes. `ends`(k) returns the two nodes
+/// of link k as an array.
 template <typename Ends>
 LinksByNode links_by_node(std::size_t node_count, std::size_t link_count, const Ends& ends) {
   return {node_count, [&](const auto& add) {

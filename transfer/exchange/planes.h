@@ -8,7 +8,7 @@
 
 namespace rebounce {
 
-/// Copies values [n] into planes [3][stride], one channel after the other, zero past n.
+/// Copies values [n] into planes [3][stride], one channel after the other, zero beyond n.
 inline void to_planes(std::span<const Float3> values, std::size_t stride, float* planes) {
   for (int c = 0; c < kChannelCount; ++c) {
     float* const plane = planes + c * stride;
@@ -17,7 +17,7 @@ inline void to_planes(std::span<const Float3> values, std::size_t stride, float*
   }
 }
 
-/// Copies them back.
+/// Copies planes [3][stride] back into values [n].
 inline void from_planes(const float* planes, std::size_t stride, std::span<Float3> values) {
   for (std::size_t i = 0; i < values.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) values[i][c] = planes[c * stride + i];
