@@ -8,7 +8,7 @@
 namespace rebounce {
 namespace {
 
-/// A place between two neighbouring entries of a table.
+/// A point between two neighbouring entries of a table.
 struct Between {
   std::size_t low = 0, high = 0;
   float fraction = 0;

@@ -13,7 +13,7 @@ constexpr double kRowHeight = kPi / 15;  // 12 degrees; the last row has half of
 
 struct RowPlace {
   std::size_t row;
-  std::uint32_t first;  ///< cell
+  std::uint32_t first;  ///< index of the row's first cell
 };
 
 RowPlace row_of(std::uint32_t cell) {
@@ -22,7 +22,7 @@ RowPlace row_of(std::uint32_t cell) {
   return place;
 }
 
-/// The sines of the altitudes between which a row lies.
+/// The sines of the lower and upper altitude of a row.
 std::pair<double, double> sines_of(std::size_t row) {
   const double low = kRowHeight * static_cast<double>(row);
   return {std::sin(low), row + 1 < kRowCells.size() ? std::sin(low + kRowHeight) : 1.0};

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Linux moves at most 2 GiB in one call.
+// Linux writes at most 2 GiB in one call.
 constexpr std::size_t kLargestWrite = std::size_t{1} << 30;
 
 std::string advice(int error) {
@@ -43,7 +43,7 @@ std::string advice(int error) {
               advice(error));
 }
 
-/// The file itself where `target` is a symbolic link, so that a rename does not replace the link.
+/// Follows a symbolic link `target`, so that the rename replaces the file and not the link.
 fs::path resolve(const fs::path& target) {
   std::error_code error;
   if (!fs::is_symlink(target, error)) return target;
@@ -61,13 +61,13 @@ fs::path temporary_name(const fs::path& target) {
   return target.parent_path() / name;
 }
 
-/// Waits until what `path` names is on the disk; 0 or the error's number.
+/// Waits until `path` is on disk. Returns 0 or the error number.
 int sync(const fs::path& path, int open_flags) {
   const int descriptor = ::open(path.c_str(), open_flags | O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) return errno;
   const int error = ::fsync(descriptor) == 0 ? 0 : errno;
   ::close(descriptor);
-  return error == EINVAL ? 0 : error;  // EINVAL: this file system has nothing to wait for
+  return error == EINVAL ? 0 : error;  // EINVAL: this file system does not support it
 }
 
 }  // namespace
@@ -109,7 +109,7 @@ void AtomicFile::close() {
 
 void AtomicFile::commit() {
   close();
-  // By name: a library that wrote to temporary_path() may have replaced the file behind it.
+  // By name: a library that wrote to temporary_path() may have replaced the file.
   if (const int error = sync(temporary_, 0)) fail(target_, error);
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, errno);
   committed_ = true;

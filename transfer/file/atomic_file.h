@@ -6,29 +6,29 @@
 
 namespace rebounce {
 
-/// A file that appears under its name whole or not at all.
+/// A file that appears under its name completely or not at all.
 ///
-/// Bytes go into a temporary file beside the target; commit() flushes it to disk and renames it
-/// over the target. Without a commit, an exception included, the destructor removes the temporary
-/// file and the target is as it was.
+/// Bytes go into a temporary file beside the target. commit() flushes it to disk and renames it
+/// over the target. Without commit(), for example after an exception, the destructor removes the
+/// temporary file and the target is unchanged.
 class AtomicFile {
  public:
-  /// Creates the temporary file. A target that is a symbolic link stands for what it points at.
-  /// Throws Error when the folder is missing or not writable, or when the target exists and is not
-  /// a regular file.
+  /// Creates the temporary file. If the target is a symbolic link, the file it points to is
+  /// replaced. Throws Error if the folder is missing or not writable, or if the target exists and
+  /// is not a regular file.
   explicit AtomicFile(const std::filesystem::path& target);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Where the bytes are until commit(), for a library that insists on opening the file itself.
+  /// The path of the bytes until commit(), for libraries that open the file themselves.
   const std::filesystem::path& temporary_path() const { return temporary_; }
 
-  /// Appends `bytes`. Throws Error when the disk is full or fails.
+  /// Appends `bytes`. Throws Error if the disk is full or fails.
   void write(std::span<const std::byte> bytes);
 
-  /// Flushes the file, gives it its name and flushes the folder. Call it once, last. Throws Error
-  /// when any of it fails.
+  /// Flushes the file, renames it and flushes the folder. Call it once, last. Throws Error if one
+  /// of these fails.
   void commit();
 
  private:

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Watches a parse: how deep it is, and the keys of each object that is open.
+/// Checks the depth of a parse and the keys of each open object.
 class Watch {
  public:
   explicit Watch(std::size_t max_depth) : max_depth_(max_depth) {}

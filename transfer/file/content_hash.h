@@ -7,7 +7,7 @@
 
 namespace rebounce {
 
-/// XXH3-128 of a sequence of bytes, for telling contents apart and finding damage; not for secrets.
+/// XXH3-128 of a sequence of bytes, to compare contents and detect damage. Not cryptographic.
 class ContentHash {
  public:
   static constexpr std::size_t kDigitCount = 32;
@@ -17,10 +17,10 @@ class ContentHash {
   ContentHash(const ContentHash&) = delete;
   ContentHash& operator=(const ContentHash&) = delete;
 
-  /// Appends `bytes` to what is hashed; how a sequence is cut into calls makes no difference.
+  /// Appends `bytes`. The hash does not depend on how a sequence is divided into calls.
   void update(std::span<const std::byte> bytes);
 
-  /// Of everything so far: "xxh3:" and 32 lower-case hexadecimal digits.
+  /// The hash of all bytes so far: "xxh3:" and 32 lower-case hexadecimal digits.
   std::string text() const;
 
  private:

@@ -22,7 +22,7 @@ namespace {
 class Descriptor {
  public:
   explicit Descriptor(const std::filesystem::path& path)
-      // Not blocking: a pipe must be refused, not waited for.
+      // O_NONBLOCK: a pipe is refused at once instead of waited for.
       : value_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
     if (value_ < 0) fail(path, std::generic_category().message(errno));
   }
@@ -63,7 +63,7 @@ SharedArray<std::byte> map_file(const std::filesystem::path& path) {
     fail(path, std::generic_category().message(errno));
   }
   if (!S_ISREG(status.st_mode)) fail(path, "it is not a regular file");
-  if (status.st_size == 0) return {};  // mmap refuses to map nothing
+  if (status.st_size == 0) return {};  // mmap does not map empty files
   auto mapping =
       std::make_shared<const Mapping>(path, descriptor, static_cast<std::size_t>(status.st_size));
   const std::span<const std::byte> bytes = mapping->bytes();

@@ -7,11 +7,11 @@
 
 namespace rebounce {
 
-/// Maps a file into memory, read-only; the array keeps the mapping alive. Throws Error when `path`
-/// is missing, unreadable or not a regular file.
+/// Maps a file into memory, read-only. The array keeps the mapping alive. Throws Error if `path` is
+/// missing, unreadable or not a regular file.
 ///
-/// The one place that knows how: a platform without mmap reads the file into a vector here. A file
-/// must not be cut short while it is mapped; AtomicFile replaces files and never does that.
+/// On a platform without mmap, only this function changes: it reads the file into a vector. A
+/// mapped file must not be truncated; AtomicFile replaces files and never truncates one.
 SharedArray<std::byte> map_file(const std::filesystem::path& path);
 
 }  // namespace rebounce

@@ -1,8 +1,8 @@
 #pragma once
 
-// The safetensors container: an 8-byte little-endian header length, a JSON header that names the
-// type, shape and place of each tensor, then the tensors, without holes. There is no code in it,
-// and it can be read in place. https://github.com/huggingface/safetensors
+// The safetensors container: an 8-byte little-endian header length, a JSON header with the type,
+// shape and offsets of each tensor, then the tensors without gaps. It contains no code and can be
+// read in place. https://github.com/huggingface/safetensors
 
 #include <concepts>
 #include <cstddef>
@@ -38,7 +38,7 @@ enum class TensorType : std::uint8_t {
 /// Bytes of one element.
 std::size_t element_size(TensorType type);
 
-/// The tensor type that stores a C++ type as it is.
+/// The tensor type that stores the C++ type `T` unchanged.
 template <typename T>
 constexpr TensorType tensor_type() {
   if constexpr (std::same_as<T, std::uint8_t>)
@@ -60,7 +60,7 @@ constexpr TensorType tensor_type() {
 using TensorShape = std::vector<std::uint64_t>;
 using SafetensorsMetadata = std::map<std::string, std::string>;
 
-/// A tensor to be written; its bytes are borrowed until they are.
+/// A tensor to write. It borrows its bytes until they are written.
 struct TensorView {
   std::string name;  ///< unique in the file, and not "__metadata__"
   TensorType type = TensorType::kU8;
@@ -70,24 +70,23 @@ struct TensorView {
 
 /// A file that is ready to be written: `prefix`, then the bytes of each tensor in turn.
 ///
-/// The first tensor begins at a multiple of 64 bytes. Tensors come in descending order of the
-/// largest power of two, at most 64, that divides their size (names in ascending order within one):
-/// each is aligned to that power, hence to its element, and one of a size that is a multiple of 64
-/// to 64, all of it without the holes that the format forbids.
+/// The first tensor begins at a multiple of 64 bytes. Tensors are in descending order of the
+/// largest power of two, at most 64, that divides their size; equal ones are in order of their
+/// names. So each tensor is aligned to this power without gaps, which the format forbids.
 struct SafetensorsLayout {
   std::string prefix;  ///< header length and header
   std::vector<TensorView> tensors;
 };
 
-/// Plans a file. The same input gives the same bytes; keys are sorted, and a byte of `metadata`
-/// that is not UTF-8 becomes U+FFFD. Throws Error when two tensors share a name.
+/// Plans a file. The same input gives the same bytes. Keys are sorted, and bytes of `metadata` that
+/// are not UTF-8 become U+FFFD. Throws Error if two tensors have the same name.
 SafetensorsLayout lay_out_safetensors(std::vector<TensorView> tensors,
                                       const SafetensorsMetadata& metadata);
 
-/// Writes a planned file, whole or not at all (see AtomicFile). Throws Error when it cannot.
+/// Writes a planned file completely or not at all (AtomicFile). Throws Error if it cannot.
 void write_safetensors(const std::filesystem::path& path, const SafetensorsLayout& layout);
 
-/// Where a tensor of a file lies, and what it is.
+/// Type, shape and offsets of a tensor in a file.
 struct TensorInfo {
   TensorType type = TensorType::kU8;
   TensorShape shape;
@@ -95,34 +94,34 @@ struct TensorInfo {
   std::uint64_t end = 0;
 };
 
-/// In an expected shape: any number.
+/// Stands for any size in an expected shape.
 inline constexpr std::uint64_t kAnySize = ~std::uint64_t{0};
 
-/// A safetensors file, of which everything but the values has been checked: the header is whole, at
-/// most 100 MB and sound; names are unique, types known, sizes those of the shapes; the tensors
-/// fill the data section without hole, overlap or rest.
+/// A safetensors file. Everything but the values is checked: the header is complete, at most 100 MB
+/// and valid; names are unique, types known, sizes those of the shapes; the tensors fill the data
+/// section without gaps, overlaps or remaining bytes.
 class SafetensorsFile {
  public:
-  /// Maps and checks the file. Throws Error when it cannot be read or is not sound.
+  /// Maps and checks the file. Throws Error if it cannot be read or is not valid.
   explicit SafetensorsFile(const std::filesystem::path& path);
 
-  /// Checks a file that is in memory already; `name` stands for it in messages.
+  /// Checks a file in memory; `name` replaces the path in messages.
   SafetensorsFile(SharedArray<std::byte> bytes, std::string name);
 
   const std::string& name() const { return name_; }
   const SafetensorsMetadata& metadata() const { return metadata_; }
   const std::map<std::string, TensorInfo>& tensors() const { return tensors_; }
 
-  /// Header length and header, and the data section after them.
+  /// The header length with the header; the data section follows it.
   std::span<const std::byte> prefix() const { return bytes_.span().first(prefix_size_); }
   std::span<const std::byte> data() const { return bytes_.span().subspan(prefix_size_); }
 
-  /// Throws Error when there is no such tensor.
+  /// Throws Error if there is no such tensor.
   const TensorInfo& info(const std::string& tensor) const;
 
-  /// The values of a tensor, in place: the array keeps the file's memory alive. `shape` is what it
-  /// must be, with kAnySize where any size will do. Throws Error, naming the tensor, when there is
-  /// none or its type, shape or alignment is another.
+  /// The values of a tensor, in place; the array keeps the file's memory alive. `shape` is the
+  /// expected shape, with kAnySize for sizes that may vary. Throws Error that names the tensor if
+  /// it is missing or has another type or shape, or if it is not aligned.
   template <typename T>
   SharedArray<T> tensor(const std::string& tensor, const TensorShape& shape,
                         TensorType type = tensor_type<T>()) const {

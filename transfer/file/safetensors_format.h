@@ -12,12 +12,12 @@
 
 namespace rebounce {
 
-// Tensors are little-endian and are used where they lie.
+// Tensors are little-endian and used in place.
 static_assert(std::endian::native == std::endian::little, "Rebounce needs a little-endian machine");
 
 inline constexpr std::size_t kHeaderLengthSize = sizeof(std::uint64_t);
 
-/// The limit of the reference implementation, against files that would exhaust memory.
+/// The limit of the reference implementation. It protects against files that would exhaust memory.
 inline constexpr std::uint64_t kLargestHeader = 100'000'000;
 
 inline constexpr std::string_view kMetadataKey = "__metadata__";
@@ -27,7 +27,7 @@ struct TensorTypeTraits {
   std::size_t size;
 };
 
-/// By TensorType.
+/// Indexed by TensorType.
 inline constexpr std::array<TensorTypeTraits, 13> kTensorTypes{{
     {"BOOL", 1},
     {"U8", 1},

@@ -18,7 +18,7 @@ using nlohmann::json;
 // The header, a tensor, its shape.
 constexpr std::size_t kHeaderDepth = 3;
 
-// What is wrong with a header is thrown without the file's name, which the constructor adds.
+// Errors of a header do not name the file; the constructor adds its name.
 [[noreturn]] void refuse_tensor(const std::string& name, const std::string& reason) {
   throw Error("tensor " + json(name).dump() + ": " + reason);
 }
@@ -51,7 +51,7 @@ TensorShape parse_sizes(const std::string& name, const json& value, const char* 
   return sizes;
 }
 
-/// Bytes of a tensor; nothing where 64 bits cannot hold it.
+/// Bytes of a tensor, or nothing if they do not fit 64 bits.
 std::optional<std::uint64_t> byte_count(TensorType type, const TensorShape& shape) {
   std::uint64_t bytes = element_size(type);
   for (const std::uint64_t size : shape) {
@@ -91,7 +91,7 @@ SafetensorsMetadata parse_metadata(const json& value) {
   return metadata;
 }
 
-/// The header, without its length.
+/// The header without its length.
 std::string_view header_of(std::span<const std::byte> bytes) {
   if (bytes.size() < kHeaderLengthSize) throw Error("shorter than a header");
   std::uint64_t length = 0;

@@ -53,7 +53,7 @@ std::string header_text(const std::vector<TensorView>& tensors,
   return header.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-/// The header with its length before it and as many blanks after it as alignment takes.
+/// The header with its length before it, padded with spaces to the alignment.
 std::string framed(std::string header) {
   const std::size_t unaligned = (kHeaderLengthSize + header.size()) % kAlignment;
   if (unaligned != 0) header.append(kAlignment - unaligned, ' ');

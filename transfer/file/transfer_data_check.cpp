@@ -10,7 +10,7 @@
 namespace rebounce {
 namespace {
 
-// What a number may be. Each is false for a NaN.
+// Allowed ranges of numbers. NaN is in none of them.
 constexpr float kLargest = std::numeric_limits<float>::max();
 constexpr float kPi = 3.14159265F;
 
@@ -93,7 +93,7 @@ class Checker {
     if (value != kNone) index(name, entry, value, count);
   }
 
-  /// Row begins: from 0, never descending, to `end`.
+  /// Checks offsets: they start at 0, never descend, and end at `end`.
   template <std::unsigned_integral T>
   void begins(const char* name, std::span<const T> begin, std::size_t end) const {
     if (begin.front() != 0) refuse(name, "does not begin with 0");

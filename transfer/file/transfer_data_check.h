@@ -6,9 +6,9 @@
 
 namespace rebounce {
 
-/// Checks all but the operator's values: that sizes agree, indices are in range, numbers finite and
-/// what transfer_data.h says of them. Throws Error, naming `file` and the tensor, at the first that
-/// is not.
+/// Checks everything but the values of the operator: sizes agree, indices are in range, numbers are
+/// finite and in the ranges that transfer_data.h states. Throws Error that names `file` and the
+/// first wrong tensor.
 void check_transfer_data(const TransferData& data, const std::string& file);
 
 }  // namespace rebounce

@@ -12,7 +12,7 @@ std::string zero_checksum() {
 }
 
 std::size_t find_checksum_digits(std::string_view prefix) {
-  // Inside a JSON string the quotes would be escaped, so that only the entry itself can match.
+  // In a JSON string the quotes would be escaped, so only the entry itself matches.
   const std::string entry = std::string("\"") + key::kChecksum + "\":\"" + std::string(kHashName);
   const std::size_t found = prefix.find(entry);
   if (found == std::string_view::npos || prefix.find(entry, found + 1) != std::string_view::npos) {

@@ -1,7 +1,7 @@
 #pragma once
 
-// The names in a transfer file, once for its writer, its reader and its checks. What they mean is
-// in notes/file_format.md.
+// The names in a transfer file, shared by its writer, reader and checks. notes/file_format.md
+// explains them.
 
 #include <array>
 #include <cstddef>
@@ -29,7 +29,8 @@ inline constexpr char kNames[] = "names";
 }  // namespace key
 
 namespace tensor {
-inline constexpr char kOpacityMap[] = "mesh.opacity_map";  // a file without it has no opacity maps
+inline constexpr char kOpacityMap[] =
+    "mesh.opacity_map";  // optional: without it there are no opacity maps
 inline constexpr char kRowBegin[] = "form_factor.row_begin";
 inline constexpr char kColumn[] = "form_factor.column";
 inline constexpr char kExchangeArea[] = "form_factor.exchange_area";
@@ -48,7 +49,7 @@ inline constexpr char kLowRankCore[] = "transfer.low_rank.core";
 inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matrix";
 }  // namespace tensor
 
-/// The tensors of a hierarchical operator; `role` is null where every patch has both roles.
+/// The tensors of a hierarchical operator. Without `role` every patch has both roles.
 struct HierarchicalTensors {
   const char *patch, *blocks, *bases, *values, *channel_matrix, *role, *coefficient_scale,
       *scale_exponent;
@@ -69,15 +70,14 @@ inline constexpr HierarchicalTensors kCompressedFormFactors = {
     nullptr,
     "form_factor.hierarchical.scale_exponent"};
 
-/// A block of the hierarchical operator as it is stored: the members of TransferBlock in their
-/// order.
+/// A stored block of the hierarchical operator: the members of TransferBlock in their order.
 using StoredBlock = std::array<std::uint32_t, 9>;
 
 inline std::string texture_tensor(std::size_t texture) {
   return "texture." + std::to_string(texture);
 }
 
-/// How one entry of an array is stored: `Scalar`s, `kColumns` to a row.
+/// How one entry of an array is stored: kColumns values of type `Scalar`.
 template <typename T>
 struct Stored {
   using Scalar = std::conditional_t<std::is_enum_v<T> || std::is_same_v<T, bool>, std::uint8_t, T>;
@@ -89,7 +89,7 @@ struct Stored<std::array<T, N>> {
   static constexpr std::uint64_t kColumns = N;
 };
 
-/// [rows] for scalars, [rows, columns] for the rest.
+/// [rows] for scalars, [rows, columns] for others.
 template <typename T>
 TensorShape stored_shape(std::uint64_t rows) {
   if constexpr (Stored<T>::kColumns == 1)
@@ -98,7 +98,7 @@ TensorShape stored_shape(std::uint64_t rows) {
     return {rows, Stored<T>::kColumns};
 }
 
-// visit(name, array) for each tensor that is an array of the data.
+// Calls visit(name, array) for each tensor that is an array of the data.
 template <typename Patches, typename Visit>
 void visit_tensors_of_patches(Patches& patches, Visit&& visit) {
   visit("patch.area", patches.area);
@@ -191,7 +191,7 @@ void visit_tensors_of_links(Links& links, Visit&& visit) {
   visit("links.scale", links.scale);
 }
 
-// visit(name, items, member) for each tensor that is a member of every item of an array.
+// Calls visit(name, items, member) for each tensor that holds one member of every item of an array.
 template <typename Data, typename Visit>
 void visit_tensors_of_scene(Data& data, Visit&& visit) {
   visit("material.base_color", data.materials, &Material::base_color);
@@ -220,7 +220,7 @@ void visit_tensors_of_scene(Data& data, Visit&& visit) {
   visit("light.outer_cone_angle", data.lights, &Light::outer_cone_angle);
 }
 
-// visit(key, value) for each member of the record that is a text, and each that is a number.
+// Calls visit(key, value) for each text member of the record, and for each number.
 template <typename Record, typename Visit>
 void visit_texts_of_record(Record& record, Visit&& visit) {
   visit("generator", record.generator);
@@ -239,7 +239,7 @@ void visit_numbers_of_record(Record& record, Visit&& visit) {
   visit("error_bound", record.error_bound);
 }
 
-// visit(kind, items) for each array whose items have names.
+// Calls visit(kind, items) for each array whose items have names.
 template <typename Data, typename Visit>
 void visit_named_items(Data& data, Visit&& visit) {
   visit("materials", data.materials);
@@ -247,11 +247,12 @@ void visit_named_items(Data& data, Visit&& visit) {
   visit("lights", data.lights);
 }
 
-/// Where the checksum's digits are in a file's prefix, or npos if that is not one place.
+/// The offset of the checksum's digits in a file's prefix, or npos if they are not there exactly
+/// once.
 std::size_t find_checksum_digits(std::string_view prefix);
 
-/// The checksum of a whole file: `prefix` with its checksum's digits, at `digits`, read as zeros,
-/// then `data`.
+/// The checksum of a whole file: of `prefix`, with the checksum's own digits at `digits` replaced
+/// by zeros, then of the data.
 class FileChecksum {
  public:
   FileChecksum(std::string_view prefix, std::size_t digits);
@@ -262,7 +263,7 @@ class FileChecksum {
   ContentHash hash_;
 };
 
-/// What the checksum is before it is known.
+/// The placeholder of the checksum.
 std::string zero_checksum();
 
 }  // namespace rebounce

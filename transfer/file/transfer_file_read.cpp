@@ -20,7 +20,7 @@ namespace {
 
 using nlohmann::json;
 
-// Settings and reports nest by subject; nothing of ours comes near.
+// Settings and reports nest by subject; those of valid files stay far below this.
 constexpr std::size_t kRecordDepth = 16;
 
 [[noreturn]] void refuse(const SafetensorsFile& file, const std::string& reason) {
@@ -70,7 +70,7 @@ void check_checksum(const SafetensorsFile& file) {
   }
 }
 
-/// The largest byte that stores a flag or an enumerator.
+/// The largest byte that stores a flag or an enumerator of type `T`.
 template <typename T>
 constexpr std::uint8_t kLastByte = 0;
 template <>
@@ -103,7 +103,7 @@ class TensorReader {
     }
   }
 
-  /// Of a tensor that stores this member.
+  /// Reads a tensor that stores this member of every item.
   template <typename Item, typename T>
   std::size_t row_count(const char* name, T Item::* /*member*/) const {
     return scalars_of<T>(name, kAnySize).size() / Stored<T>::kColumns;
@@ -175,7 +175,7 @@ void read_scene(const SafetensorsFile& file, TransferData& data) {
                     [&](const char* kind, auto& items) { read_names(file, names, kind, items); });
 }
 
-/// Empty if the file has none.
+/// Empty if the file has no pairs.
 ExchangeMatrix read_exchange(const SafetensorsFile& file) {
   if (!file.tensors().contains(tensor::kRowBegin)) return {};
   return {file.tensor<std::uint64_t>(tensor::kRowBegin, {kAnySize}),
@@ -183,7 +183,7 @@ ExchangeMatrix read_exchange(const SafetensorsFile& file) {
           file.tensor<float>(tensor::kExchangeArea, {kAnySize})};
 }
 
-/// Empty if the file has none.
+/// Empty if the file has no links.
 FormFactorLinks read_links(const SafetensorsFile& file, const PatchTable& patches) {
   FormFactorLinks links;
   if (!file.tensors().contains(tensor::kLinksPatch)) return links;
@@ -272,7 +272,7 @@ void read_integer_bases(const SafetensorsFile& file, const char* name,
   }
 }
 
-/// A file without the tensor has an operator that serves all patches.
+/// Without the tensor, the operator serves all patches.
 PatchRoles read_roles(const SafetensorsFile& file, const char* name, std::size_t patch_count) {
   if (name == nullptr || !file.tensors().contains(name)) return {};
   const auto stored = file.tensor<std::uint8_t>(name, {patch_count});
@@ -327,7 +327,8 @@ std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsF
     storage.basis_f32 = file.tensor<float>(tensor::kLowRankBasis, shape);
   }
   storage.rank = basis.shape[1];
-  storage.coupling = file.tensor<float>(tensor::kLowRankCore, {kAnySize, storage.rank, storage.rank});
+  storage.coupling =
+      file.tensor<float>(tensor::kLowRankCore, {kAnySize, storage.rank, storage.rank});
   storage.matrix_count = static_cast<std::uint32_t>(file.info(tensor::kLowRankCore).shape[0]);
   storage.channel_matrix =
       read_channel_matrix(file, tensor::kLowRankChannelMatrix, storage.matrix_count);
@@ -348,7 +349,7 @@ std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& fil
   refuse(file, "the operator is of a kind that this program does not know");
 }
 
-/// Nothing if the file holds none.
+/// Null if the file holds none.
 std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
     const SafetensorsFile& file, const std::vector<float>& area) {
   const HierarchicalTensors& names = kCompressedFormFactors;
@@ -360,7 +361,7 @@ std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
   return exchange;
 }
 
-/// A file without probes has no tensors of them.
+/// A file without probes has none of their tensors.
 void read_probes(const SafetensorsFile& file, TransferData& data) {
   if (!file.tensors().contains(tensor::kProbePosition)) return;
   visit_tensors_of_probes(data.probes, TensorReader(file));
@@ -372,7 +373,7 @@ void read_probes(const SafetensorsFile& file, TransferData& data) {
   data.probes.patch_count = data.patches.size();
 }
 
-/// A file without surface harmonics has no tensors of them.
+/// A file without surface harmonics has none of their tensors.
 SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
   SurfaceHarmonics harmonics;
   if (!file.tensors().contains(tensor::kSurfaceSky)) return harmonics;
@@ -383,7 +384,7 @@ SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
   return harmonics;
 }
 
-/// A file without a lightmap has no tensors of one.
+/// A file without a lightmap has none of its tensors.
 Lightmap read_lightmap(const SafetensorsFile& file) {
   Lightmap map;
   if (!file.tensors().contains(tensor::kLightmapSize)) return map;

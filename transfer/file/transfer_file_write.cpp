@@ -15,7 +15,7 @@
 namespace rebounce {
 namespace {
 
-/// Collects tensors: borrows what is an array already, copies members out of arrays of structs.
+/// Collects tensors. Borrows arrays, copies members out of arrays of structs.
 class TensorCollector {
  public:
   template <typename T>
@@ -40,7 +40,7 @@ class TensorCollector {
         {name, tensor_type<typename Stored<T>::Scalar>(), stored_shape<T>(items.size()), column});
   }
 
-  /// Copies an array that was made for the file.
+  /// Copies an array that only the file needs.
   template <typename T>
   void add_made(const char* name, std::span<const T> values) {
     const auto bytes = std::as_bytes(values);
@@ -63,7 +63,7 @@ void collect_textures(const std::vector<Texture>& textures, TensorCollector& col
   }
 }
 
-/// Files of scenes with too many pairs have no tensors of them.
+/// Without pairs their tensors are left out.
 void collect_exchange(const ExchangeMatrix& exchange, TensorCollector& collector) {
   if (exchange.empty()) return;
   collector.add(tensor::kRowBegin, {exchange.row_begin.size()}, exchange.row_begin.span());
@@ -84,7 +84,7 @@ void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollect
                                storage.channel_matrix);
 }
 
-/// The tensor type of values of a HierarchicalOperator: those of 16 bits without a sign are halves.
+/// The tensor type of values of a HierarchicalOperator. Unsigned 16-bit values are bits of halves.
 template <typename Value>
 constexpr TensorType value_type() {
   if constexpr (std::same_as<Value, std::uint16_t>) return TensorType::kF16;
@@ -149,7 +149,7 @@ void collect_operator(const TransferOperator* transfer, TensorCollector& collect
   }
 }
 
-/// Files without probes have no tensors of them.
+/// Without probes their tensors are left out.
 void collect_probes(const LightProbes& probes, TensorCollector& collector) {
   if (probes.size() == 0) return;
   visit_tensors_of_probes(probes, collector);
@@ -157,14 +157,14 @@ void collect_probes(const LightProbes& probes, TensorCollector& collector) {
   collector.add<std::uint32_t>(tensor::kProbeGrid, {probes.grid.size()}, probes.grid);
 }
 
-/// Files without surface harmonics have no tensors of them.
+/// Without surface harmonics their tensors are left out.
 void collect_surface_harmonics(const SurfaceHarmonics& harmonics, TensorCollector& collector) {
   if (harmonics.empty()) return;
   visit_tensors_of_surface_harmonics(harmonics, collector);
   if (!harmonics.sky_cells.empty()) visit_tensors_of_surface_sky(harmonics.sky_cells, collector);
 }
 
-/// Files without a lightmap have no tensors of one.
+/// Without a lightmap its tensors are left out.
 void collect_lightmap(const Lightmap& map, TensorCollector& collector) {
   if (map.empty()) return;
   visit_tensors_of_lightmap(map, collector);
@@ -195,7 +195,7 @@ SafetensorsMetadata make_metadata(const TransferData& data) {
   return metadata;
 }
 
-/// Puts the checksum of the whole file where its zeros are.
+/// Replaces the placeholder by the checksum of the whole file.
 void seal(SafetensorsLayout& layout) {
   const std::size_t digits = find_checksum_digits(layout.prefix);
   FileChecksum checksum(layout.prefix, digits);
