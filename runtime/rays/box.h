@@ -8,7 +8,7 @@
 
 namespace rebounce {
 
-/// A box along the axes. One without any point meets nothing.
+/// An axis-aligned box. A box without points meets nothing.
 struct Box {
   glm::vec3 low{std::numeric_limits<float>::infinity()};
   glm::vec3 high{-std::numeric_limits<float>::infinity()};
@@ -20,23 +20,23 @@ struct Box {
 
   glm::vec3 extent() const { return high - low; }
 
-  /// From corner to corner.
+  /// The length of the diagonal.
   double diagonal() const { return glm::distance(glm::dvec3(low), glm::dvec3(high)); }
 
-  /// The square of the distance of `point` from the box; 0 inside.
+  /// The squared distance of `point` from the box; 0 inside.
   float distance_squared(const glm::vec3& point) const {
     const glm::vec3 apart = glm::max(glm::max(low - point, point - high), glm::vec3(0));
     return glm::dot(apart, apart);
   }
 
-  /// True if they have a point in common.
+  /// True if the boxes have a point in common.
   bool meets(const Box& other) const {
     return glm::all(glm::lessThanEqual(low, other.high)) &&
            glm::all(glm::lessThanEqual(other.low, high));
   }
 };
 
-/// The box around `points`.
+/// The smallest box around `points`.
 inline Box box_around(std::span<const Float3> points) {
   Box box;
   for (const Float3& point : points) box.add(to_glm(point));

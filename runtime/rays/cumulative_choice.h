@@ -9,24 +9,24 @@
 
 namespace rebounce {
 
-/// Choices from a list in proportion to weights.
+/// Chooses entries of a list with probabilities in proportion to weights.
 class CumulativeChoice {
  public:
-  /// Appends a choice of `weight` >= 0.
+  /// Appends an entry of `weight` >= 0.
   void add(double weight) { end_.push_back(total() + weight); }
 
   double total() const { return end_.empty() ? 0 : end_.back(); }
 
   struct Chosen {
     std::size_t index;
-    double rest;  ///< in [0, 1): where in the chosen one's share the number fell
+    double rest;  ///< in [0, 1): position of the number within the chosen entry's share
   };
 
-  /// The choice at `number` in [0, 1): never one without weight. total() must be positive.
+  /// The entry at `number` in [0, 1); never one of weight 0. total() must be positive.
   Chosen choose(double number) const {
     assert(total() > 0);
     const double place = number * total();
-    // Where rounding takes the place to the end, the last choice that has a weight.
+    // If rounding reaches the end, the last entry that has a weight.
     auto found = std::upper_bound(end_.begin(), end_.end(), place);
     if (found == end_.end()) found = std::lower_bound(end_.begin(), end_.end(), total());
     const double begin = found == end_.begin() ? 0 : *(found - 1);
@@ -37,7 +37,7 @@ class CumulativeChoice {
  private:
   static constexpr double kBelowOne = 1 - std::numeric_limits<double>::epsilon();
 
-  std::vector<double> end_;  // running sums
+  std::vector<double> end_;  // running sums of the weights
 };
 
 }  // namespace rebounce

@@ -1,6 +1,6 @@
 #pragma once
 
-// Between the plain arrays of the public headers and the vectors used inside.
+// Conversions between the plain arrays of the public headers and GLM's vectors.
 
 #include <glm/glm.hpp>
 

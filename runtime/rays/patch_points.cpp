@@ -29,7 +29,7 @@ void PatchSurface::add(const DisplayMesh& mesh, std::uint32_t triangle) {
   grounds_.push_back({a, ab, ac, to_float3(glm::normalize(cross)), opacity_map_level(map.size())});
 }
 
-/// Each as likely as it stops light.
+/// Adds the micro-triangles of an opacity map, weighted by their opacity.
 void PatchSurface::add_places(std::span<const std::uint8_t> map, double area) {
   const auto ground = static_cast<std::uint32_t>(grounds_.size());
   if (map.empty()) {
@@ -69,7 +69,7 @@ void PatchSurface::fill(std::size_t count, const PatchPointBlock::Coordinates& u
   }
 }
 
-/// On one triangle.
+/// Computes points on one triangle.
 void PatchSurface::fill(const Ground& ground, std::size_t count,
                         const PatchPointBlock::Coordinates& u,
                         const PatchPointBlock::Coordinates& v, float offset,

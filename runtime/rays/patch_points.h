@@ -1,6 +1,6 @@
 #pragma once
 
-// Patches as sets of display triangles, and points spread over them.
+// Patches as sets of display triangles, and points on them.
 
 #include <array>
 #include <cstddef>
@@ -20,7 +20,7 @@ namespace rebounce {
 /// The display triangles of each patch, in ascending order.
 class PatchTriangles {
  public:
-  /// `triangle_patch` [t] is the patch of each display triangle, or kNone; others are <
+  /// `triangle_patch` [t] is the patch of each display triangle or kNone; patches are <
   /// `patch_count`.
   PatchTriangles(std::span<const std::uint32_t> triangle_patch, std::size_t patch_count);
 
@@ -31,38 +31,37 @@ class PatchTriangles {
   Grouped<std::uint32_t> of_patch_;
 };
 
-/// A point on a side of the surface.
+/// A point on one side of the surface.
 struct PatchPoint {
   Float3 position{0, 0, 0};  ///< metres
   Float3 normal{0, 0, 0};    ///< unit, of the flat triangle
 };
 
-/// Points with their normals, coordinate by coordinate, so that the compiler works on several at
-/// once.
+/// A block of points with normals, by coordinates, so that the compiler vectorises loops over them.
 struct PatchPointBlock {
   static constexpr std::size_t kSize = 64;
   using Coordinates = std::array<float, kSize>;
   std::array<Coordinates, 3> position, normal;  ///< as in PatchPoint
 };
 
-/// What of a patch stops light, to take points from.
+/// The surface of a patch that stops light, for sampling points.
 class PatchSurface {
  public:
   PatchSurface() = default;
   PatchSurface(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles);
 
-  /// Maps [0, 1)^2 to it, evenly by area: the first coordinate also chooses the triangle, or the
-  /// micro-triangle of its opacity map, whose order keeps neighbours together. A point without
-  /// normal where nothing stops light.
+  /// Maps the unit square [0, 1)^2 to the surface, uniformly by area. The first coordinate also
+  /// chooses the triangle, or the micro-triangle of its opacity map. Neighbours in the square are
+  /// neighbours on the surface. Returns a point with a zero normal if nothing stops light.
   PatchPoint at(const glm::dvec2& square) const {
-    // Most patches are one triangle, and points are made by the million.
+    // Most patches are one triangle, and callers need millions of points.
     if (places_.size() == 1 && choice_.total() > 0)
       return grounds_[0].at(square_to_triangle(square));
     return at_chosen_place(square);
   }
 
-  /// The points of the `count` <= PatchPointBlock::kSize squares (`u`[k], `v`[k]), moved by
-  /// `offset` along their normals; in single precision.
+  /// Computes the points of `count` <= PatchPointBlock::kSize squares (`u`[k], `v`[k]), moved by
+  /// `offset` metres along their normals; in single precision.
   void fill(std::size_t count, const PatchPointBlock::Coordinates& u,
             const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block) const;
 
@@ -70,9 +69,9 @@ class PatchSurface {
   struct Ground {
     glm::dvec3 corner, first_edge, second_edge;
     Float3 normal;
-    int map_level;  ///< of its opacity map
+    int map_level;  ///< level of its opacity map
 
-    PatchPoint at(const glm::dvec2& b) const {  ///< weights of the second and third vertex
+    PatchPoint at(const glm::dvec2& b) const {  ///< `b`: weights of the second and third vertex
       return {to_float3(corner + b.x * first_edge + b.y * second_edge), normal};
     }
   };
@@ -87,13 +86,13 @@ class PatchSurface {
   void add(const DisplayMesh& mesh, std::uint32_t triangle);
   void add_places(std::span<const std::uint8_t> map, double area);
 
-  std::vector<Ground> grounds_;  ///< its triangles
+  std::vector<Ground> grounds_;  ///< the triangles of the patch
   std::vector<Place> places_;
-  CumulativeChoice choice_;  ///< of places
+  CumulativeChoice choice_;  ///< chooses among places_
 };
 
-/// Writes points spread evenly by area over what of `triangles` of `mesh` stops light
-/// (PatchSurface): the R2 sequence, shifted by `shift`. Every prefix is well spread.
+/// Writes points on what of `triangles` of `mesh` stops light (PatchSurface), uniformly by area:
+/// the R2 sequence, shifted by `shift`. Every prefix of the sequence is well distributed.
 void spread_points(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                    const glm::dvec2& shift, std::span<PatchPoint> points);
 

@@ -15,12 +15,12 @@ namespace {
 
 constexpr std::size_t kMaxCorners = 4;
 
-// A polygon cut by a plane: at most one corner more, or none.
+// A polygon cut by a plane, which adds one corner at most.
 struct CutPolygon {
   std::array<glm::vec3, kMaxCorners + 1> corner;
   std::size_t count = 0;
   void add(const glm::vec3& v) {
-    // A polygon that is not quite flat could be cut more than twice.
+    // A polygon that is not exactly flat could be cut more than twice.
     if (count < corner.size()) corner[count++] = v;
   }
 };

@@ -1,4 +1,4 @@
-// The only file of the libraries that knows Embree.
+// The only file of the libraries that uses Embree.
 
 #include "runtime/rays/ray_tracer.h"
 
@@ -29,10 +29,10 @@ static_assert(offsetof(Ray, id) == offsetof(RTCRay, id));
 static_assert(offsetof(Ray, flags) == offsetof(RTCRay, flags));
 static_assert(RTC_INVALID_GEOMETRY_ID == kNone);
 
-constexpr std::size_t kBatch = 64;  // rays copied to the stack at a time by intersect()
+constexpr std::size_t kBatch = 64;  // rays that intersect() copies to the stack at a time
 
-// One builder thread: the tree, and with it which of two coincident triangles wins, is the same on
-// every machine, and no threads are left behind.
+// One builder thread: then the tree is the same on every machine, and so is the choice between
+// coincident triangles. No threads remain afterwards.
 constexpr const char* kDeviceConfig = "threads=1";
 
 void throw_if_failed(RTCDevice device, const char* step) {
@@ -45,25 +45,25 @@ void throw_if_failed(RTCDevice device, const char* step) {
                    : "Embree error " + std::to_string(code) + "; check the Embree installation"));
 }
 
-// Some of the triangles: those of one Embree geometry.
+// The triangles of one Embree geometry.
 struct TriangleGroup {
-  std::vector<std::uint32_t> index;  // of each among all triangles; empty where that is the same
-  OpacityMaps opacity;               // of each; empty if all are opaque
-  std::vector<float> transmitted;    // likewise the part of it that does not stop light
+  std::vector<std::uint32_t> index;  // index among all triangles; empty if the same
+  OpacityMaps opacity;               // one map per triangle; empty if all are opaque
+  std::vector<float> transmitted;    // [triangles] mean fraction of light that passes through
 
   std::uint32_t index_of(std::uint32_t primitive) const {
     return index.empty() ? primitive : index[primitive];
   }
 };
 
-// By Embree's geometry ID. What has no map is apart: it needs no filter.
+// Groups by Embree's geometry ID. Triangles without a map are in a group that needs no filter.
 enum GroupId : std::uint8_t { kSolid, kPorous, kGroupCount };
 using TriangleGroups = std::array<TriangleGroup, kGroupCount>;
 
-// What a ray does at the triangles of the porous group.
+// What a ray does at triangles of the porous group.
 enum class Rule : std::uint8_t { kHoles, kStop, kTriangleMeans, kMicroTriangles };
 
-// What the filters are given of the call they serve.
+// What a filter receives from the call that it serves.
 struct TraceContext {
   RTCIntersectContext context;
   const TriangleGroups* groups;
@@ -90,7 +90,7 @@ Hit to_hit(const RTCRayHit& traced, const TriangleGroups& groups) {
           .front = facing < 0};
 }
 
-// A number in [0, 1) that ray and triangle decide.
+// A number in [0, 1) that depends only on the ray and the triangle.
 float chance(const RTCRay& ray, std::uint32_t triangle) {
   const auto bits = [](float x, float y) {
     return (static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(x)) << 32) |
@@ -121,7 +121,7 @@ bool stops(const RTCRay& ray, const RTCHit& hit, const TraceContext& trace) {
   return chance(ray, group.index_of(hit.primID)) < part;
 }
 
-// The filter of the porous group: lets rays go on.
+// The filter of the porous group: lets rays continue.
 void let_pass(const RTCFilterFunctionNArguments* arguments) {
   const auto& trace = *reinterpret_cast<const TraceContext*>(arguments->context);
   for (unsigned k = 0; k < arguments->N; ++k) {
@@ -132,7 +132,7 @@ void let_pass(const RTCFilterFunctionNArguments* arguments) {
   }
 }
 
-// The filter of intersect_all: keeps each hit and lets the ray go on.
+// The filter of intersect_all: stores each hit and lets the ray continue.
 void collect(const RTCFilterFunctionNArguments* arguments) {
   const auto& trace = *reinterpret_cast<const TraceContext*>(arguments->context);
   for (unsigned k = 0; k < arguments->N; ++k) {
@@ -187,7 +187,7 @@ struct RayTracer::Impl {
 
   bool has_porous() const { return !groups[kPorous].index.empty(); }
 
-  /// Sorts the triangles into the groups, and hands these to Embree.
+  /// Divides the triangles into groups and passes them to Embree.
   void attach_by_group(std::span<const Float3> position, std::span<const Uint3> triangle,
                        const OpacityMaps& opacity) {
     std::array<std::vector<Uint3>, kGroupCount> grouped;
@@ -215,7 +215,7 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   if (impl_->device == nullptr) throw_if_failed(nullptr, "starting Embree");
   impl_->scene = rtcNewScene(impl_->device);
   throw_if_failed(impl_->device, "making a scene");
-  // The filter is for intersect_all.
+  // intersect_all needs the filter.
   rtcSetSceneFlags(
       impl_->scene,
       static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION));
@@ -224,8 +224,8 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   } else {
     impl_->attach_by_group(position, triangle, opacity);
   }
-  // High quality may put a triangle into several leaves, and then filters are called for one hit
-  // more than once: transmittance() needs each of them once.
+  // High quality may put a triangle into several leaves. Filters would then be called more than
+  // once for one hit, but transmittance() needs each hit exactly once.
   rtcSetSceneBuildQuality(impl_->scene,
                           impl_->has_porous() ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   rtcCommitScene(impl_->scene);
@@ -249,14 +249,14 @@ void RayTracer::transmittance(std::span<Ray> rays, PassageDetail detail,
                               std::span<float> part) const {
   assert(rays.size() == part.size());
   if (rays.empty()) return;
-  // Coherent traversal calls filters more than once for the same hit (Embree 3.13).
+  // Coherent traversal calls filters more than once for one hit (Embree 3.13).
   TraceContext trace = make_context(
       impl_->groups,
       impl_->has_porous() ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
                           : RTC_INTERSECT_CONTEXT_FLAG_COHERENT,
       detail == PassageDetail::kTriangle ? Rule::kTriangleMeans : Rule::kMicroTriangles);
   trace.transmitted = part.data();
-  // The filter is to know the rays by number; their own ids wait in a field that nothing reads.
+  // The filter identifies rays by number; their own ids are kept in an unused field meanwhile.
   for (std::size_t k = 0; k < rays.size(); ++k) {
     rays[k].time = std::bit_cast<float>(rays[k].id);
     rays[k].id = static_cast<std::uint32_t>(k);
@@ -273,7 +273,7 @@ void RayTracer::transmittance(std::span<Ray> rays, PassageDetail detail,
 
 void RayTracer::intersect(std::span<const Ray> rays, std::span<Hit> hits, Passage passage) const {
   assert(rays.size() == hits.size());
-  // Nearest hits are asked for over whole hemispheres: such rays soon part.
+  // Callers ask for nearest hits over whole hemispheres, where rays diverge early.
   TraceContext trace = make_context(impl_->groups, RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT,
                                     passage == Passage::kHoles ? Rule::kHoles : Rule::kStop);
   std::array<RTCRayHit, kBatch> batch;

@@ -11,75 +11,76 @@
 
 namespace rebounce {
 
-/// A ray from `origin` along `direction` (any length; t counts in units of it). Laid out as Embree
-/// reads it, so that a stream of rays is traced where it lies.
+/// A ray from `origin` along `direction` (any length; t counts in units of it). It has Embree's
+/// layout, so that a stream of rays is traced in place.
 struct alignas(16) Ray {
   Float3 origin;
   float t_near;
   Float3 direction;
   float time = 0;
   float t_far;
-  std::uint32_t mask = 0xFFFFFFFFU;  // Debian's Embree is built with ray masks on
-  std::uint32_t id = 0;              // the caller's own
+  std::uint32_t mask = 0xFFFFFFFFU;  // Debian's Embree compares ray masks
+  std::uint32_t id = 0;              // free for the caller
   std::uint32_t flags = 0;
 };
 
 struct Hit {
   float t = 0;
-  std::uint32_t triangle = kNone;  ///< kNone: nothing was hit
+  std::uint32_t triangle = kNone;  ///< kNone: no hit
   float u = 0, v = 0;              ///< barycentric weights of the second and third vertex
-  bool front = false;              ///< the front side was hit
+  bool front = false;              ///< whether the ray hit the front side
 };
 
 /// What a ray does at a triangle that has an opacity map.
 enum class Passage : std::uint8_t {
-  kHoles,  ///< it goes on where the map is 0, stops where it is kOpaque, and in between stops as
-           ///< often as the opacity says: by a hash of ray and triangle, the same every time
-  kSolid,  ///< it stops: the triangle counts as whole
+  kHoles,  ///< it continues where the map is 0 and stops where it is kOpaque; in between it stops
+           ///< with the probability of the opacity, by a hash of ray and triangle that never
+           ///< changes
+  kSolid,  ///< it stops: the triangle is treated as opaque
 };
 
-/// How finely transmittance() looks at an opacity map.
+/// The resolution at which transmittance() reads an opacity map.
 enum class PassageDetail : std::uint8_t {
   kTriangle,       ///< the mean of each triangle: free of noise
-  kMicroTriangle,  ///< the opacity where the ray meets it
+  kMicroTriangle,  ///< the opacity at the hit point
 };
 
-/// Triangles that rays can be traced against. Immutable, usable from any number of threads.
+/// Triangles for ray tracing. Immutable; any number of threads may use it.
 class RayTracer {
  public:
-  /// Builds the acceleration structure over all `triangle`s. Indices must be in range.
-  /// `opacity` says which of them light passes through; it may be of more triangles, and is copied.
-  /// Throws Error if Embree refuses (out of memory).
+  /// Builds the acceleration structure over all triangles. Indices must be in range. `opacity` may
+  /// cover more triangles than that; it is copied. Throws Error if Embree fails, for example out of
+  /// memory.
   RayTracer(std::span<const Float3> position, std::span<const Uint3> triangle,
             const OpacityMaps& opacity = {});
   ~RayTracer();
   RayTracer(RayTracer&&) noexcept;
   RayTracer& operator=(RayTracer&&) noexcept;
 
-  /// Traces shadow rays; afterwards `rays[k].t_far` is negative where ray k met something.
-  /// `rays` must be 16-byte aligned (std::vector<Ray> is).
+  /// Traces shadow rays. Afterwards `rays[k].t_far` is negative if ray k hit something
+  /// (is_occluded). `rays` must be 16-byte aligned; std::vector<Ray> is.
   void occluded(std::span<Ray> rays) const;
 
-  /// Writes to `part` [rays] how much of the light along each ray gets through, [0, 1]: 0 where it
-  /// meets an opaque triangle, else the product over those with maps. Afterwards is_occluded()
-  /// tells which rays met an opaque one.
+  /// Writes to `part` [rays] the fraction of light that gets through along each ray, in [0, 1]: 0
+  /// if it hits an opaque triangle, otherwise the product over triangles with maps. Afterwards
+  /// is_occluded() tells which rays hit an opaque triangle.
   void transmittance(std::span<Ray> rays, PassageDetail detail, std::span<float> part) const;
 
   /// Finds the nearest hit of every ray. hits.size() == rays.size().
   void intersect(std::span<const Ray> rays, std::span<Hit> hits,
                  Passage passage = Passage::kHoles) const;
 
-  /// Appends every hit of `ray` to `hits`, in no particular order of distance but always the same.
+  /// Appends every hit of `ray` to `hits`, in a deterministic order that is not by distance.
   void intersect_all(const Ray& ray, std::vector<Hit>& hits) const;
 
-  /// A point moved off its surface along the unit `geometric_normal`, so that a ray that begins or
-  /// ends there does not meet that surface: by offset_distance().
+  /// `point` moved by offset_distance() along the unit `geometric_normal`, so that a ray that
+  /// starts or ends there does not hit its own surface.
   Float3 offset_point(const Float3& point, const Float3& geometric_normal) const;
 
-  /// 2^-18 of the largest coordinate of the scene. The rounding errors of a ray's origin, of its
-  /// end and of the plane equation in between are each some 2^-24 of the coordinates they are found
-  /// from, however near to zero the point itself is: this is some tens of them, 40 micrometres in a
-  /// room of ten metres.
+  /// 2^-18 of the largest coordinate of the scene, in metres. A ray's origin, its end and the plane
+  /// equation each have rounding errors of about 2^-24 of the scene's largest coordinates, even
+  /// near the origin of space. The offset is a few tens of such errors: 40 micrometres in a room of
+  /// ten metres.
   float offset_distance() const;
 
  private:
@@ -90,10 +91,10 @@ class RayTracer {
 /// The offset_distance() of a tracer over these positions.
 float ray_offset_distance(std::span<const Float3> position);
 
-/// The tracer of what is shown: of the first surface_count triangles of `mesh`.
+/// A tracer over the first surface_count triangles of `mesh`.
 RayTracer make_surface_tracer(const DisplayMesh& mesh);
 
-/// True if a shadow ray given to RayTracer::occluded met something.
+/// True if RayTracer::occluded or transmittance found an opaque triangle along the ray.
 inline bool is_occluded(const Ray& ray) {
   return ray.t_far < 0;
 }

@@ -9,10 +9,10 @@
 
 namespace rebounce {
 
-/// The corners of a triangle, counter-clockwise from its front, metres.
+/// The corners of a triangle in metres, counter-clockwise seen from the front.
 using TriangleCorners = std::array<glm::dvec3, 3>;
 
-/// Those of triangle `t` of a scene or a mesh, which has `position` and `triangle`.
+/// The corners of triangle `t` of a surface, which has members `position` and `triangle`.
 template <typename Surface>
 TriangleCorners corners_of(const Surface& surface, std::size_t t) {
   const auto [a, b, c] = surface.triangle[t];
@@ -20,17 +20,17 @@ TriangleCorners corners_of(const Surface& surface, std::size_t t) {
           to_dvec3(surface.position[c])};
 }
 
-/// Along the front's normal, as long as the area is large, m².
+/// A vector along the front's normal whose length is the area, m².
 inline glm::dvec3 area_vector(const TriangleCorners& p) {
   return 0.5 * glm::cross(p[1] - p[0], p[2] - p[0]);
 }
 
-/// m².
+/// The area, m².
 inline double area_of(const TriangleCorners& p) {
   return glm::length(area_vector(p));
 }
 
-/// Unit; not finite for a triangle without area.
+/// The unit normal of the front; not finite for a triangle without area.
 inline glm::dvec3 front_normal(const TriangleCorners& p) {
   return glm::normalize(area_vector(p));
 }
