@@ -1,7 +1,7 @@
-// One-sided, of uniform luminance; sampled by its area. The form factor is an integral around the
-// rim (Stokes: E. Sparrow, "A new and simpler formulation for radiative angle factors", 1963),
-// which is elementary for an arc of a circle; the chord where a horizon cuts the disc is Lambert's
-// term for an edge.
+// A one-sided disc of uniform luminance, sampled by area. The form factor is an integral around the
+// rim by Stokes' theorem (E. Sparrow, "A new and simpler formulation for radiative angle factors",
+// 1963). It is elementary for an arc of a circle. The chord where a horizon cuts the disc adds
+// Lambert's term for an edge.
 
 #include <algorithm>
 #include <array>
@@ -36,7 +36,7 @@ void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
   const glm::vec3 to_center = lamp.position - point;
   const float area = lamp.area * lamp.range_window(glm::dot(to_center, to_center));
   for (std::size_t k = 0; k < places.size(); ++k) {
-    // From the unit square to the unit disc (Shirley and Chiu 1997).
+    // Unit square to unit disc (P. Shirley, K. Chiu, 1997).
     const glm::vec2 at(square_to_cosine_hemisphere(places[k]));
     light[k] = from_flat_place(lamp, to_center, area, at);
   }
@@ -44,11 +44,11 @@ void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
 
 constexpr double kPi = std::numbers::pi;
 
-// Below this the distance to the rim is as good as constant: the formula for that is exact to its
-// square, the other loses its reciprocal in roundings.
+// Below this the distance to the rim is treated as constant. That formula is exact up to the square
+// of the eccentricity; the other one divides by the eccentricity and loses accuracy.
 constexpr double kSmallEccentricity = 1e-7;
 
-/// The rim center + radius (cos(t) u + sin(t) v), as seen from the origin.
+/// The rim center + radius (cos(t) u + sin(t) v), seen from the origin.
 class Rim {
  public:
   Rim(const glm::dvec3& center, const glm::dvec3& normal, const glm::dvec3& axis, double radius)
@@ -70,7 +70,7 @@ class Rim {
     return center_ + radius_ * (std::cos(t) * u_ + std::sin(t) * v_);
   }
 
-  /// Height above a horizon through the origin is height(t) = h + amplitude cos(t - turn).
+  /// The height above a horizon through the origin is height(t) = h + amplitude cos(t - turn).
   double amplitude(const glm::dvec3& normal) const {
     return radius_ * std::hypot(glm::dot(normal, u_), glm::dot(normal, v_));
   }
@@ -78,7 +78,7 @@ class Rim {
     return std::atan2(glm::dot(normal, v_), glm::dot(normal, u_));
   }
 
-  /// The integral of normal . (r x dr) / |r|² from `begin` to `end`, by at most a whole turn.
+  /// The integral of normal . (r x dr) / |r|² from `begin` to `end`, over at most a whole turn.
   double integral(double begin, double end) const {
     const double shift = 2 * kPi * std::floor((begin + kPi) / (2 * kPi));
     begin -= shift;
@@ -88,7 +88,7 @@ class Rim {
   }
 
  private:
-  /// For t in [-pi, pi].
+  /// The antiderivative, for t in [-pi, pi].
   double primitive(double t) const {
     if (e_ < kSmallEccentricity * d_) return (a_ * t + b_ * std::sin(t) - c_ * std::cos(t)) / d_;
     const double angle =
@@ -110,7 +110,7 @@ double edge_integral(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3&
 
 float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal) {
   const glm::vec3 to_center = lamp.position - point;
-  if (glm::dot(to_center, lamp.direction) >= 0) return 0;  // behind it, or in its plane
+  if (glm::dot(to_center, lamp.direction) >= 0) return 0;  // behind the disc, or in its plane
   const glm::dvec3 center(to_center), up(normal);
   const Rim rim(center, up, glm::dvec3(lamp.direction), lamp.radius);
   const double height = glm::dot(center, up), amplitude = rim.amplitude(up);
@@ -150,7 +150,7 @@ float candela(const PreparedLight& lamp) {
   return lamp.area;
 }
 
-// A polygon of many corners.
+// In the shader the disc is a polygon with many corners.
 constexpr const char* kGlsl = R"(
 float disc_irradiance(vec3 to_center, vec3 direction, vec3 normal) {
   return flat_irradiance(to_center, normal, 24);

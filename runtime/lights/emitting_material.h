@@ -7,8 +7,8 @@
 
 namespace rebounce {
 
-/// The material that each patch [n] emits by: that of the largest of its triangles whose material
-/// emits, or kNone.
+/// The emitting material of each patch [n]: that of its largest triangle with an emitting material,
+/// or kNone.
 std::vector<std::uint32_t> find_emitting_material(const TransferData& data);
 
 }  // namespace rebounce

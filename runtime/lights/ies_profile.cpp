@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kMostAngles = 4096;
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
-constexpr float kAngleTolerance = 0.01F;  // degrees; files are rounded
+constexpr float kAngleTolerance = 0.01F;  // degrees; files hold rounded numbers
 
 class IesReader {
  public:
@@ -61,8 +61,8 @@ class IesReader {
     return line;
   }
 
-  /// Up to the line after TILT=, and past the lamp's own angles if they are in the file: this says
-  /// how its output falls when it is tilted, which the profile does not tell.
+  /// Skips to the line after TILT=, and past the lamp's tilt factors if the file has them. These
+  /// say how the output falls when the luminaire is tilted; the profile does not use them.
   void skip_to_tilt() {
     while (!rest_.empty()) {
       const std::string_view text = line();
@@ -110,7 +110,7 @@ class IesReader {
 
   static bool near(float a, float b) { return std::abs(a - b) <= kAngleTolerance; }
 
-  /// Degrees still.
+  /// Checks angles; they are still in degrees here.
   void check_angles(IntensityProfile& profile) const {
     const float low = profile.vertical.front(), high = profile.vertical.back();
     if (low < -kAngleTolerance || high > 180 + kAngleTolerance) {

@@ -9,9 +9,9 @@
 namespace rebounce {
 
 /// Reads the photometric data of a luminaire from the text of an IES file (ANSI/IES LM-63-1986 to
-/// -2019, type C photometry), with its multiplier and ballast factor; keywords and the lamp's shape
-/// are skipped. `name` stands for the file in messages. Throws Error if the text is not that, or of
-/// type A or B, or its angles are not those of a type C measurement.
+/// -2019, type C photometry), with multiplier and ballast factor. Keywords and the shape of the
+/// lamp are ignored. `name` stands for the file in messages. Throws Error if the text is not such a
+/// file, is of type A or B, or has angles that type C does not allow.
 std::shared_ptr<const IntensityProfile> parse_ies_profile(std::string_view text,
                                                           const std::string& name);
 

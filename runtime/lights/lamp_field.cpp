@@ -23,7 +23,7 @@ bool is_along(const Float3& direction, std::span<const float> values) {
 }  // namespace
 
 void check_field(const Light& light, const LampField& field) {
-  // Only read.
+  // The values are only read.
   const std::span<const float> values = field.values(const_cast<Light&>(light));
   const bool finite = std::ranges::all_of(values, [](float x) { return std::isfinite(x); });
   const float least = values.empty() ? 0 : std::ranges::min(values);

@@ -1,8 +1,8 @@
 #pragma once
 
-// The fields of Light, once each: what LIGHTS.json calls them and which values they may have. Kinds
-// of lamps (lamp_kind.h) list those that they use; a field that only one kind has may stand in its
-// file.
+// The fields of Light: for each, its names in LIGHTS.json and the values that it may have. Each
+// kind of lamp (lamp_kind.h) lists the fields that it uses; a field of one kind only may be in the
+// file of that kind.
 
 #include <array>
 #include <cstdint>
@@ -14,23 +14,23 @@
 namespace rebounce {
 
 enum class FieldRule : std::uint8_t {
-  kFinite,       ///< any numbers
+  kFinite,       ///< any finite numbers
   kNotNegative,  ///< each at least 0
   kLength,       ///< metres, each above 0; has no default
   kUnitVector,
-  kAcross,   ///< a vector that is not along the light's direction
+  kAcross,   ///< a vector that is not parallel to the light's direction
   kCone,     ///< inner and outer angle, radians: 0 <= inner <= outer <= pi / 2
   kProfile,  ///< an IntensityProfile, or none
 };
 
 struct LampField {
   std::string_view name;   ///< in messages
-  const char* label = "";  ///< of its control in the viewer; of lengths and directions
-  /// In LIGHTS.json: one for all of its values, or one for each.
+  const char* label = "";  ///< of its control in the viewer; for lengths and directions
+  /// Keys in LIGHTS.json: one for all of its values, or one for each.
   std::array<std::string_view, 2> json;
   FieldRule rule;
   std::span<float> (*values)(Light& light);
-  /// LIGHTS.json may give it to kinds that do not use it.
+  /// Whether LIGHTS.json may give it to kinds that do not use it.
   bool is_common = false;
 
   std::size_t json_count() const { return json[1].empty() ? 1 : 2; }
@@ -84,7 +84,7 @@ inline constexpr LampField kSize{
     .json = {"width", "height"},
     .rule = FieldRule::kLength,
     .values = [](Light& light) { return std::span<float>(light.size); }};
-/// Of kinds that need one; a profile brings its own.
+/// For kinds that always need a tangent. Others need it only with a profile (check_light).
 inline constexpr LampField kTangent{
     .name = "tangent",
     .label = "first side",
@@ -96,11 +96,11 @@ inline constexpr LampField kProfile{
       return std::span<float>();
     }};
 
-/// Those of every kind, and those that LIGHTS.json may give to every kind.
+/// The fields of every kind, and those that LIGHTS.json may give to every kind.
 inline constexpr std::array kCommonFields = {&kPosition,  &kDirection, &kColor,
                                              &kIntensity, &kRange,     &kCone};
 
-/// Throws Error that names the field if `light` breaks its rule.
+/// Throws Error that names the field if `light` breaks the field's rule.
 void check_field(const Light& light, const LampField& field);
 
 }  // namespace rebounce

@@ -28,7 +28,7 @@ void prepare_profile(const Light& light, PreparedLight& lamp) {
 UnitLight inverse_square(const PreparedLight& lamp, const glm::vec3& point) {
   const glm::vec3 to_lamp = lamp.position - point;
   const float distance_squared = glm::dot(to_lamp, to_lamp);
-  // A point inside the lamp has no direction to it: it receives nothing.
+  // A point inside the lamp has no direction to it and receives nothing.
   if (!(distance_squared > 0)) return {};
   const float distance = std::sqrt(distance_squared);
   return {to_lamp / distance, distance, lamp.range_window(distance_squared) / distance_squared};

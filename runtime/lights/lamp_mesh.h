@@ -6,7 +6,7 @@
 
 namespace rebounce {
 
-/// Triangles of a lamp's surface, counter-clockwise seen from where it shines.
+/// The surface of a lamp as triangles, counter-clockwise seen from the side that shines.
 struct LampMesh {
   std::vector<Float3> position, normal;  ///< [v] metres in the world; unit
   std::vector<Uint3> triangle;

@@ -30,7 +30,7 @@ void LampShadows::add_surface(const PreparedLight& lamp, const LitPoint& point,
     part[k] = sample[k].illuminance * std::max(0.0F, glm::dot(sample[k].direction, point.normal));
     whole += part[k];
   }
-  if (whole <= 0) {  // but for a sliver, the lamp is below the horizon
+  if (whole <= 0) {  // the lamp is below the horizon, except for a sliver
     const glm::vec3 path = lamp.highest_point(point.normal) - point.position;
     const float distance = glm::length(path);
     add_ray(point, {path / distance, distance, 0}, weight * unoccluded, sum);
@@ -59,7 +59,7 @@ void LampShadows::add_ray(const LitPoint& point, const UnitLight& light, float i
 }
 
 void LampShadows::flush() {
-  // Single holes are finer than patches.
+  // Holes in a map are finer than patches, so means are enough.
   tracer_.transmittance({rays_.data(), count_}, PassageDetail::kTriangle,
                         {transmitted_.data(), count_});
   for (std::size_t k = 0; k < count_; ++k) irradiance_[sum_[k]] += transmitted_[k] * carried_[k];

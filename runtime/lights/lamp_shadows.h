@@ -1,6 +1,6 @@
 #pragma once
 
-// The core of direct light: a lamp, points, and what is in between.
+// The core of direct light: lamps, points, and the shadows between them.
 
 #include <array>
 #include <cstdint>
@@ -12,37 +12,37 @@
 
 namespace rebounce {
 
-/// A point of a surface at which light is looked for.
+/// A point of a surface that receives light.
 struct LitPoint {
   glm::vec3 position;  ///< metres, moved off the surface (RayTracer::offset_point)
   glm::vec3 normal;    ///< unit
 };
 
-/// Most places of a lamp with a surface that a point looks at.
+/// The largest number of sample points of a lamp with a surface per receiving point.
 inline constexpr int kMaxAreaLightSamples = 64;
 
-/// Adds the light of lamps at points to sums, shadowed. Shadow rays are collected and traced
-/// together; what gets through is added in the order of the calls, so that the sums have the same
-/// bits wherever the batches end. Does not allocate.
+/// Adds the shadowed light of lamps at points to sums. Shadow rays are collected and traced in
+/// batches. The light that gets through is added in the order of the calls, so the sums have the
+/// same bits for any batch size. Does not allocate.
 class LampShadows {
  public:
   /// `tracer` and `irradiance`, the sums in lx per unit of intensity, must outlive the object.
   LampShadows(const RayTracer& tracer, std::span<float> irradiance)
       : tracer_(tracer), irradiance_(irradiance) {}
 
-  /// Adds `weight` times the irradiance at `point` from `lamp` to sum number `sum`. Of a lamp with
-  /// a surface the point looks at `places` in [0, 1)^2, from 1 to kMaxAreaLightSamples; others
-  /// ignore them. What would arrive from a surface is known exactly, and the rays find which part
-  /// of it does, each counting by what its place contributes (E. Heitz, S. Hill, M. McGuire,
+  /// Adds `weight` times the irradiance at `point` from `lamp` to sum number `sum`. For a lamp with
+  /// a surface, `places` are its sample points in [0, 1)^2, 1 to kMaxAreaLightSamples of them;
+  /// other lamps ignore them. The unshadowed irradiance of a surface is exact; the rays give the
+  /// visible fraction of it, each weighted by its own contribution (E. Heitz, S. Hill, M. McGuire,
   /// "Combining analytic direct illumination and stochastic shadows", 2018).
   void add(const PreparedLight& lamp, const LitPoint& point, std::span<const glm::vec2> places,
            float weight, std::size_t sum);
 
-  /// Traces what has been collected. The sums are complete after it.
+  /// Traces the collected rays. Then the sums are complete.
   void flush();
 
  private:
-  static constexpr std::size_t kBatch = 64;  // shadow rays that are traced together
+  static constexpr std::size_t kBatch = 64;  // shadow rays traced at a time
 
   void add_surface(const PreparedLight& lamp, const LitPoint& point,
                    std::span<const glm::vec2> places, float weight, std::size_t sum);

@@ -1,4 +1,4 @@
-// One-sided, of uniform luminance; sampled by its area.
+// A one-sided rectangle of uniform luminance, sampled by area.
 
 #include <array>
 #include <cmath>
@@ -17,7 +17,7 @@ static_assert(static_cast<int>(LightType::kRectangle) == REBOUNCE_LIGHT_RECTANGL
 constexpr const LampField* kFields[] = {&kPosition, &kDirection, &kColor,  &kIntensity,
                                         &kRange,    &kSize,      &kTangent};
 
-// In turn, in parts of the sides.
+// In order, in units of the sides.
 constexpr std::array kCorners = {glm::vec2(-1, -1), glm::vec2(1, -1), glm::vec2(1, 1),
                                  glm::vec2(-1, 1)};
 
@@ -39,7 +39,7 @@ void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
 }
 
 float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal) {
-  if (glm::dot(lamp.position - point, lamp.direction) >= 0) return 0;  // behind it
+  if (glm::dot(lamp.position - point, lamp.direction) >= 0) return 0;  // behind the rectangle
   std::array<glm::vec3, 4> corner;
   for (std::size_t k = 0; k < 4; ++k) {
     corner[k] = lamp.position + kCorners[k].x * lamp.side + kCorners[k].y * lamp.other_side;
@@ -54,7 +54,7 @@ glm::vec3 highest_point(const PreparedLight& lamp, const glm::vec3& normal) {
 }
 
 glm::vec3 place(const PreparedLight& lamp, std::uint32_t k, std::uint32_t) {
-  // The R2 sequence (M. Roberts 2018), begun in the middle.
+  // The R2 sequence (M. Roberts, 2018), starting at the centre.
   const glm::dvec2 at =
       0.5 + static_cast<double>(k) * glm::dvec2(0.7548776662466927, 0.5698402909980532);
   return from_middle(lamp, 2.0F * glm::vec2(glm::fract(at)) - 1.0F);

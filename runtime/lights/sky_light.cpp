@@ -17,7 +17,7 @@ Float3 scaled(const Sky& sky, float factor) {
 }  // namespace
 
 Float3 sky_irradiance(const TransferData& data, const Sky& sky, std::size_t patch) {
-  // A uniform sky of luminance L gives pi L to a patch that sees nothing else.
+  // A uniform sky of luminance L gives the irradiance pi L to a patch that sees nothing else.
   constexpr float kPi = std::numbers::pi_v<float>;
   if (!sky.distribution) return scaled(sky, kPi * data.patches.sky_visibility[patch]);
   const SkyCells& cells = data.sky_cells;

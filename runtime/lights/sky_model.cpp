@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Points along each side of a cell of which its mean is made.
+// Sample points along each side of a cell, for its mean luminance.
 constexpr int kPointsAcross = 8;
 
 /// Gradation 1 + a exp(b / cos Z), indicatrix 1 + c (exp(d X) - exp(d pi / 2)) + e cos² X.
@@ -45,7 +45,7 @@ class CieSky {
   CieSky(const SkyType& type, const glm::dvec3& to_sun)
       : type_(type), to_sun_(to_sun), zenith_(indicatrix(to_sun.y) * gradation(1)) {}
 
-  /// In parts of that of the zenith.
+  /// The luminance relative to the zenith.
   double luminance(const glm::dvec3& direction) const {
     return indicatrix(glm::dot(direction, to_sun_)) * gradation(direction.y) / zenith_;
   }
@@ -86,7 +86,7 @@ SkyDistribution cie_sky(int type, const Float3& sun_direction, float ground_refl
   check(type, to_sun, ground_reflectance);
   const CieSky sky(kTypes[static_cast<std::size_t>(type - 1)], glm::normalize(to_sun));
   SkyDistribution mean{};
-  double horizontal = 0;  // irradiance
+  double horizontal = 0;  // horizontal irradiance
   for (std::uint32_t cell = 1; cell < kSkyCellCount; ++cell) {
     double sum = 0, received = 0;
     for (int k = 0; k < kPointsAcross * kPointsAcross; ++k) {

@@ -1,6 +1,6 @@
-// The form factor: J. R. Howell, "A catalog of radiation heat transfer configuration factors",
-// B-43: element to sphere, also where the element's plane cuts it. Places: C. Wang, "Direct
-// lighting models for ray tracing with cylindrical lamps", 1992.
+// A sphere of uniform luminance. Form factor, also where the horizon cuts the sphere: J. R. Howell,
+// "A catalog of radiation heat transfer configuration factors", B-43. Sample points: C. Wang,
+// "Direct lighting models for ray tracing with cylindrical lamps", 1992.
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +25,8 @@ void prepare(const Light& light, PreparedLight& lamp) {
   lamp.area = 4 * kPi * lamp.radius * lamp.radius;
 }
 
-/// `sine_squared` of the half angle in which the sphere is seen, `cosine` of the angle between the
-/// normal and its middle; the horizon cuts the sphere.
+/// The form factor of a sphere that the horizon cuts. `sine_squared`: of the half angle that the
+/// sphere subtends; `cosine`: of the angle between the normal and its centre.
 double cut_sphere(double sine_squared, double cosine) {
   const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
   const double cotangent_of_half = std::sqrt(1 / sine_squared - 1);
@@ -38,7 +38,7 @@ double cut_sphere(double sine_squared, double cosine) {
          (sine_squared * (cosine * turn - cotangent_of_half * across) - lens) / std::numbers::pi;
 }
 
-// 1 from within the sphere.
+// 1 inside the sphere.
 float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal) {
   const glm::vec3 to_center = lamp.position - point;
   const float radius = lamp.radius;
@@ -52,7 +52,7 @@ float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::
   return std::max(0.0F, static_cast<float>(cut_sphere(sine_squared, cosine)));
 }
 
-// Uniformly in the cone in which the sphere is seen.
+// Uniformly in the cone that the sphere subtends.
 void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
                      std::span<const glm::vec2> places, std::span<UnitLight> light) {
   const glm::vec3 to_center = lamp.position - point;
@@ -70,10 +70,10 @@ void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
   const glm::vec3 axis = to_center / distance;
   const auto [x, y] = sides_around(axis, least_axis(axis));
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const float down = places[k].x * height;  // 1 - cosine of the direction to the axis
+    const float down = places[k].x * height;  // 1 - cosine of the angle to the axis
     const float cosine = 1 - down, sine_squared_here = down * (1 + cosine);
     const float sine = std::sqrt(sine_squared_here), turn = 2 * kPi * places[k].y;
-    // Where it meets the sphere first.
+    // The first intersection with the sphere.
     const float off_axis_squared = distance_squared * sine_squared_here;
     const float into = std::sqrt(std::max(0.0F, radius_squared - off_axis_squared));
     light[k] = {cosine * axis + sine * (std::cos(turn) * x + std::sin(turn) * y),
@@ -102,7 +102,7 @@ float candela(const PreparedLight& lamp) {
   return kPi * lamp.radius * lamp.radius;
 }
 
-// The form factor with arcs as tangents: OpenGL's arc sines are coarse.
+// The form factor, with arcs as arc tangents: OpenGL's arc sines are imprecise.
 constexpr const char* kGlsl = R"(
 float sphere_irradiance(vec3 to_center, vec3 direction, vec3 normal) {
   float sine_squared = lamp_radius * lamp_radius / dot(to_center, to_center);
