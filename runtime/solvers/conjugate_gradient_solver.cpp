@@ -6,14 +6,14 @@
 namespace rebounce {
 namespace {
 
-/// out = r in, patch by patch and channel by channel.
+/// out = r in, by patch and channel.
 void scale(std::span<const Float3> r, std::span<const Float3> in, std::span<Float3> out) {
   for (std::size_t i = 0; i < out.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) out[i][c] = r[i][c] * in[i][c];
   }
 }
 
-/// y += factor x, each channel with its own factor.
+/// y += factor x, with one factor per channel.
 void add_scaled(const std::array<double, kChannelCount>& factor, std::span<const Float3> x,
                 std::span<Float3> y) {
   for (std::size_t i = 0; i < y.size(); ++i) {
@@ -37,7 +37,8 @@ void ConjugateGradientSolver::begin(bool cold) {
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) sqrt_reflectance_[i][c] = std::sqrt(reflectance_[i][c]);
   }
-  // U = R H with H = F B of the start: no division, whatever B and rho were before.
+  // U = R H with H = F B of the starting point: no division is needed, whatever B and rho were
+  // before.
   if (cold) {
     std::ranges::fill(unknown_, Float3{0, 0, 0});
   } else {
@@ -99,7 +100,7 @@ void ConjugateGradientSolver::multiply_direction() {
 }
 
 double ConjugateGradientSolver::radiosity_residual_norm() const {
-  // M0 + rho F B - B = R (R F B - U) = R rest.
+  // M0 + rho F B - B = R (R F B - U) = R times the residual of the symmetric system.
   double sum = 0;
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {

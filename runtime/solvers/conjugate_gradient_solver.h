@@ -9,11 +9,11 @@ namespace rebounce {
 
 /// Conjugate gradients (M. R. Hestenes, E. Stiefel, 1952) on the symmetric form of the system.
 ///
-/// With R = rho^1/2 and B = M0 + R U, the system is (I - R F R) U = R F M0, self-adjoint in the
-/// area-weighted inner product (A F is symmetric) and positive. It is A rho^-1 - A F with its own
-/// diagonal A rho^-1 as the preconditioner on both sides, written so that nothing is divided by
-/// rho: on black patches U is 0 and B = M0. The three channels go together, each with scalars of
-/// its own.
+/// With R = rho^1/2 and B = M0 + R U the system is (I - R F R) U = R F M0. It is self-adjoint in
+/// the area-weighted inner product, because A F is symmetric, and positive definite. It equals A
+/// rho^-1 - A F with its diagonal A rho^-1 as preconditioner on both sides, but nothing is divided
+/// by rho: on black patches U is 0 and B = M0. The three channels run together, each with scalars
+/// of its own.
 class ConjugateGradientSolver final : public RadiositySolver {
  public:
   ConjugateGradientSolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem);

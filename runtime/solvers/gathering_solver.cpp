@@ -7,7 +7,7 @@ RadiositySolver::SweepReport GatheringSolver::sweep() {
   for (std::size_t i = 0; i < radiosity_.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) radiosity_[i][c] += residual_[i][c];
   }
-  // What is left is rho F times the residual, and |F| <= 1 in the area-weighted norm.
+  // The new residual is rho F times the old one, and |F| <= 1 in the area-weighted norm.
   return {.residual = max_reflectance_ * norm};
 }
 

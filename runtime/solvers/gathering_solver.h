@@ -4,11 +4,11 @@
 
 namespace rebounce {
 
-/// Gathering (Burenius, chapter 6): B <- M0 + rho F B, every patch at once from the values before,
-/// one more bounce per sweep.
+/// Gathering (Burenius, chapter 6): B <- M0 + rho F B for all patches at once, from the values of
+/// the sweep before. Each sweep adds one bounce.
 ///
-/// Jacobi's method is the same iteration: a flat patch does not see itself, so that the diagonal
-/// of I - rho F is 1. The error shrinks per sweep by max(rho) or better.
+/// Jacobi's method is the same iteration: a flat patch does not see itself, so the diagonal of I -
+/// rho F is 1. A sweep multiplies the error by max(rho) or less.
 class GatheringSolver : public RadiositySolver {
  public:
   GatheringSolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem)

@@ -21,8 +21,8 @@ RadiositySolver::SweepReport GaussSeidelSolver::sweep() {
     next_ =
         next_ == SweepDirection::kForward ? SweepDirection::kBackward : SweepDirection::kForward;
   }
-  // A row's change is its residual when it is reached; what is left after the sweep is rho times
-  // one triangle of F times the change.
+  // The change of a row is its residual when it is relaxed. The residual after the sweep is rho
+  // times one triangle of F times the changes.
   return {.residual = std::sqrt(changed_squared)};
 }
 

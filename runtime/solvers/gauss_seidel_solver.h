@@ -8,11 +8,12 @@
 namespace rebounce {
 
 /// Gauss-Seidel relaxation (Burenius, chapter 8): patch after patch,
-/// B(i) = M0(i) + rho(i) sum over j of F(i,j) B(j), always with the newest values.
+///   B(i) = M0(i) + rho(i) sum over j of F(i,j) B(j),
+/// always with the newest values.
 ///
-/// The sweeps are those of the form factors (SweepableFormFactors::make_relaxation), which know the
-/// order in which they are read best. A symmetric solve turns around after every sweep; each
-/// direction counts as one. On compressed form factors it reads half as much.
+/// The form factors make the sweeps, in the order that suits their storage
+/// (SweepableFormFactors::make_relaxation). A symmetric solve alternates the direction; each
+/// direction counts as one sweep. On compressed form factors this halves the memory reads.
 class GaussSeidelSolver final : public RadiositySolver {
  public:
   GaussSeidelSolver(const SweepableFormFactors& form_factors, const RadiosityProblem& problem,

@@ -6,11 +6,12 @@
 namespace rebounce {
 
 /// Hierarchical radiosity (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical radiosity
-/// algorithm", SIGGRAPH 1991): light is pulled up the tree of patches, gathered at
-/// every level along the links and pushed down again, one more bounce per sweep.
+/// algorithm", SIGGRAPH 1991). Light is pulled up the tree of patches, gathered at every level
+/// along the links, and pushed down again. Each sweep adds one bounce.
 ///
-/// It is Jacobi's method on links: a sweep costs as much as there are links, some n instead of n².
-/// The solution is that of the links' F, which differs from the patches' by their error.
+/// This is Jacobi's method on links. The cost of a sweep is proportional to the number of links,
+/// about n instead of n². The solution is that of the links' F; its error is the error of the
+/// links.
 class HierarchicalSolver final : public GatheringSolver {
  public:
   HierarchicalSolver(const LinkedFormFactors& links, const RadiosityProblem& problem)

@@ -10,10 +10,11 @@
 namespace rebounce {
 namespace {
 
-/// A method that finds nothing better for this many sweeps has met the limit of single precision.
+/// A solve stops after this many sweeps without improvement: it has reached the limit of single
+/// precision.
 constexpr int kPatience = 8;
 
-/// A restart from the measured residual that gains less than this is not worth another.
+/// A restart from the measured residual is not worth another one if it gains less than this factor.
 constexpr double kWorthwhileRestart = 0.5;
 
 }  // namespace
@@ -89,7 +90,7 @@ SolveResult RadiositySolver::solve(std::span<const Float3> initial_exitance,
   deadline_ = Clock::time_point::max();
   if (settings.time_budget_microseconds > 0) {
     const std::chrono::duration<double, std::micro> budget(settings.time_budget_microseconds);
-    // A budget of an hour and more is none.
+    // A budget of an hour or more means no limit.
     if (budget < std::chrono::hours(1)) {
       deadline_ = start + std::chrono::duration_cast<Clock::duration>(budget);
     }
@@ -148,7 +149,7 @@ SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_
         result.residual > kWorthwhileRestart * confirmed) {
       break;
     }
-    // The bound said that it was there, and it was not: go on from what was measured.
+    // The bound was reached but the residual is larger: continue from the measured residual.
     confirmed = result.residual;
     begin(false);
   }

@@ -10,16 +10,17 @@
 
 namespace rebounce {
 
-/// When an iterative method stops, at whichever comes first, and where it runs. notes/solvers.md
-/// tells the methods.
+/// When an iterative method stops (at the first limit that it reaches), and where its loops run.
+/// See notes/solvers.md for the methods.
 struct SolveSettings {
   int max_sweeps = 100;  ///< at least 1; more: closer to the solution, longer
-  /// Stop once |M0 + rho F B - B| is this part of |M0|, area-weighted L2; 0: only sweeps and time
-  /// count. Single precision ends near 1e-7 |B| / |M0|; a solve that no longer improves stops.
+  /// Stop when |M0 + rho F B - B| / |M0| (area-weighted L2) is at most this. 0: only sweeps and
+  /// time count. Single precision reaches about 1e-7 |B| / |M0|; a solve that no longer improves
+  /// stops.
   double residual = 1e-6;
-  double time_budget_microseconds = 0;  ///< no new sweep after this; 0: no limit
-  /// Measure the residual of the result; false saves that gather, and the result then says the
-  /// method's own bound.
+  double time_budget_microseconds = 0;  ///< no new sweep after this time; 0: no limit
+  /// Measure the residual of the result. `false` saves one gather; the result then has the method's
+  /// own bound.
   bool measure_residual = true;
   Scheduler scheduler{};  ///< where the loops of the solve run
 };
@@ -27,12 +28,12 @@ struct SolveSettings {
 struct SolveResult {
   int sweeps = 0;
   double residual = 0;      ///< |M0 + rho F B - B| / |M0|, area-weighted L2 over all channels
-  bool converged = false;   ///< the residual that was asked for is reached
-  bool diverged = false;    ///< iterating made it worse; the best solution found is returned
-  double microseconds = 0;  ///< without the measurement of the residual at the end
+  bool converged = false;   ///< the requested residual is reached
+  bool diverged = false;    ///< the residual grew; the result is the best solution found
+  double microseconds = 0;  ///< without the final measurement of the residual
 };
 
-/// What the methods solve: (I - rho F) B = M0.
+/// The system (I - rho F) B = M0, without M0 and F.
 struct RadiosityProblem {
   std::span<const float> area;          ///< [n] m², > 0
   std::span<const Float3> reflectance;  ///< [n] 0 <= rho < 1
@@ -40,34 +41,34 @@ struct RadiosityProblem {
 
 /// An iterative method that keeps its last solution and starts the next solve from it.
 ///
-/// A solver copies areas and reflectances and refers to the form factors, which must outlive it.
-/// It belongs to one thread at a time and gives the same bits for any scheduler. After construction
-/// nothing allocates.
+/// A solver copies areas and reflectances and refers to the form factors, which must outlive it. It
+/// belongs to one thread at a time and gives the same bits for any scheduler. After construction it
+/// does not allocate.
 class RadiositySolver {
  public:
   virtual ~RadiositySolver() = default;
   RadiositySolver(const RadiositySolver&) = delete;
   RadiositySolver& operator=(const RadiositySolver&) = delete;
 
-  /// Solves for `initial_exitance` M0 = rho E + Me [n] in lx, from the last solution. Throws Error
-  /// if its size or a setting is wrong.
+  /// Solves for `initial_exitance` M0 = rho E + Me [n] in lx, starting from the last solution.
+  /// Throws Error if its size or a setting is wrong.
   SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings = {});
 
-  /// The same, and copies the solution [n] in lx to `radiosity`.
+  /// Does the same and copies the solution [n] in lx to `radiosity`.
   SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings,
                     std::span<Float3> radiosity);
 
   /// The last solution B [n] in lx; valid until the next solve.
   std::span<const Float3> radiosity() const { return radiosity_; }
 
-  /// Takes other reflectances [n], which hold from the next solve on, exactly; M0 is to be made
-  /// with them too. Throws Error if the size is wrong or one is not in [0, 1).
+  /// Changes the reflectances [n] from the next solve on. M0 must be computed with the same
+  /// reflectances. Throws Error if the size is wrong or one is not in [0, 1).
   void set_reflectance(std::span<const Float3> reflectance);
 
   /// The next solve starts from `radiosity` [n] in lx. Throws Error if the size is wrong.
   void start_from(std::span<const Float3> radiosity);
 
-  /// The next solve starts from nothing.
+  /// The next solve starts without a solution.
   void reset();
 
   std::size_t patch_count() const { return area_.size(); }
@@ -75,24 +76,24 @@ class RadiositySolver {
  protected:
   RadiositySolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem);
 
-  /// Prepares the iteration from radiosity_; `cold`: there is no solution to start from, and
-  /// radiosity_ is M0, light that has not bounced yet.
+  /// Prepares the iteration from radiosity_. `cold`: there is no earlier solution, and radiosity_
+  /// is M0.
   virtual void begin(bool cold) = 0;
 
   struct SweepReport {
-    double residual = 0;    ///< norm of what is left, or a bound of it
-    bool measured = false;  ///< it is the norm of M0 + rho F B - B itself, for the present B
+    double residual = 0;    ///< norm of the residual, or a bound of it
+    bool measured = false;  ///< `residual` is the norm of M0 + rho F B - B for the current B
     bool stuck = false;     ///< another sweep would change nothing
-    bool diverged = false;  ///< this sweep made it worse, and was undone
+    bool diverged = false;  ///< this sweep increased the residual and was undone
   };
 
-  /// One sweep, which costs about one gather.
+  /// One sweep; it costs about one gather.
   virtual SweepReport sweep() = 0;
 
   /// Brings radiosity_ up to date with the iteration.
   virtual void finish() {}
 
-  /// residual_ = M0 + rho F B - B, and its norm: one gather.
+  /// residual_ = M0 + rho F B - B; returns its norm. Costs one gather.
   double compute_residual();
 
   const FormFactorOperator& form_factors_;
@@ -100,7 +101,7 @@ class RadiositySolver {
   std::vector<Float3> reflectance_;
   float max_reflectance_ = 0;
   std::span<const Float3> initial_exitance_;  ///< during a solve
-  Scheduler scheduler_;                       ///< likewise
+  Scheduler scheduler_;                       ///< during a solve
   std::vector<Float3> radiosity_, residual_;
   std::vector<float> gather_workspace_;
 

@@ -8,7 +8,7 @@
 namespace rebounce {
 namespace {
 
-/// Growth of a residual below this part of |B| is rounding in single precision, not divergence.
+/// Growth of a residual below this fraction of |B| is rounding in single precision, not divergence.
 constexpr double kRounding = 1e-6;
 
 }  // namespace
@@ -53,7 +53,7 @@ RadiositySolver::SweepReport RefinementSolver::sweep() {
   residual_norm_ = compute_residual();
   if (residual_norm_ < before) return {.residual = residual_norm_, .measured = true};
 
-  // No better, or not a number: back to what was there.
+  // The residual did not fall or is not a number: undo the sweep.
   std::ranges::copy(previous_, radiosity_.begin());
   residual_norm_ = compute_residual();
   const bool rounding = before <= kRounding * area_norm(radiosity_, area_);

@@ -8,16 +8,18 @@
 
 namespace rebounce {
 
-/// Iterative refinement with the stored operator as the preconditioner:
-/// B <- B + (I + rho Y)(M0 - (I - rho F) B).
+/// Iterative refinement (J. H. Wilkinson, "Rounding errors in algebraic processes", 1963) with the
+/// stored operator as preconditioner:
+///   B <- B + (I + rho Y)(M0 - (I - rho F) B).
 ///
-/// The first sweep from nothing is the product with Y; each sweep shrinks the error by the relative
-/// error of Y, also where Y is of other reflectances than the current ones. When a sweep makes the
-/// residual grow, the one before is the result, and the solve reports divergence.
-/// (J. H. Wilkinson, "Rounding errors in algebraic processes", 1963, for the iteration.)
+/// Without an earlier solution, the first sweep is the product with Y. Each sweep multiplies the
+/// error by the relative error of Y, even if Y was built for other reflectances. If a sweep
+/// increases the residual, the result is that of the sweep before, and the solve reports
+/// divergence.
 class RefinementSolver final : public RadiositySolver {
  public:
-  /// Throws Error if `transfer` is null, has another number of patches or does not serve them all.
+  /// Throws Error if `transfer` is null, has another number of patches or does not serve all
+  /// patches.
   RefinementSolver(const FormFactorOperator& form_factors, const RadiosityProblem& problem,
                    std::shared_ptr<const TransferOperator> transfer);
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// Every iterative method by name, and solves in one call.
+// All iterative methods by name, and solves in one call.
 
 #include <array>
 #include <cstdint>
@@ -17,15 +17,15 @@ namespace rebounce {
 
 enum class SolveMethod : std::uint8_t {
   kGathering,
-  kJacobi,                ///< the same iteration as gathering, see gathering_solver.h
+  kJacobi,                ///< the same iteration as kGathering (gathering_solver.h)
   kGaussSeidel,           ///< needs SweepableFormFactors
-  kSymmetricGaussSeidel,  ///< likewise
+  kSymmetricGaussSeidel,  ///< needs SweepableFormFactors
   kConjugateGradient,
   kRefine,  ///< needs a stored operator that serves all patches
 };
 
 struct NamedSolveMethod {
-  std::string_view name;  ///< as on the command line
+  std::string_view name;  ///< name on the command line
   SolveMethod method;
 };
 
@@ -42,27 +42,27 @@ constexpr bool needs_operator(SolveMethod method) {
   return method == SolveMethod::kRefine;
 }
 
-/// Sparse F in the form that `method` is fastest on: rows in blocks where it goes by rows in one
-/// direction, otherwise the symmetric half of them. `area` has n entries in m². Throws Error if the
-/// sizes do not agree.
+/// Sparse F in the form that is fastest for `method`: blocks of rows for sweeps in one direction,
+/// otherwise blocks of the symmetric half. `area` has n entries in m². Throws Error if the sizes do
+/// not agree.
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
                                                               const ExchangeMatrix& exchange,
                                                               std::span<const float> area);
 
-/// The best F that `data` hold: by pairs, as above, or compressed where those are not kept. Throws
-/// Error if there is neither.
+/// The most accurate F in `data`: pairs, in the form above, or compressed if there are no pairs.
+/// Throws Error if there is neither.
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
                                                               const TransferData& data);
 
-/// A solver of its own for `method`. `form_factors` must outlive it; `transfer` may be null for the
-/// methods that do not need it. Throws Error if sizes differ, the operator is needed and missing,
-/// or the method needs another form of F.
+/// Makes a solver for `method`. `form_factors` must outlive it. `transfer` may be null for methods
+/// that do not need it. Throws Error if sizes differ, if a needed operator is missing, or if the
+/// method needs another form of F.
 std::unique_ptr<RadiositySolver> make_solver(
     SolveMethod method, const FormFactorOperator& form_factors, const RadiosityProblem& problem,
     std::shared_ptr<const TransferOperator> transfer = nullptr);
 
-/// Solves once, from nothing, and writes the solution [n] in lx to `radiosity`. Allocates what the
-/// method needs; keep a solver for more than one solve. Throws Error as make_solver and
+/// Solves once, without a start solution, and writes the solution [n] in lx to `radiosity`.
+/// Allocates; keep a solver for repeated solves. Throws Error as make_solver and
 /// RadiositySolver::solve do.
 SolveResult solve_radiosity(SolveMethod method, const FormFactorOperator& form_factors,
                             const RadiosityProblem& problem,
