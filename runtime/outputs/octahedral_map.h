@@ -8,9 +8,9 @@
 
 namespace rebounce {
 
-/// The direction at (u, v), each in [-1, 1], of the sphere unfolded over an octahedron, +z in the
-/// middle and -z in the corners: Z. Cigolle et al., "A survey of efficient representations for
-/// independent unit vectors", JCGT 3(2), 2014.
+/// The direction at (u, v), each in [-1, 1], of an octahedral map of the sphere, with +z at the
+/// centre and -z at the corners (Z. Cigolle et al., "A survey of efficient representations for
+/// independent unit vectors", JCGT 3(2), 2014).
 inline Float3 octahedral_direction(float u, float v) {
   Float3 d = {u, v, 1 - std::abs(u) - std::abs(v)};
   if (d[2] < 0) {
@@ -22,9 +22,9 @@ inline Float3 octahedral_direction(float u, float v) {
   return d;
 }
 
-/// The directions of the texels of a map of `size` x `size`, u fastest, at their middles: normals
-/// for irradiance maps as of Z. Majercik et al., "Dynamic diffuse global illumination with
-/// ray-traced irradiance fields", JCGT 8(2), 2019. `normals` has size x size entries.
+/// Writes the directions at the centres of the texels of a map of `size` x `size`, u fastest. They
+/// are the normals of irradiance maps (Z. Majercik et al., "Dynamic diffuse global illumination
+/// with ray-traced irradiance fields", JCGT 8(2), 2019). `normals` has size x size entries.
 inline void write_octahedral_normals(std::size_t size, std::span<Float3> normals) {
   const auto at = [&](std::size_t k) {
     return (2 * static_cast<float>(k) + 1) / static_cast<float>(size) - 1;

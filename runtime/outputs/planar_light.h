@@ -7,12 +7,12 @@
 
 namespace rebounce {
 
-/// Coefficients of degree 0 to 2 in three channels, which are kept channel by channel so that the
-/// compiler has rows to work on.
+/// Coefficients of degree 0 to 2, stored channel by channel, so that the compiler vectorises loops
+/// over them.
 struct PlanarLight {
   std::array<Harmonics, kChannelCount> channel{};
 
-  /// Adds `weight` times a colour.
+  /// Adds `weight` times `color`.
   void add(const Harmonics& weight, const Float3& color) {
     for (std::size_t c = 0; c < kChannelCount; ++c) {
       for (std::size_t k = 0; k < kHarmonicCount; ++k) channel[c][k] += color[c] * weight[k];

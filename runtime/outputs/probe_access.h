@@ -11,14 +11,14 @@
 
 namespace rebounce {
 
-/// Throws Error if an argument of who uses probes has the wrong size.
+/// Throws Error if an argument of a function on probes has the wrong size.
 inline void check_probe_size(std::size_t size, std::size_t wanted, const char* name) {
   if (size == wanted) return;
   throw Error(std::string("probes: ") + name + " has " + std::to_string(size) +
               " entries; it must have " + std::to_string(wanted));
 }
 
-/// Where a coordinate lies in a row of evenly spaced probes.
+/// The position of a coordinate in a row of evenly spaced probes.
 struct GridPlace {
   std::uint32_t low = 0, high = 0;
   float fraction = 0;
@@ -32,8 +32,8 @@ inline GridPlace place_in_row(float x, float first, float last, std::uint32_t co
   return {low, low + 1, at - static_cast<float>(low)};
 }
 
-/// Calls visit(probe, weight) for the valid ones of the eight probes around `position`, by
-/// trilinear weights; returns the sum of them, 0 if the probes are no grid.
+/// Calls visit(probe, weight) for the valid ones of the eight probes around `position`, with
+/// trilinear weights. Returns the sum of the weights; 0 if the probes are not a grid.
 template <typename Visit>
 float for_each_probe_around(const LightProbes& probes, const Float3& position, const Visit& visit) {
   const auto [nx, ny, nz] = probes.grid;

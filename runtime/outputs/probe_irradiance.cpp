@@ -12,13 +12,13 @@
 namespace rebounce {
 namespace {
 
-// Mean cosine of a cone of 45 degrees to each side. What is wider is smooth enough for degree 2.
+// Mean cosine of a cone with a half angle of 45 degrees. Degree 2 is enough for wider sources.
 constexpr float kLeastSharpness = 0.85F;
 constexpr float kLeastWidth = 1e-3F;
 constexpr std::size_t kBlock = 64;
 constexpr std::size_t kProbesPerTask = 4;
 
-/// Some of the normals, coordinate by coordinate so that the compiler has rows to work on.
+/// A block of normals, stored by coordinates, so that the compiler vectorises loops over them.
 class NormalBlock {
  public:
   explicit NormalBlock(std::span<const Float3> normals) : normals_(normals) {
@@ -36,7 +36,7 @@ class NormalBlock {
   alignas(64) std::array<std::array<float, kBlock>, 3> axis_{};
 };
 
-/// The irradiance of what is seen from one place, on a block of normals.
+/// The irradiance at one point on a block of normals.
 class IrradianceSum {
  public:
   explicit IrradianceSum(const NormalBlock& normals) : normals_(normals) {}
@@ -51,7 +51,7 @@ class IrradianceSum {
     }
   }
 
-  /// Writes what was added, divided by `divisor`.
+  /// Writes the sums divided by `divisor`.
   void write(float divisor, std::span<Float3> irradiance) const {
     const auto wide = wide_.interleaved();
     for (std::size_t k = 0; k < normals_.size(); ++k) {
@@ -63,11 +63,11 @@ class IrradianceSum {
   }
 
  private:
-  /// A spot is taken for a disc of the same mean cosine. Above the horizon its irradiance goes by
-  /// the cosine of its middle exactly; while it sets, by a parabola that joins this to zero.
+  /// Treats a spot as a disc with the same mean cosine. Above the horizon its irradiance is the
+  /// cosine of its centre, exactly; where the horizon cuts it, a parabola leads smoothly to zero.
   void add_spot(const LightSpot& spot, const Float3& color) {
     const auto& d = spot.direction;
-    // The sine of the disc's half angle, whose cosine is 2 sharpness - 1.
+    // The sine of the disc's half angle; its cosine is 2 sharpness - 1.
     const float width = std::max(2 * std::sqrt(spot.sharpness * (1 - spot.sharpness)), kLeastWidth);
     const float curvature = 0.25F / width, strength = spot.amount * spot.sharpness;
     const Float3 most = {strength * color[0], strength * color[1], strength * color[2]};
@@ -105,7 +105,7 @@ void add_view(const LightProbes& probes, std::size_t p, std::span<const Float3> 
       p, [&](const Harmonics& weight, float part) { sum.add(weight, scaled(luminance, part)); });
 }
 
-/// Calls visit(block, first) for the normals, a block at a time.
+/// Calls visit(block, first) for the normals, block by block.
 template <typename Visit>
 void for_each_block(std::span<const Float3> normals, const Visit& visit) {
   for (std::size_t first = 0; first < normals.size(); first += kBlock) {

@@ -24,7 +24,7 @@ void divide(ProbeLight& light, float divisor) {
   }
 }
 
-/// What probe `p` sees.
+/// The light at probe `p`, degrees 0 to 2.
 QuadraticProbeLight quadratic_light(const LightProbes& probes, std::size_t p,
                                     std::span<const Float3> radiosity,
                                     const SeenSky<Harmonics>& sky) {
@@ -46,7 +46,7 @@ ProbeLight light_of_probe(const LightProbes& probes, std::size_t p,
   return light;
 }
 
-/// Writes what light_of finds for each probe.
+/// Writes light_of(probe) for each probe.
 template <typename Light, typename LightOf>
 void apply(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
            const LightOf& light_of, std::span<Light> light, const Scheduler& scheduler) {

@@ -11,8 +11,8 @@
 
 namespace rebounce {
 
-/// What places see of one sky, as spherical harmonics: the cells of `sky` weighted by its
-/// distribution, or, where it is uniform or the cells are not known, `uniform` for its mean.
+/// The sky that probes or patches see, as spherical harmonics: the cells of `sky` weighted by its
+/// distribution. If it is uniform or the cells are not known: `uniform` for its mean.
 template <typename Weight>
 class SeenSky {
  public:
@@ -22,7 +22,7 @@ class SeenSky {
         distribution_(cells.empty() ? nullptr : sky.distribution.get()),
         luminance_(distribution_ != nullptr ? sky_luminance_unit(sky) : mean_sky_luminance(sky)) {}
 
-  /// cd/m², which the coefficients are to be multiplied by.
+  /// Multiply the coefficients by this luminance, cd/m².
   const Float3& luminance() const { return luminance_; }
 
   Weight coefficients(std::size_t place) const {
@@ -31,8 +31,8 @@ class SeenSky {
                                 [](const Weight& weight) -> const Weight& { return weight; });
   }
 
-  /// Calls visit(weight, part) for each part of the sky that can be told from others: with `part`
-  /// times the luminance it adds `weight` to the coefficients.
+  /// Calls visit(weight, part) for each distinguishable part of the sky. The part contributes
+  /// `weight` times `part` times the luminance to the coefficients.
   template <typename Visit>
   void for_each_part(std::size_t place, const Visit& visit) const {
     if (cells_.empty()) {
@@ -45,7 +45,7 @@ class SeenSky {
     }
   }
 
-  /// Degree 4, each cell taken for a spot of light; none where the cells are not known.
+  /// Degree 4, with each cell as a small spot of light; zero where the cells are not known.
   Harmonics degree_4(std::size_t place) const {
     if (cells_.empty() || luminance_ == Float3{0, 0, 0}) return {};
     return sum_of_cells<Harmonics>(place, degree_4_of_spot<std::tuple_size_v<Weight>>);

@@ -25,7 +25,7 @@ inline Harmonics spherical_harmonics(const Float3& d) {
           0.546274F * (x * x - y * y)};
 }
 
-/// Those of degree 4, (4,-4) to (4,4), with signs to match.
+/// The spherical harmonics of degree 4, (4,-4) to (4,4), with matching signs.
 inline Harmonics degree_4_harmonics(const Float3& d) {
   const auto [x, y, z] = d;
   const float xx = x * x, yy = y * y, zz = z * z;
@@ -40,11 +40,11 @@ inline Harmonics degree_4_harmonics(const Float3& d) {
           0.625836F * (xx * (xx - 3 * yy) - yy * (3 * xx - yy))};
 }
 
-/// What degrees 0 and 1 say of light that comes from a part of the sphere.
+/// The degrees 0 and 1 of light from a part of the sphere.
 struct LightSpot {
-  Float3 direction{0, 0, 0};  ///< mean, unit; 0 where there is none
+  Float3 direction{0, 0, 0};  ///< mean, unit; 0 if there is no light
   float amount = 0;           ///< radiance times solid angle
-  /// Mean cosine to `direction`, 0 to 1: 1 of a point, 1/2 of a half sphere.
+  /// Mean cosine to `direction`, 0 to 1: 1 for a point, 1/2 for a hemisphere.
   float sharpness = 0;
 };
 
@@ -60,10 +60,10 @@ LightSpot spot_of(const std::array<float, N>& weight) {
           .sharpness = std::min(length / (0.488603F * amount), 1.0F)};
 }
 
-/// Degree 4 of what is seen in a small part of the sphere, of `weight` in degrees 0 and 1: as of a
-/// Gaussian spot around the mean direction. Degree l of the Gauss-Weierstrass kernel of the sphere
-/// is exp(-l (l + 1) t), so the tenth power in degree 4 of what degree 1 leaves of degree 0. It
-/// says nearly nothing of a part as large as a half sphere, and is zero where weight[0] is none.
+/// Degree 4 of a small part of the sphere whose degrees 0 and 1 are `weight`, as for a Gaussian
+/// spot around the mean direction. Degree l of the Gauss-Weierstrass kernel of the sphere is exp(-l
+/// (l + 1) t), so degree 4 falls with the tenth power of the ratio of degree 1 to degree 0. It
+/// nearly vanishes for a hemisphere, and is zero if weight[0] is.
 template <std::size_t N>
 Harmonics degree_4_of_spot(const std::array<float, N>& weight) {
   const LightSpot spot = spot_of(weight);
@@ -75,8 +75,8 @@ Harmonics degree_4_of_spot(const std::array<float, N>& weight) {
   return degree_4;
 }
 
-/// The harmonics that irradiance has up to degree 5: nine of degree 0 to 2, nine of degree 4. The
-/// cosine lobe has no other odd degree than 1.
+/// The harmonics that matter for irradiance up to degree 5: nine of degrees 0 to 2 and nine of
+/// degree 4. Of the odd degrees, the cosine lobe has only degree 1.
 inline constexpr std::size_t kIrradianceHarmonicCount = 2 * kHarmonicCount;
 
 inline std::array<float, kIrradianceHarmonicCount> irradiance_harmonics(const Float3& d) {
@@ -86,14 +86,15 @@ inline std::array<float, kIrradianceHarmonicCount> irradiance_harmonics(const Fl
   return all;
 }
 
-/// What the cosine lobe does to each of them: pi, 2 pi / 3, pi / 4, -pi / 24 (ibid., eq. 8).
+/// The factors of the cosine lobe: pi, 2 pi / 3, pi / 4, -pi / 24 (ibid., eq. 8).
 inline constexpr std::array<float, kIrradianceHarmonicCount> kCosineLobe = {
     3.141593F,  2.094395F,  2.094395F,  2.094395F,  0.785398F,  0.785398F,
     0.785398F,  0.785398F,  0.785398F,  -0.130900F, -0.130900F, -0.130900F,
     -0.130900F, -0.130900F, -0.130900F, -0.130900F, -0.130900F, -0.130900F};
 
-/// The irradiance (lx) on a surface that faces `normal` (unit) of light given by the first N of the
-/// irradiance_harmonics, in cd/m² (ibid., eq. 7); never negative, though the series may undershoot.
+/// The irradiance in lx on a surface with unit `normal`, for light given by the first N
+/// coefficients of the irradiance_harmonics in cd/m² (ibid., eq. 7). Never negative, although the
+/// series may be.
 template <std::size_t N>
 Float3 irradiance_of(const std::array<Float3, N>& light, const Float3& normal) {
   const auto y = irradiance_harmonics(normal);

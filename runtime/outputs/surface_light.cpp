@@ -12,8 +12,7 @@ namespace {
 
 constexpr std::size_t kPatchesPerTask = 64, kVerticesPerTask = 512;
 
-// Beyond this a bent normal would see more light than the series, which may undershoot at the
-// surface's own normal, can answer for.
+// A larger gain is not reliable: the series may be too small at the surface's own normal.
 constexpr float kLargestGain = 4;
 
 void check_size(std::size_t size, std::size_t wanted, const char* name) {
