@@ -38,11 +38,11 @@ struct rebounce_transfer {
 
 struct rebounce_engine {
   Engine engine;
-  std::vector<Light> lights;                                ///< of the present frame
-  Sky sky;                                                  ///< likewise
+  std::vector<Light> lights;                                ///< of the current frame
+  Sky sky;                                                  ///< of the current frame
   std::shared_ptr<const SkyDistribution> sky_distribution;  ///< may be null
-  std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap, which needs it
-  std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
+  std::vector<Float3> vertex_irradiance;  ///< [v] only if there is a lightmap, which needs it
+  std::vector<SurfaceLight> patch_light;  ///< [n] only if there are surface harmonics
 
   explicit rebounce_engine(Engine made) : engine(std::move(made)) {
     const TransferData& data = engine.data();
@@ -74,7 +74,7 @@ rebounce_status fail(rebounce_status status, const char* message) noexcept {
   return status;
 }
 
-/// Runs `work`, whose Errors mean `status`.
+/// Runs `work`; an Error from it becomes `status`.
 template <typename Work>
 rebounce_status guarded(rebounce_status status, const Work& work) noexcept {
   try {
@@ -105,7 +105,7 @@ Float3 triple(const float* values) {
   return {values[0], values[1], values[2]};
 }
 
-// No structure of any version comes near; more is memory that nobody has filled in.
+// Larger than the structures of any version. A larger size is memory that nobody initialised.
 constexpr std::size_t kLargestStruct = 4096;
 
 void check_struct_size(std::uint32_t size, std::size_t least_size) {
@@ -114,7 +114,7 @@ void check_struct_size(std::uint32_t size, std::size_t least_size) {
               "; fill the structure with its _init function");
 }
 
-/// `given` as far as its caller knows the structure, and `defaults` beyond.
+/// Copies the members that the caller's version of the structure has; the others keep `defaults`.
 template <typename Struct>
 Struct take(const Struct* given, Struct defaults, std::size_t least_size) {
   check_struct_size(given->struct_size, least_size);
@@ -122,8 +122,8 @@ Struct take(const Struct* given, Struct defaults, std::size_t least_size) {
   return defaults;
 }
 
-// Sizes of the structures in version 1 of the interface, up to the last member that they had then.
-// They stay when a structure grows: what an older caller does not have takes its default.
+// Sizes of the structures in version 1 of the interface, up to their last member then. They stay
+// the same when a structure grows: members that an older caller lacks get their defaults.
 constexpr std::size_t kLightSize1 =
     offsetof(rebounce_light, tangent) + sizeof(rebounce_light::tangent);
 constexpr std::size_t kSettingsSize1 = offsetof(rebounce_engine_settings, light_capacity) +
@@ -133,7 +133,7 @@ constexpr std::size_t kInfoSize1 = offsetof(rebounce_transfer_info, operator_byt
 static_assert(kLightSize1 == 84 && kSettingsSize1 == 16 && kInfoSize1 == 48);
 
 #if REBOUNCE_WITH_EMBREE
-/// Light k of an array whose entries are as large as the caller says.
+/// Reads light k of an array whose entries have the size that the caller states.
 void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   rebounce_light defaults;
   rebounce_light_init(&defaults);
@@ -163,7 +163,7 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   check_light(light);
 }
 
-/// The engine checks it.
+/// The engine checks the values.
 Sky take_sky(const rebounce_sky* sky, const std::shared_ptr<const SkyDistribution>& distribution) {
   if (sky == nullptr) return {};
   return {triple(sky->color), sky->luminance, distribution};
@@ -182,7 +182,7 @@ Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_sett
                  .scheduler = {settings.parallel_for, settings.user}});
 }
 
-/// The light at the probes in the coefficients that `Light` has.
+/// The light at the probes, with the coefficients of type `Light`.
 template <typename Light>
 rebounce_status write_probe_light(const rebounce_engine& engine, float* harmonics,
                                   std::size_t probe_count) {

@@ -16,10 +16,10 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kBlock = 64;         // patches that are lit at a time
-constexpr std::size_t kAddedPerTask = 16;  // blocks, where no light is traced
+constexpr std::size_t kBlock = 64;         // patches that a task lights
+constexpr std::size_t kAddedPerTask = 16;  // blocks per task where no light is traced
 
-/// Moves `places` of the unit square by `shift`, around its edges.
+/// Moves `places` of the unit square by `shift`, modulo 1.
 void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
                   std::span<glm::vec2> shifted) {
   const auto around = [](float x) { return x < 1 ? x : x - 1; };
@@ -31,27 +31,28 @@ void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
 
 }  // namespace
 
-/// Where light is looked for: the same for every light and every frame.
+/// The points that receive light: the same for every light and every frame.
 struct DirectLighting::Receivers {
   std::size_t points_per_patch = 0;
   std::size_t area_light_samples = 0;
-  std::vector<glm::vec2> places;  ///< [points_per_patch][area_light_samples] of every lamp
-  std::vector<LitPoint> points;   ///< [n][points_per_patch]
-  std::vector<Box> block_box;     ///< [blocks] around their points
+  /// [points_per_patch][area_light_samples] sample points, for every lamp.
+  std::vector<glm::vec2> places;
+  std::vector<LitPoint> points;  ///< [n][points_per_patch]
+  std::vector<Box> block_box;    ///< [blocks] bounds of their points
 
   std::span<const LitPoint> points_of(std::size_t patch) const {
     return std::span(points).subspan(patch * points_per_patch, points_per_patch);
   }
 };
 
-/// What one light does.
+/// The irradiance of one light at intensity 1.
 struct DirectLighting::LightResponse {
   PreparedLight light;
-  bool known = false;  ///< irradiance is that of `light`
-  bool stale = false;  ///< to be traced in this frame
+  bool known = false;  ///< whether `irradiance` is that of `light`
+  bool stale = false;  ///< whether this frame must trace it
   glm::vec3 intensity{0};
   std::vector<float> irradiance;  ///< [n] per unit of intensity
-  std::vector<std::uint8_t> lit;  ///< [blocks] 0: the irradiance of all its patches is 0
+  std::vector<std::uint8_t> lit;  ///< [blocks] 0: the irradiance of all patches in the block is 0
 };
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
@@ -128,7 +129,7 @@ void DirectLighting::prepare(std::span<const Light> lights) {
     LightResponse& response = responses_[k];
     response.intensity = to_glm(lights[k].color) * lights[k].intensity;
     response.stale = false;
-    if (response.intensity == glm::vec3(0)) continue;  // off: what is known of it stays
+    if (response.intensity == glm::vec3(0)) continue;  // switched off: keep its irradiance
     const PreparedLight light(lights[k]);
     response.stale = !response.known || !(response.light == light);
     if (!response.stale) continue;

@@ -14,30 +14,29 @@ namespace rebounce {
 
 /// Direct irradiance of the patches of one scene, with shadows.
 ///
-/// Points of the patches and places on the lamps are chosen once and stay where they are, so that a
-/// light that moves does not flicker. What each light of a frame does at intensity 1 is kept, by
-/// its number among the lights: only lights that have moved or changed shape since the last frame
-/// are traced again, and those of another intensity or colour are not. Results depend on the lights
-/// alone, not on those before.
+/// The points on patches and on lamps are chosen once, so a moving light does not flicker. The
+/// irradiance of each light at intensity 1 is kept under the light's number. Only lights that have
+/// moved or changed shape since the last frame are traced again; a change of intensity or colour
+/// needs no tracing. Results depend only on the current lights.
 ///
-/// One object per thread that lights; copies share the points.
+/// Use one object per thread; copies share the points.
 class DirectLighting {
  public:
-  /// `data` and `tracer` (the first surface_count triangles of data.mesh) must outlive the object
-  /// and its copies. Throws Error if a setting is out of range.
+  /// `data` and `tracer` (over the first surface_count triangles of data.mesh) must outlive the
+  /// object and its copies. Throws Error if a setting is out of range.
   DirectLighting(const TransferData& data, const RayTracer& tracer,
                  const DirectLightingSettings& settings = {});
   ~DirectLighting();
   DirectLighting(const DirectLighting&);
   DirectLighting& operator=(const DirectLighting&) = delete;
 
-  /// Writes the irradiance [n] in lx that arrives straight from `lights` and `sky`. Does not
-  /// allocate, but see light_capacity. The same bits for any `scheduler`. Throws Error as check_sky
-  /// does.
+  /// Writes the irradiance [n] in lx that arrives directly from `lights` and `sky`. Does not
+  /// allocate, except as light_capacity describes. Gives the same bits for any `scheduler`. Throws
+  /// Error as check_sky does.
   void compute(std::span<const Light> lights, const Sky& sky, std::span<Float3> direct_irradiance,
                const Scheduler& scheduler = {});
 
-  /// Lights that the last compute() traced: those that were new or had changed.
+  /// The number of lights that the last compute() traced: new and changed ones.
   int traced_light_count() const { return traced_light_count_; }
 
  private:
@@ -56,7 +55,7 @@ class DirectLighting {
   const RayTracer& tracer_;
   std::shared_ptr<const Receivers> receivers_;
   std::vector<LightResponse> responses_;
-  std::size_t light_count_ = 0;  ///< of the present frame; no more than there are responses
+  std::size_t light_count_ = 0;  ///< of the current frame; at most the number of responses
   int traced_light_count_ = 0;
 };
 
