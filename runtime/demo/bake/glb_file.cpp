@@ -26,7 +26,7 @@ namespace {
 
 using nlohmann::json;
 
-// Numbers that glTF took from OpenGL.
+// glTF uses OpenGL's numbers for component types.
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126;
 constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
 constexpr int kLinear = 9729, kLinearMipmapLinear = 9987;
@@ -35,7 +35,7 @@ constexpr int kRepeat = 10497, kClampToEdge = 33071, kMirroredRepeat = 33648;
 constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8, kAlignment = 4;
 
-constexpr double kNearPart = 1e-4;  // of the scene's diagonal: the cameras' near plane
+constexpr double kNearPart = 1e-4;  // fraction of the scene's diagonal: the cameras' near plane
 
 using Color16 = std::array<std::uint16_t, 4>;
 
@@ -43,10 +43,10 @@ std::size_t padded(std::size_t size) {
   return (size + kAlignment - 1) / kAlignment * kAlignment;
 }
 
-// The binary part, and the views into it.
+// The binary part of the file and its buffer views.
 class Binary {
  public:
-  // Returns the index of the new view. `stride` and `target`: 0 leaves them out.
+  // Returns the index of the new view. 0 leaves out `stride` or `target`.
   template <typename T>
   int add_view(std::span<const T> values, std::size_t stride, int target) {
     bytes_.resize(padded(bytes_.size()));
@@ -78,7 +78,7 @@ std::vector<Color16> encode_colors(std::span<const Float3> color) {
   return encoded;
 }
 
-// [low, high] of positions, as accessors must tell.
+// [low, high] of positions; accessors require it.
 std::array<Float3, 2> bounds_of(std::span<const Float3> position) {
   std::array<Float3, 2> bounds = {position.front(), position.front()};
   for (const Float3& p : position) {
@@ -107,7 +107,7 @@ int wrap_code(TextureWrap wrap) {
   return wrap == TextureWrap::kMirroredRepeat ? kMirroredRepeat : kRepeat;
 }
 
-// Rotation as glTF's quaternion x, y, z, w.
+// The rotation as glTF's quaternion x, y, z, w.
 json rotation(const glm::dmat3& axes) {
   const glm::dquat q = glm::normalize(glm::quat_cast(axes));
   return {q.x, q.y, q.z, q.w};
@@ -174,7 +174,7 @@ class GlbBuilder {
   }
 
   static json entry_of(const Light& light) {
-    // Colours beyond 1 are not glTF: the excess goes into the intensity.
+    // glTF allows no colours beyond 1: the excess goes into the intensity.
     const float peak = std::max(1.0F, *std::ranges::max_element(light.color));
     json entry = {{"color", {light.color[0] / peak, light.color[1] / peak, light.color[2] / peak}},
                   {"intensity", light.intensity * peak}};
@@ -250,7 +250,7 @@ class GlbBuilder {
 
   json material_entry(const LitMesh::Part& part) {
     const Material& material = data_.materials[part.material];
-    // For viewers without KHR_materials_unlit: as dull as can be.
+    // A dull surface, for viewers without KHR_materials_unlit.
     json surface = {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}};
     if (is_textured(part)) {
       surface["baseColorTexture"] = {{"index", part.is_in_texture
@@ -272,7 +272,7 @@ class GlbBuilder {
     return entry;
   }
 
-  // Textures go into the file when they are first needed.
+  // Textures are added to the file when they are first used.
   std::size_t texture_index(std::uint32_t texture) {
     const auto found = textures_.find(texture);
     if (found != textures_.end()) return found->second;

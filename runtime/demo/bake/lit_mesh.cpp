@@ -16,17 +16,17 @@ namespace rebounce {
 namespace {
 
 constexpr int kMaxDivisions = 64;
-constexpr float kBrightest = 1e6F;     // of the screen's white: white by any curve
+constexpr float kBrightest = 1e6F;     // relative to the screen's white: white with any tone curve
 constexpr std::uint32_t kBlock = 256;  // vertices that a thread lights at a time
 
-// The triangles around each vertex, and their areas summed up.
+// The triangles around each vertex, and running sums of their areas.
 class Surroundings {
  public:
-  // A corner of a triangle that touches a vertex.
+  // A corner of a triangle at a vertex.
   struct Corner {
     std::uint32_t triangle = 0;
     std::uint32_t index = 0;  // 0 to 2
-    double area_end = 0;      // of this triangle and those before it
+    double area_end = 0;      // area of this triangle and those before it
   };
 
   Surroundings(const SubdividedMesh& mesh, std::span<const Float3> position)
@@ -60,8 +60,8 @@ class Surroundings {
   std::vector<Corner> corner_;
 };
 
-// The weights of a point that is uniform over the third of a triangle that belongs to a corner: a
-// uniform point of the whole, turned so that its largest weight is the corner's.
+// The weights of a uniform point of the third of a triangle that belongs to a corner: a uniform
+// point of the whole triangle, rotated so that its largest weight is the corner's.
 glm::vec3 near_corner(std::uint32_t corner, const glm::vec2& place) {
   const float root = std::sqrt(place.x);
   const std::array<float, 3> w = {1 - root, root * (1 - place.y), root * place.y};
@@ -72,14 +72,14 @@ glm::vec3 near_corner(std::uint32_t corner, const glm::vec2& place) {
   return turned;
 }
 
-// Lights the vertices of a mesh: each stands for the surface around it.
+// Lights the vertices of a mesh; each stands for the surface around it.
 class VertexLighter {
  public:
   VertexLighter(const SurfaceLighter& lighter, const SubdividedMesh& mesh,
                 std::span<const Float3> position)
       : lighter_(lighter), mesh_(mesh), around_(mesh, position) {}
 
-  // What vertices [begin, end) show if their textures are white, in parts of the screen's white.
+  // The colours of vertices [begin, end) with white textures, relative to the screen's white.
   std::vector<glm::vec3> shown(std::uint32_t begin, std::uint32_t end, float exposure_scale) const {
     std::vector<LitPiece> pieces;
     std::vector<CameraSample> samples;
@@ -120,8 +120,8 @@ class VertexLighter {
   Surroundings around_;
 };
 
-// The display triangles whose light goes into a texture. Those that let light through keep theirs
-// at the vertices, as their texture has the opacity.
+// The display triangles whose light goes into a texture. Triangles that let light through are lit
+// at their vertices, because their texture holds the opacity.
 std::vector<std::uint8_t> triangles_with_texels(const TransferData& data) {
   std::vector<std::uint8_t> chosen = data.lightmap.has_texels;
   chosen.resize(data.mesh.triangle.size(), 0);
@@ -138,7 +138,7 @@ int divisions_for(std::size_t triangle_count, std::size_t target) {
   return std::clamp(static_cast<int>(std::sqrt(ratio)), 1, kMaxDivisions);
 }
 
-// Double precision and whole steps: both sides of an edge find the same point.
+// Double precision and whole steps: both sides of an edge compute the same point.
 Float3 position_of(const DisplayMesh& mesh, const MeshPlace& place) {
   const Uint3& corner = mesh.triangle[place.triangle];
   glm::dvec3 sum(0);
@@ -189,7 +189,7 @@ void light_vertices(const VertexLighter& lighter, LitMesh& lit) {
       const std::vector<glm::vec3> shown =
           lighter.shown(begin, std::min(begin + kBlock, part.vertex_end), std::exp2(lit.exposure));
       for (std::size_t k = 0; k < shown.size(); ++k) {
-        // Light without bound, as right beside a lamp, has no place on the curve.
+        // Unbounded light, as close to a lamp, has no defined value on the tone curve.
         const glm::vec3 bounded = glm::min(shown[k], glm::vec3(kBrightest));
         lit.color[begin + k] = to_float3(glm::clamp(tone_curve(bounded), 0.0F, 1.0F));
       }

@@ -36,7 +36,7 @@ std::vector<glm::vec3> SurfaceLighter::shown(std::uint32_t first, std::span<cons
   return light;
 }
 
-/// Those samples above which the first thing is no back.
+/// The samples that are not inside a body: the first surface above them is not a back face.
 std::vector<CameraSample> SurfaceLighter::uncovered(std::span<const CameraSample> samples) const {
   std::vector<Ray> rays;
   for (const CameraSample& s : samples) {

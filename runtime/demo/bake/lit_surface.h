@@ -13,29 +13,29 @@
 
 namespace rebounce {
 
-/// A piece of surface whose light is wanted, a vertex's or a texel's.
+/// A piece of surface to light: that of a vertex or of a texel.
 struct LitPiece {
-  SurfacePoint point;  ///< in its middle
+  SurfacePoint point;  ///< at its centre
   float width = 0;     ///< metres
 };
 
-/// Finds the light that leaves pieces of surface: direct light as the mean over points of them,
-/// bounced light as the patches give it, emission.
+/// Computes the light that leaves pieces of surface: direct light as a mean over points of them,
+/// indirect light from the patches, and emission.
 class SurfaceLighter {
  public:
-  /// `samples_per_piece` >= 1 and `emitter_samples` as in LitMeshSettings. Everything that is given
-  /// must outlive it. Throws Error if a texture cannot be decoded.
+  /// `samples_per_piece` >= 1 and `emitter_samples` as in LitMeshSettings. All arguments must
+  /// outlive the object. Throws Error if a texture cannot be decoded.
   SurfaceLighter(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                  int samples_per_piece, int emitter_samples);
 
   const DisplaySurface& surface() const { return surface_; }
   int samples_per_piece() const { return samples_per_piece_; }
 
-  /// What `pieces` show in parts of the screen's white, with their base colour's texture or as if
-  /// that were white. They are pieces `first` and following of all; `samples` are points of them:
+  /// The colours of `pieces` relative to the screen's white, with their base colour texture or with
+  /// a white one. `first` is the number of the first piece. `samples` are points of the pieces:
   /// CameraSample::pixel is the number of the piece, index that of the sample, below
-  /// samples_per_piece. Samples inside of solid bodies, as below a box that stands on a floor, do
-  /// not count.
+  /// samples_per_piece. Samples inside solid bodies, as below a box that stands on a floor, are
+  /// ignored.
   std::vector<glm::vec3> shown(std::uint32_t first, std::span<const LitPiece> pieces,
                                std::span<const CameraSample> samples, float exposure_scale,
                                bool textured) const;

@@ -10,10 +10,10 @@
 namespace rebounce {
 namespace {
 
-constexpr float kBrightest = 1e6F;      // of the screen's white: white by any curve
+constexpr float kBrightest = 1e6F;      // relative to the screen's white: white with any tone curve
 constexpr std::uint32_t kBlock = 1024;  // texels that a thread lights at a time
 
-/// How a display triangle lies in the texture.
+/// The position of a display triangle in the texture.
 class TexelFrame {
  public:
   TexelFrame(const TransferData& data, const DisplaySurface& surface, std::uint32_t triangle) {
@@ -35,10 +35,10 @@ class TexelFrame {
     width_ = static_cast<float>(std::sqrt(doubled / std::abs(area)));
   }
 
-  /// Metres of surface for a texel.
+  /// Metres of surface per texel.
   float width() const { return width_; }
 
-  /// The place that lies `offset` texels from the place at `weight`, kept within the triangle.
+  /// The point `offset` texels from the point at `weight`, clamped to the triangle.
   glm::vec3 moved(const Float2& weight, const glm::vec2& offset) const {
     const glm::dvec2 inside =
         glm::max(glm::dvec2(to_glm(weight)) + static_cast<double>(offset.x) * step_x_ +
@@ -49,7 +49,7 @@ class TexelFrame {
   }
 
  private:
-  glm::dvec2 step_x_{0}, step_y_{0};  ///< change of the weights for a texel to the right, down
+  glm::dvec2 step_x_{0}, step_y_{0};  ///< change of the weights per texel to the right, and down
   float width_ = 0;
 };
 

@@ -8,9 +8,9 @@
 
 namespace rebounce {
 
-/// What leaves the display triangles that are `chosen` [t] not to be 0, at the texels of
-/// data.lightmap: base colour, light and emission, as a screen shows it with `exposure` stops.
-/// Texels of others are black. The same bits for any number of OpenMP threads.
+/// The screen colour, with `exposure` stops, of the display triangles with `chosen` [t] not 0, at
+/// the texels of data.lightmap: base colour, light and emission. Other texels are black. Gives the
+/// same bits for any number of OpenMP threads.
 ScreenImage light_texture(const TransferData& data, const SurfaceLighter& lighter,
                           std::span<const std::uint8_t> chosen, float exposure);
 

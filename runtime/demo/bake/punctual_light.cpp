@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-/// Candela, over all directions.
+/// The mean over all directions, candela.
 float mean_intensity(const IntensityProfile& profile) {
   constexpr int kSteps = 90;
   double sum = 0, weights = 0;

@@ -4,10 +4,10 @@
 
 namespace rebounce {
 
-/// The light of KHR_lights_punctual that comes nearest to `light`, for what knows no others: a
-/// lamp with a surface as a point, or a spot over its half-space, of the same intensity from afar
-/// straight ahead; a luminaire with a profile as one that gives off its mean in
-/// all directions. Others are as they are.
+/// The closest light of KHR_lights_punctual to `light`, for programs that know no others. A lamp
+/// with a surface becomes a point light, or a spot light over its half-space, with the same
+/// intensity straight ahead from afar. A luminaire with a profile becomes a light with its mean
+/// intensity in all directions. Other lights are returned unchanged.
 Light punctual_equivalent(const Light& light);
 
 }  // namespace rebounce

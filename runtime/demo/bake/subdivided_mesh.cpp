@@ -8,12 +8,12 @@
 namespace rebounce {
 namespace {
 
-// Cuts the triangles of one material after another.
+// Divides the triangles of one material after another.
 class Subdivider {
  public:
   Subdivider(const DisplayMesh& mesh, SubdividedMesh& out) : mesh_(mesh), out_(out) {}
 
-  // Triangles that are added from here on are cut into `divisions`² each.
+  // Triangles that follow are divided into `divisions`² each.
   void begin_part(std::uint32_t material, bool is_whole, int divisions) {
     shared_.clear();
     divisions_ = divisions;
@@ -40,8 +40,8 @@ class Subdivider {
  private:
   // Steps from the first corner towards the second and the third.
   using Step = std::array<int, 2>;
-  // A vertex is known by the corners of the display mesh that it lies between and its steps from
-  // them, which are the same from both sides of an edge.
+  // A vertex is identified by the corners of the display mesh around it and its steps from them.
+  // These are equal on both sides of an edge.
   using Key = std::array<std::pair<std::uint32_t, int>, 3>;
 
   std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(out_.triangle.size()); }
@@ -87,7 +87,7 @@ class Subdivider {
 
 SubdividedMesh subdivide(const DisplayMesh& mesh, int divisions,
                          std::span<const std::uint8_t> whole) {
-  // What a part is of, in the order of the parts.
+  // The material of a part and whether it is whole, in the order of the parts.
   const auto part_of = [&](std::uint32_t t) {
     return std::pair(mesh.triangle_material[t], !whole.empty() && whole[t] != 0);
   };

@@ -12,7 +12,7 @@
 namespace rebounce {
 namespace {
 
-constexpr int kMaxSide = 16384;  // texels: 1 GiB decoded is the most one texture may ask for
+constexpr int kMaxSide = 16384;  // texels; the largest texture takes 1 GiB when decoded
 
 }  // namespace
 

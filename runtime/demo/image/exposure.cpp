@@ -6,11 +6,13 @@
 namespace rebounce {
 namespace {
 
-// Half a stop above the 18 % of outdoor photographs: most of a room is light walls.
+// Half a stop above the 18 % of outdoor photographs: walls of rooms are mostly light.
 constexpr double kKey = 0.25;
-constexpr double kBrightShare = 0.95;  // of the pixels must stay below kBrightLevel
-constexpr double kBrightLevel = 1.5;   // on the tone curve's shoulder, still with some colour
-constexpr double kBlackShare = 1e-3;   // of the mean: darker pixels do not pull the exposure up
+constexpr double kBrightShare = 0.95;  // fraction of the pixels that must stay below kBrightLevel
+constexpr double kBrightLevel =
+    1.5;  // on the shoulder of the tone curve, where some colour is left
+constexpr double kBlackShare =
+    1e-3;  // relative to the mean: darker pixels do not raise the exposure
 
 }  // namespace
 

@@ -4,9 +4,9 @@
 
 namespace rebounce {
 
-/// Stops that bring the luminances of a picture (cd/m², emitters left out) to the screen: their
+/// The exposure in stops for a picture with these luminances (cd/m², without emitters). The
 /// logarithmic mean becomes a quarter of white, unless the brightest part would then be far above
-/// white. 0 where all are black.
+/// white. 0 if all are black.
 float automatic_exposure(std::vector<float> luminance);
 
 }  // namespace rebounce

@@ -26,7 +26,7 @@ int wrapped(int texel, int size, TextureWrap wrap) {
   return inside < size ? inside : period - 1 - inside;
 }
 
-// Brings a coordinate near zero, so that its texel index fits an int.
+// Moves a coordinate near zero, so that its texel index fits an int.
 float reduced(float texcoord, TextureWrap wrap) {
   if (!std::isfinite(texcoord)) return 0;
   if (wrap == TextureWrap::kClampToEdge) return std::clamp(texcoord, -1.0F, 2.0F);

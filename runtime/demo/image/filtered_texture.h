@@ -14,8 +14,8 @@ class FilteredTexture {
   /// Throws Error if the image cannot be decoded or is too large.
   explicit FilteredTexture(const Texture& texture);
 
-  /// Linear colour at `texcoord`, trilinearly filtered over a footprint of `texcoord_width`
-  /// (in units of texture coordinates).
+  /// The linear colour at `texcoord`, trilinearly filtered over a footprint of `texcoord_width`
+  /// texture coordinates.
   glm::vec3 sample(const glm::vec2& texcoord, float texcoord_width) const;
 
   /// Alpha in [0, 1] at `texcoord`, bilinearly filtered; 1 if the image has none.
@@ -30,7 +30,7 @@ class FilteredTexture {
 
   static Level half_size(const Level& level);
 
-  /// What `texel`(index) gives for the four texels of `level` around `texcoord`, mixed.
+  /// Interpolates `texel`(index) between the four texels of `level` around `texcoord`.
   template <typename TexelValue>
   auto bilinear(const Level& level, const glm::vec2& texcoord, const TexelValue& texel) const;
   glm::vec3 bilinear_color(const Level& level, const glm::vec2& texcoord) const;

@@ -16,9 +16,9 @@
 namespace rebounce {
 namespace {
 
-/// A pattern of thresholds without structure that the eye finds, so that slow gradients do not show
-/// the steps of eight bits: interleaved gradient noise (J. Jimenez, "Next generation post
-/// processing in Call of Duty: Advanced Warfare", 2014), kept off 0 and 1 so that exact bytes stay.
+/// Thresholds for dithering, so that slow gradients do not show the steps of eight bits:
+/// interleaved gradient noise (J. Jimenez, "Next generation post processing in Call of Duty:
+/// Advanced Warfare", 2014). They avoid 0 and 1, so that exact bytes stay unchanged.
 float dither_threshold(int x, int y) {
   const float inner = 0.06711056F * static_cast<float>(x) + 0.00583715F * static_cast<float>(y);
   const float noise = 52.9829189F * (inner - std::floor(inner));

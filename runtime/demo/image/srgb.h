@@ -7,7 +7,7 @@
 
 namespace rebounce {
 
-// IEC 61966-2-1, both ways, on [0, 1].
+// IEC 61966-2-1 in both directions, on [0, 1].
 
 inline float srgb_to_linear(float encoded) {
   return encoded <= 0.04045F ? encoded / 12.92F : std::pow((encoded + 0.055F) / 1.055F, 2.4F);
@@ -21,8 +21,8 @@ inline glm::vec3 srgb_to_linear(const glm::vec3& c) {
   return {srgb_to_linear(c.x), srgb_to_linear(c.y), srgb_to_linear(c.z)};
 }
 
-/// `threshold` in [0, 1) is where between two bytes the upper one begins: 1/2 rounds, a pattern of
-/// thresholds dithers.
+/// `threshold` in [0, 1) is the fraction between two bytes from which the upper one is used. 1/2
+/// rounds; varying thresholds dither.
 inline std::uint8_t to_srgb_byte(float linear, float threshold = 0.5F) {
   const float value = 255 * linear_to_srgb(std::clamp(linear, 0.0F, 1.0F));
   return static_cast<std::uint8_t>(std::min(255.0F, std::floor(value + 1 - threshold)));

@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-// Short of straight up and down, where there is no heading.
+// Less than straight up and down, where the heading is undefined.
 constexpr float kMaxElevation = 0.49F * std::numbers::pi_v<float>;
 
 }  // namespace

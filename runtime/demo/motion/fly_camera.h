@@ -6,23 +6,23 @@
 
 namespace rebounce {
 
-/// A camera that is steered by hand and stays level.
+/// A camera for the user to steer; it stays level.
 class FlyCamera {
  public:
-  /// Begins as `camera`, but level.
+  /// Starts like `camera`, but level.
   explicit FlyCamera(const Camera& camera);
 
   Camera camera() const;
   glm::vec3 forward() const;
   const glm::vec3& position() const { return position_; }
 
-  /// Turns around itself, by radians to the left and upwards.
+  /// Turns on the spot, by radians to the left and upwards.
   void turn(float left, float up);
 
   /// Moves by metres to its right, upwards in the world, and forwards.
   void move(const glm::vec3& right_up_forward);
 
-  /// Turns around `target`, which stays where it is in the picture.
+  /// Turns around `target`, which stays fixed in the picture.
   void orbit(const glm::vec3& target, float left, float up);
 
  private:

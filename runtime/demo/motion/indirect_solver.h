@@ -11,26 +11,26 @@
 
 namespace rebounce {
 
-/// How a frame finds its indirect light.
+/// How a frame computes its indirect light.
 struct IndirectMethod {
   std::optional<SolveMethod> iteration{};  ///< unset: one product with the stored operator
-  bool on_links = false;  ///< instead of either: hierarchical radiosity over the file's links
-  int sweeps = 1;         ///< of an iteration, at least 1
+  bool on_links = false;  ///< hierarchical radiosity over the file's links instead of either
+  int sweeps = 1;         ///< sweeps of an iteration, at least 1
   bool warm = true;       ///< an iteration starts from the frame before
 
   bool iterates() const { return iteration || on_links; }
   bool operator==(const IndirectMethod&) const = default;
 };
 
-/// Finds the indirect light of a frame by any method; an iteration keeps its solution from frame to
-/// frame, and form factors in the form that it is fastest on (make_form_factors).
+/// Computes the indirect light of a frame by any method. An iteration keeps its solution between
+/// frames, and form factors in the form that is fastest for it (make_form_factors).
 class IndirectSolver {
  public:
   /// `data` must have an operator and outlive the object.
   explicit IndirectSolver(const TransferData& data);
 
-  /// Takes another method; another iteration begins without a solution. Throws Error if it needs
-  /// links and there are none.
+  /// Changes the method; a new iteration starts without a solution. Throws Error if it needs links
+  /// and there are none.
   void choose(const IndirectMethod& method);
   const IndirectMethod& method() const { return method_; }
 
@@ -38,8 +38,8 @@ class IndirectSolver {
   /// method cannot be used.
   std::span<const Float3> solve(std::span<const Float3> initial_exitance);
 
-  /// Of the last solve. An iteration ends with one gather more, which makes H from its radiosity
-  /// and is not counted.
+  /// Microseconds of the last solve. For an iteration, the final gather from radiosity to H is not
+  /// counted.
   double microseconds() const { return microseconds_; }
 
  private:
@@ -49,7 +49,7 @@ class IndirectSolver {
 
   const TransferData& data_;
   IndirectMethod method_;
-  std::unique_ptr<const FormFactorOperator> form_factors_;  ///< of an iteration
+  std::unique_ptr<const FormFactorOperator> form_factors_;  ///< for iterations
   std::unique_ptr<RadiositySolver> solver_;
   std::vector<Float3> indirect_irradiance_;
   std::vector<float> workspace_;

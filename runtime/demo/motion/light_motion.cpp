@@ -33,7 +33,7 @@ Float3 unit_or(const Float3& v, const Float3& otherwise) {
   return length > 1e-6F ? to_float3(to_glm(v) / length) : otherwise;
 }
 
-// The keys before and after a time, and the part of the way between them.
+// The keys before and after a time, and the fraction of the way between them.
 struct BetweenKeys {
   const LightMotion::Key &a, &b;
   float way;

@@ -7,16 +7,16 @@
 
 namespace rebounce {
 
-/// How a lamp, or a sphere that it lights, moves by itself.
+/// The motion of a lamp, or of a lit sphere.
 struct LightMotion {
   enum class Kind : std::uint8_t {
     kStill,
-    kCircle,  ///< around `center` in the plane that `axis` stands on, at even speed
-    kSwing,   ///< between `from` and `to` and back, as a pendulum does
+    kCircle,  ///< around `center` in the plane perpendicular to `axis`, at constant speed
+    kSwing,   ///< between `from` and `to` and back, like a pendulum
     kKeys,    ///< from key to key in straight lines, then again from the first
   };
 
-  /// What the lamp is at a time.
+  /// The state of the lamp at one time.
   struct Key {
     float time = 0;              ///< seconds, >= 0
     Float3 position{0, 0, 0};    ///< metres
@@ -35,10 +35,10 @@ struct LightMotion {
   std::vector<Key> keys{};  ///< keys, by ascending time; not empty
 };
 
-/// Where something that rests at `position` is `time` seconds after the motion began. `time` >= 0.
+/// The position, `time` >= 0 seconds after the start, of an object that rests at `position`.
 Float3 moved(const Float3& position, const LightMotion& motion, float time);
 
-/// `light` as it is `time` seconds after the motion began. `time` >= 0.
+/// The state of `light`, `time` >= 0 seconds after the start.
 Light moved(const Light& light, const LightMotion& motion, float time);
 
 }  // namespace rebounce

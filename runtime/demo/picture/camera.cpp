@@ -16,8 +16,8 @@ namespace rebounce {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
-constexpr float kRoomFov = 65 * kPi / 180;     // vertical: wide, as a room wants
-constexpr float kOutsideFov = 40 * kPi / 180;  // vertical: a box seen through its open side
+constexpr float kRoomFov = 65 * kPi / 180;     // vertical: a wide angle, for the inside of a room
+constexpr float kOutsideFov = 40 * kPi / 180;  // vertical: for a box seen through its open side
 constexpr int kProbeColumns = 16, kProbeRows = 12;
 
 float diagonal(const Box& box) {
@@ -42,7 +42,7 @@ std::vector<Ray> probe_rays(const Camera& camera) {
   return rays;
 }
 
-// One minus the chance that two rays of the view meet surfaces of the same kind.
+// One minus the probability that two rays of the view hit the same kind of surface.
 float variety(const std::map<std::uint32_t, int>& count, int total) {
   float same = 0;
   for (const auto& [kind, c] : count) {
@@ -58,8 +58,8 @@ std::uint32_t orientation(const glm::vec3& normal) {
   return static_cast<std::uint32_t>(2 * axis + (normal[axis] > 0 ? 1 : 0));
 }
 
-// Which patches are lit: those with at least a twentieth of the mean radiosity. All, if there is
-// none.
+// Marks lit patches: those with at least a twentieth of the mean radiosity; all patches if there is
+// no light.
 std::vector<bool> lit_patches(const TransferData& data, std::span<const Float3> radiosity) {
   double power = 0, area = 0;
   for (std::size_t i = 0; i < radiosity.size(); ++i) {
@@ -73,8 +73,8 @@ std::vector<bool> lit_patches(const TransferData& data, std::span<const Float3> 
   return lit;
 }
 
-// How good a view is: much surface, near nothing, of many orientations and materials, through no
-// culled face, and lit.
+// The quality of a view: much lit surface, nothing too near, many orientations and materials, no
+// culled faces.
 float score(const Camera& camera, const TransferData& data, const RayTracer& tracer,
             const std::vector<bool>& lit, float diagonal) {
   std::vector<Ray> rays = probe_rays(camera);
@@ -130,7 +130,8 @@ std::vector<Camera> views_from_inside(const Box& box) {
   return views;
 }
 
-// One view toward the middle of each of the four upright sides, which then fills the picture.
+// One view of each of the four upright sides of the box, towards its centre; the side fills the
+// picture.
 std::vector<Camera> views_from_outside(const Box& box) {
   std::vector<Camera> views;
   const glm::vec3 center = 0.5F * (box.low + box.high), size = box.high - box.low;

@@ -12,11 +12,10 @@ namespace rebounce {
 /// angle is not in (0, pi).
 Camera look_at(const Float3& position, const Float3& target, float vertical_fov);
 
-/// A sensible view of a scene that has no camera: level with the horizon, from inside a room or
-/// from its open side. Of a few hundred candidates it takes the one that sees the most surface, in
-/// the most directions, through the fewest culled faces, and of which most is lit: `radiosity` [n]
-/// in lx, or nothing if there is no light yet. `tracer` holds the scene's surface. The same scene
-/// and light give the same view.
+/// A view for a scene without a camera: level, from inside a room or through its open side. Of a
+/// few hundred candidates it returns the one that sees the most surface, in the most directions,
+/// through the fewest culled faces, and mostly lit. `radiosity` [n] is in lx; it may be empty.
+/// `tracer` holds the surface of the scene. The same scene and light give the same view.
 Camera fit_camera(const TransferData& data, const RayTracer& tracer,
                   std::span<const Float3> radiosity = {});
 

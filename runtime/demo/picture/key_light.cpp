@@ -12,12 +12,12 @@ namespace {
 
 constexpr double kFluxPerArea = 100;  // lm/m²
 constexpr std::size_t kCandidates = 128;
-constexpr std::size_t kReceivers = 512;  // patches that a candidate may reach
+constexpr std::size_t kReceivers = 512;  // patches that a candidate may light
 
-// A lamp counts as close to a surface within this part of the scene's diagonal.
+// A lamp is close to a surface within this fraction of the scene's diagonal.
 constexpr float kCloseness = 0.15F;
 
-// `count` patches, spread evenly over the surface's area.
+// `count` patches, evenly distributed over the surface area.
 std::vector<std::size_t> spread_patches(const PatchTable& patches, std::size_t count) {
   const double total = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
   std::vector<std::size_t> chosen;
@@ -34,7 +34,7 @@ Float3 above(const PatchTable& patches, std::size_t patch, const RayTracer& trac
   return tracer.offset_point(patches.centroid[patch], patches.normal[patch]);
 }
 
-// Half way from each patch to what is opposite, or up to `reach`.
+// Half way from each patch to the opposite surface, at most `reach` metres.
 std::vector<Float3> candidates(const PatchTable& patches, const RayTracer& tracer, float reach) {
   std::vector<Ray> rays;
   for (const std::size_t i : spread_patches(patches, kCandidates)) {
@@ -53,8 +53,8 @@ std::vector<Float3> candidates(const PatchTable& patches, const RayTracer& trace
   return places;
 }
 
-// How many of `receivers` see `place`, times its distance to the nearest that does, `reach` at
-// most.
+// The number of `receivers` that see `place`, times the distance to the nearest of them, at most
+// `reach`.
 float merit(const Float3& place, std::span<const std::size_t> receivers, const PatchTable& patches,
             const RayTracer& tracer, float reach) {
   std::vector<Ray> rays;

@@ -5,9 +5,9 @@
 
 namespace rebounce {
 
-/// A point light for a scene that has no light of its own: in free space, where it reaches much of
-/// the surface and is not close to any of it. It sends out 100 lm for each m² of surface. The same
-/// scene, the same light. `tracer` holds the scene's surface.
+/// A point light for a scene without lights, in free space, where it reaches much of the surface
+/// and is not close to any of it. It emits 100 lm per m² of surface. The same scene gives the same
+/// light. `tracer` holds the surface of the scene.
 Light make_key_light(const TransferData& data, const RayTracer& tracer);
 
 }  // namespace rebounce

@@ -25,8 +25,8 @@ constexpr int kTile = 16;  // pixels a side
 constexpr int kMaxSide = 32768;
 constexpr int kMaxSamplesPerAxis = 64;
 constexpr int kMaxEmitterSamples = 65536;
-constexpr int kMaxLayers = 16;    // that a camera ray sees through; the next is opaque
-const glm::vec3 kNothing(0.02F);  // what is behind patches and errors
+constexpr int kMaxLayers = 16;    // layers that a camera ray sees through; the next one is opaque
+const glm::vec3 kNothing(0.02F);  // background of patches and errors
 
 void check_setting(int value, int most, const char* name) {
   if (value >= 1 && value <= most) return;
@@ -46,7 +46,7 @@ void check(const PictureSettings& settings) {
   }
 }
 
-// Camera rays of a tile, in the order of pixels and then samples.
+// The camera rays of a tile, by pixel, then by sample.
 struct CameraRays {
   std::vector<Ray> rays;
   std::vector<std::uint32_t> pixel;
@@ -61,7 +61,7 @@ class View {
         pixel_width_(2 * std::tan(0.5F * settings.camera.vertical_fov) /
                      static_cast<float>(settings.height)) {}
 
-  // Metres between neighbouring samples at ray parameter t.
+  // The distance in metres between neighbouring samples at ray parameter t.
   float footprint(float t) const {
     return pixel_width_ * t / static_cast<float>(settings_.samples_per_axis);
   }
@@ -109,7 +109,7 @@ class View {
   float pixel_width_;  // at unit distance along the axis
 };
 
-// Takes away from the rays what stops at their hits, and returns it; the rest of them goes on.
+// Returns the part of each ray that stops at its hit, and leaves the rest in the ray.
 std::vector<CameraSample> seen_surface(CameraRays& tile, std::span<const Hit> hits, bool last_layer,
                                        const DisplaySurface& surface, const View& view) {
   std::vector<CameraSample> samples;
@@ -122,7 +122,7 @@ std::vector<CameraSample> seen_surface(CameraRays& tile, std::span<const Hit> hi
     sample.weight = opacity * tile.weight[k];
     sample.point = surface.point_at(hits[k]);
     const glm::vec3 direction = glm::normalize(to_glm(tile.rays[k].direction));
-    // A slanted surface spreads the footprint in one direction; its mean width is what counts.
+    // A slanted surface stretches the footprint in one direction; its mean width is used.
     const float cosine = std::abs(glm::dot(direction, sample.point.geometric_normal));
     sample.footprint = view.footprint(hits[k].t) / std::sqrt(std::max(cosine, 0.01F));
     samples.push_back(sample);
@@ -137,20 +137,20 @@ std::vector<CameraSample> seen_surface(CameraRays& tile, std::span<const Hit> hi
   return samples;
 }
 
-// Draws into pixels; one per picture, used by all threads on different pixels.
+// Draws into pixels. A picture has one painter; all threads use it, on different pixels.
 class Painter {
  public:
   virtual ~Painter() = default;
 
-  // Adds to `pixel` what a camera ray of this `weight` sees where there is no surface.
+  // Adds to `pixel` what a camera ray of `weight` sees where there is no surface.
   virtual void paint_background(std::uint32_t index, float weight, const glm::vec3& direction,
                                 std::span<glm::vec3> pixel) = 0;
 
-  // Adds the colours of `samples` to their pixels, each times its weight.
+  // Adds the colours of `samples` to their pixels, times their weights.
   virtual void paint(std::span<CameraSample> samples, std::span<glm::vec3> pixel) = 0;
 };
 
-// What shines by itself, apart from what is lit: its mean where it covers a pixel.
+// Emitters, separate from lit surface: their mean where they cover a pixel.
 struct ShiningLayer {
   std::vector<glm::vec3> luminance;  // cd/m² x coverage
   std::vector<float> coverage;       // [0, 1]
@@ -163,9 +163,9 @@ struct ShiningLayer {
     coverage[pixel] += weight;
   }
 
-  // A lamp may be a thousand times brighter than the screen's white: a pixel that it covers by a
-  // sixteenth would be white as well, and its edge jagged. So it is dimmed, hue kept, to
-  // `brightest` before it is mixed in.
+  // A lamp may be a thousand times brighter than the screen's white. A pixel that it covers by a
+  // sixteenth would be white too, and its edge jagged. So its colour is dimmed to `brightest`, with
+  // the same hue, before it is blended.
   glm::vec3 dimmed(std::size_t pixel, float brightest) const {
     return rebounce::dimmed(luminance[pixel], brightest * coverage[pixel]);
   }
@@ -208,7 +208,7 @@ class LightPainter final : public Painter {
     }
   }
 
-  // Stops that suit what does not emit.
+  // The exposure for everything but emitters, in stops.
   float exposure() const {
     std::vector<float> mean;
     for (std::size_t k = 0; k < reflected_.size(); ++k) {
@@ -217,7 +217,7 @@ class LightPainter final : public Painter {
     return automatic_exposure(std::move(mean));
   }
 
-  // Adds emitters and sky, once the exposure is known.
+  // Adds emitters and sky; they need the exposure.
   void add_shining(float exposure, std::span<glm::vec3> pixel) const {
     const float brightest = kBrightestEmitter * std::exp2(-exposure);
     for (std::size_t k = 0; k < pixel.size(); ++k) pixel[k] += shining_.dimmed(k, brightest);
@@ -247,7 +247,7 @@ class LightPainter final : public Painter {
   const PictureLight& light_;
   const PictureSettings& settings_;
   VertexLight vertex_light_;
-  std::vector<float> reflected_, coverage_;  // by pixel, of what does not emit
+  std::vector<float> reflected_, coverage_;  // by pixel, without emitters
   ShiningLayer shining_;
 };
 
@@ -291,7 +291,7 @@ class PatchPainter final : public Painter {
   float top_ = 0;
 };
 
-// Pixels belong to one tile each and tiles to one thread each: the order of every sum is fixed.
+// Each pixel belongs to one tile and each tile to one thread, so the order of every sum is fixed.
 std::vector<glm::vec3> paint_tiles(const RayTracer& tracer, const DisplaySurface& surface,
                                    const PictureSettings& settings, Painter& painter) {
   const View view(settings);

@@ -13,8 +13,8 @@ namespace rebounce {
 
 /// What a picture shows.
 enum class Show : std::uint8_t {
-  kDirect,     ///< light straight from lamps, sky and emitters, and the emitters themselves
-  kIndirect,   ///< only what has bounced at least once
+  kDirect,     ///< light directly from lamps, sky and emitters, and the emitters themselves
+  kIndirect,   ///< only light that has bounced at least once
   kRadiosity,  ///< both
   kPatches,    ///< every patch in a colour of its own
   kError,      ///< a number per patch in a colour map (viridis)
@@ -25,16 +25,16 @@ struct PictureSettings {
   int height = 720;  ///< pixels
   Camera camera;     ///< the horizontal field of view follows from the aspect ratio
   Show show = Show::kRadiosity;
-  std::optional<float> exposure;  ///< stops; unset: found from the picture
+  std::optional<float> exposure;  ///< stops; unset: computed from the picture
   int samples_per_axis = 4;  ///< camera rays per pixel = its square; more: smoother edges, slower
   int emitter_samples = 64;  ///< per pixel; more: less grain in the shadows of emitters, slower
-  float error_top = 0;       ///< the number at the top of the colour map; 0: the largest one
+  float error_top = 0;       ///< the value at the top of the colour map; 0: the largest one
 };
 
-/// Draws pictures of one scene; keeps its decoded textures from one to the next.
+/// Draws pictures of one scene; keeps its decoded textures between pictures.
 ///
-/// One-sided surfaces are not seen from behind (a camera outside a closed room looks in), but cast
-/// shadows from both sides. The same bits for any number of OpenMP threads.
+/// One-sided surfaces are invisible from behind (a camera outside a closed room sees into it) but
+/// cast shadows from both sides. Gives the same bits for any number of OpenMP threads.
 class PictureRenderer {
  public:
   /// `data` and `tracer` must outlive the renderer; `tracer` holds the first surface_count()
@@ -56,7 +56,7 @@ class PictureRenderer {
 Picture render_picture(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                        const PictureSettings& settings);
 
-/// Stops that suit a picture of the scene from `camera`, found from a small one.
+/// The exposure in stops for a picture of the scene from `camera`, computed from a small picture.
 float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
                    const Camera& camera);
 

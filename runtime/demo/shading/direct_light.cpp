@@ -13,7 +13,7 @@
 namespace rebounce {
 namespace {
 
-// Shadow rays with what each of them carries, traced together.
+// Shadow rays with the light that each carries, traced in batches.
 class ShadowRays {
  public:
   void add(CameraSample& receiver, const Ray& ray, const glm::vec3& irradiance) {
@@ -21,7 +21,7 @@ class ShadowRays {
     arrivals_.push_back({&receiver, irradiance});
   }
 
-  // Adds what arrives to its receivers, in the order of `add`, and forgets all rays.
+  // Adds the light that arrives to its receivers, in the order of `add`, and removes all rays.
   void deliver(const RayTracer& tracer) {
     transmitted_.resize(rays_.size());
     tracer.transmittance(rays_, PassageDetail::kMicroTriangle, transmitted_);
@@ -42,7 +42,7 @@ class ShadowRays {
   std::vector<Arrival> arrivals_;
 };
 
-// Cosine at the receiver for light from `direction`; zero from below its triangle.
+// The cosine at the receiver for light from `direction`; zero if it comes from below the triangle.
 float receiving_cosine(const SurfacePoint& point, const glm::vec3& direction) {
   if (glm::dot(point.geometric_normal, direction) <= 0) return 0;
   return std::max(0.0F, glm::dot(point.shading_normal, direction));
@@ -65,10 +65,10 @@ Ray ray_to_lamp(const PreparedLight& lamp, const UnitLight& light, const Float3&
           .t_far = 1};
 }
 
-// Places of a lamp with a surface at which each camera sample looks.
+// Sample points of a lamp with a surface per camera sample.
 constexpr std::uint32_t kPlacesPerSample = 4;
 
-// Place k of those, spread over all of the samples of a pixel.
+// Sample point k of a camera sample; together the samples of a pixel cover the lamp evenly.
 glm::vec2 place_on_lamp(const CameraSample& sample, std::uint32_t k) {
   const glm::vec2 shift(hash_to_unit(sample.pixel, 5), hash_to_unit(sample.pixel, 6));
   return r2_point(kPlacesPerSample * sample.index + k, shift);
@@ -86,7 +86,7 @@ UnitLight light_of(const PreparedLight& lamp, const CameraSample& sample, std::u
 float form_factor(const SurfacePoint& receiver, const EmitterPiece& piece) {
   const glm::vec3 path = piece.centroid - receiver.position;
   const float distance_squared = glm::dot(path, path);
-  // From this far, a piece's middle stands for the whole to about 0.2 %.
+  // Beyond this distance the centre of a piece represents it with an error of about 0.2 %.
   constexpr float kFar = 32;
   if (distance_squared < kFar * piece.area) {
     return point_to_polygon_form_factor(receiver.position, receiver.shading_normal, piece.corner);
@@ -96,14 +96,14 @@ float form_factor(const SurfacePoint& receiver, const EmitterPiece& piece) {
   return cosines * piece.area / (std::numbers::pi_v<float> * distance_squared * distance_squared);
 }
 
-// The irradiance from a piece where nothing is in between.
+// The unshadowed irradiance from a piece.
 glm::vec3 from_piece(const SurfacePoint& receiver, const EmitterPiece& piece) {
   const bool in_front = glm::dot(piece.normal, receiver.position - piece.centroid) > 0;
   if (!in_front) return glm::vec3(0);
   return std::numbers::pi_v<float> * piece.luminance * form_factor(receiver, piece);
 }
 
-// A point of the piece for `place` in the unit square, uniformly.
+// A uniform point of the piece, for `place` in the unit square.
 glm::vec3 point_on(const EmitterPiece& piece, const glm::vec2& place) {
   const float root = std::sqrt(place.x);
   return (1 - root) * piece.corner[0] + root * (1 - place.y) * piece.corner[1] +
@@ -156,7 +156,7 @@ void add_emitter_light(std::span<CameraSample> samples, const Emitters& emitters
       const auto [piece, weight] = emitters.draw(index, hash_to_unit(sample.pixel, 0));
       const glm::vec3 arriving = from_piece(sample.point, *piece);
       if (arriving == glm::vec3(0)) continue;
-      // What arrives is exact; only whether it does is found from one point of the piece.
+      // The irradiance is exact; visibility is tested at one point of the piece.
       const glm::vec2 shift(hash_to_unit(sample.pixel, 1), hash_to_unit(sample.pixel, 2));
       Ray ray;
       if (!ray_to_piece(sample.point, *piece, point_on(*piece, r2_point(index, shift)), tracer,

@@ -11,7 +11,7 @@
 
 namespace rebounce {
 
-/// What a camera ray saw, and the light that arrives there.
+/// A surface point that a camera ray sees, and the light that arrives there.
 struct CameraSample {
   std::uint32_t pixel = 0;  ///< y * width + x
   std::uint32_t index = 0;  ///< among the camera samples of its pixel
@@ -25,8 +25,8 @@ struct CameraSample {
 void add_punctual_light(std::span<CameraSample> samples, std::span<const Light> lights,
                         const RayTracer& tracer);
 
-/// Adds the first flight of the emitters' light, with shadows. Each camera sample of a pixel takes
-/// its share of the emitters' pieces for all of them: only the pixel's mean is complete.
+/// Adds the direct light of emitters, with shadows. Each camera sample of a pixel uses a share of
+/// the emitters' pieces in place of all, so only the mean of the pixel is complete.
 void add_emitter_light(std::span<CameraSample> samples, const Emitters& emitters,
                        const RayTracer& tracer, int samples_per_pixel);
 

@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-// Layers that a camera ray may pass; more than any sensible scene has.
+// Layers that a camera ray may pass; more than any realistic scene has.
 constexpr int kMaxPassedLayers = 256;
 
 glm::vec3 unit_or(const glm::vec3& v, const glm::vec3& otherwise) {
@@ -17,7 +17,7 @@ glm::vec3 unit_or(const glm::vec3& v, const glm::vec3& otherwise) {
   return length > 1e-6F ? v / length : otherwise;
 }
 
-// Square root of the ratio of texture area to surface area.
+// The square root of the ratio of texture area to surface area.
 float texcoord_per_metre(const DisplayMesh& mesh, std::span<const Float2> texcoord,
                          std::uint32_t triangle) {
   const Uint3& corner = mesh.triangle[triangle];
@@ -44,7 +44,7 @@ DisplaySurface::DisplaySurface(const TransferData& data)
 SurfacePoint DisplaySurface::point_on(std::uint32_t triangle, const glm::vec3& weight) const {
   const DisplayMesh& m = mesh();
   // In double precision: the error of the point must not exceed the rounding of its coordinates,
-  // or offset_point could leave it on the wrong side.
+  // otherwise offset_point could leave it on the wrong side.
   const TriangleCorners t = corners_of(m, triangle);
   const double v = weight.y, w = weight.z;
   SurfacePoint point{.triangle = triangle, .weight = weight};
@@ -126,7 +126,7 @@ glm::vec3 DisplaySurface::emitted_luminance(const SurfacePoint& point, float wid
 }
 
 float beyond(const Hit& hit) {
-  return hit.t * (1 + 1e-6F);  // a few roundings further
+  return hit.t * (1 + 1e-6F);  // a few rounding errors further
 }
 
 bool is_culled(const DisplayMesh& mesh, const Hit& hit) {
@@ -135,7 +135,7 @@ bool is_culled(const DisplayMesh& mesh, const Hit& hit) {
 
 namespace {
 
-// Finds the first hit of each ray that it does not pass, as `passes`(hit) says.
+// Finds the first hit of each ray for which `passes`(hit) is false.
 template <typename Passes>
 void intersect_past(const RayTracer& tracer, Passage passage, const Passes& passes,
                     std::span<Ray> rays, std::span<Hit> hits) {

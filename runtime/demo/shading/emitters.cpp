@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-constexpr int kMaxLevel = 8;  // 4^8 pieces of one triangle
+constexpr int kMaxLevel = 8;  // at most 4^8 pieces of one triangle
 
 using Corners = std::array<glm::vec3, 3>;
 
@@ -24,7 +24,7 @@ Corners corners_of(const DisplayMesh& mesh, std::uint32_t triangle) {
           to_glm(mesh.position[corner[2]])};
 }
 
-// The power of a triangle up to a factor; 0 if it does not emit.
+// The power of a triangle up to a common factor; 0 if it does not emit.
 double power_of(const TransferData& data, std::uint32_t triangle) {
   const std::uint32_t patch = data.mesh.triangle_patch[triangle];
   if (patch == kNone) return 0;
@@ -32,7 +32,7 @@ double power_of(const TransferData& data, std::uint32_t triangle) {
          luminance(to_glm(data.patches.emitted_exitance[patch]));
 }
 
-// The triangle's four quarters: at its corners and in its middle.
+// The four quarters of a triangle: at its corners and in its centre.
 std::array<Corners, 4> quarters(const Corners& t) {
   const glm::vec3 ab = 0.5F * (t[0] + t[1]), bc = 0.5F * (t[1] + t[2]), ca = 0.5F * (t[2] + t[0]);
   return {{{t[0], ab, ca}, {ab, t[1], bc}, {ca, bc, t[2]}, {bc, ca, ab}}};
@@ -46,7 +46,7 @@ Emitters::Emitters(const TransferData& data, const DisplaySurface& surface, int 
   for (std::uint32_t t = 0; t < power.size(); ++t) total += power[t] = power_of(data, t);
   for (std::uint32_t t = 0; t < power.size(); ++t) {
     if (!(power[t] > 0)) continue;
-    // Each level quarters a piece.
+    // Each level divides a piece into four.
     const double level = 0.5 * std::log2(piece_count * power[t] / total);
     add_pieces(surface, t, static_cast<int>(std::clamp<long>(std::lround(level), 0, kMaxLevel)));
   }
@@ -56,7 +56,7 @@ Emitters::Emitters(const TransferData& data, const DisplaySurface& surface, int 
 }
 
 void Emitters::add_pieces(const DisplaySurface& surface, std::uint32_t triangle, int level) {
-  // Barycentric weights of the pieces' corners, quartered in step with their positions.
+  // Barycentric weights of the pieces' corners, divided along with their positions.
   std::vector<Corners> weights{{glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)}};
   for (int k = 0; k < level; ++k) {
     std::vector<Corners> finer;

@@ -10,7 +10,7 @@
 
 namespace rebounce {
 
-/// A piece of an emitting surface that is treated as uniform.
+/// A piece of an emitting surface, with uniform luminance.
 struct EmitterPiece {
   std::array<glm::vec3, 3> corner;
   glm::vec3 centroid{0, 0, 0};
@@ -19,23 +19,23 @@ struct EmitterPiece {
   float area = 0;                ///< m²
 };
 
-/// A piece, and how many pieces it stands for.
+/// A piece, and the number of pieces that it represents.
 struct ChosenPiece {
   const EmitterPiece* piece = nullptr;
   float weight = 1;
 };
 
-/// All emitting surface, cut into pieces of about equal power.
+/// All emitting surface, divided into pieces of about equal power.
 class Emitters {
  public:
-  /// Cuts into about `piece_count` pieces; more if more triangles than that emit.
+  /// Divides into about `piece_count` pieces; more if more triangles emit.
   Emitters(const TransferData& data, const DisplaySurface& surface, int piece_count);
 
-  /// How many pieces to draw for a complete picture of the emitters: all of them, or a sample of
+  /// The number of draws for a complete picture of the emitters: all pieces, or a sample of
   /// `piece_count` if there are many more.
   std::uint32_t draw_count() const { return draw_count_; }
 
-  /// Draw `index` < draw_count(). `shift` in [0, 1) selects which pieces a sample takes.
+  /// Draw `index` < draw_count(). `shift` in [0, 1) selects the sampled pieces.
   ChosenPiece draw(std::uint32_t index, float shift) const;
 
  private:
@@ -43,7 +43,7 @@ class Emitters {
   void find_shares();
 
   std::vector<EmitterPiece> pieces_;
-  std::vector<double> power_end_;  // running sum of the pieces' shares of the power, last = 1
+  std::vector<double> power_end_;  // running sum of the pieces' fractions of the power, last = 1
   std::uint32_t draw_count_ = 0;
 };
 

@@ -7,9 +7,9 @@
 
 namespace rebounce {
 
-/// |values - reference| of each patch over all channels, as a part of the reference's root mean
-/// square over the surface; 0 where the reference is dark everywhere. All have n entries; `area` in
-/// m².
+/// |values - reference| of each patch over all channels, relative to the reference's root mean
+/// square over the surface. 0 if the reference is 0 everywhere. All arrays have n entries; `area`
+/// is in m².
 std::vector<float> patch_errors(std::span<const Float3> values, std::span<const Float3> reference,
                                 std::span<const float> area);
 

@@ -25,7 +25,7 @@ VertexLight light_at_vertices(const TransferData& data, const PictureLight& ligh
     sky[i] = to_glm(sky_irradiance(data, light.sky, i));
     if (!light.indirect_irradiance.empty()) bounced[i] = to_glm(light.indirect_irradiance[i]);
     if (!light.emitted_irradiance.empty()) bounced[i] -= to_glm(light.emitted_irradiance[i]);
-    // The operator's error may leave a little less than the first flight.
+    // The error of the operator may make this slightly negative.
     bounced[i] = glm::max(bounced[i], glm::vec3(0));
   }
   return {reconstruct_at_vertices(data.mesh, sky), reconstruct_at_vertices(data.mesh, bounced)};

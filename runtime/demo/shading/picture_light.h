@@ -13,9 +13,9 @@ namespace rebounce {
 struct PictureLight {
   std::span<const Light> lights{};
   Sky sky{};
-  std::span<const Float3> indirect_irradiance{};  ///< H = F B in lx, what the operator gives
-  /// F M_e in lx: the part of H that comes straight from emitters. The picture finds it anew in
-  /// every pixel, with sharp shadows, and takes only the rest of H from the patches.
+  std::span<const Float3> indirect_irradiance{};  ///< H = F B in lx, the product of the operator
+  /// F M_e in lx: the part of H that comes directly from emitters. The picture computes this part
+  /// for every pixel, with sharp shadows, and takes only the rest of H from the patches.
   std::span<const Float3> emitted_irradiance{};
   std::span<const float> error{};  ///< >= 0, drawn by Show::kError
 };

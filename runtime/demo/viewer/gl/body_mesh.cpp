@@ -8,7 +8,7 @@
 namespace rebounce {
 namespace {
 
-/// Adds triangles that `vertices` more vertices of the mesh are the corners of.
+/// Adds `triangles` over `vertices` new vertices of the mesh; the caller fills in the vertices.
 BodyPart add_part(std::span<const Uint3> triangles, std::size_t vertices, BodyMesh& mesh) {
   const auto first = static_cast<std::uint32_t>(mesh.vertex.size());
   BodyPart part{.begin = static_cast<std::uint32_t>(mesh.triangle.size())};

@@ -11,7 +11,8 @@
 
 namespace rebounce {
 
-/// A vertex of what is not part of the scene: colour and light are linear, light in lx.
+/// A vertex of an object that is not part of the scene. Colour and light are linear; light is in
+/// lx.
 struct BodyVertex {
   Float3 position{}, normal{}, color{};
   Float3 first_flight{};  ///< sky and emitters
@@ -24,7 +25,7 @@ struct BodyPart {
   Float3 emitted_luminance{0, 0, 0};  ///< cd/m²
 };
 
-/// Spheres that are lit, and the surfaces of lamps, as triangles.
+/// Lit spheres and the surfaces of lamps, as triangles.
 struct BodyMesh {
   std::vector<BodyVertex> vertex;
   std::vector<Uint3> triangle;
@@ -34,11 +35,11 @@ struct BodyMesh {
 /// Unit normals of the vertices that add_sphere makes, in their order.
 const std::vector<Float3>& sphere_normals();
 
-/// Adds a sphere; `shade`(k) is all of its vertex k but place and normal.
+/// Adds a sphere. `shade`(k) returns its vertex k; position and normal are filled in.
 void add_sphere(const Float3& center, float radius,
                 const std::function<BodyVertex(std::size_t k)>& shade, BodyMesh& mesh);
 
-/// Adds the surface of `lamp` as something that shines; nothing if it has none.
+/// Adds the surface of `lamp` as an emitter; nothing if it has none.
 void add_lamp_surface(const Light& lamp, BodyMesh& mesh);
 
 }  // namespace rebounce

@@ -1,6 +1,6 @@
 #pragma once
 
-// OpenGL 3.3 core, with owners for what it allocates. All of it needs a current context.
+// OpenGL 3.3 core, with owners for its objects. Everything here needs a current context.
 
 #define GL_GLEXT_PROTOTYPES
 #include <GL/glcorearb.h>
@@ -9,7 +9,7 @@
 
 namespace rebounce {
 
-/// Owns one OpenGL object of a kind that `Traits` makes and deletes.
+/// Owns an OpenGL object that `Traits` creates and deletes.
 template <typename Traits>
 class GlObject {
  public:

@@ -10,7 +10,7 @@ namespace rebounce {
 /// A linked vertex and fragment shader.
 class GlProgram {
  public:
-  /// Throws Error with the compiler's words if the sources do not compile and link.
+  /// Throws Error with the compiler's message if the sources do not compile and link.
   GlProgram(const char* vertex_source, const char* fragment_source);
   ~GlProgram();
   GlProgram(const GlProgram&) = delete;
@@ -18,7 +18,7 @@ class GlProgram {
 
   void use() const { glUseProgram(name_); }
 
-  // Uniforms of the program, which must be in use.
+  // Sets a uniform. The program must be in use.
   void set(const char* uniform, int value) const;
   void set(const char* uniform, float value) const;
   void set(const char* uniform, const glm::vec2& value) const;

@@ -11,10 +11,10 @@
 
 namespace rebounce {
 
-/// A BodyMesh on the graphics card, anew for each frame.
+/// A BodyMesh on the graphics card; it is replaced in each frame.
 class GpuBodies {
  public:
-  /// `scene` draws what has no texture, and must outlive the object.
+  /// `scene` sets the materials without textures, and must outlive the object.
   explicit GpuBodies(const GpuScene& scene);
 
   void upload(BodyMesh mesh);

@@ -11,7 +11,7 @@
 namespace rebounce {
 namespace {
 
-// What does not change of a vertex.
+// The attributes of a vertex that never change.
 struct StaticVertex {
   Float3 position, normal, color;
   Float2 base_color_texcoord, emissive_texcoord;
@@ -61,7 +61,7 @@ void attach_table(const GlTexture& texture, GLenum format, const GlBuffer& buffe
   glTexBuffer(GL_TEXTURE_BUFFER, format, buffer.name());
 }
 
-// What shaders discard: where the texture's alpha times base_alpha is below alpha_cutoff.
+// Shaders discard fragments whose texture alpha times base_alpha is below alpha_cutoff.
 struct AlphaTest {
   float base_alpha, alpha_cutoff;
   bool operator==(const AlphaTest&) const = default;
@@ -74,7 +74,7 @@ struct AlphaTest {
 
 constexpr AlphaTest kAllThere{1, -1}, kNotThere{0, 1};
 
-// As DisplaySurface::opacity, but that half of the light is as good as all of it.
+// Like DisplaySurface::opacity, but rounded to 0 or 1.
 AlphaTest alpha_test(const Material& material) {
   const bool emits = material.emitted_luminance != Float3{0, 0, 0};
   const float solid = emits ? 1 : 1 - material.transmission;
@@ -128,7 +128,7 @@ void GpuScene::sort_triangles() {
   attach_table(triangle_patch_texture_, GL_R32UI, triangle_patches_);
 }
 
-/// What is there all over comes first, as one range.
+/// Opaque surface comes first, as one range.
 void GpuScene::sort_surface() {
   const DisplayMesh& mesh = data_.mesh;
   const auto group = [&](std::uint32_t t) {
@@ -198,7 +198,7 @@ void GpuScene::upload_bounced(Side side, std::span<const glm::vec3> value) {
 }
 
 void GpuScene::upload_patch_colors(Side side, std::span<const glm::vec3> color) {
-  // Tables of three floats are OpenGL 4.
+  // Buffer textures with three floats need OpenGL 4.
   std::vector<glm::vec4> padded;
   padded.reserve(color.size());
   for (const glm::vec3& c : color) padded.emplace_back(c, 1);

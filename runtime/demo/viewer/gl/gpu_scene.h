@@ -16,24 +16,24 @@ namespace rebounce {
 enum class Side : std::uint8_t { kFirst, kSecond };
 inline constexpr std::size_t kSideCount = 2;
 
-/// A scene on the graphics card: what stands still once, the light of each frame anew.
+/// A scene on the graphics card. Geometry is uploaded once, light in each frame.
 class GpuScene {
  public:
   /// Throws Error if a texture cannot be decoded.
   explicit GpuScene(const TransferData& data);
 
-  /// Light at the vertices [v] in lx that has not bounced yet: sky and emitters.
+  /// Uploads the direct light of sky and emitters at the vertices [v], lx.
   void upload_first_flight(std::span<const glm::vec3> value);
-  /// Bounced light at the vertices [v] in lx.
+  /// Uploads the bounced light at the vertices [v], lx.
   void upload_bounced(Side side, std::span<const glm::vec3> value);
-  /// A linear colour for each patch [n].
+  /// Uploads a linear colour for each patch [n].
   void upload_patch_colors(Side side, std::span<const glm::vec3> color);
 
-  /// Draws every material in turn; binds its textures to units 0 (base colour) and 1 (emissive) and
-  /// sets base_color, emitted_luminance, base_alpha and alpha_cutoff: where a texture's alpha times
-  /// base_alpha is below alpha_cutoff nothing is there.
+  /// Draws every material in turn. Binds its textures to units 0 (base colour) and 1 (emissive) and
+  /// sets base_color, emitted_luminance, base_alpha and alpha_cutoff. Shaders discard fragments
+  /// whose texture alpha times base_alpha is below alpha_cutoff.
   void draw_materials(const GlProgram& program, Side side) const;
-  /// Does the same for something without textures, white, that is about to be drawn.
+  /// Sets the same for an object that is drawn next, white and without textures.
   void set_plain_material(const GlProgram& program, const Float3& emitted_luminance) const;
   /// Draws with the colours of patches at texture units 0 and 1; sets first_triangle.
   void draw_patches(const GlProgram& program, Side side) const;

@@ -2,8 +2,8 @@
 
 namespace rebounce {
 
-/// An OpenGL 3.3 context without a window or display, current while the object lives. Through EGL,
-/// on the graphics card or, where there is none, Mesa's software renderer.
+/// An OpenGL 3.3 context without a window or display, current while the object lives. It uses EGL,
+/// with the graphics card or else Mesa's software renderer.
 class HeadlessContext {
  public:
   /// Throws Error if this machine has no such OpenGL.

@@ -8,11 +8,11 @@
 namespace rebounce::shaders {
 namespace {
 
-/// What arrives from a lamp with a surface is its closed form times the part that is not hidden, as
-/// seen by shadow maps from places all over the lamp, each weighted by what it contributes (E.
-/// Heitz, S. Hill, M. McGuire, "Combining analytic direct illumination and stochastic shadows", I3D
-/// 2018). Each place stands for a part of the lamp, whose own small half shadow is that of R.
-/// Fernando, "Percentage-closer soft shadows", SIGGRAPH 2005.
+/// A lamp with a surface has the irradiance of its closed form times its visible fraction. Shadow
+/// maps from points all over the lamp give this fraction, each point weighted by its contribution
+/// (E. Heitz, S. Hill, M. McGuire, "Combining analytic direct illumination and stochastic shadows",
+/// I3D 2018). Each point stands for a part of the lamp; the part's own small penumbra is computed
+/// as in R. Fernando, "Percentage-closer soft shadows", SIGGRAPH 2005.
 constexpr const char* kBegin = R"(#version 330 core
 in vec3 world_position, shading_normal, color;
 in vec2 base_uv;
@@ -199,7 +199,8 @@ void main() {
 }
 )";
 
-/// A function that hands `arguments` on to that of the lamp's kind whose name ends in `suffix`.
+/// A function that passes `arguments` on to the function of the lamp's kind whose name ends in
+/// `suffix`.
 std::string dispatcher(const std::string& declaration, const std::string& suffix,
                        const std::string& arguments, const std::string& otherwise,
                        bool surfaces_only) {

@@ -5,13 +5,13 @@
 
 namespace rebounce {
 
-/// Places on a lamp with a surface from which its shadows are seen.
+/// Shadow maps of a lamp with a surface.
 inline constexpr std::uint32_t kLampPlaceCount = 16;
 
 namespace shaders {
 
-/// GLSL that adds one lamp to what is there: the light that its kind (lamp_kind.h) says, times what
-/// shadow maps let through.
+/// GLSL that adds the light of one lamp: the irradiance of its kind (lamp_kind.h) times the
+/// fraction that the shadow maps let through.
 std::string lamp_fragment();
 
 }  // namespace shaders

@@ -18,7 +18,7 @@
 namespace rebounce {
 namespace {
 
-constexpr float kNearPart = 2e-4F;  // of the scene's diagonal
+constexpr float kNearPart = 2e-4F;  // fraction of the scene's diagonal
 
 glm::vec3 background(const FrameSettings& frame) {
   if (frame.show == Show::kPatches || frame.show == Show::kError) return glm::vec3(0.02F);
@@ -37,7 +37,7 @@ SceneBounds bounds_of(const DisplayMesh& mesh) {
   return bounds;
 }
 
-// World to clip space of `camera`, whose picture has this `aspect` (width / height).
+// World to clip space of `camera`, for a picture with this `aspect` (width / height).
 glm::mat4 view_of(const Camera& camera, float aspect, const SceneBounds& bounds) {
   const glm::vec3 eye = to_glm(camera.position);
   const float reach = bounds.diagonal() + glm::distance(eye, 0.5F * (bounds.low + bounds.high));
@@ -197,7 +197,7 @@ void SceneRenderer::draw_light(const FrameSettings& frame, const glm::mat4& view
 }
 
 void SceneRenderer::draw_lamp_surfaces() const {
-  // They may lie flush with a ceiling.
+  // Lamps may lie in the plane of a ceiling.
   glEnable(GL_POLYGON_OFFSET_FILL);
   glPolygonOffset(-2, -16);
   lamp_surfaces_.draw(ambient_, Side::kFirst);
@@ -228,7 +228,7 @@ void SceneRenderer::set_lamp_surface(const PreparedLight& lamp) const {
     places[k] = lamp.kind->surface->place(lamp, k, kLampPlaceCount);
   }
   lamp_.set("lamp_places", std::span<const glm::vec3>(places));
-  // Parts overlap, so that the edges of their shadows run into one another.
+  // Parts overlap, so that the edges of their shadows blend.
   constexpr float kOverlap = 1.5F;
   lamp_.set("place_reach", kOverlap * std::sqrt(lamp.area / (std::numbers::pi_v<float> *
                                                              static_cast<float>(places.size()))));

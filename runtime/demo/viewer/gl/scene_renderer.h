@@ -24,28 +24,28 @@ struct FrameSettings {
   Camera camera;
   Show show = Show::kRadiosity;
   float exposure = 0;            ///< stops
-  std::optional<float> split{};  ///< part of the width that shows the first side; unset: all
+  std::optional<float> split{};  ///< fraction of the width that shows the first side; unset: all
   std::span<const Light> lights{};
   Sky sky{};
 };
 
-/// Draws a GpuScene: light from its vertices, then each lamp with its shadow map, into a picture of
-/// wide range; then exposure, tone curve and encoding as in picture.h.
+/// Draws a GpuScene: light from its vertices, then each lamp with its shadow map, into a picture
+/// with high dynamic range; then exposure, tone curve and encoding as in picture.h.
 class SceneRenderer {
  public:
   /// `scene` must outlive the renderer.
   SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh);
 
-  /// What moves through the scene in the next frames: `spheres`, which cast shadows, unless
-  /// `keeps_places` as where they were; and lamps.
+  /// Sets the moving objects of the next frames: `spheres`, which cast shadows, and lamps.
+  /// `keeps_places`: the spheres have not moved.
   void set_bodies(BodyMesh spheres, bool keeps_places, std::span<const Light> lamps);
 
-  /// Brings the shadow maps up to date: one for each light.
+  /// Updates the shadow maps, one for each light.
   void update_shadows(std::span<const Light> lights);
 
   const SceneBounds& bounds() const { return bounds_; }
 
-  /// Draws into `framebuffer` (0: the window). update_shadows must have seen the same lights.
+  /// Draws into `framebuffer` (0: the window). Call update_shadows with the same lights first.
   void draw(const FrameSettings& frame, GLuint framebuffer);
 
  private:

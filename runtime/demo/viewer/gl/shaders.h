@@ -4,7 +4,7 @@
 
 namespace rebounce::shaders {
 
-/// Every pass over the scene places its vertices alike, to the bit, so that later ones can compare
+/// All passes over the scene compute exactly the same positions, so that later passes can test
 /// depths for equality.
 inline constexpr const char* kSceneVertex = R"(#version 330 core
 layout(location = 0) in vec3 position;
@@ -30,7 +30,7 @@ void main() {
 }
 )";
 
-/// What needs no shadow map: light from the vertices, and what shines by itself.
+/// Light that needs no shadow map: from the vertices, and emission.
 inline constexpr const char* kAmbientFragment = R"(#version 330 core
 in vec3 color, first_light, bounced_light;
 in vec2 base_uv, emissive_uv;

@@ -13,12 +13,12 @@
 namespace rebounce {
 namespace {
 
-// Texels a side.
+// Texels per side.
 constexpr int kCubeSide = 1024, kPlaneSide = 4096, kPlaceSide = 512;
 
-// Of the scene's diagonal: nearer than this nothing casts a shadow, as a lamp's own housing.
+// Fraction of the scene's diagonal: nearer objects, such as a lamp's own housing, cast no shadow.
 constexpr float kNearPart = 1e-3F;
-// Likewise, receivers are lifted off their surface by at least this.
+// Fraction of the scene's diagonal: receivers are moved off their surface by at least this.
 constexpr float kOffsetPart = 1e-4F;
 
 struct CubeFace {

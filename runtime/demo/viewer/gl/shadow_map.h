@@ -16,12 +16,12 @@ struct SceneBounds {
   float diagonal() const { return glm::length(high - low); }
 };
 
-/// What casts shadows: the scene, and what moves through it.
+/// The objects that cast shadows: the scene, and moving bodies.
 struct ShadowCasters {
   const GpuScene& scene;
   const GpuBodies& bodies;
   SceneBounds bounds;
-  int version = 0;  ///< another one for other bodies, or where they have moved
+  int version = 0;  ///< changes with the bodies or their positions
 
   void draw(const GlProgram& program) const {
     scene.draw_surface(program);
@@ -29,23 +29,23 @@ struct ShadowCasters {
   }
 };
 
-/// What one lamp sees: a cube of depths around a point or spot light, one plane for a directional
-/// one, cubes around all of its places for one with a surface. Drawn anew only when
-/// the lamp or a caster has moved.
+/// The shadow map of one lamp: a cube of depths around a point or spot light, one plane for a
+/// directional light, cubes around several points of a lamp with a surface. It is drawn again only
+/// if the lamp or a caster has moved.
 class ShadowMap {
  public:
   /// Makes the map fit `light`; `program` draws depths.
   void update(const Light& light, const ShadowCasters& casters, const GlProgram& program);
 
-  /// Binds the map to texture units 2 (cube), 3 (plane), 4 and 5 (places) and sets the
-  /// uniforms of shaders::lamp_fragment() that say how to look it up.
+  /// Binds the map to texture units 2 (cube), 3 (plane), 4 and 5 (cubes on a surface), and sets the
+  /// uniforms that lamp_fragment() uses to read it.
   void bind(const GlProgram& program) const;
 
   ShadowMap();
 
  private:
   void draw_places(const Light& light, const ShadowCasters& casters, const GlProgram& program);
-  /// Draws what is seen from `eye`; attach(face) makes a face the target.
+  /// Draws the depths seen from `eye`; attach(face) selects the face to draw.
   template <typename Attach>
   void draw_faces(const glm::vec3& eye, int side, const ShadowCasters& casters,
                   const GlProgram& program, const Attach& attach);

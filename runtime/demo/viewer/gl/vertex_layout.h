@@ -7,7 +7,7 @@
 
 namespace rebounce {
 
-/// What shaders::kSceneVertex takes of a vertex, by location.
+/// The inputs of shaders::kSceneVertex, by location.
 enum Attribute : GLuint {
   kPosition,
   kNormal,
@@ -18,15 +18,15 @@ enum Attribute : GLuint {
   kBounced,
 };
 
-/// Replaces what `buffer` holds.
+/// Replaces the contents of `buffer`.
 template <typename T>
 void fill(GLenum target, const GlBuffer& buffer, std::span<const T> values, GLenum usage) {
   glBindBuffer(target, buffer.name());
   glBufferData(target, static_cast<GLsizeiptr>(values.size_bytes()), values.data(), usage);
 }
 
-/// Lets `attribute` of the bound vertex array be `components` floats of the bound buffer, every
-/// `stride` bytes from `offset` on.
+/// Defines `attribute` of the bound vertex array as `components` floats of the bound buffer, at
+/// `offset` bytes, every `stride` bytes.
 inline void point_to(Attribute attribute, int components, std::size_t stride, std::size_t offset) {
   glEnableVertexAttribArray(attribute);
   glVertexAttribPointer(attribute, components, GL_FLOAT, GL_FALSE, static_cast<GLsizei>(stride),

@@ -19,7 +19,7 @@ namespace {
 constexpr float kHandleRadius = 9;  // pixels
 constexpr float kTurnPerPixel = 0.004F;
 constexpr float kCrossingSeconds = 6;  // to fly along the scene's diagonal
-constexpr float kHurry = 4;            // times faster with Shift
+constexpr float kHurry = 4;            // speed factor with Shift
 
 glm::vec2 screen_size() {
   const ImVec2 size = ImGui::GetIO().DisplaySize;
@@ -30,7 +30,7 @@ bool has_place(const Light& light) {
   return lamp_kind(light.type).has_place();
 }
 
-// Metres along the view of one pixel at `depth` metres.
+// The metres per pixel at `depth` metres.
 float metres_per_pixel(const Camera& camera, float depth) {
   return 2 * depth * std::tan(0.5F * camera.vertical_fov) / std::max(1.0F, screen_size().y);
 }
@@ -39,7 +39,7 @@ float depth_of(const Camera& camera, const glm::vec3& point) {
   return glm::dot(to_glm(camera.position) - point, to_glm(camera.backward));
 }
 
-// Where a point is on the screen; nothing if it is behind the camera.
+// The screen position of a point; nothing if it is behind the camera.
 std::optional<glm::vec2> to_screen(const Camera& camera, const glm::vec3& point) {
   const float depth = depth_of(camera, point);
   if (depth <= 0) return std::nullopt;
@@ -73,8 +73,8 @@ void shift_all(Float3& position, LightMotion& motion, const glm::vec3& shift) {
   for (LightMotion::Key& key : motion.keys) move(key.position);
 }
 
-// By how much the mouse has moved something at `place`: in the plane of the view, or with Shift
-// away from the camera and back.
+// The mouse's movement of an object at `place`, metres: in the plane of the view, or with Shift
+// along the view.
 glm::vec3 dragged(const Camera& camera, const Float3& place) {
   const ImGuiIO& io = ImGui::GetIO();
   const float metres = metres_per_pixel(camera, depth_of(camera, to_glm(place)));
@@ -82,7 +82,7 @@ glm::vec3 dragged(const Camera& camera, const Float3& place) {
   return metres * (io.MouseDelta.x * to_glm(camera.right) - io.MouseDelta.y * upwards);
 }
 
-// Metres along the unit `direction` from `eye` to a sphere; infinite if it is missed.
+// Metres along the unit `direction` from `eye` to a sphere; infinite if it misses.
 float distance_to(const ViewerSphere& sphere, const glm::vec3& eye, const glm::vec3& direction) {
   const glm::vec3 to_center = to_glm(sphere.position) - eye;
   const float along = glm::dot(to_center, direction);

@@ -9,16 +9,15 @@
 
 namespace rebounce {
 
-/// Mouse and keys, apart from the panels: steers the camera and drags spheres and lamps, whose
-/// handles it draws
-/// over the picture. Works on ImGui's input of the current frame.
+/// Mouse and keys outside the panels: steers the camera, drags spheres and lamps, and draws handles
+/// for lamps over the picture. Uses ImGui's input of the current frame.
 class Controls {
  public:
   Controls(const LitScene& scene, const SceneBounds& bounds) : scene_(scene), bounds_(bounds) {}
 
   void update(ViewerState& state);
 
-  /// Draws a disc in its colour for each lamp that has a place; hollow if it is off.
+  /// Draws a disc in its colour for each lamp that has a position; hollow if it is off.
   void draw_handles(const ViewerState& state) const;
 
  private:
@@ -38,10 +37,10 @@ class Controls {
   glm::vec3 orbit_target_{0};
 };
 
-/// Moves a lamp and the way it moves on by `shift` metres.
+/// Moves a lamp and its motion by `shift` metres.
 void shift_lamp(ViewerLight& lamp, const glm::vec3& shift);
 
-/// The same with a sphere.
+/// Moves a sphere and its motion by `shift` metres.
 void shift_sphere(ViewerSphere& sphere, const glm::vec3& shift);
 
 }  // namespace rebounce

@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-// Microseconds that `work` takes, to the end of what it asks of the graphics card.
+// The microseconds of `work`, until the graphics card has finished it.
 template <typename Work>
 double microseconds_of(const Work& work) {
   const auto begin = std::chrono::steady_clock::now();
@@ -19,7 +19,7 @@ double microseconds_of(const Work& work) {
   return time.count();
 }
 
-// Lamps as the picture draws them, where a luminaire shines alike in all directions.
+// The lamps as the picture draws them: without profiles.
 std::vector<Light> without_profiles(std::vector<Light> lights) {
   for (Light& light : lights) {
     if (light.profile) light = punctual_equivalent(light);
@@ -109,7 +109,7 @@ void FrameDrawer::compare(const ViewerState& state) {
 }
 
 void FrameDrawer::upload_errors() {
-  // Both sides in the same colours.
+  // Both sides use the same colours.
   for (const Side side : {Side::kFirst, Side::kSecond}) {
     std::vector<glm::vec3> color(lit_.data().patches.size(), glm::vec3(0.02F));
     const auto& error = patch_error_[static_cast<std::size_t>(side)];

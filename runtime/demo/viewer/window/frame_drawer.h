@@ -12,7 +12,7 @@
 
 namespace rebounce {
 
-/// One frame from light to picture. Needs a current OpenGL context.
+/// Draws frames, from light to picture. Needs a current OpenGL context.
 class FrameDrawer {
  public:
   FrameDrawer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup);
@@ -24,7 +24,7 @@ class FrameDrawer {
   const LitScene& scene() const { return lit_; }
   const SceneBounds& bounds() const { return renderer_.bounds(); }
 
-  /// The largest error of a patch that is shown (LitScene::patch_errors); 0 without any.
+  /// The largest shown error of a patch (LitScene::patch_errors); 0 without errors.
   float error_top() const { return error_top_; }
 
  private:

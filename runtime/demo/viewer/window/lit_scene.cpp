@@ -62,7 +62,7 @@ LightInAir LitScene::light_in_air(const Float3& position, std::span<const Float3
   for (auto& irradiance : light.bounced) irradiance.resize(normals.size());
   const LightProbes& around = probes();
   if (around.size() == 0) return light;
-  // Lamps and openings are small and bright; what has bounced is smooth enough for harmonics.
+  // Lamps and openings are small and bright; bounced light is smooth enough for harmonics.
   irradiance_in_air(around, data_->patches.emitted_exitance, sky, position, normals,
                     light.first_flight);
   for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {

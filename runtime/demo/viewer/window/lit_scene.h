@@ -15,9 +15,9 @@
 
 namespace rebounce {
 
-/// Irradiance in lx at a point in the air, on surfaces of given normals.
+/// Irradiance in lx at a point in the air, on surfaces with given normals.
 struct LightInAir {
-  std::vector<Float3> first_flight;  ///< from sky and emitters
+  std::vector<Float3> first_flight;  ///< directly from sky and emitters
   std::array<std::vector<Float3>, kSideCount> bounced;
 };
 
@@ -31,7 +31,7 @@ class LitScene {
   /// `data` must have an operator. `reference` and `make_probes` may be empty.
   LitScene(std::shared_ptr<const TransferData> data, Reference reference, MakeProbes make_probes);
 
-  /// Finds direct light, and indirect light by `methods`; the second only if `both`. Sets
+  /// Computes direct light, and indirect light by `methods`, the second only if `both`. Sets
   /// `times.direct` and `times.solve`.
   void relight(std::span<const Light> lights, const Sky& sky,
                std::span<const IndirectMethod, kSideCount> methods, bool both, StageTimes& times);
@@ -39,26 +39,26 @@ class LitScene {
   /// H [n] in lx of the last frame.
   std::span<const Float3> indirect(Side side) const { return indirect_[index(side)]; }
 
-  /// Values at the vertices [v] in lx: sky and emitters; what has bounced.
+  /// The direct light of sky and emitters at the vertices [v], lx.
   std::vector<glm::vec3> first_flight_at_vertices(const Sky& sky) const;
   std::vector<glm::vec3> bounced_at_vertices(Side side) const;
 
-  /// What arrives at `position` on surfaces of these unit normals, as the probes around it see the
-  /// last frame but for lamps; the second side's is zero unless `both`. Finds probes first where
-  /// the file has none.
+  /// The irradiance at `position` on surfaces with these unit normals, from the probes around it
+  /// and the last frame, without lamps. The second side is zero unless `both`. Computes probes
+  /// first if the file has none.
   LightInAir light_in_air(const Float3& position, std::span<const Float3> normals, const Sky& sky,
                           bool both);
 
-  /// Compares a side with the reference solution for the same direct light, which is found anew
-  /// where that has changed. Returns |H - reference| of each patch as a part of the reference's
-  /// root mean square [n]; nothing without a reference.
+  /// Compares a side with the reference solution for the same direct light; computes that again if
+  /// the light has changed. Returns |H - reference| of each patch [n], relative to the reference's
+  /// root mean square; nothing without a reference.
   std::vector<float> patch_errors(Side side);
 
   /// |H - reference| / |reference| of the last patch_errors of that side, area-weighted L2.
   double error(Side side) const { return error_[index(side)]; }
   bool has_reference() const { return static_cast<bool>(reference_); }
 
-  /// Stops that a small picture of the scene from `camera` would take.
+  /// The exposure in stops of a small picture of the scene from `camera`.
   float find_exposure(std::span<const Light> lights, const Sky& sky, const Camera& camera) const;
 
   const Engine& engine() const { return engine_; }
@@ -78,8 +78,8 @@ class LitScene {
   PictureRenderer pictures_;
   Reference reference_;
   MakeProbes make_probes_;
-  std::optional<LightProbes> own_probes_;                        // of a file without
-  std::vector<Float3> reference_exitance_, reference_indirect_;  // what it was last found for
+  std::optional<LightProbes> own_probes_;                        // if the file has none
+  std::vector<Float3> reference_exitance_, reference_indirect_;  // of the last computed reference
 };
 
 }  // namespace rebounce

@@ -17,7 +17,7 @@ namespace rebounce {
 namespace {
 
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
-constexpr float kStepPart = 0.005F;  // of the scene's size, that a pixel of dragging moves
+constexpr float kStepPart = 0.005F;  // fraction of the scene's size per pixel of dragging
 constexpr const char* kTransferName = "transfer (one product)";
 constexpr const char* kHierarchicalName = "hierarchical (links)";
 
@@ -39,7 +39,7 @@ std::string name_of(const IndirectMethod& method) {
   return std::string(named->name);
 }
 
-/// Offers what can be done with `data`.
+/// Offers the methods that `data` allow.
 void choose_method(const char* label, const TransferData& data, IndirectMethod& method) {
   const auto choice = [&](const std::string& name, std::optional<SolveMethod> iteration,
                           bool on_links) {
@@ -78,13 +78,13 @@ void time_row(const char* stage, double microseconds) {
   ImGui::Text("%8.2f ms", microseconds / 1000);
 }
 
-// Candela of a lamp of intensity 1, straight ahead.
+// Candela of a lamp with intensity 1, straight ahead.
 float candela_of_unit(const Light& light) {
   const LampSurface* const surface = lamp_kind(light.type).surface;
   return surface != nullptr ? surface->candela(PreparedLight(light)) : 1;
 }
 
-// Gives lengths of the kind that have none a value that suits a scene of `size` metres.
+// Sets unset lengths of the kind to values that suit a scene of `size` metres.
 void complete_lengths(Light& light, float size) {
   for (const LampField* field : lamp_kind(light.type).fields) {
     if (field->rule != FieldRule::kLength) continue;
@@ -97,7 +97,7 @@ void complete_lengths(Light& light, float size) {
   }
 }
 
-// `size` is that of the scene, metres.
+// `size`: that of the scene, metres.
 void edit_type(Light& light, float size) {
   LightType type = light.type;
   if (!ImGui::BeginCombo("type", std::string(lamp_kind(type).name).c_str())) return;
@@ -112,7 +112,7 @@ void edit_type(Light& light, float size) {
   complete_lengths(light, size);
   light.intensity = candela / candela_of_unit(light);
   const bool is_far = !lamp_kind(light.type).has_place();
-  // Candela are not lux: begin with what is bright indoors.
+  // Candela are not lux: start with a typical indoor value.
   if (was_far != is_far) light.intensity = is_far ? 1000 : 100 / candela_of_unit(light);
 }
 
@@ -140,7 +140,7 @@ void edit_shape(Light& light, float step) {
   }
 }
 
-// A rectangle's first side is not to lie along its direction.
+// A rectangle's first side must not be parallel to its direction.
 void keep_first_side_across(Light& light) {
   const glm::vec3 direction = to_glm(light.direction), tangent = to_glm(light.tangent);
   if (glm::length(glm::cross(direction, tangent)) > 1e-2F * glm::length(tangent)) return;
@@ -156,7 +156,7 @@ void edit_cone(Light& light) {
   light.inner_cone_angle = std::min(inner, outer - 0.5F) * kDegree;
 }
 
-// A motion around where something is.
+// Starts a motion around a position.
 void begin_motion(const Float3& position, LightMotion::Kind kind, float size, LightMotion& motion) {
   motion.kind = kind;
   motion.center = motion.from = motion.to = position;
@@ -187,7 +187,7 @@ void edit_motion(const Float3& position, LightMotion& motion, float step) {
   }
 }
 
-// `size` is that of the scene, metres.
+// `size`: that of the scene, metres.
 void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size) {
   Light& light = lamp.light;
   const float step = kStepPart * size;
@@ -223,7 +223,7 @@ void edit_sphere(ViewerSphere& sphere, float size) {
   edit_motion(sphere.position, sphere.motion, step);
 }
 
-// Lines of a list to choose from.
+// A line of a list to select from.
 void list_line(std::size_t k, const std::string& name, std::size_t& selected) {
   ImGui::PushID(static_cast<int>(k));
   const std::string label = std::to_string(k) + (name.empty() ? "" : ": " + name);
@@ -242,7 +242,7 @@ ViewerLight lamp_ahead(const FlyCamera& camera, float size) {
 }  // namespace
 
 void Panels::smooth(const StageTimes& times) {
-  // The first frames fill caches and make solvers: they do not count.
+  // The first frames fill caches and create solvers; they are not counted.
   constexpr int kWarmUp = 3;
   const float part = frame_ < kWarmUp ? 1 : 0.1F;
   frame_ = std::min(frame_ + 1, kWarmUp);

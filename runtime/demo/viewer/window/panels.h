@@ -5,7 +5,7 @@
 
 namespace rebounce {
 
-/// Draws the viewer's panels with ImGui and takes over what the user changes in them.
+/// Draws the viewer's panels with ImGui and applies the user's changes.
 class Panels {
  public:
   void draw(ViewerState& state, const FrameDrawer& frame);

@@ -87,7 +87,7 @@ void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& set
   while (keep_open() && window.begin_frame()) {
     controls.update(state);
     if (state.playing) state.time += ImGui::GetIO().DeltaTime;
-    // A window that is minimised has no pixels.
+    // A minimised window has no pixels.
     if (window.width() > 0 && window.height() > 0) {
       drawer.draw(state, window.width(), window.height(), 0);
     }

@@ -21,17 +21,17 @@ struct ViewerLight {
   bool on = true;
 };
 
-/// A sphere that moves through the scene, lit by the light probes, and by lamps with shadows. Light
-/// that it reflects or holds off does not go into the radiosity of the patches.
+/// A sphere that moves through the scene. Light probes light it, and lamps with shadows. It does
+/// not change the radiosity of the patches.
 struct ViewerSphere {
-  Float3 position{0, 0, 0};  ///< metres, the middle
+  Float3 position{0, 0, 0};  ///< metres, the centre
   float radius = 0.1F;       ///< metres, > 0
   Float3 reflectance{0.7F, 0.7F, 0.7F};
   LightMotion motion{};
   bool on = true;
 };
 
-/// What the viewer begins with; all of it can be changed in its panels.
+/// The initial state of the viewer; the panels can change all of it.
 struct ViewerSetup {
   std::string title = "Rebounce";
   int width = 1280;  ///< pixels
@@ -41,21 +41,21 @@ struct ViewerSetup {
   Sky sky{};
   Camera camera;
   Show show = Show::kRadiosity;
-  std::optional<float> exposure;  ///< stops; unset: found from a picture of the first frame
-  /// How the two sides of a split screen find their indirect light; without a split the first
-  /// counts.
+  std::optional<float> exposure;  ///< stops; unset: computed from a picture of the first frame
+  /// How the two sides of a split screen compute their indirect light. Without a split only the
+  /// first is used.
   std::array<IndirectMethod, 2> methods{};
-  std::optional<float> split{};  ///< part of the width, 0 to 1, that shows the first method
+  std::optional<float> split{};  ///< fraction of the width, 0 to 1, that shows the first method
   bool panels = false;           ///< pictures without a window show the panels too
-  /// Gives the exact indirect irradiance [n] in lx for an initial exitance [n] in lx; without it
-  /// there is no error to show.
+  /// Returns the exact indirect irradiance [n] in lx for an initial exitance [n] in lx. Without it
+  /// there are no errors to show.
   std::function<std::vector<Float3>(std::span<const Float3>)> reference{};
-  /// Finds light probes for a file that has none, when the first sphere needs them; without it such
-  /// spheres are lit by lamps alone.
+  /// Computes light probes when the first sphere needs them and the file has none. Without it only
+  /// lamps light such spheres.
   std::function<LightProbes()> make_probes{};
 };
 
-/// Microseconds that the stages of a frame took.
+/// The microseconds of the stages of a frame.
 struct StageTimes {
   double direct = 0;                 ///< direct light of the patches, with shadow rays
   std::array<double, 2> solve = {};  ///< indirect light of each side

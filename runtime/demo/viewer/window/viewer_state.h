@@ -5,7 +5,7 @@
 
 namespace rebounce {
 
-/// What the user steers.
+/// The state that the user controls.
 struct ViewerState {
   explicit ViewerState(const ViewerSetup& setup)
       : lights(setup.lights),
@@ -17,7 +17,7 @@ struct ViewerState {
         split(setup.split.value_or(0.5F)),
         is_split(setup.split.has_value()) {}
 
-  /// The lamps that are on, where they are now.
+  /// The lamps that are on, at the current time.
   std::vector<Light> lights_now() const {
     std::vector<Light> now;
     for (const ViewerLight& light : lights) {
@@ -26,7 +26,7 @@ struct ViewerState {
     return now;
   }
 
-  /// The spheres that are shown, where they are now.
+  /// The shown spheres, at the current time.
   std::vector<ViewerSphere> spheres_now() const {
     std::vector<ViewerSphere> now;
     for (const ViewerSphere& sphere : spheres) {
@@ -48,10 +48,10 @@ struct ViewerState {
   bool is_split;
   float time = 0;  ///< seconds
   bool playing = true;
-  bool wants_exposure = false;  ///< find the exposure anew
+  bool wants_exposure = false;  ///< compute the exposure again
   bool shows_panels = true;
   bool shows_spheres = true;
-  std::size_t selected = 0;  ///< lamp
+  std::size_t selected = 0;  ///< selected lamp
   std::size_t selected_sphere = 0;
 };
 

@@ -33,7 +33,7 @@ Window::Window(int width, int height, const std::string& title) {
   glfwSwapInterval(1);
   glfwGetFramebufferSize(window_, &width_, &height_);
   ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // leaves no file behind
+  ImGui::GetIO().IniFilename = nullptr;  // writes no settings file
   ImGui_ImplGlfw_InitForOpenGL(window_, true);
   ImGui_ImplOpenGL3_Init("#version 330 core");
 }

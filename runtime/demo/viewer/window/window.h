@@ -10,20 +10,20 @@ namespace rebounce {
 /// both.
 class Window {
  public:
-  /// Throws Error if there is no display or no such OpenGL.
+  /// Throws Error if there is no display or no OpenGL 3.3.
   Window(int width, int height, const std::string& title);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
 
-  /// Takes in what the user did and begins a frame of ImGui; false once the window is to close.
+  /// Reads the user's input and begins a frame of ImGui; false when the window is to close.
   bool begin_frame();
 
-  /// Draws what ImGui holds over the picture and shows it.
+  /// Draws ImGui over the picture and shows both.
   void end_frame();
 
-  int width() const { return width_; }    ///< of the picture, in pixels
-  int height() const { return height_; }  ///< likewise
+  int width() const { return width_; }    ///< of the picture, pixels
+  int height() const { return height_; }  ///< of the picture, pixels
 
  private:
   GLFWwindow* window_ = nullptr;
