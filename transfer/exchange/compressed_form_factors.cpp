@@ -12,7 +12,8 @@ CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalO
     if (matrix != 0) throw Error("compressed form factors: the channels have different matrices");
   }
   if (!exchange_->storage().coefficient_scale.empty()) {
-    throw Error("compressed form factors: their blocks have moments, which sweeps do not know");
+    throw Error(
+        "compressed form factors: their bases are nested, and sweeps need bases that are not");
   }
 }
 

@@ -51,7 +51,7 @@ IncomingLink seen_from(std::uint32_t node, const FormFactorLinks& links, std::ui
 void check_tree(const FormFactorLinks& links, std::size_t n) {
   const std::size_t m = links.first_child.size();
   if (n == 0 || m != 2 * n - 1 || links.count.size() != m || links.count[0] != n) {
-    refuse("not a binary tree over the patches");
+    refuse("the nodes are not a binary tree over the patches");
   }
   std::size_t next = 1;
   for (std::size_t k = 0; k < m; ++k) {
@@ -60,7 +60,7 @@ void check_tree(const FormFactorLinks& links, std::size_t n) {
       if (links.count[k] != 1) refuse("a leaf is not one patch");
       continue;
     }
-    if (child != next || child <= k || next + 2 > m) refuse("nodes are not in order of levels");
+    if (child != next || child <= k || next + 2 > m) refuse("the nodes are not in order of levels");
     const std::uint64_t both =
         static_cast<std::uint64_t>(links.count[child]) + links.count[child + 1];
     if (both != links.count[k]) refuse("children are not as large as their parent");
@@ -72,7 +72,7 @@ void check_tree(const FormFactorLinks& links, std::size_t n) {
 void check_permutation(const FormFactorLinks& links, std::size_t n) {
   std::vector<bool> there(n, false);
   for (const std::uint32_t patch : links.patch) {
-    if (patch >= n || there[patch]) refuse("a patch is not there once");
+    if (patch >= n || there[patch]) refuse("a patch is not in exactly one leaf");
     there[patch] = true;
   }
 }
@@ -81,7 +81,7 @@ void check_values(const FormFactorLinks& links) {
   const auto is_finite = [](float x) { return std::isfinite(x); };
   const std::size_t m = links.first_child.size();
   for (const auto& [a, b] : links.pair) {
-    if (a >= m || b >= m) refuse("no such node");
+    if (a >= m || b >= m) refuse("a link joins a node that does not exist");
   }
   for (const float s : links.exchange_area) {
     if (!(s >= 0) || !is_finite(s)) refuse("an exchange area is not finite and >= 0");
@@ -99,10 +99,10 @@ void check_values(const FormFactorLinks& links) {
 void check_links(const FormFactorLinks& links, std::size_t patch_count) {
   const std::size_t l = links.pair.size();
   if (links.patch.size() != patch_count || links.scale.size() != patch_count) {
-    refuse("they and the patches differ in number");
+    refuse("they are for another number of patches");
   }
   if (links.exchange_area.size() != l || links.gradient.size() != l) {
-    refuse("their arrays differ in number");
+    refuse("their arrays differ in size");
   }
   check_tree(links, patch_count);
   check_permutation(links, patch_count);

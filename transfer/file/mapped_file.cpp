@@ -16,7 +16,7 @@ namespace rebounce {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
-  throw Error("cannot read " + path.string() + ": " + reason + "; check the name and its rights");
+  throw Error("cannot read " + path.string() + ": " + reason + "; check its name and permissions");
 }
 
 class Descriptor {

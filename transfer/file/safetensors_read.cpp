@@ -44,7 +44,7 @@ TensorShape parse_sizes(const std::string& name, const json& value, const char* 
   TensorShape sizes;
   for (const json& size : value) {
     if (!size.is_number_unsigned()) {
-      refuse_tensor(name, std::string(key) + " holds something else than whole numbers");
+      refuse_tensor(name, std::string(key) + " has an entry that is not a whole number");
     }
     sizes.push_back(size.get<std::uint64_t>());
   }
@@ -85,7 +85,7 @@ SafetensorsMetadata parse_metadata(const json& value) {
   if (!value.is_object()) throw Error("__metadata__ is not an object");
   SafetensorsMetadata metadata;
   for (const auto& [key, text] : value.items()) {
-    if (!text.is_string()) throw Error("__metadata__ holds something else than strings");
+    if (!text.is_string()) throw Error("__metadata__ has a value that is not a string");
     metadata[key] = text.get<std::string>();
   }
   return metadata;
@@ -115,8 +115,8 @@ SafetensorsFile::SafetensorsFile(SharedArray<std::byte> bytes, std::string name)
     parse_header(header);
     check_contiguous();
   } catch (const Error& error) {
-    throw Error(name_ + " is not a sound safetensors file: " + error.what() +
-                "; it is damaged or something else, so make it again");
+    throw Error(name_ + " is not a valid safetensors file: " + error.what() +
+                "; make the file again");
   }
 }
 
@@ -138,7 +138,7 @@ void SafetensorsFile::check_contiguous() const {
   std::sort(ranges.begin(), ranges.end());
   std::uint64_t reached = 0;
   for (const auto& [begin, end] : ranges) {
-    if (begin != reached) throw Error("tensors overlap or leave a hole between them");
+    if (begin != reached) throw Error("tensors overlap or have gaps between them");
     reached = end;
   }
   if (reached != data().size()) throw Error("bytes are left over after the last tensor");

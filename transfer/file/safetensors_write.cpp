@@ -42,7 +42,7 @@ std::string header_text(const std::vector<TensorView>& tensors,
   for (const TensorView& tensor : tensors) {
     assert(size_agrees(tensor));
     if (header.contains(tensor.name) || tensor.name == kMetadataKey) {
-      throw Error("tensor " + tensor.name + ": the name is taken; give it another");
+      throw Error("tensor " + tensor.name + ": its name is used twice or reserved; rename it");
     }
     const std::uint64_t end = begin + tensor.bytes.size();
     header[tensor.name] = {{"dtype", traits(tensor.type).name},

@@ -271,10 +271,11 @@ class Checker {
     if (x == 0 && y == 0 && z == 0) return;
     std::size_t rest = data_.probes.size();
     for (const std::uint32_t side : {x, y, z}) {
-      if (side == 0 || rest % side != 0) refuse(tensor::kProbeGrid, "not that of the probes");
+      if (side == 0 || rest % side != 0)
+        refuse(tensor::kProbeGrid, "does not fit the number of probes");
       rest /= side;
     }
-    if (rest != 1) refuse(tensor::kProbeGrid, "not that of the probes");
+    if (rest != 1) refuse(tensor::kProbeGrid, "does not fit the number of probes");
   }
 
   void check_sky_cells() const {
@@ -293,7 +294,7 @@ class Checker {
     const Lightmap& map = data_.lightmap;
     const std::size_t texels = std::size_t{map.width} * map.height;
     if (texels == 0 && (map.width != 0 || !map.triangle.empty())) {
-      refuse(tensor::kLightmapSize, "of no texels");
+      refuse(tensor::kLightmapSize, "there are no texels");
     }
     if (texels == 0) return;
     rows("lightmap.texcoord", map.texcoord.size(), data_.mesh.position.size());

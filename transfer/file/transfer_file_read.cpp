@@ -144,10 +144,10 @@ void read_names(const SafetensorsFile& file, const json& names, const char* kind
                 std::vector<Item>& items) {
   const json list = names.value(kind, json());
   if (!list.is_array() || list.size() != items.size()) {
-    refuse(file, std::string("metadata names: not one for each of the ") + kind);
+    refuse(file, std::string("metadata names: there is not one for each of the ") + kind);
   }
   for (std::size_t i = 0; i < items.size(); ++i) {
-    if (!list[i].is_string()) refuse(file, "metadata names: something else than a string");
+    if (!list[i].is_string()) refuse(file, "metadata names: an entry is not a string");
     items[i].name = list[i].template get<std::string>();
   }
 }
@@ -220,7 +220,7 @@ std::array<std::uint32_t, kChannelCount> read_channel_matrix(const SafetensorsFi
   std::array<std::uint32_t, kChannelCount> channel_matrix{};
   for (std::size_t channel = 0; channel < stored.size(); ++channel) {
     if (stored[channel] >= matrix_count) {
-      refuse(file, std::string("tensor ") + name + ": no such matrix");
+      refuse(file, std::string("tensor ") + name + ": a channel has no matrix");
     }
     channel_matrix[channel] = stored[channel];
   }
@@ -241,7 +241,8 @@ std::shared_ptr<const DenseOperator> read_dense_operator(const SafetensorsFile& 
     storage.tiles_f32 = file.tensor<float>(tensor::kDenseTiles, shape);
   }
   if (tiles.shape[0] < 1 || tiles.shape[0] > kChannelCount) {
-    refuse(file, std::string("tensor ") + tensor::kDenseTiles + ": not 1, 2 or 3 matrices");
+    refuse(file, std::string("tensor ") + tensor::kDenseTiles +
+                     ": the number of matrices is not 1, 2 or 3");
   }
   storage.matrix_count = static_cast<std::uint32_t>(tiles.shape[0]);
   storage.channel_matrix =

@@ -22,7 +22,7 @@ constexpr std::size_t kAlignment = HierarchicalFormat::kAlignment;
 }
 
 void check_permutation(std::span<const std::uint32_t> patch, std::size_t patch_count) {
-  if (patch.size() != patch_count) refuse("not one position for each patch");
+  if (patch.size() != patch_count) refuse("there is not one position for each patch");
   std::vector<bool> seen(patch_count, false);
   for (const std::uint32_t p : patch) {
     if (p >= patch_count || seen[p]) refuse("the order of patches is not a permutation");
@@ -32,7 +32,7 @@ void check_permutation(std::span<const std::uint32_t> patch, std::size_t patch_c
 
 void check_exponents(std::span<const std::int8_t> exponents, std::size_t patch_count) {
   if (!exponents.empty() && exponents.size() != patch_count) {
-    refuse("not one scale for each position");
+    refuse("there is not one scale for each position");
   }
   constexpr int kLargest = HierarchicalFormat::kLargestExponent;
   if (std::ranges::any_of(exponents, [](int e) { return e < -kLargest || e > kLargest; })) {
@@ -62,11 +62,11 @@ struct Places {
 
 void check_moments(const TransferBlock& block, const Places& places) {
   if (!places.are_positions(block.row_begin, block.row_count))
-    refuse("moments are of no positions");
+    refuse("a cluster basis is not over positions");
   if (block.row_rank != block.column_count || block.row_rank > block.row_count ||
       block.column_rank != 0 || block.row_residual_rank > block.row_rank ||
       block.column_residual_rank != 0) {
-    refuse("the rank of moments does not fit their number");
+    refuse("the rank of a cluster basis does not fit its size");
   }
 }
 
@@ -99,7 +99,7 @@ void check_block(const TransferBlock& block, const Places& places) {
       if (block.row_residual_rank > block.row_rank ||
           block.column_residual_rank > block.column_rank ||
           (block.on_diagonal() && block.row_residual_rank != block.column_residual_rank)) {
-        refuse("the remainders of a block do not fit its ranks");
+        refuse("the residual ranks of a block do not fit its ranks");
       }
       return;
     case TransferBlock::Kind::kClusterBasis:
@@ -114,13 +114,14 @@ std::size_t checked_moment_count(const Storage& storage, std::size_t position_co
   std::uint64_t end = position_count;
   for (const TransferBlock& block : storage.blocks) {
     if (!is_cluster_basis(block)) continue;
-    if (block.column_begin != end) refuse("moments are not numbered in the order of their blocks");
+    if (block.column_begin != end)
+      refuse("cluster coefficients are not numbered in the order of their blocks");
     end += block.column_count;
   }
   if (storage.coefficient_scale.size() != end - position_count)
-    refuse("not one scale for each moment");
+    refuse("there is not one scale for each cluster coefficient");
   if (!std::ranges::all_of(storage.coefficient_scale, [](float s) { return std::isfinite(s); })) {
-    refuse("a scale of a moment is not finite");
+    refuse("a scale of a cluster coefficient is not finite");
   }
   return end - position_count;
 }
@@ -129,7 +130,7 @@ void check_tables(const Storage& storage) {
   const std::size_t n = storage.area.size();
   if (n == 0) refuse("there are no patches");
   if (storage.matrix_count < 1 || storage.matrix_count > kChannelCount) {
-    refuse("not 1, 2 or 3 matrices");
+    refuse("the number of matrices is not 1, 2 or 3");
   }
   for (const std::uint32_t matrix : storage.channel_matrix) {
     if (matrix >= storage.matrix_count) refuse("a channel has no matrix");
@@ -153,7 +154,7 @@ void check_tables(const Storage& storage) {
     const bool rounded = storage.precision.bases == BasisPrecision::kF16 ||
                          storage.precision.bases == BasisPrecision::kQ16;
     if (rounded && (block.row_residual_rank | block.column_residual_rank) != 0) {
-      refuse("a block has remainders, which are for bases in 8 bits alone");
+      refuse("a block has residual ranks, but its bases are not in 8 bits");
     }
   }
 }
@@ -190,9 +191,9 @@ bool sizes_fit(const Storage& storage) {
 
 void check_hierarchical_storage(const Storage& storage) {
   check_tables(storage);
-  if (!is_offered(storage.precision)) refuse("its precisions do not go together");
+  if (!is_offered(storage.precision)) refuse("its precisions cannot be combined");
   if (!storage.one_array() && storage.order != HierarchicalStorage::Order::kStreamed) {
-    refuse("integers are for streamed values alone");
+    refuse("bases in integers are not in the streamed order");
   }
   if (!sizes_fit(storage)) refuse("the number of values does not fit the blocks");
   // Otherwise sums of products could overflow 32 bits.

@@ -59,16 +59,16 @@ LowRankOperator::LowRankOperator(Storage storage) : storage_(std::move(storage))
   if (n == 0) refuse("there are no patches");
   if (rank > n) refuse("its rank is above the number of patches");
   if (storage_.matrix_count < 1 || storage_.matrix_count > kChannelCount) {
-    refuse("not 1, 2 or 3 matrices");
+    refuse("the number of matrices is not 1, 2 or 3");
   }
   for (const std::uint32_t matrix : storage_.channel_matrix) {
     if (matrix >= storage_.matrix_count) refuse("a channel has no matrix");
   }
   const bool half = storage_.precision == Precision::kF16;
   const std::size_t basis = half ? storage_.basis_f16.size() : storage_.basis_f32.size();
-  if (basis != tile_count(n) * rank * kTile) refuse("the basis is of another size");
+  if (basis != tile_count(n) * rank * kTile) refuse("the basis has the wrong size");
   if (storage_.coupling.size() != storage_.matrix_count * rank * rank) {
-    refuse("the cores are of another size");
+    refuse("the coupling matrices have the wrong size");
   }
   sqrt_area_.reserve(n);
   for (const float area : storage_.area) sqrt_area_.push_back(std::sqrt(area));

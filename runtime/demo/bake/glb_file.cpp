@@ -99,7 +99,7 @@ const char* mime_type(const Texture& texture) {
   };
   if (begins_with(kPng)) return "image/png";
   if (begins_with(kJpeg)) return "image/jpeg";
-  throw Error("texture: neither PNG nor JPEG; precompute the scene again from a sound file");
+  throw Error("texture: neither PNG nor JPEG; precompute the scene again from an intact file");
 }
 
 int wrap_code(TextureWrap wrap) {

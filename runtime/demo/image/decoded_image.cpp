@@ -18,7 +18,7 @@ constexpr int kMaxSide = 16384;  // texels; the largest texture takes 1 GiB when
 
 DecodedImage decode_image(const Texture& texture) {
   const auto fail = [](const std::string& reason) -> Error {
-    return Error("texture: " + reason + "; precompute the scene again from a sound file");
+    return Error("texture: " + reason + "; precompute the scene again from an intact file");
   };
   if (texture.encoded.size() > std::numeric_limits<int>::max()) throw fail("too many bytes");
   const auto* bytes = texture.encoded.data();

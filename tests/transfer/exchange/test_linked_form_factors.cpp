@@ -167,7 +167,8 @@ TEST(LinkedFormFactors, ThatAreDamagedInAFileAreRefused) {
   data.links = sample_links();
   data.links.pair[0][0] = 99;
   save_transfer_file(folder / "file", data);
-  test::expect_error([&] { load_transfer_file(folder / "file"); }, "no such node");
+  test::expect_error([&] { load_transfer_file(folder / "file"); },
+                     "a link joins a node that does not exist");
 }
 
 }  // namespace

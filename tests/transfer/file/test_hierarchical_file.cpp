@@ -266,7 +266,7 @@ TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
       {"blocks", 5, 1000, "rank"},
       {"blocks", 5, 0, "rank"},
       {"blocks", 6, 0xFFFFFFFF, "rank"},
-      {"channel_matrix", 2, 3, "no such matrix"},
+      {"channel_matrix", 2, 3, "a channel has no matrix"},
       {"channel_matrix", 2, 2, "number of values"},
       {"patch", 0, kPatchCount, "not a permutation"},
       {"patch", 0, 0xFFFFFFFF, "not a permutation"},
@@ -298,11 +298,11 @@ TEST(HierarchicalFile, RefusesClusterBasesThatDoNotFit) {
     Tampering(folder / "file").set(tensor, entry, value);
     expect_error([&] { load_transfer_file(folder / "file"); }, message);
   };
-  refuses("blocks", 0, 112, "moments are of no positions");
+  refuses("blocks", 0, 112, "a cluster basis is not over positions");
   refuses("blocks", 2, 0, "not numbered in the order");
   refuses("blocks", 3, 0xFFFFFFF0, "not numbered in the order");
   refuses("blocks", 4, 1, "not numbered in the order");
-  refuses("blocks", 5, 6, "rank of moments");
+  refuses("blocks", 5, 6, "rank of a cluster basis");
   refuses("moment_scale", 3, 0x7FC00000, "not finite");
   refuses("moment_scale", 3, 0x7F800000, "not finite");
 }
@@ -317,7 +317,7 @@ TEST(HierarchicalFile, RefusesScalesThatDoNotFit) {
 TEST(HierarchicalFile, RefusesFormFactorsWithClusterBases) {
   const auto cluster_coefficients = std::make_shared<const HierarchicalOperator>(
       encode_values(test::random_nested_storage(kPatchCount, 1, 5), Precision::kF16));
-  expect_error([&] { CompressedFormFactors{cluster_coefficients}; }, "have moments");
+  expect_error([&] { CompressedFormFactors{cluster_coefficients}; }, "bases are nested");
 }
 
 void survive_mutations(const TransferData& data) {

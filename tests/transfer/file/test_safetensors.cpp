@@ -128,7 +128,8 @@ TEST(Safetensors, RefusesToWriteANameTwice) {
         lay_out_safetensors({view("a", {3}, kTriple), view("a", {2}, kPair)}, {});
       },
       "tensor a");
-  expect_error([] { lay_out_safetensors({view("__metadata__", {2}, kPair)}, {}); }, "taken");
+  expect_error([] { lay_out_safetensors({view("__metadata__", {2}, kPair)}, {}); },
+               "used twice or reserved");
 }
 
 TEST(Safetensors, TypedAccessNamesTheTensorItRefuses) {
@@ -196,9 +197,10 @@ std::vector<Malformed> malformed_tensors() {
       {"a shape of another size", one("U8", "[7]", "[0,8]"), "do not agree"},
       {"a shape that overflows", one("U8", "[4294967296,4294967296,8]", "[0,8]"), "do not agree"},
       {"a shape that overflows to fit", one("F64", "[2305843009213693953]", "[0,8]"), "agree"},
-      {"a negative size", one("U8", "[-8]", "[0,8]"), "whole numbers"},
-      {"a fraction", one("U8", "[8.0]", "[0,8]"), "whole numbers"},
-      {"a number beyond 64 bits", one("U8", "[99999999999999999999]", "[0,8]"), "whole numbers"},
+      {"a negative size", one("U8", "[-8]", "[0,8]"), "not a whole number"},
+      {"a fraction", one("U8", "[8.0]", "[0,8]"), "not a whole number"},
+      {"a number beyond 64 bits", one("U8", "[99999999999999999999]", "[0,8]"),
+       "not a whole number"},
       {"a shape that is no array", one("U8", "8", "[0,8]"), "shape is not an array"},
       {"offsets that descend", one("U8", "[8]", "[8,0]"), "not a range"},
       {"offsets beyond the file", one("U8", "[9]", "[0,9]"), "not a range"},
@@ -209,7 +211,7 @@ std::vector<Malformed> malformed_tensors() {
        "not described by"},
       {"an overlap", two("[0,4]", "[3,7]"), "overlap"},
       {"the same place", two("[0,4]", "[0,4]"), "overlap"},
-      {"a hole", one("U8", "[4]", "[4,8]"), "hole"},
+      {"a hole", one("U8", "[4]", "[4,8]"), "gaps"},
       {"bytes left over", one("U8", "[4]", "[0,4]"), "left over"},
       {"bytes without a tensor", file_with("{}", "1"), "left over"},
   };

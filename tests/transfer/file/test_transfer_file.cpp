@@ -611,7 +611,7 @@ TEST(TransferFile, RefusesImpossibleLightmaps) {
   expect_refused({
       {"lightmap.triangle: 2 rows, not 6", lightmap([](auto& m) { m.height = 3; })},
       {"lightmap.triangle: 2 rows", lightmap([](auto& m) { m.width = m.height = 0xFFFFFFFF; })},
-      {"lightmap.size: of no texels", lightmap([](auto& m) { m.height = 0; })},
+      {"lightmap.size: there are no texels", lightmap([](auto& m) { m.height = 0; })},
       {"lightmap.triangle: entry 1 is", lightmap([](auto& m) { m.triangle[1] = 1000; })},
       {"lightmap.weight", lightmap([](auto& m) { m.weight.pop_back(); })},
       {"lightmap.weight", lightmap([](auto& m) { m.weight[0][1] = kNan; })},

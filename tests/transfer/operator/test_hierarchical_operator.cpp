@@ -272,8 +272,8 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
   };
   const std::vector<Fault> faults = {
       {"no patches", [](Storage& s) { s.area.clear(), s.patch.clear(), s.blocks.clear(); }},
-      {"1, 2 or 3 matrices", [](Storage& s) { s.matrix_count = 0; }},
-      {"1, 2 or 3 matrices", [](Storage& s) { s.matrix_count = 4; }},
+      {"matrices is not 1, 2 or 3", [](Storage& s) { s.matrix_count = 0; }},
+      {"matrices is not 1, 2 or 3", [](Storage& s) { s.matrix_count = 4; }},
       {"has no matrix", [](Storage& s) { s.channel_matrix[1] = 3; }},
       {"not one position", [](Storage& s) { s.patch.pop_back(); }},
       {"not a permutation", [](Storage& s) { s.patch[3] = s.patch[4]; }},
@@ -307,27 +307,27 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
          s.blocks[0].kind = Kind::kDense;
          s.blocks[0].row_residual_rank = 1;
        }},
-      {"remainders of a block",
+      {"residual ranks of a block",
        [](Storage& s) {
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
          s.blocks[0].row_residual_rank = s.blocks[0].column_residual_rank = 3;
        }},
-      {"remainders of a block",
+      {"residual ranks of a block",
        [](Storage& s) {
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
          s.blocks[0].row_residual_rank = 1;
          s.blocks[0].column_residual_rank = 0;
        }},
-      {"8 bits alone",
+      {"not in 8 bits",
        [](Storage& s) {
          s.precision = hierarchical_precision(Precision::kF16);
          s.blocks[0].kind = Kind::kLowRank;
          s.blocks[0].row_rank = s.blocks[0].column_rank = 2;
          s.blocks[0].row_residual_rank = s.blocks[0].column_residual_rank = 1;
        }},
-      {"do not go together", [](Storage& s) { s.precision.couplings = CouplingPrecision::kF16; }},
+      {"cannot be combined", [](Storage& s) { s.precision.couplings = CouplingPrecision::kF16; }},
       {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
       {"number of values", [](Storage& s) { s.order = HierarchicalStorage::Order::kStreamed; }},
       {"number of values",
@@ -482,14 +482,16 @@ TEST(NestedOperator, RefusesClusterBasesThatDoNotFit) {
       {"not numbered in the order", [](Storage& s) { s.blocks[1].column_begin += 16; }},
       {"not numbered in the order", [](Storage& s) { std::swap(s.blocks[0], s.blocks[1]); }},
       {"not numbered in the order", [](Storage& s) { s.blocks[0].column_count = 4294967295U; }},
-      {"moments are of no positions", [](Storage& s) { s.blocks[0].row_begin = 1008; }},
-      {"moments are of no positions", [](Storage& s) { s.blocks[0].row_count = 24; }},
-      {"rank of moments", [](Storage& s) { s.blocks[0].row_rank = 4; }},
-      {"rank of moments", [](Storage& s) { s.blocks[0].column_rank = 1; }},
-      {"rank of moments", [](Storage& s) { s.blocks[0].row_residual_rank = 6; }},
-      {"rank of moments", [](Storage& s) { s.blocks[0].column_residual_rank = 1; }},
-      {"one scale for each moment", [](Storage& s) { s.coefficient_scale.pop_back(); }},
-      {"one scale for each moment", [](Storage& s) { s.coefficient_scale.push_back(1); }},
+      {"a cluster basis is not over positions", [](Storage& s) { s.blocks[0].row_begin = 1008; }},
+      {"a cluster basis is not over positions", [](Storage& s) { s.blocks[0].row_count = 24; }},
+      {"rank of a cluster basis", [](Storage& s) { s.blocks[0].row_rank = 4; }},
+      {"rank of a cluster basis", [](Storage& s) { s.blocks[0].column_rank = 1; }},
+      {"rank of a cluster basis", [](Storage& s) { s.blocks[0].row_residual_rank = 6; }},
+      {"rank of a cluster basis", [](Storage& s) { s.blocks[0].column_residual_rank = 1; }},
+      {"one scale for each cluster coefficient",
+       [](Storage& s) { s.coefficient_scale.pop_back(); }},
+      {"one scale for each cluster coefficient",
+       [](Storage& s) { s.coefficient_scale.push_back(1); }},
       {"not finite", [](Storage& s) { s.coefficient_scale[3] = std::nanf(""); }},
       {"reaches outside",
        [](Storage& s) {
