@@ -4,8 +4,8 @@
 
 namespace rebounce {
 
-/// In what the system is inverted: double precision, for operators that are compared with, or
-/// single for those that are compressed, in half of the time.
+/// The precision in which the system is inverted. Single precision takes half of the time and is
+/// enough for operators that are compressed; double precision is for reference operators.
 enum class Arithmetic : std::uint8_t { kDouble, kSingle };
 
 }  // namespace rebounce

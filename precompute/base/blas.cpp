@@ -12,7 +12,7 @@ namespace {
 
 constexpr const char* kKernelVariable = "OPENBLAS_CORETYPE";
 
-// What OpenBLAS falls back to.
+// The kernels that OpenBLAS falls back to on a processor that it does not know.
 constexpr std::string_view kOfUnknown = "Prescott";
 
 struct Close {
@@ -35,10 +35,10 @@ Function* find(const Handle& library, const char* name) {
   return reinterpret_cast<Function*>(address);
 }
 
-/// An OpenBLAS of our own, beside any that the process has, with a C library of its own. It chooses
-/// its kernels as it is loaded, by an environment that is that C library's: the process's stays as
-/// it is. One thread, so that products are the same on any machine and stay on the thread that
-/// asks.
+/// An instance of OpenBLAS beside any other in the process, with a C library of its own. OpenBLAS
+/// chooses its kernels while it is loaded, by the environment of that C library; the environment of
+/// the process does not change. It runs on one thread: products are the same on any machine and
+/// stay on the calling thread.
 class Blas {
  public:
   Blas() {
@@ -72,7 +72,7 @@ class Blas {
 };
 
 const Blas& blas() {
-  // Never closed: other objects may multiply as the program ends.
+  // This is never closed: other objects may multiply while the program ends.
   static const Blas& blas = *new Blas;
   return blas;
 }
@@ -104,8 +104,9 @@ std::string better_blas_kernels(std::string_view chosen, const ProcessorFeatures
 
 }  // namespace rebounce
 
-// What Eigen calls with EIGEN_USE_BLAS, in single and double precision, under the names of Fortran,
-// which passes addresses only. Hidden: a shared library keeps them to itself.
+// The Fortran functions that Eigen calls with EIGEN_USE_BLAS, in single and double precision.
+// Fortran passes addresses only. The symbols are hidden, so that a shared library does not export
+// them.
 using P = const void*;
 #define REBOUNCE_FORWARD_AS(name, parameters, ...)                                   \
   extern "C" __attribute__((visibility("hidden"))) void name parameters {            \

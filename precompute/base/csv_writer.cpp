@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::size_t kBufferSize = std::size_t{1} << 16;
 
-/// A line's cells, gathered until there are enough for a write.
+/// Gathers cells of a line until there are enough for one write.
 class LineWriter {
  public:
   explicit LineWriter(AtomicFile& file) : file_(file) {}

@@ -14,9 +14,9 @@ struct CsvColumns {
 };
 
 /// Writes a table of `groups` side by side: a header line, then n lines of comma-separated
-/// decimals, each the shortest that reads back as the same float. Whole or not at all (see
-/// AtomicFile). Throws Error when the file cannot be written or the groups differ in their number
-/// of rows.
+/// decimals, each the shortest that reads back as the same float. The file is written whole or not
+/// at all (see AtomicFile). Throws Error if the file cannot be written or the groups differ in
+/// their number of rows.
 void write_csv(const std::filesystem::path& path, std::span<const CsvColumns> groups);
 
 }  // namespace rebounce

@@ -7,14 +7,14 @@
 
 namespace rebounce {
 
-/// Numbers below `size` in sets that can be joined.
+/// Disjoint sets of the numbers below `size` (union-find).
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t size) : parent_(size) {
     std::iota(parent_.begin(), parent_.end(), 0U);
   }
 
-  /// The number that stands for the set of `i`.
+  /// The number that represents the set of `i`.
   std::uint32_t find(std::uint32_t i) {
     while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
     return i;

@@ -11,16 +11,17 @@
 
 namespace rebounce {
 
-/// A triangle at one of its edges.
+/// One side of a triangle, stored with the edge that it lies on.
 class HalfEdge {
  public:
   HalfEdge() = default;
   HalfEdge(std::uint32_t high, std::uint32_t triangle, bool ascends)
       : high_(high), triangle_(2 * triangle + (ascends ? 1 : 0)) {}
 
-  std::uint32_t high() const { return high_; }  ///< the end with the higher number
+  std::uint32_t high() const { return high_; }  ///< the end of the edge with the higher number
   std::uint32_t triangle() const { return triangle_ / 2; }
-  bool ascends() const { return triangle_ % 2 == 1; }  ///< it runs from the lower end to the higher
+  /// True if it runs from the lower end to the higher.
+  bool ascends() const { return triangle_ % 2 == 1; }
 
   void set_triangle(std::uint32_t triangle) { triangle_ = 2 * triangle + triangle_ % 2; }
 
@@ -32,7 +33,8 @@ class HalfEdge {
   std::uint32_t high_ = 0, triangle_ = 0;
 };
 
-/// The edges of triangles by the numbers of their ends: 8 bytes for each side of each triangle.
+/// The edges of a triangle mesh, found by the numbers of their ends. Takes 8 bytes for each side of
+/// each triangle.
 class EdgeTable {
  public:
   EdgeTable() = default;
@@ -72,7 +74,7 @@ class EdgeTable {
     return std::size_t{end} + 1 < begin_.size();
   }
 
-  /// The triangles at the edge between two ends, the lower first; none if there is no such edge.
+  /// The triangles at the edge between two ends, `low` < `high`; empty if there is no such edge.
   std::span<HalfEdge> find(std::uint32_t low, std::uint32_t high) {
     const auto found = std::ranges::equal_range(around(low), high, {}, &HalfEdge::high);
     return {found.begin(), found.end()};
@@ -97,7 +99,7 @@ class EdgeTable {
     return {half_edge_.data() + begin_[low], half_edge_.data() + begin_[low + 1]};
   }
 
-  std::vector<std::uint32_t> begin_;  ///< of the edges of each lower end, in half_edge_
+  std::vector<std::uint32_t> begin_;  ///< first half-edge of each lower end, in half_edge_
   std::vector<HalfEdge> half_edge_;
 };
 

@@ -6,9 +6,9 @@
 
 namespace rebounce {
 
-/// Takes denormal numbers for zero, in and out of operations of the thread that makes it, for as
-/// long as this lives. Processors of Intel take a hundred cycles and more for one operation on
-/// them. On other processors than x86-64 nothing changes.
+/// Makes the current thread treat denormal numbers as zero, as operands and as results, for the
+/// lifetime of the object. Some processors take a hundred cycles and more for one operation on a
+/// denormal number. On other processors than x86-64 nothing changes.
 class FlushToZero {
  public:
   FlushToZero(const FlushToZero&) = delete;

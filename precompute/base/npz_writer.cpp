@@ -15,10 +15,10 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the arrays are declared little-endian");
 
-// numpy.lib.format: the data of an .npy file begins at a multiple of this.
+// numpy.lib.format: the data of an .npy file begins at a multiple of this number of bytes.
 constexpr std::size_t kNpyAlignment = 64;
 
-// 1980-01-01 00:00, the zero of zip: the time of day has no business in a result.
+// 1980-01-01 00:00, the earliest time of a zip: the same arrays give the same bytes at any time.
 constexpr zip_uint16_t kZipTime = 0;
 constexpr zip_uint16_t kZipDate = (1 << 5) | 1;
 
@@ -27,7 +27,7 @@ struct NumpyTypeTraits {
   std::size_t size;
 };
 
-/// By NumpyType.
+/// Indexed by NumpyType.
 constexpr std::array<NumpyTypeTraits, 4> kNumpyTypes{
     {{"<f4", 4}, {"<f8", 8}, {"<u4", 4}, {"<u8", 8}}};
 
@@ -39,7 +39,7 @@ const NumpyTypeTraits& traits(NumpyType type) {
   throw Error("cannot write " + path.string() + ": " + reason);
 }
 
-/// A Python tuple; of one element, it has a comma all the same.
+/// A shape as a Python tuple: one element is followed by a comma too.
 std::string shape_text(const std::vector<std::size_t>& shape) {
   std::string text = "(";
   for (const std::size_t size : shape) text += std::to_string(size) + ", ";
@@ -48,8 +48,8 @@ std::string shape_text(const std::vector<std::size_t>& shape) {
   return text + ")";
 }
 
-/// What precedes the data in an .npy file: version 1.0, or 2.0 where 16 bits cannot hold the
-/// length.
+/// The bytes before the data in an .npy file: version 1.0, or 2.0 where 16 bits cannot hold the
+/// length of the header.
 std::string npy_header(const NumpyArray& array) {
   std::string text = std::string("{'descr': '") + traits(array.type).name +
                      "', 'fortran_order': False, 'shape': " + shape_text(array.shape) + ", }";
@@ -79,7 +79,7 @@ void check_size(const std::filesystem::path& path, const NumpyArray& array) {
   }
 }
 
-/// A zip archive being written; abandoned unless finish() is called.
+/// A zip archive while it is written. It is discarded unless finish() is called.
 class ZipWriter {
  public:
   ZipWriter(const std::filesystem::path& target, const std::filesystem::path& temporary)
@@ -114,7 +114,7 @@ class ZipWriter {
   /// Writes everything that was added.
   void finish() {
     if (::zip_close(archive_.get()) != 0) fail_for_archive();
-    static_cast<void>(archive_.release());  // closing freed it
+    static_cast<void>(archive_.release());  // zip_close has freed it
   }
 
  private:
@@ -128,7 +128,8 @@ class ZipWriter {
   }
 
   zip_source_t* make_source(const std::string& header, std::span<const std::byte> data) {
-    // libzip takes pointers to bytes that it could own; it is told not to, and only reads them.
+    // libzip takes a non-const pointer because it can own the bytes. Here it does not own them and
+    // only reads.
     const auto fragment = [](const void* bytes, std::size_t size) {
       return zip_buffer_fragment_t{static_cast<zip_uint8_t*>(const_cast<void*>(bytes)), size};
     };

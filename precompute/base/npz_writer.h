@@ -30,30 +30,30 @@ constexpr NumpyType numpy_type() {
   }
 }
 
-/// An array to be written; its bytes are borrowed until they are.
+/// An array to be written. Its bytes are borrowed until the file is written.
 struct NumpyArray {
-  std::string name;  ///< unique in the file; NumPy's key
+  std::string name;  ///< unique in the file; the key in NumPy
   NumpyType type = NumpyType::kF4;
   std::vector<std::size_t> shape;    ///< outermost dimension first; empty for a single number
   std::span<const std::byte> bytes;  ///< element size x the product of `shape`, row-major
 };
 
-/// Names `values`, row-major in `shape`.
+/// An array of `values`, row-major in `shape`.
 template <typename T>
 NumpyArray numpy_array(std::string name, std::vector<std::size_t> shape,
                        std::span<const T> values) {
   return {std::move(name), numpy_type<T>(), std::move(shape), std::as_bytes(values)};
 }
 
-/// Names per-patch or per-vertex triples: [n, 3].
+/// An array [n, 3] of triples by patch or by vertex.
 inline NumpyArray numpy_array(std::string name, std::span<const Float3> values) {
   return {std::move(name), NumpyType::kF4, {values.size(), 3}, std::as_bytes(values)};
 }
 
-/// Writes a NumPy .npz: an uncompressed zip of .npy files (zip64 where 4 GiB do not suffice), whole
-/// or not at all (see AtomicFile). The arrays are not copied, and the same arrays give the same
-/// bytes. Throws Error when the file cannot be written, two names are the same, or an array's bytes
-/// do not agree with its shape.
+/// Writes a NumPy .npz file: an uncompressed zip of .npy files (zip64 above 4 GiB). The file is
+/// written whole or not at all (see AtomicFile). The arrays are not copied; the same arrays give
+/// the same bytes. Throws Error if the file cannot be written, two names are the same, or the bytes
+/// of an array do not agree with its shape.
 void write_npz(const std::filesystem::path& path, std::span<const NumpyArray> arrays);
 
 }  // namespace rebounce

@@ -10,9 +10,9 @@
 
 namespace rebounce {
 
-/// Progress of a loop that OpenMP threads share: counts what is finished, tells so on the thread
-/// that began the loop, and remembers whether it is to stop. An OpenMP loop cannot be left, so
-/// iterations that find stopped() do nothing.
+/// Progress of a loop that OpenMP threads share: counts finished iterations, reports on the thread
+/// that began the loop, and keeps whether the loop has to stop. An OpenMP loop cannot be left
+/// early, so iterations that find stopped() do nothing.
 class ParallelProgress {
  public:
   /// `count` iterations; `progress` must outlive it.
@@ -21,7 +21,7 @@ class ParallelProgress {
 
   bool stopped() const { return stop_; }
 
-  /// One more iteration is finished.
+  /// Counts one finished iteration.
   void advance() {
     const double done = static_cast<double>(++done_);
     if (progress_ && omp_get_thread_num() == 0 && !progress_(done / static_cast<double>(count_))) {
@@ -29,7 +29,7 @@ class ParallelProgress {
     }
   }
 
-  /// To be called behind the loop: throws Cancelled if it was stopped.
+  /// Call this after the loop. Throws Cancelled if the loop was stopped.
   void finish() const {
     if (stop_) throw Cancelled();
   }

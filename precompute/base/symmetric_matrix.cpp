@@ -16,11 +16,11 @@ constexpr Index kTile = DenseOperator::kTile;
 using Tile = Eigen::Matrix<float, kTile, kTile, Eigen::RowMajor>;
 using RowMajorMatrixXf = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Rows and columns that are looked at together: few columns, which are what threads share, and many
-// rows, as a matrix made of links is read by the columns.
+// Rows and columns that are read together. Threads share the columns, so these are few; a matrix
+// made of links is read column by column, so rows are many.
 constexpr std::size_t kBatchRows = 2048, kBatchColumns = 256;
 
-/// Patches [begin, begin + count) of a list, or those that there are.
+/// Patches [begin, begin + count) of a list, cut at its end.
 std::span<const std::uint32_t> part_of(std::span<const std::uint32_t> patches, std::size_t begin,
                                        std::size_t count) {
   return patches.subspan(begin, std::min(count, patches.size() - begin));
@@ -65,7 +65,7 @@ void DenseMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> r
                           Eigen::Ref<MatrixXf> entries) const {
   const float* const tiles = tiles_of(matrix);
   const auto m = static_cast<Index>(rows.size()), n = static_cast<Index>(columns.size());
-  // In squares: patches that are close in the order of clusters mostly share cache lines of tiles.
+  // Square by square: patches that are close in the order of clusters mostly share cache lines.
   for (Index first_column = 0; first_column < n; first_column += kTile) {
     const Index end_column = std::min(first_column + kTile, n);
     for (Index first_row = 0; first_row < m; first_row += kTile) {
@@ -123,7 +123,7 @@ FormFactorMatrix::FormFactorMatrix(const ExchangeMatrix& exchange, std::span<con
 void FormFactorMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::uint32_t> rows,
                                std::span<const std::uint32_t> columns,
                                Eigen::Ref<MatrixXf> entries) const {
-  std::vector<std::uint32_t> place(root_area_.size(), kNone);  // of a patch among the columns
+  std::vector<std::uint32_t> place(root_area_.size(), kNone);  // column of each patch, or kNone
   for (std::size_t j = 0; j < columns.size(); ++j)
     place[columns[j]] = static_cast<std::uint32_t>(j);
   entries.setZero();
@@ -139,7 +139,7 @@ void FormFactorMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::ui
   }
 }
 
-// Rows are spread out to full length, some at a time: most patches of a room see each other, and a
+// Rows are expanded to full length, some at a time. Most patches of a room see each other, and a
 // product of full matrices is many times faster than gathering entry by entry.
 MatrixXf FormFactorMatrix::multiply(std::uint32_t /*matrix*/, const MatrixXf& x) const {
   load_blas();

@@ -13,42 +13,44 @@
 
 namespace rebounce {
 
-/// What is compressed: a matrix M over the patches for each distinct channel, in its symmetric form
-/// A^1/2 M A^-1/2. Any number of threads may ask.
+/// What compression reads: a matrix M over the patches for each distinct channel, in its symmetric
+/// form A^1/2 M A^-1/2, where A holds the areas. Usable from any number of threads.
 class SymmetricMatrix {
  public:
-  /// Of the matrix, the rows of receivers and the columns of sources are wanted.
+  /// `roles`: the rows of receivers and the columns of sources are wanted.
   explicit SymmetricMatrix(PatchRoles roles = {}) : roles_(std::move(roles)) {}
   virtual ~SymmetricMatrix() = default;
 
-  /// Entries and products are nevertheless those of the whole matrix.
+  /// Entries and products are those of the whole matrix, whatever the roles.
   const PatchRoles& roles() const { return roles_; }
 
   /// [n] m².
   virtual std::span<const float> area() const = 0;
-  /// Distinct matrices, and which of them each channel has: by default one for all channels.
+  /// The number of distinct matrices, and the matrix of each channel. By default one serves all
+  /// channels.
   virtual std::uint32_t matrix_count() const { return 1; }
   virtual std::array<std::uint32_t, kChannelCount> channel_matrix() const { return {0, 0, 0}; }
 
-  /// Writes the entries between two lists of patches without repetitions, which are the same or
-  /// have none in common; `entries` is [rows][columns].
+  /// Writes the entries between two lists of patches to `entries` [rows][columns]. A list has no
+  /// repetitions; the two lists are equal or have no patch in common.
   virtual void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                        std::span<const std::uint32_t> columns,
                        Eigen::Ref<Eigen::MatrixXf> entries) const = 0;
 
-  /// The product with many vectors at once, x [n][k]. The same bits for any number of threads.
+  /// The product with many vectors at once, x [n][k]. The bits do not depend on the number of
+  /// threads.
   virtual Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const = 0;
 
-  /// What arrives at receivers of the light of each source alone: the squared norms of the columns,
-  /// of all matrices together, [n] by patch, 0 for others. `order` lists the patches so that
-  /// neighbours stay together.
+  /// The squared norms of the columns in the rows of receivers, summed over all matrices, [n] by
+  /// patch: the energy that receivers get from each source alone. 0 for patches that are no
+  /// sources. `order` lists the patches so that neighbours stay together.
   virtual Eigen::VectorXd energies(std::span<const std::uint32_t> order) const;
 
  private:
   PatchRoles roles_;
 };
 
-/// Yhat, from an operator in f32.
+/// Yhat, from a dense operator in f32.
 class DenseMatrix final : public SymmetricMatrix {
  public:
   explicit DenseMatrix(const DenseOperator& dense, PatchRoles roles = {})
@@ -82,12 +84,12 @@ class FormFactorMatrix final : public SymmetricMatrix {
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
  private:
-  /// Writes the entries of a row that are not 0 into `entries` [n].
+  /// Writes the nonzero entries of a row into `entries` [n].
   void spread_row(std::uint32_t row, Eigen::Ref<Eigen::RowVectorXf> entries) const;
 
   std::span<const float> area_;
   FormFactorRows rows_;
-  std::vector<double> root_area_;  ///< [n]
+  std::vector<double> root_area_;  ///< [n] square roots of the areas
 };
 
 }  // namespace rebounce

@@ -6,8 +6,8 @@
 
 namespace rebounce {
 
-/// Lets OpenMP have so many threads at most, for what the thread that makes it begins, for as long
-/// as this lives.
+/// Limits the number of OpenMP threads of the parallel regions that the current thread begins, for
+/// the lifetime of the object.
 class ThreadLimit {
  public:
   /// `count` > 0.

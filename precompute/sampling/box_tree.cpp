@@ -19,7 +19,7 @@ BoxTree::BoxTree(std::vector<Box> boxes) : boxes_(std::move(boxes)), order_(boxe
   for (std::size_t k = 0; k < nodes_.size(); ++k) split(k);
 }
 
-/// Halves a node at the median of its boxes' middles along the longest axis of its own box.
+/// Splits a node at the median of the middles of its boxes, along the longest axis of the node.
 void BoxTree::split(std::size_t index) {
   Node node = nodes_[index];
   for (std::uint32_t k = node.begin; k < node.end; ++k) {
@@ -45,7 +45,8 @@ void BoxTree::split(std::size_t index) {
 
 void BoxTree::find(const ConvexRegion& region, std::vector<std::uint32_t>& found) const {
   found.clear();
-  // Halving 2^32 boxes goes no deeper than this, and leaves one more node to do at each level.
+  // Splitting 2^32 boxes goes no deeper than this, and each level leaves one more node on the
+  // stack.
   std::array<std::uint32_t, 40> stack = {0};
   std::size_t waiting = 1;
   while (waiting > 0) {

@@ -8,20 +8,21 @@
 
 namespace rebounce {
 
-/// A binary tree over boxes that finds those in a region. Immutable, usable from any number
-/// of threads.
+/// A binary tree over boxes that finds the boxes in a region. Immutable, usable from any number of
+/// threads.
 class BoxTree {
  public:
   explicit BoxTree(std::vector<Box> boxes);
 
-  /// Puts the numbers of the boxes that may meet `region` into `found`, ascending.
+  /// Writes the numbers of the boxes that may meet `region` to `found`, ascending.
   void find(const ConvexRegion& region, std::vector<std::uint32_t>& found) const;
 
  private:
   struct Node {
     Box box;
-    std::uint32_t begin, end;       ///< in order_
-    std::uint32_t first_child = 0;  ///< the second follows it; 0 for a leaf
+    std::uint32_t begin, end;  ///< in order_
+    /// Index of the first child, the second follows it; 0 for a leaf.
+    std::uint32_t first_child = 0;
   };
 
   void split(std::size_t index);

@@ -14,13 +14,14 @@ struct HalfSpace {
   double limit;  ///< metres if `normal` is a unit vector
 };
 
-/// What a box along the axes and any number of half-spaces have in common.
+/// The intersection of a box along the axes with any number of half-spaces.
 struct ConvexRegion {
   Box box;
   std::vector<HalfSpace> sides;
 
-  /// False if a box is beyond one of the sides, or clear of the region's box. Never false for a
-  /// box around a segment for which the other overload is true, not even by rounding.
+  /// False if `other` lies outside one of the half-spaces or outside the box of the region. It is
+  /// never false for a box around a segment for which the other overload is true, not even by
+  /// rounding.
   bool may_meet(const Box& other) const {
     if (!box.meets(other)) return false;
     for (const auto& [normal, limit] : sides) {
@@ -32,7 +33,7 @@ struct ConvexRegion {
     return true;
   }
 
-  /// The same of a segment.
+  /// The same for a segment.
   bool may_meet(const glm::vec3& begin, const glm::vec3& end) const {
     Box segment;
     segment.add(begin);

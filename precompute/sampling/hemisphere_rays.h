@@ -16,7 +16,7 @@
 
 namespace rebounce {
 
-/// Sine and cosine of an angle of at most pi / 4, by their series: to the precision of a float.
+/// Sine and cosine of an angle of at most pi / 4 by their series, to the precision of a float.
 inline float small_sine(float angle) {
   const float a = angle * angle;
   return angle *
@@ -27,13 +27,13 @@ inline float small_cosine(float angle) {
   return 1 + a * (-0.5F + a * (1.0F / 24 + a * (-1.0F / 720 + a * (1.0F / 40320))));
 }
 
-/// Samples of directions, in [0, 1)². Their steps are other irrational ones than those of
-/// r2_sequence, so that points and directions do not march together.
+/// Samples of directions, in [0, 1)². The irrational steps differ from those of r2_sequence, so
+/// that points and directions are not correlated.
 inline PointSequence direction_sequence(const glm::dvec2& shift) {
   return {shift, {0.41421356237, 0.73205080757}};
 }
 
-/// square_to_cosine_hemisphere in single precision, for many.
+/// square_to_cosine_hemisphere in single precision, for many calls.
 inline glm::vec3 to_cosine_direction(const glm::dvec2& s) {
   const float x = static_cast<float>(2 * s.x - 1), y = static_cast<float>(2 * s.y - 1);
   const bool wide = std::abs(x) > std::abs(y);
@@ -43,7 +43,8 @@ inline glm::vec3 to_cosine_direction(const glm::dvec2& s) {
   return {wide ? along : aside, wide ? aside : along, std::sqrt(std::max(0.0F, 1 - r * r))};
 }
 
-/// The directions around +Z, turned to what `normal` is: a frame for as long as it stays the same.
+/// Turns directions around +Z to directions around `normal`. The frame is kept as long as the
+/// normal stays the same.
 class NormalFrame {
  public:
   glm::vec3 turn(const Float3& normal, const glm::vec3& direction) {
@@ -59,7 +60,7 @@ class NormalFrame {
   glm::mat3 frame_{1};
 };
 
-/// A ray from `point` along the unit vector `direction`.
+/// A ray without end from `point` along the unit vector `direction`.
 inline Ray make_free_ray(const PatchPoint& point, const glm::vec3& direction,
                          const RayTracer& tracer) {
   Ray ray{};
@@ -70,7 +71,7 @@ inline Ray make_free_ray(const PatchPoint& point, const glm::vec3& direction,
   return ray;
 }
 
-/// Fills `rays` with one cosine-distributed ray from each of `points`; the directions are those of
+/// Fills `rays` with one cosine-distributed ray from each of `points`. The directions are those of
 /// a low-discrepancy sequence shifted by `direction_shift`.
 inline void make_hemisphere_rays(std::span<const PatchPoint> points, const RayTracer& tracer,
                                  const glm::dvec2& direction_shift, std::span<Ray> rays) {
@@ -82,8 +83,8 @@ inline void make_hemisphere_rays(std::span<const PatchPoint> points, const RayTr
   }
 }
 
-/// Fills `rays` with such rays, from number `first` on, from points spread over a triangle, on the
-/// side that `normal` points to. The same `seed` gives the same rays.
+/// Fills `rays` with cosine-distributed rays from points spread over a triangle, on the side that
+/// `normal` points to: the rays with numbers from `first` on. The same `seed` gives the same rays.
 inline void make_hemisphere_rays(const std::array<glm::dvec3, 3>& triangle,
                                  const glm::dvec3& normal, const RayTracer& tracer,
                                  std::uint64_t seed, std::span<Ray> rays, std::uint32_t first = 0) {

@@ -6,7 +6,7 @@
 namespace rebounce {
 namespace {
 
-/// What nanoflann asks of a set of points.
+/// The interface that nanoflann needs of a set of points.
 struct PointSet {
   std::span<const Float3> point;
 
@@ -23,8 +23,8 @@ struct PointSet {
 using PointTree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, PointSet>,
                                                       PointSet, 3, std::uint32_t>;
 
-/// What nanoflann asks of a set of results: the points in a ball that shrinks while it holds too
-/// many.
+/// The interface that nanoflann needs of a set of results. The ball shrinks while it holds too many
+/// points.
 class ShrinkingBall {
  public:
   ShrinkingBall(float radius, std::size_t most, std::vector<PointFinder::Found>& found)

@@ -24,12 +24,12 @@ class PointFinder {
   PointFinder(const PointFinder&) = delete;
   PointFinder& operator=(const PointFinder&) = delete;
 
-  /// The `count` points nearest to `place`, fewer if there are not so many; the nearest first.
+  /// The `count` points nearest to `place`, the nearest first; fewer if there are not so many.
   std::vector<Found> nearest(const Float3& place, std::size_t count) const;
 
-  /// Puts all points within `radius` metres of `place` into `found`, in no particular order but
-  /// always the same; where they are more than `most`, only those within the largest of radius /
-  /// sqrt(2)^k that are not. Returns the radius that was taken.
+  /// Writes all points within `radius` metres of `place` to `found`, in an arbitrary order that is
+  /// always the same. If they are more than `most`, the radius is divided by sqrt(2) until they are
+  /// not. Returns the radius used.
   float within(const Float3& place, float radius, std::size_t most,
                std::vector<Found>& found) const;
 

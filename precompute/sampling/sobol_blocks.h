@@ -9,10 +9,11 @@
 
 namespace rebounce {
 
-/// Sobol's sequence in four dimensions (direction numbers of S. Joe and F. Y. Kuo 2008), shifted
-/// digit by digit (exclusive or) by random bits: every point is uniform over [0, 1)^4, and the
-/// points of each aligned block of 2^k are as well spread as unshifted ones. Made in blocks, so
-/// that the compiler makes several points at once.
+/// Sobol's sequence in four dimensions (direction numbers: S. Joe and F. Y. Kuo, "Constructing
+/// Sobol sequences with better two-dimensional projections", 2008), shifted digit by digit
+/// (exclusive or) by random bits. Every point is uniform over [0, 1)^4, and the points of each
+/// aligned block of 2^k are as well spread as unshifted ones. Points are made in blocks, so that
+/// the compiler computes several at once.
 class SobolBlocks {
  public:
   static constexpr int kDimensions = 4;
@@ -21,7 +22,7 @@ class SobolBlocks {
   /// The coordinates of the points of a block, dimension by dimension.
   using Block = std::array<std::array<float, kSize>, kDimensions>;
 
-  /// Equal `bits` are equal shifts.
+  /// Equal `bits` give equal shifts.
   explicit SobolBlocks(std::uint64_t bits) {
     const std::uint64_t first = mix_bits(bits), second = mix_bits(first);
     shift_ = {high(first), low(first), high(second), low(second)};
@@ -33,7 +34,7 @@ class SobolBlocks {
       const std::uint32_t shift = shift_[d] ^ coordinate(d, number * kSize);
       const std::array<std::uint32_t, kSize>& first = kFirstBlock[d];
       for (std::size_t k = 0; k < count; ++k) {
-        // By way of signed integers, whose conversion is one instruction.
+        // The conversion goes through signed integers, because that is one instruction.
         block[d][k] =
             static_cast<float>(static_cast<std::int32_t>((first[k] ^ shift) >> 8)) * 0x1p-24F;
       }
@@ -49,7 +50,7 @@ class SobolBlocks {
   static std::uint32_t low(std::uint64_t bits) { return static_cast<std::uint32_t>(bits); }
 
   static constexpr Directions make_directions() {
-    // Degree and inner coefficients of a primitive polynomial, and the first direction numbers.
+    // Degree and inner coefficients of a primitive polynomial, and its first direction numbers.
     struct Polynomial {
       int degree;
       std::uint32_t coefficients;
