@@ -26,7 +26,7 @@ std::vector<double> root_reflectance(const PatchTable& patches, int channel) {
   return root;
 }
 
-/// visit(i, j, g) for the entries of G that are not zero, i <= j.
+/// Calls visit(i, j, g) for the nonzero entries of G with i <= j.
 template <typename Visit>
 void visit_exchange(const ExchangeMatrix& exchange, const std::vector<float>& area,
                     const Visit& visit) {
@@ -38,7 +38,7 @@ void visit_exchange(const ExchangeMatrix& exchange, const std::vector<float>& ar
   }
 }
 
-/// I - R G R.
+/// The matrix I - R G R.
 template <typename Scalar>
 void fill_system(const ExchangeMatrix& exchange, const std::vector<float>& area,
                  const std::vector<double>& root, TiledMatrix<Scalar>& system) {
@@ -50,7 +50,7 @@ void fill_system(const ExchangeMatrix& exchange, const std::vector<float>& area,
   });
 }
 
-/// Writes Yhat = R^-1 (inverse - I) R^-1 as the operator's tiles, but for the diagonal.
+/// Writes Yhat = R^-1 (inverse - I) R^-1 to the tiles of the operator, except for the diagonal.
 template <typename Scalar>
 void write_tiles(TiledMatrix<Scalar>& inverse, const std::vector<double>& root, float* tiles) {
   const std::size_t n = root.size(), side = (n + kTile - 1) / kTile;
@@ -71,8 +71,9 @@ void write_tiles(TiledMatrix<Scalar>& inverse, const std::vector<double>& root, 
   }
 }
 
-/// The diagonal of Yhat = G + G R² Yhat from the entries beside it: in that of the inverse little
-/// is left after the 1, and nothing where patches are black.
+/// Writes the diagonal of Yhat = G + G R² Yhat, from the entries beside it. The diagonal of the
+/// inverse cannot give it: little is left of an entry after the 1 is subtracted, and nothing where
+/// patches are black.
 void write_diagonal(const ExchangeMatrix& exchange, const std::vector<float>& area,
                     const std::vector<double>& root, float* tiles) {
   std::vector<double> sum(area.size(), 0.0), left(area.size(), 1.0);
@@ -91,7 +92,7 @@ void write_diagonal(const ExchangeMatrix& exchange, const std::vector<float>& ar
   }
 }
 
-/// Yhat of one channel.
+/// The inverse of one channel: Yhat.
 template <typename Scalar>
 void solve_channel(const ExchangeMatrix& exchange, const PatchTable& patches, int channel,
                    float* tiles, const Progress& progress) {
@@ -103,7 +104,7 @@ void solve_channel(const ExchangeMatrix& exchange, const PatchTable& patches, in
   write_diagonal(exchange, patches.area, root, tiles);
 }
 
-/// Floating-point operations a second in products of tiles, all threads together.
+/// Floating-point operations per second in products of tiles, all threads together.
 template <typename Scalar>
 double measure_tile_speed() {
   using Matrix = typename TiledMatrix<Scalar>::Matrix;
@@ -123,7 +124,7 @@ double measure_tile_speed() {
     return 2.0 * kSide * kSide * kSide * kProducts * static_cast<double>(sums.size()) /
            seconds.count();
   };
-  multiply();  // starts the threads, and touches what they write to
+  multiply();  // starts the threads and touches the memory that they write to
   return multiply();
 }
 

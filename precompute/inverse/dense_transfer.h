@@ -17,14 +17,14 @@ namespace rebounce {
 /// Builds Y = F (I - rho F)^-1 for each channel, dense.
 ///
 /// With G = A^1/2 F A^-1/2 and R = rho^1/2, the matrix I - R G R is symmetric positive definite,
-/// and (I - R G R)^-1 = I + R Yhat R gives Yhat = A^1/2 Y A^-1/2. A floor of 1e-7 under the
-/// reflectance makes the division by R harmless for black patches and changes Y by less than 1e-7.
+/// and (I - R G R)^-1 = I + R Yhat R gives Yhat = A^1/2 Y A^-1/2. The reflectance is raised to at
+/// least 1e-7: the division by R is then safe for black patches, and Y changes by less than 1e-7.
 ///
-/// Single precision is enough: the system is an M-matrix, positive on its diagonal only, so that no
-/// sum on the way cancels and every entry keeps its relative error, however small the reflectances
-/// by which it is divided (A. S. Alfa, J. Xue and Q. Ye, "Entrywise perturbation theory for
-/// diagonally dominant M-matrices with applications", 2002). Only the 1 on the diagonal cancels;
-/// entries there follow from the others by Yhat = G + G R² Yhat.
+/// Single precision is enough. The system is an M-matrix, positive on its diagonal only, so no sum
+/// cancels and every entry keeps its relative error, however small the reflectances by which it is
+/// divided (A. S. Alfa, J. Xue and Q. Ye, "Entrywise perturbation theory for diagonally dominant
+/// M-matrices with applications", 2002). Only the 1 on the diagonal cancels; the diagonal follows
+/// from the other entries by Yhat = G + G R² Yhat.
 ///
 /// Channels with the same reflectances share one matrix. Throws Cancelled if asked to stop.
 std::shared_ptr<const DenseOperator> build_dense_transfer(
@@ -35,12 +35,12 @@ std::shared_ptr<const DenseOperator> build_dense_transfer(
 std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count,
                                       Arithmetic arithmetic);
 
-/// Seconds that build_dense_transfer will take with the threads that there are, by the time of a
-/// few products of tiles, as if it did nothing else: rough, and rather too few.
+/// Forecasts the seconds that build_dense_transfer takes with all OpenMP threads, from the time of
+/// a few products of tiles. The forecast leaves out all other work: it is rough and rather too low.
 double forecast_dense_transfer(std::size_t patch_count, std::size_t matrix_count,
                                Arithmetic arithmetic);
 
-/// Number of different reflectance channels, 1 to 3, and which of them each channel uses.
+/// Number of different reflectance channels, 1 to 3; writes which of them each channel uses.
 std::uint32_t distinct_channels(std::span<const Float3> reflectance,
                                 std::array<std::uint32_t, kChannelCount>& channel_matrix);
 std::uint32_t distinct_channels(std::span<const Float3> reflectance);

@@ -14,18 +14,18 @@ using Eigen::MatrixXf;
 using Vectors = HierarchicalMatrix::Vectors;
 using ConstMap = Eigen::Map<const Vectors>;
 
-// Positions of a strip: blocks are found by the strips that they meet.
+// Positions in a strip. Each strip lists the blocks that meet it.
 constexpr std::uint32_t kStrip = 512;
 
 // Vectors that one thread multiplies with at a time.
 constexpr Index kBatchLights = 32;
 
-/// to = matrix from, or with kAdd to += matrix from; matrix [rows][columns], the others with
-/// `width` columns, all of them row after row.
+/// Computes to = matrix from, or to += matrix from with kAdd. matrix is [rows][columns], the
+/// vectors have `width` columns; all are row-major.
 enum class Write { kSet, kAdd };
 void product(bool transposed, Index rows, Index columns, const float* matrix, const float* from,
              float* to, Index width, Write write) {
-  // The BLAS's matrices are column after column: these, transposed.
+  // The BLAS expects column-major matrices: these are the transposed ones.
   const auto m = static_cast<int>(width), n = static_cast<int>(rows), k = static_cast<int>(columns),
              stride = transposed ? n : k;
   const float one = 1, kept = write == Write::kAdd ? 1 : 0;
@@ -71,7 +71,7 @@ HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage)
   sort_blocks();
 }
 
-/// R K R instead of K; in powers of two, so that nothing is rounded.
+/// Passes on R K R instead of K. R holds powers of two, so nothing is rounded.
 void HierarchicalMatrix::take_scales() {
   std::vector<float> scale(static_cast<std::size_t>(position_count()), 1.0F);
   for (std::size_t k = 0; k < position_.size(); ++k) scale[k] = storage_.position_scale(k);
@@ -216,7 +216,7 @@ void HierarchicalMatrix::multiply(std::uint32_t matrix, const Vectors& x, Vector
   }
 }
 
-/// The coupling matrices, and all of dense blocks.
+/// Multiplies with the coupling matrices, and with all of the dense blocks.
 void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                                          Workspace& workspace) const {
   for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
@@ -230,7 +230,7 @@ void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x,
     const Index columns = dense ? block.column_count : block.column_rank;
     const Vectors& from = dense ? x : workspace.sent;
     Vectors& to = dense ? y : workspace.received;
-    // Coefficients have one block that writes them, positions several.
+    // A coefficient is written by one block, a position by several.
     const Write write = dense ? Write::kAdd : Write::kSet;
     const float* const entries = coupling(matrix, b);
     product(false, rows, columns, entries, from.row(column).data(), to.row(row).data(), x.cols(),

@@ -10,10 +10,10 @@
 
 namespace rebounce {
 
-/// A hierarchical operator of any precision as a matrix, in f32.
+/// A hierarchical operator of any precision as a SymmetricMatrix, decoded to f32.
 class HierarchicalMatrix final : public SymmetricMatrix {
  public:
-  /// Some vectors side by side: the rows are positions, with those that hold no patch.
+  /// Vectors side by side, row-major: a row for each position, also those that hold no patch.
   using Vectors = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   explicit HierarchicalMatrix(const HierarchicalStorage& storage);
@@ -29,27 +29,28 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
   Eigen::Index position_count() const;
-  std::span<const std::uint32_t> patch() const { return storage_.patch; }  ///< [n] at each position
+  /// [positions] patch at each.
+  std::span<const std::uint32_t> patch() const { return storage_.patch; }
 
-  /// What `multiply` needs beside its vectors.
+  /// Memory that `multiply` needs beside its vectors.
   struct Workspace {
     Vectors sent, received;  ///< coefficients before and after the coupling matrices
   };
 
-  /// y = matrix x on one thread, all [positions][k]; y must not be x.
+  /// y = matrix x on the calling thread, both [positions][k]; y must not alias x.
   void multiply(std::uint32_t matrix, const Vectors& x, Vectors& y, Workspace& workspace) const;
 
  private:
-  /// Where a patch of a list is, and which of them it is.
+  /// The position of a patch, and its index in a list of patches.
   struct Place {
     std::uint32_t position, index;
   };
-  /// Such a list by position.
+  /// The places of such a list, by position.
   struct Places;
 
   void take_scales();
   void sort_blocks();
-  /// The entries of a block in some of its rows and columns.
+  /// The entries of a block in the given rows and columns.
   Eigen::MatrixXf block_entries(std::uint32_t matrix, std::size_t block,
                                 std::span<const Place> rows, std::span<const Place> columns) const;
   void add_block(std::uint32_t matrix, std::size_t block, const Places& rows, const Places& columns,
@@ -59,13 +60,15 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   const float* basis(const HierarchicalLayout::End& end) const;
   const float* coupling(std::uint32_t matrix, std::size_t block) const;
 
-  HierarchicalStorage storage_;  ///< f32, without values
+  HierarchicalStorage storage_;  ///< f32; its values are moved to the arrays below
   HierarchicalLayout layout_;
-  std::vector<float> bases_;                          ///< [rank][size] by cluster
-  std::vector<std::vector<float>> couplings_;         ///< of each matrix: S or the entries by block
-  std::vector<std::uint32_t> position_;               ///< [n] of each patch
-  Eigen::Index low_rank_count_ = 0;                   ///< coefficients of low-rank blocks
-  std::vector<std::vector<std::uint32_t>> touching_;  ///< blocks that meet a strip of positions
+  std::vector<float> bases_;  ///< [rank][size] by cluster
+  /// Of each matrix: coupling matrices or dense entries, by block.
+  std::vector<std::vector<float>> couplings_;
+  std::vector<std::uint32_t> position_;  ///< [n] position of each patch
+  Eigen::Index low_rank_count_ = 0;      ///< number of coefficients of low-rank blocks
+  /// The blocks that meet each strip of positions.
+  std::vector<std::vector<std::uint32_t>> touching_;
 };
 
 }  // namespace rebounce

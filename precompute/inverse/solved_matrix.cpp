@@ -13,13 +13,13 @@ using Eigen::Index;
 
 constexpr auto kBatchColumns = static_cast<std::size_t>(SolvedTransfer::kBatchColumns);
 
-/// Columns that one thread solves for, counted from the first of all.
+/// Columns that one thread solves for. The first is counted over all panels.
 struct Group {
   std::uint32_t matrix;
   std::size_t begin, count;
 };
 
-/// All columns of `panels` that hold patches, of which there are `patch_count`.
+/// The columns of `panels` that hold patches, in groups. There are `patch_count` patches.
 std::vector<Group> make_groups(std::span<const Cluster> panels, std::size_t patch_count,
                                std::uint32_t matrix_count) {
   std::vector<Group> groups;
@@ -35,8 +35,8 @@ std::vector<Group> make_groups(std::span<const Cluster> panels, std::size_t patc
   return groups;
 }
 
-/// Rows fall from one panel to the next: what the first took is kept, as new pages are cleared when
-/// they are written to.
+/// Keeps the memory of the first panel: later panels have fewer rows, and the operating system
+/// clears new pages when they are written to.
 void make_room(SolvedTransfer::Vectors& part, std::size_t rows, std::size_t columns) {
   const Index rows_had = part.rows(), columns_had = part.cols();
   if (rows_had >= static_cast<Index>(rows) && columns_had >= static_cast<Index>(columns)) return;

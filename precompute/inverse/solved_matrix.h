@@ -11,10 +11,10 @@
 
 namespace rebounce {
 
-/// Yhat as far as its products say; where entries come from is left open.
+/// Yhat through its products, which are solved for. Derived classes provide the entries.
 class SolvedMatrix : public SymmetricMatrix {
  public:
-  /// `solved` must outlive it; `energies` [n] are those that it estimates with these roles.
+  /// `solved` must outlive the object; `energies` [n] are those that it estimates with these roles.
   SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies, PatchRoles roles)
       : SymmetricMatrix(std::move(roles)), solved_(solved), energies_(std::move(energies)) {}
 
@@ -38,31 +38,32 @@ class SolvedMatrix : public SymmetricMatrix {
   Eigen::VectorXd energies_;
 };
 
-/// Its columns, exact, of some panels of patches at a time.
+/// Exact columns of Yhat, for a few panels of patches at a time.
 class PanelMatrix final : public SolvedMatrix {
  public:
   using SolvedMatrix::SolvedMatrix;
 
-  /// Solves for the columns of the patches at `panels` of `tree`, neighbours in their order, in the
-  /// rows from there to the end: the lower triangle. The bits of a panel do not depend on others.
-  /// Throws Cancelled if asked to stop.
+  /// Solves for the columns of the patches at `panels` of `tree`, neighbours in the order of
+  /// positions, in the rows from there to the end: the lower triangle. The bits of a panel do not
+  /// depend on the other panels. Throws Cancelled if asked to stop.
   void solve(const ClusterTree& tree, std::span<const Cluster> panels,
              const Progress& progress = {});
 
-  /// Those of rows and columns that the panels have.
+  /// The rows and columns must be covered by the panels.
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
 
  private:
-  /// Solutions [positions][k] as the columns of the panels from `begin` on.
+  /// Keeps solutions [positions][k] as the columns of the panels from `begin` on.
   void keep(const SolvedTransfer::Vectors& columns, std::uint32_t matrix, std::size_t begin);
 
-  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, [rows][columns] at the least
-  std::vector<std::uint32_t> place_;            ///< [n] row, and column, of a patch
+  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, at least [rows][columns]
+  std::vector<std::uint32_t> place_;            ///< [n] row and column of a patch
 };
 
-/// Its entries as an operator has them that was made of it, with the roles of that.
+/// Yhat with the entries of an operator that was compressed from it, and with the roles of that
+/// operator. Its products are solved for.
 class RoundedMatrix final : public SolvedMatrix {
  public:
   RoundedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies,

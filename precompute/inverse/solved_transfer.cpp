@@ -17,29 +17,29 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXf;
 using Vectors = HierarchicalMatrix::Vectors;
-using Sums = Eigen::Array<double, 1, Eigen::Dynamic>;  ///< of each right-hand side
+using Sums = Eigen::Array<double, 1, Eigen::Dynamic>;  ///< one for each right-hand side
 using Factors = Eigen::Array<float, 1, Eigen::Dynamic>;
 
-// Residuals fall by half or more in a step even at a reflectance of 0.9.
+// A bound on the steps. Residuals fall by half or more in a step even at a reflectance of 0.9.
 constexpr int kMostSteps = 500;
 
-// Eigenvectors that are told from the rest, no more than a part of all, and multiplications that
+// Number of leading eigenvectors, at most 1 / kLeadingPart of all, and of the multiplications that
 // find them. Measured: notes/operator.md.
 constexpr Index kLeadingCount = 256, kLeadingPart = 8;
 constexpr int kLeadingSteps = 6;
 
-// Rows whose products are summed in single precision before they go into the double.
+// Rows whose products are summed in single precision before they are added to the double.
 constexpr Index kSummedRows = 128;
 
-// Vectors that are multiplied side by side: fewer than columns are, so that threads share even the
-// few that lights are.
+// Vectors that are multiplied side by side. They are fewer than kBatchColumns, so that threads can
+// share the few vectors of lights.
 constexpr Index kSmallGroup = 16;
 
-// Random vectors for the energies: their errors are sqrt(2 / 128), 13 %, and of their roots, which
-// count (light_weights.cpp), 6 %.
+// Random vectors for the energies. Their relative errors are sqrt(2 / 128) = 13 %; those of their
+// roots, which light_weights.cpp uses, are 6 %.
 constexpr Index kProbeCount = 128;
 
-/// Sums over the rows of `term(first, count)`, an expression [count][k].
+/// Sums of `term(first, count)`, an expression [count][k], over all rows.
 template <typename Term>
 Sums column_sums(Index rows, Index width, const Term& term) {
   Sums sums = Sums::Zero(width);
@@ -158,7 +158,7 @@ void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_
     const Sums pq = column_sums(rows, width, [&](Index i) {
       return p.row(i).array().square() - sent.row(i).array() * arrived.row(i).array();
     });
-    // Solutions that are good enough stay as they are.
+    // A solution that is good enough stays as it is.
     const Factors alpha = (rr > allowed).select(quotient(rr, pq), 0);
     const Sums before = rr;
     rr = column_sums(rows, width, [&](Index i) {

@@ -27,12 +27,12 @@ class StageProgress {
   std::size_t steps_;
 };
 
-/// work(k) for k < count, shared out among threads.
+/// Runs work(k) for k < count, shared among threads.
 template <typename Work>
 void for_each_tile(std::size_t count, const Work& work) {
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < count; ++k) {
-    const FlushToZero flush;  // of this thread; some cycles, where a tile takes a million
+    const FlushToZero flush;  // of this thread; it takes some cycles, a tile takes a million
     work(k);
   }
 }
@@ -53,7 +53,7 @@ void factor(TiledMatrix<Scalar>& m, const StageProgress& progress) {
           .transpose()
           .template solveInPlace<Eigen::OnTheRight>(a);
     });
-    // All tiles (i, j) with k < j <= i, as one index so that threads share them evenly.
+    // All tiles (i, j) with k < j <= i, as one index, so that threads share them evenly.
     for_each_tile(left * left, [&](std::size_t index) {
       const std::size_t i = k + 1 + index / left, j = k + 1 + index % left;
       if (j > i) return;
@@ -91,7 +91,7 @@ void invert_lower(TiledMatrix<Scalar>& m, const StageProgress& progress) {
   }
 }
 
-/// L^-T L^-1 in place of L^-1.
+/// Replaces L^-1 by L^-T L^-1.
 template <typename Scalar>
 void multiply_by_transpose(TiledMatrix<Scalar>& m, const StageProgress& progress) {
   for (std::size_t k = 0; k < m.side(); ++k) {

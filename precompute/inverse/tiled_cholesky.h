@@ -8,8 +8,8 @@
 
 namespace rebounce {
 
-/// A symmetric matrix of doubles or floats, of which the lower triangle of square tiles is stored;
-/// both halves of a tile on the diagonal are. The last tiles are padded with the identity.
+/// A symmetric matrix of doubles or floats, stored as the lower triangle of square tiles. Tiles on
+/// the diagonal store both halves. The last tiles are padded with the identity.
 template <typename Scalar>
 class TiledMatrix {
  public:
@@ -41,15 +41,14 @@ class TiledMatrix {
 };
 
 /// Replaces a symmetric positive definite matrix by its inverse (lower triangle), through its
-/// Cholesky factor L: M = L L^T, then L^-1, then L^-T L^-1. n³ multiply-adds.
+/// Cholesky factor L: M = L L^T, then L^-1, then L^-T L^-1. Takes n³ multiply-adds.
 ///
 /// The algorithms are the tiled ones of A. Buttari, J. Langou, J. Kurzak and J. Dongarra, "A class
-/// of parallel tiled linear algebra algorithms for multicore architectures", 2009. Every tile meets
+/// of parallel tiled linear algebra algorithms for multicore architectures", 2009. Every tile gets
 /// its updates in a fixed order and BLAS runs on one thread, so the bits do not depend on the
-/// number of OpenMP threads. Throws Error if the matrix is not positive definite, Cancelled if
-/// asked to stop. Denormal numbers count as zero: where patches exchange next to nothing, products
-/// of little with little are, and took two thirds of the time (Sponza of 16,000 patches, on a
-/// processor of Intel). For doubles and floats.
+/// number of OpenMP threads. Denormal numbers count as zero: where patches exchange very little
+/// light, products of small numbers are denormal and slow on some processors. Throws Error if the
+/// matrix is not positive definite, Cancelled if asked to stop.
 template <typename Scalar>
 void invert_positive_definite(TiledMatrix<Scalar>& matrix, const Progress& progress = {});
 
