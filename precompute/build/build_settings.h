@@ -67,8 +67,8 @@ struct BuildSettings {
   /// stored, and from links solved for; light goes by way of all patches nevertheless. What emits
   /// is a source, named or not. The operator is then hierarchical.
   std::vector<std::string> receivers, sources;
-  /// Refuse to start what needs more; 0: half the machine's. With kLinks, less of the operator is
-  /// made at a time where it is short: slower, with the same bits.
+  /// Limit of the memory beside the form factors, bytes; 0: none. A lower limit means fewer threads
+  /// and panels at a time: slower, with the same bits.
   std::uint64_t memory_limit_bytes = 0;
   /// With kLinks: folder that what is done of the operator is kept in, so that a build that was
   /// killed has that done when it is started again with the same scene and settings. It stays

@@ -15,11 +15,11 @@ namespace {
 static_assert(std::is_trivially_copyable_v<TransferBlock> &&
               sizeof(TransferBlock) == 9 * sizeof(std::uint32_t));
 
-/// "xxh3:", the digits and zeros.
+/// "xxh3:", the digits, and zeros.
 using HashText = std::array<char, 8 + ContentHash::kDigitCount>;
 
-/// What a file begins with; blocks and values follow. Files are read on the machine that wrote
-/// them.
+/// The start of a file; blocks and values follow. A file is read on the machine that wrote it, so
+/// its byte order is that of the machine.
 struct Header {
   HashText made_for{}, content{};
   std::uint64_t block_count = 0, value_count = 0;
@@ -57,7 +57,7 @@ bool read_into(std::ifstream& stream, std::span<T> target) {
   return static_cast<bool>(stream);
 }
 
-/// Whether a file is as long as its header says.
+/// True if a file is as long as its header says.
 bool fits(const Header& header, std::uintmax_t file_bytes) {
   return header.block_count <= file_bytes / sizeof(TransferBlock) &&
          header.value_count <= file_bytes / sizeof(float) &&

@@ -14,19 +14,19 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Columns of a sketch beyond the rank that is wanted; Halko et al. advise 5 to 10.
+// Columns of a sketch beyond the wanted rank; Halko et al. advise 5 to 10.
 constexpr Index kOversampling = 8;
 
-// Of a block with more rows than this, ranks above a quarter of them are not tried.
+// In a block with more rows than this, ranks above a quarter of the rows are not tried.
 constexpr Index kLargeBlock = 128;
 
-/// Orthonormal directions in descending order of the energy that they carry.
+/// Orthonormal directions in descending order of their energy.
 struct Spectrum {
   MatrixXd directions;          ///< one to a column
-  std::vector<double> missing;  ///< [k] energy of the whole less that of the first k
+  std::vector<double> missing;  ///< [k] energy of the whole minus that of the first k
 };
 
-/// From eigenvectors in ascending order; `lost` is energy outside of their span.
+/// Makes a spectrum from eigenvectors in ascending order; `lost` is the energy outside their span.
 Spectrum descending(MatrixXd vectors, const Eigen::VectorXd& energies, double lost) {
   Spectrum spectrum;
   const Index count = energies.size();
@@ -70,13 +70,13 @@ Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t s
   return inner;
 }
 
-/// Leading left singular vectors of `a`, of which no more than `largest_rank` are wanted.
+/// Leading left singular vectors of `a`; no more than `largest_rank` are wanted.
 Spectrum left_spectrum(const MatrixXd& a, Index largest_rank, std::uint64_t seed) {
   const Index sketch_size = largest_rank + kOversampling;
   return 2 * sketch_size < a.rows() ? sketched_spectrum(a, sketch_size, seed) : gram_spectrum(a);
 }
 
-/// The same of the rows of `a`: right singular vectors, exact.
+/// Exact right singular vectors of `a`.
 Spectrum right_spectrum(const MatrixXd& a) {
   if (a.cols() <= a.rows()) return gram_spectrum(a.transpose());
   Spectrum left = gram_spectrum(a);
@@ -86,8 +86,8 @@ Spectrum right_spectrum(const MatrixXd& a) {
   return left;
 }
 
-/// The number of directions, at most `largest`, with the least total cost if rank k takes
-/// `size(k)` and each unit of missing energy counts `weight` times.
+/// The number of directions, at most `largest`, with the least total cost. Rank k takes `size(k)`;
+/// a unit of missing energy counts `weight` times.
 template <typename Size>
 Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCost& cost,
                     double weight, const Size& size) {
@@ -104,13 +104,13 @@ Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCo
   return best;
 }
 
-/// Of the bases, for each rank.
+/// The size of the bases for each rank.
 double size_per_rank(const WideBlock& block, const CompressionCost& cost) {
   return block.on_diagonal ? cost.size(block.rows(), 1, 0)
                            : cost.size(block.rows() + block.columns(), 2, 0);
 }
 
-/// Ranks above are not tried.
+/// Larger ranks are not tried.
 Index largest_rank_of(const WideBlock& block) {
   return block.rows() > kLargeBlock ? block.rows() / 4 : block.rows();
 }
@@ -121,8 +121,8 @@ Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cos
   return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
 }
 
-/// The least cost of ranks above `seen`, as far as energies of the rows' directions tell: those of
-/// the columns' and coupling matrices are left out. 0 for blocks that do not take long to try.
+/// The least cost of ranks above `seen`, estimated from the energies of the row directions alone:
+/// those of the columns and the coupling matrices are left out. 0 for blocks that are fast to try.
 double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index seen,
                          const CompressionCost& cost) {
   constexpr Index kFewest = 8;
@@ -130,8 +130,8 @@ double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index see
   const auto energy = [&](Index first, Index last) {
     return (rows.missing[first] - rows.missing[last]) / static_cast<double>(last - first);
   };
-  // Of the later directions of a sketch the energies are too low, and what is missing from the
-  // first is too much, by no more than this in the mean: Halko et al., theorem 10.5.
+  // The energies of the later directions of a sketch are too low and the energy missing from the
+  // first is too high, but on average by no more than this factor: Halko et al., theorem 10.5.
   const Index half = seen / 2, quarter = half / 2;
   const double excess =
       1 + static_cast<double>(half) / static_cast<double>(seen + kOversampling - half - 1);
@@ -152,7 +152,7 @@ double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index see
 void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index largest,
                        const CompressionCost& cost, LowRankBlock& result) {
   const Index m = block.rows(), matrices = block.matrix_count;
-  // What is missing from the rows is missing from the columns too.
+  // Energy that is missing from the rows is missing from the columns too.
   const Index rank = cheapest_rank(rows, largest, cost, 2,
                                    [&](Index k) { return cost.size(m * k, k, matrices * k * k); });
   result.row_basis = rows.directions.leftCols(rank);
@@ -167,7 +167,7 @@ void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index large
 void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
               const CompressionCost& cost, LowRankBlock& result) {
   const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
-  // Half of a coupling matrix for the rows and half for the columns.
+  // Half of the size of a coupling matrix counts for the rows, half for the columns.
   const Index row_rank = cheapest_rank(
       rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, k, matrices * k * k / 2); });
   result.row_basis = rows.directions.leftCols(row_rank);

@@ -18,13 +18,13 @@ struct WideBlock {
   auto matrix(Eigen::Index m) const { return entries.middleCols(m * columns(), columns()); }
 };
 
-/// B_m ~ row_basis core_m column_basis^T; the column basis is empty on the diagonal, where it is
+/// B_m ~ row_basis coupling_m column_basis^T. On the diagonal the column basis is empty: it equals
 /// the row basis.
 struct LowRankBlock {
   Eigen::MatrixXd row_basis;               ///< [rows][row rank], orthonormal columns
-  Eigen::MatrixXd column_basis;            ///< [columns][column rank], likewise
+  Eigen::MatrixXd column_basis;            ///< [columns][column rank], orthonormal columns
   std::vector<Eigen::MatrixXd> couplings;  ///< [matrices], [row rank][column rank]
-  double error_squared = 0;                ///< Frobenius, of all matrices together
+  double error_squared = 0;                ///< squared Frobenius norm, all matrices together
 
   Eigen::Index basis_values() const { return row_basis.size() + column_basis.size(); }
   Eigen::Index vectors() const { return row_basis.cols() + column_basis.cols(); }
@@ -35,24 +35,26 @@ struct LowRankBlock {
   }
 };
 
-/// What the parts of an operator take, in values of coupling matrices; may count the time of a
-/// product too.
+/// The sizes of the parts of an operator, in values of coupling matrices. They may include the time
+/// of a product.
 struct PartSizes {
   double basis_value = 1;
-  double vector = 0;  ///< a vector of a basis beside its values: its coefficients
-  double block = 32;  ///< a block beside its values: its description, and the start of its loops
+  double vector = 0;  ///< a vector of a basis, beside its values: its coefficients
+  double block = 32;  ///< a block, beside its values: its description and the start of its loops
 };
 
-/// What the construction minimises: error² + multiplier x size, summed over the blocks. For every
-/// multiplier this is the smallest operator of its error (and the most exact one of its size) that
-/// the cluster tree admits.
+/// The objective that construction minimises: error² + multiplier x size, summed over the blocks,
+/// with a Lagrange multiplier as in rate-distortion optimisation. For every multiplier the minimum
+/// is the smallest operator of its error, and the most exact operator of its size, that the cluster
+/// tree admits.
 struct CompressionCost {
   double multiplier =
-      0;  ///< squared error that one stored value of a coupling matrix or dense block is worth
-  double multiplicity = 1;  ///< 2 for a block that stands for its mirror image as well
+      0;  ///< the squared error that is worth one stored value of a coupling matrix or dense block
+  double multiplicity = 1;  ///< 2 for a block that also stands for its mirror image
   PartSizes sizes = {};
 
-  /// Of bases with so many values in so many vectors, and coupling matrices with so many values.
+  /// The size of bases with `basis_values` values in `vectors` vectors, and coupling matrices with
+  /// `coupling_values` values.
   double size(Eigen::Index basis_values, Eigen::Index vectors, Eigen::Index coupling_values) const {
     return sizes.basis_value * static_cast<double>(basis_values) +
            sizes.vector * static_cast<double>(vectors) + static_cast<double>(coupling_values);
@@ -66,22 +68,22 @@ struct CompressionCost {
   }
 };
 
-/// What was found among ranks up to some largest.
+/// The result of trying ranks up to a limit.
 struct BlockAttempt {
-  std::optional<LowRankBlock> block;  ///< nothing if none costs less than the limit
-  double least_beyond = 0;            ///< about the least that more ranks may cost; 0: unknown
+  std::optional<LowRankBlock> block;  ///< empty if none costs less than the limit
+  double least_beyond = 0;            ///< estimate of the least cost of higher ranks; 0: unknown
 };
 
-/// The approximation of `block` that costs the least, with bases that all matrices share.
+/// The approximation of `block` with the least cost, with bases that all matrices share.
 ///
-/// The bases are leading singular vectors, from the Gram matrix of a small block and from a random
-/// sketch of a large one: N. Halko, P. G. Martinsson and J. A. Tropp, "Finding structure with
-/// randomness", 2011, algorithm 4.1, whose error is then known exactly, as the bases are
-/// orthonormal. `limit` bounds the rank that is worth having and so the sketch; no rank is above
-/// `largest_rank`.
+/// The bases are leading singular vectors: from the Gram matrix of a small block, from a random
+/// sketch of a large one (N. Halko, P. G. Martinsson and J. A. Tropp, "Finding structure with
+/// randomness", 2011, algorithm 4.1). The error is known exactly, because the bases are
+/// orthonormal. `limit` is the cost that the block must stay below; it bounds the rank that is
+/// worth having, and with it the sketch. No rank is above `largest_rank`.
 ///
-/// Beyond it, energies of directions are taken to fall with the power of their number with which
-/// they fell up to half of it.
+/// The cost of higher ranks is estimated from how energies fall: the energies of directions follow
+/// a power of their number, fitted to the first half of the directions.
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
                             Eigen::Index largest_rank, std::uint64_t seed);
 

@@ -14,11 +14,11 @@ namespace {
 
 using Eigen::Index;
 
-// Rows of the squares that the matrix is gathered and compressed in.
+// The largest and the smallest side of a piece of the matrix that is read and compressed at a time.
 constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
 
-// A block whose best ranks stay below this part of its sides is smooth: cutting it would only store
-// the same few functions several times over. Measured: notes/operator.md.
+// A block is smooth if its best ranks stay below this fraction of its sides. Splitting it would
+// only store the same few functions several times. Measured: notes/operator.md.
 constexpr Index kSmoothPart = 16;
 
 void append_columns(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
@@ -29,7 +29,8 @@ void append_rows(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
   append_columns(matrix.transpose(), values);
 }
 
-/// Makes the columns of `basis` orthonormal, by Householder QR; returns R, basis before = after R.
+/// Makes the columns of `basis` orthonormal, by Householder QR. Returns R: the old basis is the new
+/// basis times R.
 Eigen::MatrixXd make_orthonormal(Eigen::MatrixXd& basis) {
   const Index rank = basis.cols();
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
@@ -39,7 +40,7 @@ Eigen::MatrixXd make_orthonormal(Eigen::MatrixXd& basis) {
   return factor;
 }
 
-/// Compresses one square of the matrix, below or on the diagonal.
+/// Compresses one piece of the matrix, below or on the diagonal.
 class PieceCompressor {
  public:
   PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
@@ -101,7 +102,7 @@ class PieceCompressor {
     return block;
   }
 
-  /// In how many directions light goes through a block.
+  /// The number of directions, 1 or 2, in which light passes through a block.
   double multiplicity(std::uint32_t row, std::uint32_t column) const {
     return row != column && wanted_.leads(row, column) && wanted_.leads(column, row) ? 2 : 1;
   }
@@ -172,13 +173,13 @@ class PieceCompressor {
     return part;
   }
 
-  /// The weight of the light that goes from one cluster to another; none if it is not wanted.
+  /// The weight of light that goes from one cluster to another; null if it is not wanted.
   const ClusterWeight* weight_of(std::uint32_t from, std::uint32_t to) const {
     return wanted_.leads(from, to) ? &weights_[from] : nullptr;
   }
 
-  /// Of the weighted block's factors those of the block itself. Bases are made orthonormal again,
-  /// so that neither they nor the coupling matrices leave the range of half precision.
+  /// Turns the factors of the weighted block into factors of the block itself. The bases are made
+  /// orthonormal again, so that bases and coupling matrices stay in the range of half precision.
   void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
     if (const auto* weight = weight_of(row, column)) weight->take_away(block.row_basis);
     const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);

@@ -14,12 +14,12 @@
 
 namespace rebounce {
 
-/// Two clusters, by index: a square of the lower triangle that is compressed in one go.
+/// Two clusters, by index: a piece of the lower triangle that is compressed at once.
 struct BlockPiece {
   std::uint32_t row = 0, column = 0;
 };
 
-/// A part of an operator: blocks in the order of traversal and what they hold, in f32.
+/// A part of an operator: its blocks in the order of traversal, and their values in f32.
 struct BlockPart {
   std::vector<TransferBlock> blocks;
   std::vector<float> values;
@@ -28,23 +28,23 @@ struct BlockPart {
   void append(BlockPart&& other);
 };
 
-/// The side of a piece for so many positions: 2048, and an eighth of all where that is smaller, so
-/// that there are enough pieces to share.
+/// The side of a piece for a number of positions: at most 2048, and at most an eighth of the
+/// positions where possible, so that there are enough pieces to share among threads.
 std::uint32_t largest_piece(std::uint32_t position_count);
 
-/// The lower triangle cut into pieces with sides of `largest` positions at most, in the order of
+/// The lower triangle cut into pieces with sides of at most `largest` positions, in the order of
 /// traversal.
 std::vector<BlockPiece> block_pieces(const ClusterTree& tree, std::uint32_t largest);
 
-/// Compresses one matrix at any number of multipliers.
+/// Compresses one matrix for any number of Lagrange multipliers.
 ///
-/// What is minimised is error² + multiplier x size, in which the error is that of the symmetric
-/// form in the Frobenius norm, with the weights of light_weights.h on both sides, or on the side
-/// that light comes from where but one direction is wanted. Where the roles of the matrix want none
-/// there is no block.
+/// The objective is error² + multiplier x size. The error is that of the symmetric form in the
+/// Frobenius norm, with the weights of light_weights.h on both sides; where only one direction is
+/// wanted, on the side that light comes from. There are no blocks where the roles of the matrix
+/// want none.
 class BlockTreeCompressor {
  public:
-  /// All that is given must outlive the object; `weights` has one entry for each cluster.
+  /// All arguments must outlive the object; `weights` has one entry for each cluster.
   BlockTreeCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
                       const std::vector<ClusterWeight>& weights, const PartSizes& sizes = {})
       : matrix_(matrix),
@@ -53,17 +53,18 @@ class BlockTreeCompressor {
         wanted_(matrix.roles(), tree),
         sizes_(sizes) {}
 
-  /// All pieces, with sides of largest_piece at most.
+  /// All pieces, with sides of at most largest_piece.
   std::vector<BlockPiece> pieces() const;
 
-  /// Whether anything of a piece is wanted.
+  /// True if any entry of a piece is wanted.
   bool wants(const BlockPiece& piece) const { return wanted_.wanted(piece.row, piece.column); }
 
-  /// Some pieces of the operator (f32) at a multiplier > 0. Throws Cancelled if asked to stop.
+  /// Compresses pieces of the operator (f32) at a multiplier > 0. Throws Cancelled if asked to
+  /// stop.
   BlockPart compress(std::span<const BlockPiece> pieces, double multiplier,
                      const Progress& progress = {}) const;
 
-  /// The operator that all parts together are.
+  /// The operator made of `whole`, all parts together.
   HierarchicalStorage assemble(BlockPart whole) const;
 
  private:

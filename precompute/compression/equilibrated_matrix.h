@@ -8,9 +8,9 @@
 
 namespace rebounce {
 
-/// K of a matrix R K R: the matrix with each row and column divided by a scale of its patch, a
-/// power of two (symmetric equilibration; N. J. Higham, "Accuracy and Stability of Numerical
-/// Algorithms", 2002, section 7.3).
+/// The factor K of a matrix R K R: the matrix with each row and column divided by the scale of its
+/// patch, a power of two (symmetric equilibration: N. J. Higham, "Accuracy and Stability of
+/// Numerical Algorithms", 2002, section 7.3).
 class EquilibratedMatrix final : public SymmetricMatrix {
  public:
   /// `matrix` must outlive it; R is 2^`exponent` [n], by patch.
@@ -30,7 +30,7 @@ class EquilibratedMatrix final : public SymmetricMatrix {
 
  private:
   const SymmetricMatrix& matrix_;
-  Eigen::VectorXf inverse_;  ///< [n] of R
+  Eigen::VectorXf inverse_;  ///< [n] inverse of R
 };
 
 }  // namespace rebounce

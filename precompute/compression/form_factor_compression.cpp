@@ -12,7 +12,7 @@
 namespace rebounce {
 namespace {
 
-/// Sweeps work on the light at positions.
+/// Sweeps read the light at positions, so form factors have no cluster bases.
 HierarchicalSettings without_cluster_bases(HierarchicalSettings settings) {
   settings.cluster_coefficients = false;
   return settings;

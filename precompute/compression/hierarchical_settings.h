@@ -5,14 +5,15 @@
 namespace rebounce {
 
 struct HierarchicalSettings {
-  /// Relative area-weighted L2 error of the indirect irradiance that lights may have in the mean;
-  /// twice the tolerance takes about 0.6 of the bytes.
+  /// Relative area-weighted L2 error of the indirect irradiance, averaged over lights. Twice the
+  /// tolerance takes about 0.6 of the bytes.
   double tolerance = 0.005;
-  Precision precision = Precision::kQ8;  ///< kF32: twice the bytes, no less error worth mention
-  /// Whether it is for applies: large blocks may then be of cluster coefficients (TransferBlock),
-  /// which is smaller from some thousand patches on and which sweeps over compressed form factors
-  /// do not know, and blocks are priced by the time that they take, too. Patches are equilibrated
-  /// (HierarchicalOperator) in these and wherever bases are integers.
+  Precision precision = Precision::kQ8;  ///< kF32 takes twice the bytes and is hardly more exact
+  /// Whether large blocks may have cluster bases (TransferBlock). Set it for operators that are
+  /// applied: from some thousand patches on, cluster bases make the operator smaller, and the cost
+  /// of a block then includes the time of its product. Sweeps over compressed form factors do not
+  /// support them. Patches are equilibrated (HierarchicalOperator) with cluster bases and wherever
+  /// bases are integers.
   bool cluster_coefficients = true;
 };
 

@@ -16,21 +16,21 @@
 
 namespace rebounce {
 
-/// Compresses a dense operator (f32) so coarsely that an error of one in the square of the
-/// Frobenius norm of Yhat, with the weights that the `training` lights give (light_weights.h), is
-/// worth 1 / `multiplier` stored values. A uniform light is always among them. With `roles`, only
-/// what the light of sources does to receivers is looked at and stored. Throws Cancelled if asked
-/// to stop.
+/// Compresses a dense operator (f32) at one Lagrange multiplier: a squared error of `multiplier` is
+/// worth one stored value. The error is that of Yhat in the Frobenius norm, with the weights that
+/// the `training` lights give (light_weights.h). A uniform light always is among the training
+/// lights. With `roles`, only the transfer from sources to receivers is read and stored. Throws
+/// Cancelled if asked to stop.
 HierarchicalStorage compress_transfer(const DenseOperator& dense, const PatchTable& patches,
                                       std::span<const std::vector<Float3>> training,
                                       double multiplier, const Progress& progress = {},
                                       const PatchRoles& roles = {});
 
-/// The smallest such operator whose errors under the validation lights are well within the
-/// tolerance in the mean, and within three times of it at most, found in a few rounds. From round
-/// to round, training lights that came out badly get more weight. If no operator is within, the
-/// most exact one: measure it. With `roles`, the errors are those at receivers, of what sources
-/// give off.
+/// The smallest operator whose errors under the validation lights stay within the tolerance: in the
+/// mean with a margin, and for each light within three times the tolerance. It is found in a few
+/// rounds; from round to round, training lights with large errors get more weight. If no operator
+/// is within the tolerance, the result is the most exact one: measure it. With `roles`, errors are
+/// those at receivers, for light of sources.
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
     const DenseOperator& dense, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress = {},

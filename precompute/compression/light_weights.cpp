@@ -14,16 +14,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Directions of a cluster that are told from the rest. Measured: notes/operator.md.
+// Directions of a cluster that get a strength of their own. Measured: notes/operator.md.
 constexpr Index kDirectionCount = 8;
 
-// The part of the mean energy of the sample at one position that is taken for the variance of
-// lights in any direction. Measured: notes/operator.md.
+// The variance of lights in any direction, as a fraction of the mean energy of the sample at one
+// position. Measured: notes/operator.md.
 constexpr double kBackground = 1;
 
-// The background grows with the root of what the light of a patch lacks to the usual energy, so
-// that the errors of all single patches count alike, and no further below this part of it.
-// Measured: notes/operator.md.
+// The background grows with the square root of how far the energy of a patch is below the usual
+// energy, so that the errors of all single patches count alike. It grows no further below this
+// fraction of the usual energy. Measured: notes/operator.md.
 constexpr double kLeastEnergy = 1e-6;
 
 struct Principal {
@@ -45,7 +45,7 @@ Principal principal_directions(const MatrixXd& sample) {
     result.directions = vectors;
     return result;
   }
-  // Where there is no energy there is no direction either, and none is needed.
+  // Where there is no energy there is no direction, and none is needed.
   const VectorXd scale = result.energies.unaryExpr(
       [&](double e) { return e > 1e-12 * result.energies.maxCoeff() ? 1 / std::sqrt(e) : 0.0; });
   result.directions = sample * vectors * scale.asDiagonal();
@@ -67,7 +67,7 @@ void ClusterWeight::put_right(Eigen::Ref<MatrixXd> matrix) const {
 }
 
 double ClusterWeight::squared_norm() const {
-  // Of B (I + P diag(s) P^T), with orthonormal P.
+  // The norm of B (I + P diag(s) P^T), with orthonormal P.
   double sum = background_.squaredNorm();
   for (Index k = 0; k < strength_.size(); ++k) {
     const double more = (1 + strength_[k]) * (1 + strength_[k]) - 1;
@@ -109,7 +109,7 @@ std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const M
                                                 const VectorXd& background,
                                                 const PatchRoles& roles) {
   const MatrixXd relative = background.cwiseInverse().asDiagonal() * sample;
-  // Lights without any indirect light leave nothing to weigh.
+  // The minimum keeps the variance positive where lights give no indirect light.
   const auto positions = static_cast<double>(
       roles.count(PatchRoles::kSource, static_cast<std::size_t>(relative.rows())));
   const double variance = std::max(kBackground * relative.squaredNorm() / positions,

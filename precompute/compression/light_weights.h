@@ -8,13 +8,13 @@
 
 namespace rebounce {
 
-/// What light a cluster receives, as the weight W = B (I + P diag(s) P^T) of errors in what the
-/// operator does to it: P holds the leading directions of the sample lights on the cluster, and the
-/// diagonal B stands for lights that the sample does not show, single patches that emit first of
-/// all.
+/// The weight of a cluster, W = B (I + P diag(s) P^T): how strongly errors of the operator count,
+/// by the light that the cluster gets. P holds the leading directions of the sample lights on the
+/// cluster. The diagonal B stands for lights that the sample does not contain, above all single
+/// patches that emit.
 ///
-/// For lights x with E[x x^T] = v B (I + P diag(l) P^T) B the mean square of |D x| is v |D W|² in
-/// the Frobenius norm when 1 + s = sqrt(1 + l).
+/// For lights x with E[x x^T] = v B (I + P diag(l) P^T) B, the mean square of |D x| is v |D W|² in
+/// the Frobenius norm if 1 + s = sqrt(1 + l).
 class ClusterWeight {
  public:
   /// `background` [positions], > 0, is the diagonal; `directions` [positions][k], orthonormal
@@ -30,8 +30,8 @@ class ClusterWeight {
   /// matrix = matrix W.
   void put_right(Eigen::Ref<Eigen::MatrixXd> matrix) const;
 
-  /// Sum of the squares of the entries of W: by it the squared norm of what W^T makes of errors
-  /// that are as large at all positions, and independent, is larger than theirs at one.
+  /// The sum of the squares of the entries of W. Independent errors of equal size at all positions
+  /// grow by this factor in squared norm under W^T, relative to the error at one position.
   double squared_norm() const;
 
   /// basis = W^-T basis.
@@ -43,14 +43,15 @@ class ClusterWeight {
   Eigen::VectorXd strength_;
 };
 
-/// How strong lights are that the sample does not show, [positions]: 1 where the light of a single
-/// patch reaches others as it usually does, and more where less of it arrives, so that its error
-/// counts beside what does; 1 where no light comes from, as patches are no sources.
+/// The background B of lights that the sample does not contain, [positions]. It is 1 where the
+/// light of a single patch reaches other patches as usual. It is more where less light arrives, so
+/// that the error of such a patch counts like that of others. It is 1 for patches that are no
+/// sources.
 Eigen::VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree);
 
 /// The weights of all clusters of `tree`. `sample` [positions][lights] holds a light in each
-/// column, in the coordinates of Yhat, of sources alone, scaled so that all count alike;
-/// `background` is as background_light gives it.
+/// column, in the coordinates of Yhat, at sources only, scaled so that all lights count alike;
+/// `background` comes from background_light.
 std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree,
                                                 const Eigen::MatrixXd& sample,
                                                 const Eigen::VectorXd& background,

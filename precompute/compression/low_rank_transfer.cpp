@@ -16,11 +16,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::MatrixXf;
 
-// Up to this many patches all eigenvectors are found: seconds at most.
+// Up to this number of patches all eigenvectors are found. This takes seconds at most.
 constexpr Index kDenseSize = 700;
 
-// Columns beyond the rank, a half of it and some, and multiplications by sum Yhat². The spectrum
-// falls slowly (corners): with fewer of either the subspace is some per cent off the best.
+// The sketch has rank / kOversamplingPart + kOversampling columns beyond the rank. The spectrum
+// falls slowly (corners): with fewer columns or fewer multiplications by sum Yhat² the subspace is
+// some per cent off the best.
 constexpr Index kOversamplingPart = 2, kOversampling = 8;
 constexpr int kIterations = 4;
 

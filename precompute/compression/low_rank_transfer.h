@@ -11,16 +11,16 @@
 namespace rebounce {
 
 struct LowRankSettings {
-  std::size_t rank = 256;  ///< at least 1; more than there are patches is as many as there are
+  std::size_t rank = 256;                 ///< at least 1; bounded by the number of patches
   Precision precision = Precision::kF16;  ///< or kF32
 };
 
 /// The operator of low rank that is nearest to a dense one (f32) in the Frobenius norm of Yhat, all
-/// channels together, up to the few per cent of its error that a randomised method may add where
-/// the spectrum is flat.
+/// channels together. Where the spectrum is flat, the randomised method may add a few per cent to
+/// its error.
 ///
-/// The basis is that of the leading eigenvectors of sum Yhat_c², each channel's coupling matrix V^T
-/// Yhat_c V; for one channel V S V^T is the truncated eigenvalue decomposition, and no other
+/// The basis V holds the leading eigenvectors of sum Yhat_c²; the coupling matrix of a channel is
+/// V^T Yhat_c V. For one channel V S V^T is the truncated eigenvalue decomposition, and no other
 /// operator of this rank is nearer (C. Eckart and G. Young, 1936).
 ///
 /// Up to some hundreds of patches the eigenvectors are found densely, above by subspace iteration

@@ -18,20 +18,20 @@
 
 namespace rebounce {
 
-/// How blocks are cut and errors weighed in an operator over some patches.
+/// The cluster tree and the weights of errors for operators over some patches.
 struct CompressionFrame {
   ClusterTree tree;
-  Eigen::VectorXd background;  ///< as background_light gives it
+  Eigen::VectorXd background;  ///< from background_light
   Eigen::MatrixXd sample;      ///< the training lights, normalised
   PatchRoles roles;            ///< of the matrix
   double received_part = 1;    ///< ReceivedLight::part of the training lights
 
-  /// What a value is worth where that is `usual` with all patches receivers: squares of errors are
-  /// relative to those of what arrives.
+  /// Scales a multiplier, `usual` with all patches as receivers, to these roles: squared errors are
+  /// relative to the light that arrives at receivers.
   double multiplier_for(double usual) const { return usual * received_part * received_part; }
 
-  /// Goes over to the coordinates of a matrix K that leaves the background of all lights about 1,
-  /// EquilibratedMatrix: x becomes R x. Returns R as powers of two, by position.
+  /// Changes to the coordinates of a matrix K (EquilibratedMatrix) in which the background of all
+  /// lights is about 1: x becomes R x. Returns the exponents of R, powers of two, by position.
   std::vector<std::int8_t> balance();
 
   std::vector<ClusterWeight> weights() const {
@@ -39,7 +39,7 @@ struct CompressionFrame {
   }
 };
 
-/// That of `matrix` under these lights; only its products and energies are asked for.
+/// The frame of `matrix` under these lights. Only products and energies of the matrix are used.
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
                                    std::span<const std::vector<Float3>> training);
 
@@ -83,7 +83,7 @@ class MatrixCompression {
   std::optional<EquilibratedMatrix> equilibrated_;
 };
 
-/// Compresses `matrix` as compress_transfer does. `patches` are those of the matrix.
+/// Compresses `matrix` as compress_transfer does; `patches` are those of the matrix.
 HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
                                     std::span<const std::vector<Float3>> training,
                                     double multiplier, const Progress& progress = {});

@@ -11,24 +11,23 @@ namespace rebounce {
 
 struct MatrixFreeTransferSettings {
   HierarchicalSettings compression{};  ///< of the result
-  /// What the light of sources does to receivers is solved for and stored: as many columns as there
-  /// are of those, whichever are the fewer.
+  /// Only the transfer from sources to receivers is solved for and stored. The number of solved
+  /// columns is that of sources or of receivers, whichever are fewer.
   PatchRoles roles{};
-  /// Memory that may be taken beside the form factors; 0: as much as it takes. Less: fewer threads
-  /// and panels at a time, slower, the same bits.
+  /// Limit of the memory beside the form factors, bytes; 0: none. A lower limit means fewer threads
+  /// and panels at a time: slower, with the same bits.
   std::uint64_t memory_limit_bytes = 0;
-  /// Folder that what is finished is kept in, panels of the first stage and parts of the rounds of
-  /// the second, so that a run that was killed goes on where it was; empty: none. What was begun
-  /// from anything else is begun anew. It stays behind: remove it when the operator is where it
-  /// belongs.
+  /// Folder that keeps finished work, panels of the first stage and parts of the rounds of the
+  /// second, so that a run that was killed continues; empty: none. Work that was made from other
+  /// arguments is made again. The folder stays behind: remove it when the operator is saved.
   std::filesystem::path checkpoint{};
 };
 
-/// How much of build_matrix_free_transfer is done at the same time.
+/// How much work build_matrix_free_transfer does at the same time.
 struct MatrixFreeTransferPlan {
   int thread_count = 1;
-  std::size_t panel_count = 1;  ///< of 512 columns each, solved for together
-  /// At the peak, form factors not included; in proportion to the number of patches.
+  std::size_t panel_count = 1;  ///< panels, of 512 columns each, that are solved for together
+  /// At the peak, without the form factors; in proportion to the number of patches.
   std::size_t peak_bytes = 0;
 };
 

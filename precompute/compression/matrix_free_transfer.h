@@ -15,11 +15,11 @@ namespace rebounce {
 /// is compressed finely as soon as it is there. The operator that this leaves, a few times as large
 /// as the result, is then compressed to the tolerance as build_hierarchical_transfer does.
 ///
-/// `form_factors` are G = A^1/2 F A^-1/2, compressed, f32 or f16 (compress_form_factors): their
-/// error, which must be well below the tolerance, stays in the result and is not part of it. Throws
-/// Error if the least that it can do with is above the memory limit, if F is not a passive exchange
-/// (I - R G R not positive definite), or if the checkpoint cannot be written, and Cancelled if
-/// asked to stop. The same bits for any number of threads and memory limit, and from a checkpoint.
+/// `form_factors` are a compressed G = A^1/2 F A^-1/2 in f32 or f16 (compress_form_factors). Their
+/// error stays in the result and must be well below the tolerance; the reported error does not
+/// contain it. Throws Error if the least memory is above the limit, if F is not a passive exchange
+/// (I - R G R not positive definite), or if the checkpoint cannot be written; Cancelled if asked to
+/// stop. The bits do not depend on the number of threads, the memory limit or the checkpoint.
 std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
     const HierarchicalOperator& form_factors, const PatchTable& patches,
     const FittingLights& lights, const MatrixFreeTransferSettings& settings,

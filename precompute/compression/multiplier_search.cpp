@@ -7,29 +7,29 @@
 namespace rebounce {
 namespace {
 
-// Logarithm of the error against that of the multiplier: about 1/2 far from the ends, and less
-// where the error has its floor or everything is left out. Bounds keep a step outwards bold but
+// Slope of the logarithm of the error over that of the multiplier: about 1/2 in the middle, less
+// where the error has a floor or everything is left out. The bounds keep a step outwards bold but
 // finite.
 constexpr double kUsualSlope = 0.5, kLeastSlope = 0.2, kMostSlope = 1;
 
-// Minus the logarithm of the size against that of the multiplier: 0.2 to 0.5 where applies count,
-// 0.05 to 0.2 in form factors. Measured: notes/operator.md.
+// Minus the slope of the logarithm of the size over that of the multiplier: 0.2 to 0.5 for
+// operators that are applied, 0.05 to 0.2 for form factors. Measured: notes/operator.md.
 constexpr double kUsualShrinking = 0.3, kLeastShrinking = 0.05, kMostShrinking = 1;
 
-// A step outwards is at most this, in the logarithm of the multiplier: a factor of a thousand.
+// The longest step outwards, in the logarithm of the multiplier: a factor of a thousand.
 constexpr double kLongestStep = 6.9;
 
-// Of a bracket, at least this part is cut off by a step inside.
+// A step inside a bracket cuts off at least this fraction.
 constexpr double kMargin = 0.1;
 
-// Errors, in the logarithm, that differ by this much more or less than their multipliers explain
-// are not of the same curve.
+// Errors whose logarithms differ by this much more or less than their multipliers explain are not
+// of the same curve.
 constexpr double kUneven = 0.1;
 
-// Trials that are forgotten for it; after that, the curve itself must jump.
+// The most trials that are dropped because of it. After that, the curve itself must have a jump.
 constexpr std::size_t kMostForgotten = 4;
 
-// Multipliers this close together, in the logarithm, give the same operator or nearly so.
+// Multipliers whose logarithms are this close give about the same operator.
 constexpr double kNarrow = 0.02;
 
 }  // namespace
@@ -44,7 +44,7 @@ void MultiplierSearch::report(double error, double size) {
   const auto place = std::ranges::upper_bound(trials_, trial.multiplier, {}, &Trial::multiplier);
   trials_.insert(place, trial);
 
-  // Errors need not be quite monotonic: the bracket is where they first pass the aim.
+  // Errors need not be monotonic: the bracket is where they first pass the aim.
   const double aim = std::log(wanted_.aim);
   const auto high = std::ranges::find_if(trials_, [&](const Trial& t) { return t.error > aim; });
   const bool bracketed = high != trials_.begin() && high != trials_.end();
@@ -62,7 +62,7 @@ bool MultiplierSearch::contradicts(const Trial& trial, const Trial& old) {
   return rise < -kUneven || rise > kMostSlope * std::abs(step) + kUneven;
 }
 
-/// The size at `multiplier`, along the line through two trials.
+/// The size at `multiplier`, on the line through two trials.
 double MultiplierSearch::size_at(double multiplier, const Trial& from, const Trial& to) {
   const double shrinking = (from.size - to.size) / (to.multiplier - from.multiplier);
   return from.size -

@@ -5,44 +5,45 @@
 
 namespace rebounce {
 
-/// Searches for the multiplier that gives the smallest operator within an error, which grows with
-/// it, to a few per cent of its size: another trial takes as long as those before.
+/// Searches for the Lagrange multiplier that gives the smallest operator within an error. The error
+/// grows with the multiplier. The search stops within a few per cent of the smallest size, because
+/// every trial takes long.
 ///
-/// Works on the logarithms of both, where the error is nearly a straight line: outwards along the
-/// line through the nearest two trials until the wanted error lies between two of them, then by the
-/// secant between those (regula falsi, kept off the ends of the bracket). The curve may change from
-/// one trial to the next, as weights that follow the errors make it: older trials that no curve
-/// through the newest could have given are forgotten. Sizes fall along lines of their own.
+/// It works on the logarithms of multiplier and error, where the curve is nearly straight. It steps
+/// outwards along the line through the two nearest trials until the wanted error lies between two
+/// trials, then uses the secant between those (regula falsi, kept off the ends of the bracket). The
+/// curve may change from one trial to the next, because weights follow the errors: older trials
+/// that do not fit a curve through the newest are dropped. Sizes follow lines of their own.
 class MultiplierSearch {
  public:
-  /// Errors to `most` are good; `aim`, a little less, is steered for.
+  /// Errors up to `most` are accepted; the search aims at `aim`, a little less.
   struct Range {
     double aim = 0, most = 0;
   };
 
-  /// What a trial is hoped to save of the size, or it is not made.
+  /// The least fraction of the size that a further trial is expected to save.
   static constexpr double kLeastSaving = 0.03;
 
   MultiplierSearch(double initial_multiplier, Range wanted)
       : multiplier_(initial_multiplier), wanted_(wanted) {}
 
-  /// What to try next.
+  /// The multiplier of the next trial.
   double multiplier() const { return multiplier_; }
 
-  /// Takes what multiplier() gave, the error, >= 0, and the size, > 0, and moves on to the next
+  /// Reports the error, >= 0, and the size, > 0, of the trial at multiplier(), and chooses the next
   /// multiplier.
   void report(double error, double size);
 
-  /// True once some error was good and the next multiplier is not expected to save enough, or the
-  /// bracket is too narrow for more.
+  /// True once an error was accepted and the next trial is not expected to save enough, or the
+  /// bracket is too narrow for another.
   bool done() const { return done_; }
 
  private:
   struct Trial {
-    double multiplier, error, size;  ///< their logarithms
+    double multiplier, error, size;  ///< logarithms
   };
 
-  /// The logarithms of the multiplier to try next, and of the size where the error is as wanted.
+  /// The logarithms of the next multiplier, and of the size where the error is the aim.
   struct Next {
     double multiplier, size;
   };
@@ -54,8 +55,9 @@ class MultiplierSearch {
 
   double multiplier_;
   Range wanted_;
-  std::vector<Trial> trials_;                                  ///< by multiplier, ascending
-  double smallest_ = std::numeric_limits<double>::infinity();  ///< logarithm, of what is good
+  std::vector<Trial> trials_;  ///< by multiplier, ascending
+  /// Logarithm of the smallest accepted size.
+  double smallest_ = std::numeric_limits<double>::infinity();
   std::size_t forgotten_ = 0;
   bool done_ = false;
 };

@@ -19,24 +19,25 @@ using Eigen::VectorXd;
 using Storage = HierarchicalStorage;
 using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// Cells have so many positions at most; a side of a block has cluster coefficients if it is made of
-// whole groups, clusters of so many positions at most. Measured: notes/operator.md.
+// A cell has at most kCell positions. A side of a block can have cluster bases if it consists of
+// whole groups, clusters of at most kGroup positions. Measured: notes/operator.md.
 constexpr std::uint32_t kCell = 128, kGroup = 256;
 
-// The largest entry of a coupling matrix between cluster coefficients: half of what half precision
-// has room for.
+// The largest entry of a coupling matrix between cluster coefficients: half of the range of half
+// precision.
 constexpr double kLargestCoupling = 32768 / HierarchicalFormat::kHalfScale;
 
-// A cell's description, in values.
+// The size of the description of a cell, in values.
 constexpr double kCellOverhead = 32;
 
 constexpr auto kAlignment = static_cast<Index>(HierarchicalFormat::kAlignment);
 
-/// Clusters that the rows and columns of large blocks are made of, in the order of positions.
+/// The clusters that the rows and columns of large blocks are made of, in the order of positions.
 struct Cells {
   std::vector<std::uint32_t> cluster;
-  std::vector<std::size_t> group_first;       ///< the first cell of each group, and their end
-  std::vector<std::uint32_t> group_position;  ///< where each group begins, and where the last ends
+  std::vector<std::size_t> group_first;  ///< first cell of each group, and their end
+  /// First position of each group, and the end of the last.
+  std::vector<std::uint32_t> group_position;
 
   explicit Cells(const ClusterTree& tree) {
     add(tree, 0, false);
@@ -60,38 +61,40 @@ struct Cells {
   }
 };
 
-/// A side of a large block.
+/// One side of a large block.
 struct NestedEnd {
   std::size_t block = 0;
   bool is_row = true;
-  std::uint32_t cluster = 0, other = 0;       ///< of the tree, and that of the other side
-  std::size_t first_cell = 0, last_cell = 0;  ///< [first, last)
+  std::uint32_t cluster = 0, other = 0;  ///< in the tree: that of this side and of the other side
+  std::size_t first_cell = 0, last_cell = 0;  ///< range of cells [first, last)
   double multiplicity = 1;
-  bool sends = false, receives = false;  ///< light that is wanted at the other side, or from there
-  /// [rank][rank]: an error E of the basis is one of the block whose square is the trace of
-  /// E weighted E^T, and of E plain E^T where light at the other side is not weighed.
+  /// Whether light goes to the other side, or comes from there.
+  bool sends = false, receives = false;
+  /// [rank][rank]: an error E of the basis is an error of the block. Its square is the trace of E
+  /// weighted E^T, or of E plain E^T where light at the other side has no weight.
   MatrixXd weighted = {}, plain = {};
-  RowMajor cluster_coefficients = {};  ///< [rank][cluster coefficients] in place of the basis
-  MatrixXd folded = {};  ///< [rank][vectors before]: what the vectors were combined of
+  RowMajor cluster_coefficients = {};  ///< [rank][cluster coefficients], replaces the basis
+  MatrixXd folded = {};  ///< [rank][old vectors], factor that goes into the coupling matrix
 
   Index rank() const { return plain.rows(); }
 };
 
-/// Those of a block; null where it has its own basis.
+/// The sides of a block; null where a side has its own basis.
 struct NestedSides {
   const NestedEnd *row = nullptr, *column = nullptr;
 };
 
-/// What all large blocks over a cell share.
+/// The cluster basis of a cell, shared by all large blocks over it.
 struct CellBasis {
-  std::vector<std::size_t> ends;  ///< that lie over it
-  bool weighed = false;           ///< whether light that comes from here counts
-  VectorXd energies;              ///< of directions, falling
-  MatrixXd directions;            ///< [positions][positions], then [positions][rank]
-  Index stacked = 0, rank = 0;    ///< vectors of all blocks; of the basis
+  std::vector<std::size_t> ends;  ///< sides of blocks over the cell
+  bool weighed = false;           ///< whether light from here counts
+  VectorXd energies;              ///< of the directions, descending
+  MatrixXd directions;            ///< [positions][positions], cut to [positions][rank]
+  Index stacked = 0, rank = 0;    ///< vectors of all blocks together; of the basis
   Index first_coefficient = 0;
-  MatrixXd vectors;       ///< [positions][rank], columns of norm 1
-  VectorXd norm, length;  ///< [rank] of the vectors before; what coefficients are divided by
+  MatrixXd vectors;  ///< [positions][rank], columns of norm 1
+  /// [rank] norms of the vectors before scaling; divisors of the coefficients.
+  VectorXd norm, length;
   Index residual_rank = 0;
 };
 
@@ -107,7 +110,7 @@ class Nesting {
     find_ends();
   }
 
-  /// Whether it takes less error and bytes together.
+  /// Finds the bases; true if they reduce error and size together.
   bool pays() {
     if (ends_.empty()) return false;
 #pragma omp parallel for schedule(dynamic, 1)
@@ -160,7 +163,7 @@ class Nesting {
             block.column_count};
   }
 
-  /// Its coupling matrix for one matrix, [row rank][column rank].
+  /// The coupling matrix of a block for one matrix, [row rank][column rank].
   Vectors coupling(std::size_t b, std::uint32_t matrix) const {
     const TransferBlock& block = storage_.blocks[b];
     const Index size = Index{block.row_rank} * block.column_rank;
@@ -213,7 +216,8 @@ class Nesting {
     }
   }
 
-  /// What a block has of a cell, [positions][rank], under the weight of light from there.
+  /// The part of the basis of a block over a cell, [positions][rank], under the weight of light
+  /// from there.
   MatrixXd weighted_part(const NestedEnd& end, std::size_t c) const {
     const Cluster& range = cell(c);
     const Index first = range.begin - tree_.clusters[end.cluster].begin;
@@ -242,8 +246,8 @@ class Nesting {
     own.rank = (own.energies.array() > worth).count();
   }
 
-  /// Groups begin at multiples of the alignment, and so do their cluster coefficients: the ranks of
-  /// their cells are filled up with the best directions that are left.
+  /// Groups begin at multiples of the alignment, and so do their cluster coefficients. The ranks of
+  /// their cells are filled up with the best remaining directions.
   void fill_groups() {
     for (std::size_t g = 0; g + 1 < cells_.group_first.size(); ++g) {
       const std::span group = std::span(bases_).subspan(
@@ -275,8 +279,8 @@ class Nesting {
     return multiplier() * (before - after) - own.energies.tail(size - own.rank).sum();
   }
 
-  /// Vectors of norm 1, and lengths of the cluster coefficients between those of coefficients (all
-  /// alike as they are rounded) and of energies: rounding does the least there. notes/operator.md.
+  /// Scales the vectors to norm 1. The lengths of cluster coefficients lie between equal ones and
+  /// their energies: this is where rounding does least (notes/operator.md).
   void make_basis(std::size_t c) {
     CellBasis& own = bases_[c];
     own.directions.conservativeResize(Eigen::NoChange, own.rank);
@@ -303,9 +307,9 @@ class Nesting {
     }
   }
 
-  /// Vectors of cluster coefficients get norm 1, as those of bases, and coupling matrices what they
-  /// were longer by. Of a side with more vectors than cluster coefficients as many do, and the rest
-  /// goes into the coupling matrix.
+  /// Scales the vectors of cluster coefficients to norm 1, as those of bases, and moves the norms
+  /// into the coupling matrices. A side with more vectors than cluster coefficients keeps as many
+  /// vectors as coefficients; the rest goes into the coupling matrix.
   static void fold(NestedEnd& end) {
     if (end.rank() > end.cluster_coefficients.cols()) {
       const MatrixXd vectors = end.cluster_coefficients.transpose().cast<double>();
@@ -325,9 +329,9 @@ class Nesting {
     end.plain = by * end.plain * by.transpose();
   }
 
-  /// Cluster coefficients get longer, and coupling matrices smaller, until the largest entry of all
-  /// coupling matrices fits half precision well. By as much for all: small coupling matrices are
-  /// not to fall below its normal numbers.
+  /// Makes cluster coefficients longer, and coupling matrices smaller, until the largest entry of
+  /// all coupling matrices fits half precision. All get the same factor, so that small coupling
+  /// matrices do not fall below its normal numbers.
   void fit_couplings() {
     double one_side = 0, both_sides = 0;
     for (const auto& [b, sides] : sides_of_blocks()) {
@@ -347,7 +351,7 @@ class Nesting {
     for (CellBasis& own : bases_) own.length *= length;
   }
 
-  /// Of all blocks that have any; those on the diagonal have the same twice.
+  /// The sides of all blocks that have any; a block on the diagonal has the same side twice.
   std::map<std::size_t, NestedSides> sides_of_blocks() const {
     std::map<std::size_t, NestedSides> sides;
     for (const NestedEnd& end : ends_) {
@@ -358,7 +362,7 @@ class Nesting {
     return sides;
   }
 
-  /// A coupling matrix with what its sides have folded into it.
+  /// A coupling matrix times the factors that its sides fold into it.
   MatrixXd folded_coupling(std::size_t b, std::uint32_t matrix, const NestedSides& sides) const {
     MatrixXd s = coupling(b, matrix).cast<double>();
     if (sides.row != nullptr) s = sides.row->folded * s;
@@ -384,7 +388,7 @@ class Nesting {
     });
   }
 
-  /// Of the vectors of cluster coefficients of an end.
+  /// The residual rank of the cluster coefficients of a side.
   Index residual_rank(const NestedEnd& end) const {
     double arriving = 0, leaving = 0;
     for (std::size_t c = end.first_cell; c < end.last_cell; ++c) {
@@ -444,7 +448,7 @@ class Nesting {
     }
   }
 
-  /// One side of a block as it will be.
+  /// One side of a block in the result.
   struct Side {
     std::uint32_t begin, count, rank, residual_rank;
     RowMajor vectors;
@@ -467,8 +471,7 @@ class Nesting {
             basis(b, false)};
   }
 
-  /// Rows come after columns: the sides change places if only the columns have cluster
-  /// coefficients.
+  /// Rows come after columns; the sides are swapped if only the columns have cluster bases.
   void add_block(std::size_t b, const NestedSides& sides, std::uint32_t positions, Storage& result,
                  std::vector<float>& values) const {
     const bool diagonal = storage_.blocks[b].on_diagonal();
@@ -501,9 +504,9 @@ class Nesting {
   const NestingFrame& frame_;
   const ClusterTree& tree_;
   Cells cells_;
-  std::vector<std::uint64_t> values_of_;  ///< where those of each block begin
+  std::vector<std::uint64_t> values_of_;  ///< first value of each block
   std::vector<NestedEnd> ends_;
-  std::vector<CellBasis> bases_;  ///< of each cell
+  std::vector<CellBasis> bases_;  ///< by cell
 };
 
 }  // namespace

@@ -8,24 +8,23 @@
 
 namespace rebounce {
 
-/// What a compression knows of its blocks.
+/// The data of a compression that nest_bases needs.
 struct NestingFrame {
   const ClusterTree& tree;
-  const std::vector<ClusterWeight>& weights;  ///< of its clusters
+  const std::vector<ClusterWeight>& weights;  ///< of the clusters
   const WantedBlocks& wanted;
   CompressionCost cost;
 };
 
-/// Gives the large blocks of an operator, in f32 and the order kByBlock, cluster coefficients for
-/// positions.
+/// Gives the large blocks of an operator, in f32 and the order kByBlock, cluster bases.
 ///
-/// Over a patch there are some tens of large blocks with some tens of vectors each, and within a
-/// small cluster, a *cell*, these are combinations of far fewer: cells have bases that all large
-/// blocks over them share, and of the vectors of these are kept what they are combined from
-/// (nested bases in one level: W. Hackbusch and S. Börm, "Data-sparse approximation by adaptive
-/// H2-matrices", 2002). How many vectors a cell has follows from the multiplier, as ranks of blocks
-/// do: as long as one takes away more error, weighed in the same way, than its values cost. Where
-/// there is nothing to gain the operator is returned as it is.
+/// Over a patch there are some tens of large blocks with some tens of vectors each. Within a small
+/// cluster, a *cell*, these are combinations of far fewer vectors. A cell therefore has one basis
+/// that all large blocks over it share, and a block stores the combinations (nested bases in one
+/// level: W. Hackbusch and S. Börm, "Data-sparse approximation by adaptive H2-matrices", 2002). The
+/// rank of a cell follows from the multiplier, as the ranks of blocks do: a vector is kept if it
+/// removes more weighted error than its values cost. If there is nothing to gain, the operator is
+/// returned as it is.
 HierarchicalStorage nest_bases(HierarchicalStorage storage, const NestingFrame& frame);
 
 }  // namespace rebounce

@@ -9,8 +9,7 @@
 namespace rebounce {
 namespace {
 
-// What it takes to compress all panels, in columns that are solved for. Measured:
-// notes/operator.md.
+// The time to compress all panels, in columns that are solved for. Measured: notes/operator.md.
 constexpr double kCompression = 5500;
 
 }  // namespace

@@ -14,41 +14,42 @@
 
 namespace rebounce {
 
-/// The first stage of build_matrix_free_transfer: all of Yhat, compressed finely, some panels of
+/// The first stage of build_matrix_free_transfer: compresses all of Yhat finely, some panels of
 /// neighbouring columns at a time.
 class PanelCompressor {
  public:
   /// Columns of a panel, and rows of the pieces that it is compressed in. Larger pieces save bytes
-  /// that the second stage saves anyway, and at so fine a multiplier take several times as long.
+  /// that the second stage saves anyway, and take several times as long at so small a multiplier.
   static constexpr std::uint32_t kPanelWidth = 512;
 
-  /// Finds how blocks are cut and weighed, and what `checkpoint` has already. `matrix` and
-  /// `checkpoint` must outlive the object. Of `panels_together` panels, > 0, the columns are there
-  /// at the same time; the bits do not depend on it.
+  /// Prepares the cluster tree and the weights, and finds the panels that `checkpoint` holds.
+  /// `matrix` and `checkpoint` must outlive the object. The columns of `panels_together` panels, >
+  /// 0, are in memory at the same time; the bits do not depend on it.
   PanelCompressor(PanelMatrix& matrix, const PatchTable& patches,
                   std::span<const std::vector<Float3>> training, double multiplier,
                   std::size_t panels_together, const BlockCheckpoint& checkpoint);
   PanelCompressor(const PanelCompressor&) = delete;
   PanelCompressor& operator=(const PanelCompressor&) = delete;
 
-  /// What is left to do, in columns that are solved for.
+  /// The remaining work, in columns that are solved for.
   double work() const { return work_of(panels_); }
 
-  /// Does it, and keeps every panel in the checkpoint; once. Throws Cancelled if asked to stop.
+  /// Does the work and keeps every panel in the checkpoint. Call it once. Throws Cancelled if asked
+  /// to stop.
   HierarchicalStorage run(const Progress& progress);
 
  private:
   /// All pieces of a column of pieces.
   struct Panel {
-    std::uint32_t column = 0;  ///< a cluster
+    std::uint32_t column = 0;  ///< index of its cluster
     std::vector<BlockPiece> pieces;
     std::string name;
-    std::optional<BlockPart> part;  ///< when it is done
+    std::optional<BlockPart> part;  ///< empty until the panel is done
   };
 
   void make_panels();
   double compression_work(const Panel& panel) const;
-  double work_of(std::span<const Panel> panels) const;  ///< of those that are not done
+  double work_of(std::span<const Panel> panels) const;  ///< of the panels that are not done
   void run(std::span<Panel> panels, const Progress& progress);
 
   PanelMatrix& matrix_;
@@ -58,8 +59,8 @@ class PanelCompressor {
   CompressionFrame frame_;
   std::vector<ClusterWeight> weights_;
   BlockTreeCompressor compressor_;
-  std::vector<Panel> panels_;   ///< by their first columns
-  std::size_t all_pieces_ = 0;  ///< of panels, with those that nobody wants
+  std::vector<Panel> panels_;   ///< ordered by their first columns
+  std::size_t all_pieces_ = 0;  ///< of all panels, including unwanted ones
 };
 
 }  // namespace rebounce

@@ -6,8 +6,8 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// What a value of a residual has to remove, in multipliers of a value of a coupling matrix.
-// Measured: notes/operator.md.
+// The squared error that a value of a residual must remove, in multipliers. Measured:
+// notes/operator.md.
 constexpr double kResidualWorth = 1;
 
 constexpr double kLargestByte = 127;
@@ -24,7 +24,8 @@ MatrixXd weighted_gram(const BasisEnd& end) {
   return weighted.transpose() * weighted;
 }
 
-/// For the end whose vectors are the rows of `couplings`. `other` is the other end.
+/// The residual rank of the end whose vectors belong to the rows of `couplings`; `other` is the
+/// other end.
 Index residual_rank_of(const BasisEnd& end, const BasisEnd& other,
                        const std::vector<MatrixXd>& couplings, const CompressionCost& cost) {
   const auto size = static_cast<double>(end.basis.rows());

@@ -114,6 +114,9 @@ double initial_multiplier(double tolerance, std::size_t patch_count) {
   return kInitialMultiplier * tolerance * tolerance / static_cast<double>(patch_count);
 }
 
+/// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. `checkpoint`, made for
+/// these arguments, keeps the results of each round; parts that it holds are reused. The bits are
+/// the same with and without it.
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress,

@@ -12,7 +12,7 @@
 
 namespace rebounce {
 
-/// What a value per patch is worth at the tolerance: that with which searches begin, or near it.
+/// The multiplier at which searches begin, for one value per patch.
 double initial_multiplier(double tolerance, std::size_t patch_count);
 
 /// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. What each round of the

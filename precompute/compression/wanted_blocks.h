@@ -10,34 +10,33 @@
 
 namespace rebounce {
 
-/// How a cluster tree is to part the patches for blocks to be wanted or not as a whole, [n], empty
-/// where all are both: first those with both roles, then of receivers alone and sources alone the
-/// fewer, then the others, and last those with no role. Below the diagonal no block that is wanted
-/// then has columns of the last two.
+/// Groups of patches by role, [n], for a cluster tree whose blocks are wanted or not as a whole;
+/// empty if all patches have both roles. The order is: both roles; receivers or sources alone,
+/// whichever are fewer; the others of these two; no role. A wanted block below the diagonal then
+/// has no columns of the last two groups.
 std::vector<std::uint8_t> role_groups(const PatchRoles& roles);
 
-/// Which blocks of an operator over a cluster tree its roles ask for. Y restricted to the rows of
-/// receivers and the columns of sources is a part of the whole matrix, whose light goes by way of
-/// all patches.
+/// The blocks of an operator over a cluster tree that its roles need: rows of receivers and columns
+/// of sources. Light still passes by all patches.
 class WantedBlocks {
  public:
   /// `roles` must outlive the object.
   WantedBlocks(const PatchRoles& roles, const ClusterTree& tree);
 
-  /// Whether light of the cluster `from` is wanted in the cluster `to`.
+  /// True if light of the cluster `from` is wanted in the cluster `to`.
   bool leads(std::uint32_t from, std::uint32_t to) const {
     return sends_[from] != 0 && receives_[to] != 0;
   }
 
-  /// The same in either direction: by reciprocity a block serves both.
+  /// True if a block is wanted in either direction: by reciprocity it serves both.
   bool wanted(std::uint32_t row, std::uint32_t column) const {
     return leads(row, column) || leads(column, row);
   }
 
-  /// Whether a cluster has patches of several roles that its children part.
+  /// True if a cluster has patches of several roles that its children separate.
   bool is_mixed(std::uint32_t cluster) const { return mixed_[cluster] != 0; }
 
-  /// Sets the entries [rows][columns] to 0 that are wanted in neither direction.
+  /// Sets entries [rows][columns] to 0 that are wanted in neither direction.
   void clear_unwanted(std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns,
                       Eigen::Ref<Eigen::MatrixXf> entries) const;
 
