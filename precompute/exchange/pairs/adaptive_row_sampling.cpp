@@ -11,7 +11,7 @@ namespace {
 // Rows of each kind in the trial.
 constexpr std::size_t kTrialRows = 16;
 
-// The part of the errors that the trial must have taken away.
+// The fraction of its errors that a kind must lose in the trial.
 constexpr double kWorthwhile = 0.25;
 
 }  // namespace
@@ -50,7 +50,7 @@ std::vector<bool> AdaptiveRowSampling::rest(std::span<const double> sum) const {
   return rest;
 }
 
-/// By how many times the error is what is tolerated.
+/// The binary logarithm of the error over the tolerance, cut at the last kind.
 std::size_t AdaptiveRowSampling::kind_of(std::size_t row) const {
   const double allowed = tolerance_ + 3 * target_[row].deviation;
   const double doublings = std::log2(std::max(1.0, error_[row] / allowed));

@@ -9,17 +9,18 @@ namespace {
 
 using Vector = std::vector<double>;
 
-constexpr int kPassCount = 8;        // entries at their bounds leave a rest for the next pass
-constexpr int kMaxIterations = 500;  // of conjugate gradients; some 20 to 60 are usual
-constexpr double kClosed = 1e-6;     // row sums nearer to their targets than this are there
-constexpr double kResidual = 1e-11;  // relative, for that
+constexpr int kPassCount = 8;  // entries that reach their bounds leave a rest for the next pass
+constexpr int kMaxIterations = 500;  // of conjugate gradients; 20 to 60 are usual
+constexpr double kClosed = 1e-6;     // a row sum this near to its target is closed
+constexpr double kResidual = 1e-11;  // relative residual of the solution
 constexpr float kLeastPart = 0.5F, kGreatestPart = 1.5F;
 
 double dot(const Vector& a, const Vector& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-/// The normal equations of the constraints: (diagonal + V) multiplier = rest, V the variances.
+/// The normal equations of the constraints: (diagonal + V) multiplier = rest, where V holds the
+/// variances.
 class NormalEquations {
  public:
   NormalEquations(const ExchangeRows& rows, std::span<const double> area,
@@ -35,7 +36,7 @@ class NormalEquations {
       const double deviation = area[i] * target[i].deviation;
       diagonal_[i] += deviation * deviation;
       // Keeps the system definite for rows without entries and for two groups that only see each
-      // other, and is far below what is resolved.
+      // other. It is far below what is resolved.
       diagonal_[i] += 1e-12 * (diagonal_[i] + area[i] * area[i] * 1e-12);
     }
   }
@@ -71,7 +72,7 @@ class NormalEquations {
       double sum = 0;
       for (const ExchangeEntry& entry : rows_[i]) {
         const double v = entry.variance();
-        if (entry.column == i) continue;  // all of it is in the diagonal
+        if (entry.column == i) continue;  // the diagonal contains it
         sum += v * x[entry.column];
         y[entry.column] += v * x[i];
       }
@@ -93,8 +94,8 @@ Areas exchange_areas(const ExchangeRows& rows) {
   return areas;
 }
 
-/// Changes each entry by its variance times the multipliers of its row and column, as far as its
-/// bounds let it.
+/// Changes each entry by its variance times the Lagrange multipliers of its row and column, within
+/// its bounds.
 void give_way(const Vector& multiplier, const Areas& original, ExchangeRows& rows) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (std::size_t k = 0; k < rows[i].size(); ++k) {
@@ -104,12 +105,13 @@ void give_way(const Vector& multiplier, const Areas& original, ExchangeRows& row
       const float least = kLeastPart * original[i][k];
       const float most = std::max(kGreatestPart * original[i][k], entry.unoccluded_area);
       entry.exchange_area = std::clamp(static_cast<float>(wanted), least, most);
-      if (wanted < least || wanted > most) entry.visibility_variance = 0;  // gives way no further
+      // The entry is at its bound and changes no further.
+      if (wanted < least || wanted > most) entry.visibility_variance = 0;
     }
   }
 }
 
-/// |S' - S| / |S|, Frobenius, of the upper triangle.
+/// |S' - S| / |S|, Frobenius norms of the upper triangles.
 double relative_change(const ExchangeRows& rows, const Areas& original) {
   double change = 0, norm = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -8,11 +8,11 @@
 
 namespace rebounce {
 
-/// One pair in the upper triangle of the exchange matrix while it is being made.
+/// A pair in the upper triangle of the exchange matrix under construction.
 struct ExchangeEntry {
   std::uint32_t column;
   float exchange_area;        ///< m²
-  float unoccluded_area;      ///< m²: what it would be with nothing between; the most it can be
+  float unoccluded_area;      ///< m²: the exchange area with nothing between, the upper limit
   float visibility_variance;  ///< of exchange_area / unoccluded_area
 
   double variance() const {  ///< of exchange_area, m⁴
@@ -23,7 +23,7 @@ struct ExchangeEntry {
 
 using ExchangeRows = std::vector<std::vector<ExchangeEntry>>;
 
-/// What a row of F should add up to, and how sure that is (0: certain). A sum of 0: no ray saw
+/// The target of a row sum of F and its uncertainty (0: certain). A sum of 0 means that no ray met
 /// anything.
 struct RowTarget {
   double sum;
@@ -33,19 +33,19 @@ struct RowTarget {
 /// The row sums of F that `rows` amount to; `area` [n] in m².
 std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> area);
 
-/// The largest error of a row sum, of all rows or of those whose target is certain.
+/// The largest error of a row sum, over all rows or over those with a certain target.
 double largest_row_error(std::span<const double> sum, std::span<const RowTarget> target,
                          bool certain);
 
-/// Corrects the exchange areas so that rows add up to their targets, reciprocity untouched.
+/// Corrects the exchange areas so that rows add up to their targets; reciprocity holds.
 ///
 /// Minimises sum (S' - S)² / variance + sum over i of (row sum of F' - target)² / deviation² over
 /// symmetric S': the least squares of M. E. Larsen and J. R. Howell, "Least-squares smoothing of
-/// direct-exchange areas in zonal analysis", 1986, with two differences. The weights are variances
-/// that we know, so that pairs in penumbrae give way and fully visible ones stay; and targets that
-/// are themselves measured (rows that escape in part) pull only as hard as they are certain.
-/// Entries stay within half of what they were; those that would not are held there, their variance
-/// made 0, and the others share out what is left.
+/// direct-exchange areas in zonal analysis", 1986, with two differences. The weights are the
+/// variances of the entries, so that pairs in penumbrae change and fully visible pairs stay.
+/// Targets that are measured (rows that escape in part) pull only as strongly as they are certain.
+/// An entry changes by at most half of its value. An entry that reaches this bound is fixed there,
+/// with variance 0, and the others share the rest.
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
                               std::span<const RowTarget> target);
 

@@ -13,7 +13,7 @@
 namespace rebounce {
 namespace {
 
-/// Adds the cells by which one more patch sees the sky, `sky` in all.
+/// Adds the sky cells of one more patch, `sky` in all.
 void append_sky_cells(const Escape& escape, double sky, SkyCells& cells) {
   if (cells.empty()) cells.entry_begin.push_back(0);
   for (const auto& [cell, part] : escape.sky_cells) {
@@ -27,7 +27,7 @@ void append_sky_cells(const Escape& escape, double sky, SkyCells& cells) {
 using Coordinates = PatchPointBlock::Coordinates;
 using Directions = std::array<Coordinates, 3>;
 
-/// to_cosine_direction() of `count` points (`u`[k], `v`[k]) of the unit square.
+/// Applies to_cosine_direction() to `count` points (`u`[k], `v`[k]) of the unit square.
 void fill_cosine_directions(std::size_t count, const Coordinates& u, const Coordinates& v,
                             Directions& direction) {
   for (std::size_t k = 0; k < count; ++k) {
@@ -57,7 +57,7 @@ void turn_to_normals(std::size_t count, const PatchPointBlock& points, Direction
   }
 }
 
-/// One cosine-distributed ray from each of as many points spread over `surface`.
+/// Makes one cosine-distributed ray from each point of a sample of `surface`.
 void make_escape_rays(const PatchSurface& surface, float offset, std::uint64_t bits,
                       std::span<Ray> rays) {
   constexpr std::size_t kBlock = SobolBlocks::kSize;
@@ -118,7 +118,7 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
 EscapedLight share_escape(std::span<const double> row_sum, std::span<const Escape> escape) {
   EscapedLight result;
   for (std::size_t i = 0; i < row_sum.size(); ++i) {
-    // Sums of links cancel to a little below 0 where nothing is seen.
+    // Links with both signs can leave a row sum a little below 0 where nothing is visible.
     const double rest = std::clamp(1 - row_sum[i], 0.0, 1.0);
     const double lost = escape[i].sky + escape[i].absorbed;
     const double sky = lost > 0 ? rest * escape[i].sky / lost : 0;

@@ -13,16 +13,17 @@
 
 namespace rebounce {
 
-/// Where the light of a patch goes that no other patch gets, as parts of 1.
+/// Where the light of a patch goes that meets no other patch, as fractions of its light.
 struct Escape {
   double sky = 0;       ///< leaves the scene
-  double absorbed = 0;  ///< meets the back of a one-sided surface, or a side without a patch
-  /// What leaves by cells of the sky, ascending, without those by which nothing does.
+  double absorbed = 0;  ///< meets the back of a one-sided surface or a side without a patch
+  /// The fraction of light that leaves through each cell of the sky, ascending by cell; cells
+  /// without light are left out.
   std::vector<std::pair<std::uint8_t, float>> sky_cells{};
 };
 
-/// Room for the work of measure_escape; afterwards `rays` hold what was traced, and `met` which
-/// patch's light each of them met: kNone if none's.
+/// Memory of measure_escape. Afterwards `rays` hold the rays that were traced, and `met` the patch
+/// that each ray met, or kNone.
 struct EscapeScratch {
   std::vector<Ray> rays;
   std::vector<Hit> hits;
@@ -31,13 +32,13 @@ struct EscapeScratch {
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over its `triangles`, by Sobol's sequence; what they meet is what prefer_lit_side says.
+/// over its `triangles`, by Sobol's sequence. prefer_lit_side decides which patch a ray meets.
 Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
                       std::uint32_t patch, const RayTracer& tracer, int ray_count,
                       std::uint64_t seed, EscapeScratch& scratch);
 
-/// What the rows of F, which add up to `row_sum` [n], leave of 1 is what escapes; its parts are
-/// shared as they were measured, `escape` [n].
+/// The escaped light of all patches: 1 minus `row_sum` [n] of F, shared among sky and absorption in
+/// the proportions measured, `escape` [n].
 EscapedLight share_escape(std::span<const double> row_sum, std::span<const Escape> escape);
 
 }  // namespace rebounce

@@ -6,23 +6,25 @@
 
 namespace rebounce {
 
-/// How large the correction for closure was (closure.h).
+/// The size of the correction for closure (closure.h).
 struct ClosureReport {
-  double row_sum_error_before = 0;  ///< largest |sum over j of F(i,j) - target| before
-  double row_sum_error_after = 0;   ///< the same after, over rows whose target is exact
-  double relative_change = 0;       ///< |S' - S| / |S|, Frobenius
+  /// Largest |sum over j of F(i,j) - target| before the correction.
+  double row_sum_error_before = 0;
+  double row_sum_error_after = 0;  ///< the same after it, over rows with a certain target
+  double relative_change = 0;      ///< |S' - S| / |S|, Frobenius
 };
 
-/// Where the light of patches goes that no patch gets.
+/// The light of patches that meets no patch.
 struct EscapedLight {
-  std::vector<float> sky_visibility;  ///< [n] fraction of a patch's light that leaves the scene
-  std::vector<float> absorbed;        ///< [n] fraction that meets back faces; with the row sum of F
-                                      ///< the three add up to 1
-  SkyCells sky_cells;                 ///< by which of its cells patches see the sky
+  /// [n] fraction of the light of a patch that leaves the scene.
+  std::vector<float> sky_visibility;
+  /// [n] fraction that meets back faces; with the row sum of F the three add up to 1.
+  std::vector<float> absorbed;
+  SkyCells sky_cells;  ///< the sky that patches see, by cell
 };
 
 struct FormFactorForecast {
-  double seconds = 0;  ///< with the threads that there are
+  double seconds = 0;  ///< with all OpenMP threads
   double ray_count = 0;
 };
 

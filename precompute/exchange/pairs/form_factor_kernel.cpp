@@ -13,7 +13,7 @@ struct Polygon {
   int count = 0;
 };
 
-// Points nearer to a plane than this part of the triangles' size count as on it.
+// Points closer to a plane than this fraction of the size of the triangles count as on it.
 constexpr double kPlaneTolerance = 1e-7;
 
 double plane_tolerance(const FlatTriangle& a, const FlatTriangle& b) {
@@ -51,7 +51,7 @@ Polygon clip_to_front(const FlatTriangle& t, const FlatTriangle& plane, double t
 }
 
 struct Segment {
-  glm::dvec3 begin, direction;  // direction is unit
+  glm::dvec3 begin, direction;  // direction is a unit vector
   double length;
 };
 
@@ -83,8 +83,8 @@ constexpr std::array<double, 6> kGaussWeight = {0.249147045813402785, 0.23349253
                                                 0.203167426723065922, 0.160078328543346226,
                                                 0.106939325995318431, 0.0471753363865118272};
 
-/// Integrates f over [begin, end] after the substitution v -> v²(3 - 2v), which takes the edge off
-/// logarithmic behaviour at either end.
+/// Integrates f over [begin, end] after the substitution v -> v²(3 - 2v), which weakens logarithmic
+/// singularities at both ends.
 template <typename Function>
 double integrate_graded(double begin, double end, const Function& f) {
   double sum = 0;
@@ -99,7 +99,7 @@ double integrate_graded(double begin, double end, const Function& f) {
   return sum * (end - begin);
 }
 
-/// Where along the line of `a` it comes closest to the line of `b`; nothing sensible if parallel.
+/// The place on the line of `a` that is closest to the line of `b`; arbitrary if they are parallel.
 double closest_approach(const Segment& a, const Segment& b) {
   const double cosine = glm::dot(a.direction, b.direction);
   const double sine_squared = 1 - cosine * cosine;
@@ -109,8 +109,8 @@ double closest_approach(const Segment& a, const Segment& b) {
 }
 
 /// The double integral of ln r over two segments. The outer interval is cut where the inner
-/// integral is least smooth: beside the ends of the inner segment, and where the two cross or
-/// nearly do.
+/// integral is least smooth: at the ends of the inner segment, and where the two segments cross or
+/// nearly cross.
 double integrate_log_distance(const Segment& outer, const Segment& inner) {
   const glm::dvec3 inner_end = inner.begin + inner.length * inner.direction;
   std::array<double, 3> candidate = {glm::dot(inner.begin - outer.begin, outer.direction),
@@ -151,7 +151,8 @@ struct TriangleRule {
   std::array<double, kCount> weight;                // sums to 1
 };
 
-// Strang and Fix, "An Analysis of the Finite Element Method", 1973: degree 2 and degree 5.
+// G. Strang and G. J. Fix, "An Analysis of the Finite Element Method", 1973: rules of degree 2 and
+// degree 5.
 constexpr TriangleRule<3> kDegree2 = {
     {{{2.0 / 3, 1.0 / 6, 1.0 / 6}, {1.0 / 6, 2.0 / 3, 1.0 / 6}, {1.0 / 6, 1.0 / 6, 2.0 / 3}}},
     {1.0 / 3, 1.0 / 3, 1.0 / 3}};
@@ -187,9 +188,10 @@ double quadrature(const FlatTriangle& a, const FlatTriangle& b, const TriangleRu
   return a.area * b.area * sum;
 }
 
-// Measured over random pairs of triangles (tests/precompute/test_form_factor_kernel.cpp): a rule of
-// degree p is wrong by less than kErrorConstant q^(p+1), where q = (sum of radii) / distance, in
-// all but a few of a thousand pairs.
+// Measured over random pairs of triangles
+// (tests/precompute/exchange/pairs/test_form_factor_kernel.cpp): a rule of degree p has an error
+// below kErrorConstant q^(p+1), where q = (sum of radii) / distance, in all but a few of a thousand
+// pairs.
 constexpr double kErrorConstant2 = 0.1;
 constexpr double kErrorConstant5 = 0.01;
 

@@ -1,6 +1,7 @@
 #pragma once
 
-// The geometry of form factors: how much light two flat polygons exchange with nothing between.
+// The geometry of form factors: how much light two flat polygons exchange with nothing between
+// them.
 
 #include <array>
 #include <glm/glm.hpp>
@@ -10,14 +11,15 @@
 
 namespace rebounce {
 
-/// A flat triangle as the kernel wants it; the front side is where it is counter-clockwise.
+/// A flat triangle with the values that the kernel needs; the front is the side where it is
+/// counter-clockwise.
 struct FlatTriangle {
   std::array<glm::dvec3, 3> vertex;
   glm::dvec3 normal{0};      ///< unit
   glm::dvec3 centroid{0};    ///< metres
   double area = 0;           ///< m²
   double radius = 0;         ///< of the sphere around the centroid, metres
-  double stopping_part = 1;  ///< of the area; the rest lets light through. The kernels ignore it
+  double stopping_part = 1;  ///< fraction of the area that stops light; the kernels ignore it
 
   FlatTriangle() = default;
   FlatTriangle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
@@ -25,24 +27,25 @@ struct FlatTriangle {
   double stopping_area() const { return area * stopping_part; }
 };
 
-/// True if some point on the front of each triangle is before the front of the other.
+/// True if some point on the front of each triangle lies in front of the other.
 bool can_exchange(const FlatTriangle& a, const FlatTriangle& b);
 
 /// Exchange area A_a F_ab = A_b F_ba in m² between the fronts of two triangles with nothing between
 /// them: symmetric in a and b up to rounding, >= 0.
 ///
-/// Where the triangles are small for their distance, a product of quadrature rules whose degree
-/// is chosen by the error term of the rule; otherwise, and where one cuts the other's plane, the
-/// double contour integral of ln r over what lies before each plane, with the inner integral in
-/// closed form (E. M. Sparrow, "A new and simpler formulation for radiative angle factors", 1963).
-/// `tolerance` is the relative error that the choice aims at.
+/// If the triangles are small for their distance, this is a product of quadrature rules whose
+/// degree follows from their error terms. Otherwise, and where one triangle cuts the plane of the
+/// other, it is the double contour integral of ln r over the parts in front of both planes, with
+/// the inner integral in closed form (E. M. Sparrow, "A new and simpler formulation for radiative
+/// angle factors", 1963). `tolerance` is the relative error that the choice aims at.
 double unoccluded_exchange_area(const FlatTriangle& a, const FlatTriangle& b,
                                 double tolerance = 3e-4);
 
-/// The same by the contour integral alone, whatever the distance.
+/// The same by the contour integral alone, at any distance.
 double contour_exchange_area(const FlatTriangle& a, const FlatTriangle& b);
 
-/// The integrand of the area formulation (Burenius, eq. 4.13): cos cos / (pi r²), 0 behind a plane.
+/// The integrand of the area formulation (Burenius, eq. 4.13): cos cos / (pi r²); 0 for points
+/// behind a plane.
 inline double point_kernel(const glm::dvec3& x, const glm::dvec3& nx, const glm::dvec3& y,
                            const glm::dvec3& ny) {
   const glm::dvec3 d = y - x;

@@ -5,33 +5,33 @@
 namespace rebounce {
 
 struct FormFactorSettings {
-  std::uint64_t seed = 1;  ///< of the sample points; another seed is another, equally good F
-  /// Shadow rays for a pair of patches to begin with; if they agree that is all. More: partly
-  /// hidden pairs are noticed more often. At most 256.
+  std::uint64_t seed = 1;  ///< of the sample points; every seed gives an equally good F
+  /// Shadow rays that each pair of patches gets first, at most 256. If they agree, the pair gets no
+  /// more. More rays notice partly hidden pairs more often.
   int probe_rays = 8;
-  /// Shadow rays for a pair that is partly hidden; one that exchanges much gets six times as many.
-  /// More: smoother penumbrae, slower. At most 256.
+  /// Shadow rays for a pair that is partly hidden, at most 256; a pair that exchanges much light
+  /// gets six times as many. More rays make penumbrae smoother and take longer.
   int full_rays = 64;
-  /// Rays per patch into its hemisphere. They measure what escapes, and what near patches of many
-  /// triangles exchange; they find the pairs that probe rays misjudge. More: better row sums in
-  /// open scenes, less noise between near patches.
+  /// Rays per patch into its hemisphere. They measure the light that escapes and the exchange of
+  /// near patches of many triangles, and they find pairs that probe rays misjudge. More rays
+  /// improve row sums in open scenes and reduce noise between near patches.
   int hemisphere_rays = 4096;
-  /// Relative error aimed at by the unoccluded kernel.
+  /// Relative error that the unoccluded kernel aims at.
   double kernel_tolerance = 3e-4;
-  /// Of links alone (links.h), for which it is above 0: the error that a link may have, of the part
-  /// of the symmetric form A^1/2 F A^-1/2 that it stands for, Frobenius, absolute. Smaller: smaller
-  /// sets, more links.
+  /// Only for links (links.h), where it must be above 0: the largest error of a link. It is an
+  /// absolute error, in the Frobenius norm, of the part of A^1/2 F A^-1/2 that the link stands for.
+  /// Smaller values give smaller sets and more links.
   double link_epsilon = 0;
 };
 
-/// How much work form factors are worth.
+/// How exact form factors are, and how long they take.
 enum class FormFactorQuality : std::uint8_t {
-  kLow,      ///< for a first look: some three times as fast
-  kDefault,  ///< analytic view factors to 0.5 %
-  kHigh,     ///< to 0.1 %: some ten times slower
+  kLow,      ///< for a first look: about three times as fast
+  kDefault,  ///< view factors agree with closed forms to 0.5 %
+  kHigh,     ///< to 0.1 %: about ten times slower
 };
 
-/// `settings` with what a quality decides; seed and links stay.
+/// `settings` with the values of a quality; seed and links stay.
 ///
 /// | quality | probe_rays | full_rays | hemisphere_rays | kernel_tolerance |
 /// |---|---|---|---|---|

@@ -18,19 +18,19 @@ struct FormFactors : EscapedLight {
   std::uint64_t pair_count = 0;  ///< pairs of patches that face each other
 };
 
-/// Finds the form factors of every pair of patches: the exact exchange of the unoccluded patches
-/// times the kernel-weighted part of shadow rays that get through (form_factor_kernel.h), joined
-/// with what hemisphere rays count, which alone speak for near patches of many triangles; corrected
-/// so that reciprocity and closure hold together (closure.h).
+/// Computes the form factors of every pair of patches: the exact exchange of the unoccluded patches
+/// (form_factor_kernel.h) times the kernel-weighted fraction of shadow rays that pass, combined
+/// with the counts of hemisphere rays. Near patches of many triangles use hemisphere rays alone. A
+/// correction then makes reciprocity and closure hold together (closure.h).
 ///
-/// `tracer` holds the first surface_count triangles of model.mesh. Rows are shared out among OpenMP
-/// threads; the bits do not depend on how many. Throws Cancelled when `progress` says so.
+/// `tracer` holds the first surface_count triangles of model.mesh. OpenMP threads share the rows;
+/// the bits do not depend on their number. Throws Cancelled if `progress` asks to stop.
 FormFactors compute_form_factors(const PatchModel& model, const RayTracer& tracer,
                                  const FormFactorSettings& settings = {},
                                  const Progress& progress = {});
 
-/// What compute_form_factors will take: by a sample of the pairs, in about a hundredth of the time.
-/// Rough. Throws Cancelled when `progress` says so.
+/// Forecasts the work of compute_form_factors from a sample of the pairs, in about a hundredth of
+/// the time. The result is rough. Throws Cancelled if `progress` asks to stop.
 FormFactorForecast forecast_form_factors(const PatchModel& model, const RayTracer& tracer,
                                          const FormFactorSettings& settings = {},
                                          const Progress& progress = {});

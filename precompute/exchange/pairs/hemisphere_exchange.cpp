@@ -9,9 +9,9 @@
 namespace rebounce {
 namespace {
 
-/// Variance of a count of low-discrepancy rays of which so many are expected: as random ones while
-/// they are few, then growing with the power 3/4, as points of four dimensions on either side of a
-/// border do. Measured: notes/form_factors.md.
+/// The variance of a count of low-discrepancy rays with this expected value. It is that of random
+/// rays while they are few, then grows with the power 3/4, as for points in four dimensions on
+/// either side of a border. Measured: notes/form_factors.md.
 double variance_of_count(double expected) {
   return expected / std::pow(1 + 0.5 * expected, 0.25);
 }
@@ -32,12 +32,12 @@ std::vector<MetPatch> MetPatchCounter::count(std::size_t patch_count,
   return met;
 }
 
-/// The counts of both sides, n_i of N from area A_i and n_j of N from A_j, weighted by the inverse
-/// of their variances: (n_i + n_j) A_i A_j / ((A_i + A_j) N), whatever the exchange is.
+/// Combines the counts of both sides, n_i of N from area A_i and n_j of N from A_j, weighted by the
+/// inverse of their variances: (n_i + n_j) A_i A_j / ((A_i + A_j) N), whatever the exchange.
 HemisphereExchange::HemisphereExchange(const std::vector<std::vector<MetPatch>>& met,
                                        std::span<const double> area, int ray_count)
     : area_(area.begin(), area.end()), ray_count_(ray_count), pairs_(met.size()) {
-  // In the order of the other patch, so that each list below comes out in order.
+  // Lists by the other patch, in its order, so that each list below comes out in order.
   std::vector<std::vector<MetPatch>> met_by(met.size());
   for (std::uint32_t k = 0; k < met.size(); ++k) {
     for (const MetPatch& m : met[k]) {
@@ -53,7 +53,7 @@ HemisphereExchange::HemisphereExchange(const std::vector<std::vector<MetPatch>>&
       const bool take_other =
           own == met[i].end() || (other != met_by[i].end() && other->patch <= own->patch);
       const std::uint32_t j = take_own ? own->patch : other->patch;
-      // A patch's rays to itself count for either side.
+      // Rays of a patch to itself count for both sides.
       const std::uint32_t count =
           (take_own ? (j == i ? 2 : 1) * own->count : 0) + (take_other ? other->count : 0);
       pairs_[i].push_back({j, count, count * area_per_ray(i, j)});

@@ -11,31 +11,33 @@
 namespace rebounce {
 namespace {
 
-// Normals within this angle (in cosine; 2.5 degrees), and a thickness of this part of the radius,
-// count as one plane's.
+// A patch is flat if its normals stay within this angle (in cosine; 2.5 degrees) and its thickness
+// within this fraction of its radius.
 constexpr double kFlatCosine = 0.999, kFlatThickness = 0.02;
 
-// Pairs with as few pairs of triangles as this are summed triangle by triangle; near ones, where
-// sums over parts are coarser, with as many as that.
+// Pairs with at most this number of pairs of triangles are summed triangle by triangle. The limit
+// is higher for near pairs, where sums over parts are coarser.
 constexpr std::size_t kFewTrianglePairs = 4, kFewNearTrianglePairs = 64;
 
-// Below this tolerance sums over parts are too coarse, and pairs of as many triangles as there are
-// pairs of parts are summed triangle by triangle.
+// Below this tolerance sums over parts are too coarse. Pairs are then summed triangle by triangle
+// if they have at most as many pairs of triangles as pairs of parts.
 constexpr double kPartTolerance = 1e-4;
 constexpr std::size_t kPartPairs = std::size_t{1} << (2 * PatchGeometry::kPartLevels);
 
-// Sums over 2^level parts each are taken while (sum of radii) / distance is below these: their
-// error goes with (that / sqrt(2)^level)^2. Measured: tests/precompute/test_patch_geometry.cpp.
+// Sums over 2^level parts of each patch are used while (sum of radii) / distance is below these:
+// their error grows with (that / sqrt(2)^level)^2. Measured:
+// tests/precompute/exchange/pairs/test_patch_geometry.cpp.
 constexpr std::array<double, 4> kPartReach = {0.02, 0.1, 0.4, 0.6};
 constexpr std::array<int, 4> kPartLevel = {0, 2, 4, 5};
 
-// A part whose vector area is this much of its area is about flat: within 45 degrees or so.
+// A part whose vector area is at least this fraction of its area is about flat: within 45 degrees
+// or so.
 constexpr double kAboutFlat = 0.85;
 
-// A part nearer than this many times the radii of both is looked at triangle by triangle.
+// A part nearer than this multiple of the radii of both is summed triangle by triangle.
 constexpr double kNearPart = 1.5;
 
-// A triangle this small for its distance is taken as a point.
+// A triangle this small relative to its distance counts as a point.
 constexpr double kPointLike = 0.25;
 
 std::size_t part_offset(int level) {
@@ -106,8 +108,8 @@ std::array<FlatTriangle, 2> bisect(const FlatTriangle& t) {
   return halves;
 }
 
-/// Sorts triangles along the axis in which `vector`(t) spreads most; returns how many make up half
-/// the area.
+/// Sorts triangles along the axis in which `vector`(t) spreads most; returns how many of them make
+/// up half the area.
 template <typename Vector>
 std::size_t split_in_half(std::span<FlatTriangle> triangles, const Vector& vector) {
   glm::dvec3 low(std::numeric_limits<double>::max()), high = -low;
@@ -127,8 +129,8 @@ std::size_t split_in_half(std::span<FlatTriangle> triangles, const Vector& vecto
   return std::max<std::size_t>(count, 1);
 }
 
-/// Cuts a patch into parts of about equal area, a binary heap of them: the children of the part at
-/// k are at 2 k + 1 and 2 k + 2.
+/// Cuts a patch into parts of about equal area, stored as a binary heap: the children of part k are
+/// parts 2 k + 1 and 2 k + 2.
 class PartWriter {
  public:
   PartWriter(std::span<PatchPart> heap, std::vector<FlatTriangle>& fragment,
@@ -150,7 +152,7 @@ class PartWriter {
       half = bisect(triangles[0]);
       triangles = half;
     } else {
-      // First by normals, which matter at any distance.
+      // The first cuts are by normals, which matter at any distance.
       first = is_about_flat(heap_[node])
                   ? split_in_half(triangles, [](const FlatTriangle& t) { return t.centroid; })
                   : split_in_half(triangles, [](const FlatTriangle& t) { return t.normal; });
@@ -188,7 +190,7 @@ double between_triangles(std::span<const FlatTriangle> a, std::span<const FlatTr
   return sum;
 }
 
-/// From the part to the triangle, per area of the part as `normal` faces it.
+/// The exchange of a part with a triangle per area of the part, which faces `normal`.
 double part_to_triangle(const PatchPart& part, const glm::dvec3& normal, const FlatTriangle& t) {
   const glm::dvec3 d = part.centroid - t.centroid;
   const double height = glm::dot(t.normal, d);
@@ -196,14 +198,14 @@ double part_to_triangle(const PatchPart& part, const glm::dvec3& normal, const F
   if (t.radius * t.radius < kPointLike * kPointLike * glm::dot(d, d)) {
     return t.stopping_area() * point_kernel(part.centroid, normal, t.centroid, t.normal);
   }
-  // Relative to the part, so that single precision is enough.
+  // Coordinates are relative to the part, so that single precision is enough.
   const std::array<glm::vec3, 3> corner = {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid,
                                            t.vertex[2] - part.centroid};
   return t.stopping_part * point_to_polygon_form_factor({0, 0, 0}, normal, corner);
 }
 
-/// From the parts of patch i to patch j: to its parts where they are far for their size, else to
-/// their triangles.
+/// The exchange of the parts of patch i with patch j: with its parts where they are far for their
+/// size, otherwise with its triangles.
 double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
   constexpr int kFinest = PatchGeometry::kPartLevels;
   const std::span<const PatchPart> to = geometry.parts(j, kFinest);
@@ -229,10 +231,10 @@ double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t 
   return sum;
 }
 
-// Where the outermost points lie between the centroid and a corner of a triangle.
+// The outermost points lie at this fraction of the way from the centroid to a corner of a triangle.
 constexpr double kBesideCorner = 0.94;
 
-/// The points beside the corners of all `triangles`.
+/// The points near the corners of all `triangles`.
 std::vector<PatchPoint> corner_points(std::span<const FlatTriangle> triangles) {
   std::vector<PatchPoint> points;
   for (const FlatTriangle& t : triangles) {
@@ -243,7 +245,7 @@ std::vector<PatchPoint> corner_points(std::span<const FlatTriangle> triangles) {
   return points;
 }
 
-/// The point for which `measure`(position) is largest.
+/// The point with the largest `measure`(position).
 template <typename Measure>
 PatchPoint find_farthest(std::span<const PatchPoint> points, const Measure& measure) {
   return *std::ranges::max_element(
@@ -263,7 +265,7 @@ std::array<PatchPoint, 3> find_outermost(std::span<const PatchPoint> points,
   return {first, second, third};
 }
 
-/// The sum of the radii by the distance: the larger, the nearer.
+/// The sum of the radii over the distance: large for near pairs.
 double relative_reach(const PatchGeometry& geometry, std::size_t i, std::size_t j) {
   const PatchBounds &a = geometry.bounds(i), &b = geometry.bounds(j);
   return (a.radius + b.radius) / glm::distance(a.centre, b.centre);
@@ -354,8 +356,8 @@ double unoccluded_exchange_area(const PatchGeometry& geometry, std::size_t i, st
                          geometry.parts(j, std::max(kPartLevel[k], geometry.flat_level(j))));
   }
   if (a.size() * b.size() <= kFewNearTrianglePairs) return between_triangles(a, b, tolerance);
-  // The smaller patch tells better what it sees: a large part of the other, taken as a point beside
-  // it, would give it all that the whole part has. No patch gives more than all.
+  // The smaller patch gives the better estimate: a large part of the other, taken as a point beside
+  // it, would exchange all that the whole part has. The fraction is at most one.
   const double own = std::pow(geometry.bounds(i).radius, 2),
                other = std::pow(geometry.bounds(j).radius, 2);
   const double exchange =

@@ -15,25 +15,25 @@
 namespace rebounce {
 namespace {
 
-// Deviations by which the count of hemisphere rays must be off to have a clear pair looked at
-// again, and to be believed more than all of its rays.
+// Deviations by which the count of hemisphere rays must be off before a clear pair is examined
+// again, and before the count overrules all rays of the pair.
 constexpr double kDoubt = 2, kContradiction = 4;
 
-// A large pair exchanges more than this part of what either patch sends out.
+// A large pair exchanges more than this fraction of the light of either patch.
 constexpr double kLargePart = 3e-4;
 
-// Variance of Sobol's points, of that of as many random ones: 0.19 with 64, 0.14 with 256, measured
-// over partly hidden pairs.
+// The variance of points of Sobol's sequence as a fraction of that of random ones, over partly
+// hidden pairs. Measured: notes/form_factors.md.
 constexpr double kSpreadGain = 0.2;
 
-// A row whose sum is off its target by more than this (and three deviations), with as many rays as
-// the default or more, is traced again with so many times the probe rays: they miss some of what is
-// partly covered.
+// A row is traced again with this multiple of the probe rays if its sum is off its target by more
+// than the tolerance (and three deviations), for settings with at least the default number of rays:
+// probe rays miss some partly covered pairs.
 constexpr double kRowSumTolerance = 6e-4;
 constexpr int kDefaultRays = 64, kRefinedProbes = 4;
 
-// A forecast looks at one of so many patches, but at so many at least and at most; in runs of
-// neighbours, whose rays go alike.
+// A forecast samples one of kForecastShare patches, within these limits, in runs of neighbours,
+// whose rays meet similar surfaces.
 constexpr std::size_t kForecastShare = 32, kForecastLeast = 64, kForecastMost = 512;
 constexpr std::size_t kForecastRun = 16;
 
@@ -71,7 +71,7 @@ class RawExchangeBuilder {
     const std::vector<Escape> escape =
         trace_hemispheres(all, [](double done) { return 0.2 * done; });
     ExchangeRows rows(n);
-    // Row i has n - i pairs: what is left is a triangle.
+    // Row i has n - i pairs: the rest of the work is a triangle.
     const auto triangle = [](double done) { return 1 - (1 - done) * (1 - done); };
     const auto every = [](std::uint32_t) { return true; };
     for_each_patch(
@@ -91,7 +91,7 @@ class RawExchangeBuilder {
     return {std::move(rows), escape, target, ray_count_ + hemisphere_ray_count(n), pair_count_};
   }
 
-  /// The pairs of some patches with each other.
+  /// Forecasts from the pairs of some patches with each other.
   FormFactorForecast forecast() {
     const std::size_t n = geometry_.patch_count();
     const std::vector<std::uint32_t> sample = sample_of_patches(n);
@@ -122,7 +122,7 @@ class RawExchangeBuilder {
   struct Scratch {
     std::vector<FacingPatch> facing, mixed, large_mixed;
     std::vector<Ray> rays;
-    std::vector<float> transmitted;  ///< of each ray
+    std::vector<float> transmitted;  ///< by ray
     EscapeScratch escape;
     MetPatchCounter counter;
   };
@@ -131,8 +131,8 @@ class RawExchangeBuilder {
     return patch_count * static_cast<std::uint64_t>(settings_.hemisphere_rays);
   }
 
-  /// Runs `work` for every one of `patches` on all threads; throws Cancelled if asked to. `part`
-  /// says which part of the whole is done when a part of the patches is.
+  /// Runs `work` for every one of `patches` on all threads; throws Cancelled if asked to stop.
+  /// `part` maps the fraction of these patches that is done to the fraction of the whole.
   template <typename Work, typename Part>
   void for_each_patch(std::span<const std::uint32_t> patches, const Work& work, const Part& part) {
     const Progress whole = [&](double done) { return !progress_ || progress_(part(done)); };
@@ -150,7 +150,7 @@ class RawExchangeBuilder {
     loop.finish();
   }
 
-  /// Those of `patches`; of others nothing is known afterwards.
+  /// Measures the escape of `patches`; for others nothing is known afterwards.
   template <typename Part>
   std::vector<Escape> trace_hemispheres(std::span<const std::uint32_t> patches, const Part& part) {
     const std::size_t n = geometry_.patch_count();
@@ -168,7 +168,7 @@ class RawExchangeBuilder {
     return escape;
   }
 
-  /// The pairs (i, j) that are not coarse and `wanted`(j), and all coarse ones.
+  /// The pairs (i, j) that are not coarse and have `wanted`(j), and all coarse ones.
   template <typename Wanted>
   void compute_row(std::uint32_t i, const Wanted& wanted, Scratch& scratch,
                    std::vector<ExchangeEntry>& row) {
@@ -177,8 +177,8 @@ class RawExchangeBuilder {
     std::ranges::sort(row, {}, &ExchangeEntry::column);
   }
 
-  /// Adds the pairs (i, j) that are not coarse and `wanted`(j), of which `probe` rays each say
-  /// whether they need more.
+  /// Adds the pairs (i, j) that are not coarse and have `wanted`(j). Each first gets `probe` rays,
+  /// which show whether it needs more.
   template <typename Wanted>
   void append_fine(std::uint32_t i, std::size_t probe, const Wanted& wanted, Scratch& scratch,
                    std::vector<ExchangeEntry>& row) {
@@ -207,25 +207,26 @@ class RawExchangeBuilder {
     ray_count_ += scratch.facing.size() * probe;
   }
 
-  /// Fewer rays than the default leave noise that more of them would only trade for time.
+  /// With fewer rays than the default, rows are noisy, and more rays for some of them would only
+  /// cost time.
   double row_sum_tolerance() const {
     return kRowSumTolerance *
            std::max(1.0, static_cast<double>(kDefaultRays) / settings_.full_rays);
   }
 
-  /// True if hemisphere rays say otherwise than the rays of a pair that agree: by so many
-  /// `deviations` if these call it clear.
+  /// True if the hemisphere rays contradict the agreeing rays of a pair: by this number of
+  /// `deviations` if the pair counts as clear.
   bool is_contradicted(std::uint32_t i, const FacingPatch& pair, ShadowRays::Agreement agreement,
                        double deviations) const {
     const double count = hemisphere_->find(i, pair.patch).count;
     if (agreement == ShadowRays::Agreement::kHidden) return count > 0;
     const double expected = hemisphere_->expected_count(i, pair.patch, pair.unoccluded);
-    // As random rays would deviate: more than they do, but of many thousand pairs none may be lost
-    // to chance whose kernel is exact.
+    // The deviation is that of random rays. It is larger than that of these rays, because among
+    // many thousand pairs no pair with an exact kernel may be lost to chance.
     return std::abs(count - expected) > deviations * std::sqrt(expected + 1);
   }
 
-  /// Looks at the fine pairs of row i that have a doubtful patch with more probe rays, and replaces
+  /// Traces more probe rays for the fine pairs of row i that have a doubtful patch, and replaces
   /// their entries.
   void refine_row(std::uint32_t i, const std::vector<bool>& doubtful, Scratch& scratch,
                   std::vector<ExchangeEntry>& row) {
@@ -238,8 +239,8 @@ class RawExchangeBuilder {
     std::ranges::sort(row, {}, &ExchangeEntry::column);
   }
 
-  /// Traces `full` rays for each of `pairs` and adds what gets through to row i: the mean of what
-  /// shadow rays and hemisphere rays say, weighted by the inverse of their variances.
+  /// Traces `full` rays for each of `pairs` and adds the mean of shadow rays and hemisphere rays,
+  /// weighted by the inverse of their variances, to row i.
   void append_mixed(std::uint32_t i, const std::vector<FacingPatch>& pairs, int full,
                     Scratch& scratch, std::vector<ExchangeEntry>& row) {
     shadow_rays_.make_rays(i, pairs, full, scratch.rays);
@@ -259,8 +260,8 @@ class RawExchangeBuilder {
     ray_count_ += pairs.size() * full;
   }
 
-  /// Adds the mean of `visible` and of the hemisphere rays. The variances are those of one and the
-  /// same guess: by estimates of its own, each side would count the more the less it found.
+  /// Adds the mean of `visible` and of the hemisphere rays. Both variances follow from one common
+  /// estimate: with an estimate of its own, each side would count more the less light it finds.
   void append_mean(std::uint32_t i, const FacingPatch& pair, const ShadowRays::Visibility& visible,
                    std::vector<ExchangeEntry>& row) const {
     const double most = pair.unoccluded, shadow = most * visible.part;
@@ -278,17 +279,17 @@ class RawExchangeBuilder {
            kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
   }
 
-  /// Variance of what the rays of `visible` say if `part` of the light gets through. Rays that are
-  /// dimmed, as by glass, spread less than those that are stopped or not.
+  /// The variance of `visible` if `part` of the light passes. Rays that are dimmed, as by glass,
+  /// spread less than rays that either pass or are stopped.
   static double variance_of_part(double part, const ShadowRays::Visibility& visible) {
     const double binary = visible.part * (1 - visible.part), rays = visible.ray_count;
     const double spread = binary > 0 ? visible.variance * rays / binary : 1;
-    // No part is known better than that many rays tell (rule of succession).
+    // No fraction is known better than this number of rays tells (rule of succession).
     const double expected = (part * rays + 1) / (rays + 2), least = 1 / (rays + 2);
     return kSpreadGain * std::max(spread * expected * (1 - expected) / (rays + 1), least * least);
   }
 
-  /// Adds the near pairs of many triangles to row i, as hemisphere rays have them.
+  /// Adds the near pairs of many triangles to row i, from hemisphere rays.
   void append_coarse(std::uint32_t i, std::vector<ExchangeEntry>& row) const {
     for (const HemisphereExchange::Pair& pair : hemisphere_->pairs(i)) {
       if (!is_coarse_pair(geometry_, i, pair.patch)) continue;
@@ -297,15 +298,14 @@ class RawExchangeBuilder {
     }
   }
 
-  /// Traces the rays of the pairs of a patch.
-  /// Where there are holes, a triangle's mean is all that patches resolve: taking it keeps the
-  /// noise of single holes out of F.
+  /// Traces the rays of the pairs of a patch. Where a surface has holes, the mean of a triangle is
+  /// all that patches resolve; using it keeps the noise of single holes out of F.
   void trace(Scratch& scratch) const {
     scratch.transmitted.resize(scratch.rays.size());
     tracer_.transmittance(scratch.rays, PassageDetail::kTriangle, scratch.transmitted);
   }
 
-  /// Adds a pair of so much `exchange`, m², of so much variance, m⁴.
+  /// Adds a pair with this `exchange`, m², and variance, m⁴.
   static void append(std::vector<ExchangeEntry>& row, const FacingPatch& pair, double exchange,
                      double variance) {
     if (static_cast<float>(exchange) <= 0) return;

@@ -12,46 +12,45 @@
 
 namespace rebounce {
 
-/// A pair whose rays all agree may still be partly hidden: its variance is not zero but this part
-/// of the squared exchange.
+/// A pair whose rays all agree may still be partly hidden: its variance is this fraction of the
+/// squared exchange instead of zero.
 inline constexpr double kVisibilityVarianceFloor = 1e-6;
 
-/// The exchange of all pairs of patches as rays and kernels have it, before closure.
+/// The exchange of all pairs of patches from rays and kernels, before closure.
 struct RawExchange {
   ExchangeRows rows;
   std::vector<Escape> escape;     ///< [n]
   std::vector<RowTarget> target;  ///< [n]
   std::uint64_t ray_count = 0;
-  std::uint64_t pair_count = 0;  ///< pairs that face each other and were asked by shadow rays
+  std::uint64_t pair_count = 0;  ///< pairs that face each other and got shadow rays
 };
 
-/// True for a pair of patch i that exchanges so much that, if it is partly hidden, it gets
-/// kLargeFactor times the rays of others: what they miss is seen in the sums of rows, and their
-/// noise in the ranks of blocks.
+/// True for a pair of patch i that exchanges much light. If it is partly hidden, it gets
+/// kLargeFactor times the rays of other pairs: what its rays miss shows in row sums, and its noise
+/// in the ranks of blocks.
 bool is_large_pair(const PatchGeometry& geometry, std::uint32_t i, const FacingPatch& pair);
 inline constexpr int kLargeFactor = 6;
 
-/// Looks at every pair of patches:
+/// Computes the exchange of every pair of patches:
 ///
-/// - 1. Hemisphere rays of every patch say what escapes, and which patches see each other.
+/// - 1. Hemisphere rays of every patch measure what escapes and which patches see each other.
 /// - 2. A pair with a good kernel gets a few shadow rays. If they agree with each other and with
-/// the
-///   hemisphere rays, that is the answer; else it gets all of its rays, the more the more it
-///   exchanges, and if those do not agree either the mean of what they and the hemisphere rays say,
-///   weighted by the inverse of their variances.
-/// - 3. A near pair of many triangles is taken from the hemisphere rays alone.
+///   the hemisphere rays, that is the answer. Otherwise it gets all of its rays, more if it
+///   exchanges much. If those do not agree either, the answer is the mean of shadow rays and
+///   hemisphere rays, weighted by the inverse of their variances.
+/// - 3. A near pair of many triangles uses the hemisphere rays alone.
 /// - 4. Rows whose sum is off its target get more probe rays for every pair
-/// (adaptive_row_sampling.h).
+///   (adaptive_row_sampling.h).
 ///
-/// Rows are shared out among OpenMP threads; the bits do not depend on how many. Throws Cancelled
-/// when `progress` says so.
+/// OpenMP threads share the rows; the bits do not depend on their number. Throws Cancelled if
+/// `progress` asks to stop.
 RawExchange compute_raw_exchange(const PatchModel& model, const ShadowRays& shadow_rays,
                                  const RayTracer& tracer, const FormFactorSettings& settings,
                                  const Progress& progress);
 
-/// What compute_raw_exchange will take but for its fourth step, by what the others take for one in
-/// 32 patches, 512 at most: a thirtieth of the first, a thousandth of those of pairs. Throws
-/// Cancelled when `progress` says so.
+/// Forecasts the work of compute_raw_exchange, without its fourth step, from a sample of one in 32
+/// patches, at most 512: a thirtieth of the work of the first step and a thousandth of that of the
+/// pairs. Throws Cancelled if `progress` asks to stop.
 FormFactorForecast forecast_raw_exchange(const PatchModel& model, const ShadowRays& shadow_rays,
                                          const RayTracer& tracer,
                                          const FormFactorSettings& settings,

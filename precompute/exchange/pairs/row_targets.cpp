@@ -8,10 +8,10 @@ std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count
   target.reserve(escape.size());
   for (const Escape& e : escape) {
     const double lost = e.sky + e.absorbed, count = ray_count;
-    // Where no ray at all is lost, the row is taken as closed; nor does a single one open it, as it
-    // may have begun beyond the wall of an edge, a ray's offset away. Else the measurement is as
-    // sure as the rule of succession says; low-discrepancy rays err about half as much as random
-    // ones. Where all are lost, nothing is seen, exactly.
+    // If no ray is lost, the row counts as closed. A single lost ray does not open it, because the
+    // ray may have begun beyond the wall of an edge, by the offset of rays. Otherwise the
+    // uncertainty follows from the rule of succession; low-discrepancy rays have about half the
+    // error of random ones. If all rays are lost, the patch sees nothing, with certainty.
     const bool closed = lost * count < 1.5;
     const bool unseeing = lost * count > count - 0.5;
     const double p = (lost * count + 1) / (count + 2);

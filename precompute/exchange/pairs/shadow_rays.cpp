@@ -7,12 +7,12 @@
 namespace rebounce {
 namespace {
 
-// Pairs of patches whose numbers agree but for so many bits, which are mostly neighbours, share
-// their points: their errors are more alike, so that blocks of far pairs have lower rank, and rows
-// still average many.
+// Pairs of patches whose numbers agree except for this number of low bits, mostly neighbours, share
+// their points. Their errors are then similar, so that blocks of far pairs have lower rank, and
+// rows still average many different points.
 constexpr int kSharedBits = 4;
 
-/// ShadowRays::kernel() between the first `count` points of two blocks.
+/// Evaluates ShadowRays::kernel() between the first `count` points of two blocks.
 void find_kernels(const PatchPointBlock& from, const PatchPointBlock& to, std::size_t count,
                   PatchPointBlock::Coordinates& kernel) {
   for (std::size_t k = 0; k < count; ++k) {
@@ -58,7 +58,7 @@ void ShadowRays::make_probe_rays(std::uint32_t i, const std::vector<FacingPatch>
   }
 }
 
-/// Writes those between the outermost points that face each other, and returns how many.
+/// Writes the rays between the outermost points that face each other, and returns their number.
 std::size_t ShadowRays::make_corner_rays(std::uint32_t i, std::uint32_t j,
                                          std::span<Ray> rays) const {
   std::size_t made = 0;
@@ -72,7 +72,7 @@ std::size_t ShadowRays::make_corner_rays(std::uint32_t i, std::uint32_t j,
 }
 
 void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray> rays) const {
-  constexpr std::size_t kBlock = SobolBlocks::kSize, kCandidates = 4;  // for each ray
+  constexpr std::size_t kBlock = SobolBlocks::kSize, kCandidates = 4;  // weights, one per ray
   const SobolBlocks sequence(shift_of_pair(i, j));
   SobolBlocks::Block square;
   PatchPointBlock from, to;
@@ -80,7 +80,7 @@ void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray>
   std::size_t made = 0;
   const std::size_t most = kCandidates * rays.size();
   for (std::size_t begin = 0; begin < most && made < rays.size(); begin += kBlock) {
-    // Most often all of the first face each other.
+    // Usually all candidates of the first block face each other.
     const std::size_t count = std::min(kBlock, (begin == 0 ? rays.size() : most) - begin);
     sequence.fill(static_cast<std::uint32_t>(begin / kBlock), count, square);
     geometry_.points(i, count, square[0], square[1], from);
@@ -121,7 +121,7 @@ ShadowRays::Visibility ShadowRays::visibility(std::span<const Ray> rays,
   return {estimate.part(), estimate.variance(), estimate.effective_count()};
 }
 
-/// By four sums, which do not wait for each other. Void rays weigh nothing.
+/// Uses four sums that do not depend on each other. Void rays have weight 0.
 void ShadowRays::add(std::span<const Ray> rays, std::span<const float> transmitted,
                      VisibilityEstimate& estimate) {
   constexpr std::size_t kLanes = 4;

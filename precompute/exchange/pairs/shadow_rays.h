@@ -14,16 +14,16 @@
 
 namespace rebounce {
 
-/// A patch that another one would exchange light with.
+/// The other patch of a pair that exchanges light.
 struct FacingPatch {
   std::uint32_t patch;
   double unoccluded;  ///< exchange area in m² with nothing between
 };
 
-/// What weighted rays say of how much light gets through.
+/// An estimate, from weighted rays, of the fraction of light that passes.
 class VisibilityEstimate {
  public:
-  /// A ray of `weight` >= 0 of whose light the part `transmitted` in [0, 1] gets through.
+  /// Adds a ray of `weight` >= 0; the fraction `transmitted` in [0, 1] of its light passes.
   void add(double weight, double transmitted) {
     sum_ += weight;
     sum_of_squares_ += weight * weight;
@@ -38,13 +38,14 @@ class VisibilityEstimate {
     visible_squared_ += other.visible_squared_;
   }
 
-  bool is_empty() const { return sum_ <= 0; }  ///< no ray weighs anything: nothing below holds
+  /// No ray has weight: the values below are undefined.
+  bool is_empty() const { return sum_ <= 0; }
   double part() const { return visible_ / sum_; }
 
-  /// Variance of what single rays find.
+  /// Variance of single rays.
   double spread() const { return std::max(0.0, visible_squared_ / sum_ - part() * part()); }
 
-  /// As sure as that many rays of equal weight (Kish's effective sample size).
+  /// The number of rays of equal weight with the same certainty (Kish's effective sample size).
   double effective_count() const { return sum_ * sum_ / sum_of_squares_; }
   double variance() const { return spread() / effective_count(); }  ///< of part()
 
@@ -52,70 +53,70 @@ class VisibilityEstimate {
   double sum_ = 0, sum_of_squares_ = 0, visible_ = 0, visible_squared_ = 0;
 };
 
-/// The pairs of patches that face each other, and the shadow rays that find out how much of a
-/// pair's exchange gets through. Immutable, usable from any number of threads.
+/// Finds the pairs of patches that face each other, and makes the shadow rays that measure the
+/// visible fraction of their exchange. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
-  /// The most rays that a pair can be asked to have.
+  /// The largest number of rays of a pair.
   static constexpr std::uint32_t kMostRays = 256;
 
-  /// `geometry` must outlive it. `seed` decides which points of a pair are joined;
+  /// `geometry` must outlive the object. `seed` decides which points of a pair are joined;
   /// `kernel_tolerance` is that of unoccluded_exchange_area().
   ShadowRays(const PatchGeometry& geometry, std::uint64_t seed, double kernel_tolerance)
       : geometry_(geometry), seed_(seed), kernel_tolerance_(kernel_tolerance) {}
 
   const PatchGeometry& geometry() const { return geometry_; }
 
-  /// Exchange area in m² of two patches with nothing between them, i <= j; of a patch with itself
-  /// if it is not flat.
+  /// Exchange area in m² of two patches, i <= j, with nothing between them; for i == j that of a
+  /// patch with itself, if it is not flat.
   double unoccluded(std::uint32_t i, std::uint32_t j) const {
     return unoccluded(i, j, kernel_tolerance_);
   }
   double unoccluded(std::uint32_t i, std::uint32_t j, double tolerance) const;
 
-  /// Writes to `facing` the patches j >= i that patch i would exchange light with, if `wanted`(j),
-  /// in ascending order. Patch i itself is among them if it is not flat.
+  /// Writes to `facing` the patches j >= i with `wanted`(j) that patch i exchanges light with,
+  /// ascending. Patch i is among them if it is not flat.
   template <typename Wanted>
   void find_facing(std::uint32_t i, std::vector<FacingPatch>& facing, const Wanted& wanted) const;
 
-  /// Writes to `rays` `count` untraced rays for each pair of patch i, one pair after the other,
-  /// each with its weight (ray_weight), between points of Sobol's sequence (sobol_blocks.h) over
-  /// both patches. Rays between points that do not face each other carry no
-  /// light and are not made; where a pair has fewer the rest are never occluded and void (is_void).
+  /// Writes `count` untraced rays for each pair of patch i to `rays`, pair by pair, each with its
+  /// weight (ray_weight), between points of Sobol's sequence (sobol_blocks.h) over both patches.
+  /// Rays between points that do not face each other carry no light and are not made; if a pair has
+  /// fewer than `count`, the rest are void rays (is_void) that are never occluded.
   void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                  std::vector<Ray>& rays) const;
 
-  /// The same for rays that are to tell whether a pair is partly hidden: the first kCornerRays join
-  /// the outermost points of the two, which what has a straight edge hides or shows first.
+  /// The same for probe rays, which tell whether a pair is partly hidden: the first kCornerRays
+  /// join the outermost points of the two patches, which an occluder with a straight edge hides or
+  /// shows first.
   void make_probe_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
                        std::vector<Ray>& rays) const;
   static constexpr std::uint32_t kCornerRays = 9;
 
-  /// What the `rays` of a pair agree on, whose transmittances are `transmitted`.
+  /// Whether the `rays` of a pair agree, given their transmittances `transmitted`.
   enum class Agreement : std::uint8_t { kClear, kHidden, kMixed };
   static Agreement agreement(std::span<const Ray> rays, std::span<const float> transmitted);
 
-  /// True for a ray that stands for none.
+  /// True for a ray that only fills up the count.
   static bool is_void(const Ray& ray) { return ray_weight(ray) == 0; }
 
   struct Visibility {
-    double part;       ///< of the pair's light that gets through, [0, 1]
+    double part;       ///< fraction of the light of the pair that passes, [0, 1]
     double variance;   ///< of `part`
-    double ray_count;  ///< rays of equal weight that would tell as much
+    double ray_count;  ///< number of rays of equal weight with the same certainty
   };
 
-  /// What the `rays` of a pair that make_rays made and their transmittances `transmitted` say of
-  /// it.
+  /// The visibility of a pair from `rays` of make_rays and their transmittances `transmitted`.
   static Visibility visibility(std::span<const Ray> rays, std::span<const float> transmitted);
 
-  /// Adds the same rays to what is known of the pair.
+  /// Adds such rays to the estimate of a pair.
   static void add(std::span<const Ray> rays, std::span<const float> transmitted,
                   VisibilityEstimate& estimate);
 
-  /// The kernel between the ends of a ray; 0 of a void one.
+  /// The kernel between the ends of a ray; 0 for a void ray.
   static double ray_weight(const Ray& ray) { return std::bit_cast<float>(ray.id); }
 
-  /// A ray from `x` to `y`, of `weight` > 0: the kernel between them.
+  /// A ray from `x` to `y` with `weight` > 0, the kernel between them.
   static Ray ray_between(const PatchPoint& x, const PatchPoint& y, float weight) {
     Ray ray;
     for (int axis = 0; axis < 3; ++axis) {
@@ -128,11 +129,10 @@ class ShadowRays {
     return ray;
   }
 
-  /// One that stands for none and is never occluded.
+  /// A ray that only fills up the count and is never occluded.
   static Ray void_ray();
 
-  /// The kernel between two points as point_kernel() has it, 1/m²; 0 if they do not face each
-  /// other.
+  /// The kernel between two points as in point_kernel(), 1/m²; 0 if they do not face each other.
   static float kernel(const PatchPoint& x, const PatchPoint& y) {
     const glm::vec3 d = to_glm(y.position) - to_glm(x.position);
     const float cx = glm::dot(to_glm(x.normal), d), cy = -glm::dot(to_glm(y.normal), d);
