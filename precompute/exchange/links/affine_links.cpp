@@ -11,15 +11,15 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Directions in which a node extends by less than this part of its size have no gradient. It would
-// be as large as the direction is thin; and gradients are kept as bfloat16, axis by axis, so that
-// what is rounded off it points anywhere, along the node's whole length too: by 2^-9 / 0.03 of what
-// the gradient stands for at most. With 1e-6 gathering diverged, by 6 a sweep.
+// A node has no gradient in directions in which it extends by less than this fraction of its size.
+// Such a gradient would be as large as the direction is thin. Gradients are stored as bfloat16,
+// axis by axis, so rounding errors point anywhere, also along the length of the node: they are at
+// most 2^-9 / 0.03 of what the gradient stands for. With 1e-6 gathering diverges.
 constexpr double kFlat = 0.03;
 constexpr int kScalingRounds = 4;
 
-// Factors stay within these. A patch that sees next to nothing may have lost most of it, and what
-// would make up for that would amplify the light between two of them without end.
+// Factors stay within these limits. A patch that sees almost nothing may have lost most of it;
+// factors that compensate would amplify the light between two such patches without end.
 constexpr float kLeastScale = 0.5F, kMostScale = 2;
 
 Matrix3d inverse_without_flat(const Matrix3d& covariance) {
@@ -106,7 +106,7 @@ void scale_rows(std::span<const float> target, std::span<const float> area,
   for (std::size_t i = 0; i < target.size(); ++i) {
     if (target[i] == 0) links.scale[i] = 0;
   }
-  std::vector<float> scaled(target.size(), 1);  // by this function
+  std::vector<float> scaled(target.size(), 1);  // with the factors of this function
   for (int round = 0; round < kScalingRounds; ++round) {
     const std::vector<float> sum = row_sums(links, area, centroid);
     for (std::size_t i = 0; i < sum.size(); ++i) {

@@ -11,15 +11,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Sides of the blocks within which links are chosen, in patches: larger ones are never worth a
-// single link in scenes of thousands of patches, and their tables leave the caches.
+// Side, in patches, of the blocks in which links are chosen. In scenes of thousands of patches no
+// single link is worth a larger block, and the tables of larger blocks do not fit into caches.
 constexpr std::uint32_t kBlockSide = 256;
 
 struct NodePair {
   std::uint32_t a, b;
 };
 
-/// A node and all below it, the children of each side by side.
+/// A node and all nodes below it; the children of a node are neighbours.
 class Subtree {
  public:
   void list(const ClusterTree& tree, std::uint32_t root) {
@@ -36,7 +36,7 @@ class Subtree {
 
   std::size_t size() const { return node_.size(); }
   std::uint32_t node(std::uint32_t k) const { return node_[k]; }
-  /// Place of the first child in the list, or kNone.
+  /// Index of the first child in the list, or kNone.
   std::uint32_t first_child(std::uint32_t k) const { return child_[k]; }
 
  private:
@@ -50,7 +50,7 @@ class BlockFitting {
                double multiplier)
       : tree_(tree), sums_(pairs, patches, tree.tree.patch), multiplier_(multiplier) {}
 
-  /// The links between two nodes of which the first comes before the second.
+  /// The links between two nodes; the first node comes before the second.
   std::vector<AffineLink> fit(const NodePair& block) {
     sums_.add_up(tree_.range(block.a), tree_.range(block.b));
     a_.list(tree_.tree, block.a);
@@ -67,7 +67,7 @@ class BlockFitting {
 
   enum class Kind : std::uint8_t { kUnknown, kNothing, kLink, kSplitA, kSplitB };
   struct Choice {
-    double cost = 0;  ///< squared error and multipliers
+    double cost = 0;  ///< squared error plus the multiplier for each link
     Kind kind = Kind::kUnknown;
   };
 
@@ -93,13 +93,13 @@ class BlockFitting {
     return std::max(0.0, pairs.squared - norm);
   }
 
-  /// Otherwise a link would take light through a wall.
+  /// Without this condition a link could carry light through a wall.
   bool is_of_one_room(std::uint32_t i, std::uint32_t j) const {
     const std::uint32_t room = tree_.room[a_.node(i)];
     return room != kNone && room == tree_.room[b_.node(j)];
   }
 
-  /// The least that places i and j of the two subtrees can cost.
+  /// The least cost for entries i and j of the two subtrees.
   double cost(std::uint32_t i, std::uint32_t j) {
     if (choice(i, j).kind == Kind::kUnknown) choice(i, j) = choose(i, j);
     return choice(i, j).cost;
@@ -107,13 +107,13 @@ class BlockFitting {
 
   Choice choose(std::uint32_t i, std::uint32_t j) {
     const PairSums pairs = sums(i, j);
-    // Next to nothing beside others in the tables is rounded to 0, or to less.
+    // Rounding may turn an exchange that is tiny beside others in the tables into 0 or less.
     if (pairs.count == 0 || pairs.exchange <= 0) return {0, Kind::kNothing};
     Choice best{kForbidden, Kind::kLink};
     if (is_of_one_room(i, j)) {
       const double error = squared_error(i, j, pairs);
       best.cost = error + multiplier_;
-      // A second link costs more than the first could save.
+      // A second link costs more than it could save.
       if (error <= multiplier_) return best;
     }
     if (const std::uint32_t k = a_.first_child(i); k != kNone) {
@@ -147,8 +147,8 @@ class BlockFitting {
   std::vector<Choice> choice_;  ///< [a][b]
 };
 
-/// Appends the pairs of nodes of at most kBlockSide patches into which the pairs of two nodes, a
-/// before b or the same, are cut.
+/// Appends the pairs of nodes of at most kBlockSide patches that make up the pair (a, b); a comes
+/// before b or equals it.
 void append_blocks(const ClusterTree& tree, std::uint32_t a, std::uint32_t b,
                    std::vector<NodePair>& blocks) {
   const Cluster &first = tree.clusters[a], &second = tree.clusters[b];
@@ -181,7 +181,7 @@ std::vector<std::uint32_t> leaves_of(const ClusterTree& tree) {
   return leaf;
 }
 
-/// Those of patches with themselves.
+/// The links of patches with themselves.
 std::vector<AffineLink> links_to_themselves(const SpreadTree& tree, const PairSource& pairs) {
   std::vector<AffineLink> links;
   std::vector<float> block(std::size_t{kBlockSide} * kBlockSide);

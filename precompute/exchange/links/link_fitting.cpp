@@ -15,7 +15,7 @@
 namespace rebounce {
 namespace {
 
-// Rooms with groups of their own in the tree; smaller ones share the last.
+// The largest rooms have groups of their own in the tree; all others share the last group.
 constexpr std::size_t kRoomGroups = 255;
 
 std::vector<std::uint32_t> numbers_of(DisjointSets& sets, std::size_t count) {
@@ -24,7 +24,8 @@ std::vector<std::uint32_t> numbers_of(DisjointSets& sets, std::size_t count) {
   return number;
 }
 
-/// [n] A number for each room: the patches that light can go between, on however long a way.
+/// [n] The number of the room of each patch. Light can reach all patches of a room from each other,
+/// directly or by reflection.
 std::vector<std::uint32_t> find_rooms(const ExchangeMatrix& exchange) {
   const auto n = static_cast<std::uint32_t>(exchange.patch_count());
   DisjointSets sets(n);
@@ -36,7 +37,7 @@ std::vector<std::uint32_t> find_rooms(const ExchangeMatrix& exchange) {
   return numbers_of(sets, n);
 }
 
-/// The same where links say what light goes between.
+/// The same from links.
 std::vector<std::uint32_t> find_rooms(const FormFactorLinks& links) {
   const std::size_t m = links.first_child.size(), n = links.patch.size();
   const std::vector<std::uint32_t> begin = first_positions(links);
@@ -54,8 +55,8 @@ std::vector<std::uint32_t> find_rooms(const FormFactorLinks& links) {
   return numbers_of(sets, n);
 }
 
-/// [n] Groups for the tree, so that its nodes are of one room as far as may be: the largest rooms
-/// have one each.
+/// [n] Groups for the tree, so that most nodes are of one room: each of the largest rooms is a
+/// group.
 std::vector<std::uint8_t> room_groups(std::span<const std::uint32_t> room) {
   std::vector<std::uint32_t> size(room.size(), 0), rooms;
   for (const std::uint32_t r : room) {
@@ -72,7 +73,7 @@ std::vector<std::uint8_t> room_groups(std::span<const std::uint32_t> room) {
   return group;
 }
 
-/// For each node the room that all of its patches are in, or kNone.
+/// The room that contains all patches of each node, or kNone.
 std::vector<std::uint32_t> rooms_of_nodes(const ClusterTree& tree,
                                           std::span<const std::uint32_t> room) {
   std::vector<std::uint32_t> of_node(tree.clusters.size());
@@ -88,7 +89,7 @@ std::vector<std::uint32_t> rooms_of_nodes(const ClusterTree& tree,
   return of_node;
 }
 
-/// The sums of the rows of F and the square of the Frobenius norm of A^1/2 F A^-1/2.
+/// The row sums of F, and the squared Frobenius norm of A^1/2 F A^-1/2.
 struct Totals {
   std::vector<float> row_sum;
   double squared = 0;
@@ -110,7 +111,7 @@ Totals totals_of(const ExchangeMatrix& exchange, const std::vector<float>& area)
   return totals;
 }
 
-/// The same of links, with what patches lose by their scales left out of the norm.
+/// The same from links; the norm leaves out what patches lose by their scales.
 Totals totals_of(const FormFactorLinks& links, const PatchTable& patches) {
   const std::vector<NodeSpread> nodes = spread_nodes(links, patches.area, patches.centroid);
   Totals totals{row_sums(links, patches.area, patches.centroid), 0};
@@ -149,7 +150,7 @@ ClusterTree tree_of(const FormFactorLinks& links) {
   return tree;
 }
 
-/// The tree whose nodes links are chosen for; `room` [n].
+/// The tree that links are chosen for; `room` [n].
 SpreadTree spread_tree(ClusterTree clusters, const PatchTable& patches,
                        const std::vector<std::uint32_t>& room) {
   SpreadTree tree{std::move(clusters), {}, {}};
@@ -189,7 +190,7 @@ FormFactorLinks fit_links(const FormFactorLinks& links, const PatchTable& patche
                           double error_per_link, const Progress& progress) {
   check_error_per_link(error_per_link);
   check_links(links, patches.size());
-  // In a tree of its own a link would be cut where another's nodes end.
+  // The fit reuses the tree of `links`: in another tree, links would be cut where its nodes end.
   const SpreadTree tree = spread_tree(tree_of(links), patches, find_rooms(links));
   return fit(tree, LinkedPairs(links, patches, tree.tree.patch), totals_of(links, patches), patches,
              error_per_link, progress);

@@ -8,7 +8,7 @@
 namespace rebounce {
 namespace {
 
-// As many rays are needed to say that two nodes do not see each other at all.
+// The number of rays that shows that two nodes do not see each other at all.
 constexpr int kEnoughRays = 6;
 
 }  // namespace
@@ -32,19 +32,19 @@ LinkRays::Visibility LinkRays::trace_patches(std::uint32_t i, std::uint32_t j, i
   return {.part = visible.part, .variance = visible.variance, .mixed = true};
 }
 
-/// As form factors of pairs have it: where there are holes, a triangle's mean is taken.
+/// As for form factors of pairs: where a surface has holes, the mean of a triangle is used.
 void LinkRays::trace(Scratch& scratch) const {
   scratch.transmitted.resize(scratch.rays.size());
   tracer_.transmittance(scratch.rays, PassageDetail::kTriangle, scratch.transmitted);
 }
 
-/// The part of a node's area that its first child has.
+/// The fraction of the area of a node that belongs to its first child.
 double LinkRays::first_part(const LinkNode& node) const {
   return node.is_leaf() ? 1 : tree_[node.first_child].area / node.area;
 }
 
-/// True if no ray between two of the children gets through, of enough to tell: they are hidden
-/// from each other or do not face each other.
+/// True if no ray between two of the children passes, and there are enough rays to tell: the two
+/// are hidden from each other or do not face each other.
 bool LinkRays::is_divided(const Scratch& scratch, std::span<const int> children) {
   std::array<int, 4> seen{}, count{};
   for (std::size_t k = 0; k < scratch.rays.size(); ++k) {
@@ -68,9 +68,9 @@ LinkRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int
                       to = r2_sequence(unit_square(mix_bits(hash + 1)));
   scratch.rays.resize(count);
   std::array<double, kMostRays> weight;
-  std::array<int, kMostRays> children;  // which pair of them a ray joins
+  std::array<int, kMostRays> children;  // the pair of children that each ray joins
   for (int k = 0; k < count; ++k) {
-    // Strata of equal area of one node against those of the other, in steps of 19.
+    // Joins strata of equal area of one node to those of the other, in steps of 19.
     const int other = (19 * k + first) % count;
     const double along_a = (k + shift.x) / count, along_b = (other + shift.y) / count;
     const std::uint32_t i = tree_.patch_at(tree_[a], along_a),
@@ -80,7 +80,7 @@ LinkRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int
     const PatchPoint x = shadow_rays_.geometry().point(i, from[k]),
                      y = shadow_rays_.geometry().point(j, to[7 * k]);
     weight[k] = ShadowRays::kernel(x, y);
-    // Between points that do not face each other there is no light to hide.
+    // Points that do not face each other exchange no light.
     scratch.rays[k] = weight[k] > 0 ? ShadowRays::ray_between(x, y, static_cast<float>(weight[k]))
                                     : ShadowRays::void_ray();
   }
@@ -92,7 +92,7 @@ LinkRays::Visibility LinkRays::judge(const Scratch& scratch, std::span<const dou
                                      std::span<const int> children) {
   VisibilityEstimate estimate;
   for (std::size_t k = 0; k < weight.size(); ++k) estimate.add(weight[k], scratch.transmitted[k]);
-  if (estimate.is_empty()) return {1, 1, 1, true, true};  // no ray can tell
+  if (estimate.is_empty()) return {1, 1, 1, true, true};  // no ray has weight
   const bool divided = estimate.part() > 0 && is_divided(scratch, children);
   const bool mixed = divided || ShadowRays::agreement(scratch.rays, scratch.transmitted) ==
                                     ShadowRays::Agreement::kMixed;

@@ -11,14 +11,14 @@
 namespace rebounce {
 
 /// Shadow rays between the nodes of a tree. Immutable, usable from any number of threads, each with
-/// scratch of its own.
+/// its own scratch.
 class LinkRays {
  public:
   static constexpr int kMostRays = static_cast<int>(ShadowRays::kMostRays);
 
   struct Scratch {
     std::vector<Ray> rays;
-    std::vector<float> transmitted;  ///< of each ray
+    std::vector<float> transmitted;  ///< by ray
     std::vector<FacingPatch> facing;
   };
 
@@ -27,15 +27,15 @@ class LinkRays {
       : tree_(tree), shadow_rays_(shadow_rays), tracer_(tracer), seed_(seed) {}
 
   struct Visibility {
-    double part = 0;       ///< of the pair's light that gets through, [0, 1]
+    double part = 0;       ///< fraction of the light of the pair that passes, [0, 1]
     double variance = 0;   ///< of `part`
-    double spread = 0;     ///< variance of what single rays find
-    bool mixed = false;    ///< not all of either sees all of the other, or nothing
-    bool divided = false;  ///< mixed, and two of the nodes' children see nothing of each other
+    double spread = 0;     ///< variance of single rays
+    bool mixed = false;    ///< the nodes see each other in part
+    bool divided = false;  ///< mixed, and two of the children do not see each other at all
   };
 
-  /// What `count` <= kMostRays rays between points spread over two nodes say. Two patches have the
-  /// rays that ShadowRays gives them.
+  /// The visibility from `count` <= kMostRays rays between points spread over two nodes. Two
+  /// patches get the rays of ShadowRays.
   Visibility trace(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
 
  private:

@@ -12,10 +12,11 @@
 namespace rebounce {
 namespace {
 
-// A plane's points are off it by less than this part of its size.
+// The points of a plane are off it by less than this fraction of its size.
 constexpr double kPlane = 1e-7;
 
-// A pair that faces in part may be linked where all of it is below this part of the error allowed.
+// A pair that faces in part may get a link if all of it is below this fraction of the allowed
+// error.
 constexpr double kNegligible = 0.1;
 
 bool is_plane(const LinkNode& node) {
@@ -144,7 +145,7 @@ LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratc
                       !(scratch.kernel.faces_in_part() &&
                         scratch.kernel.norm_squared() > kNegligible * kNegligible * allowed);
   if (smooth && scratch.kernel.unoccluded() == 0) return {};
-  // Where k rays agree, the part that does not is some 1 / (k + 2): rule of succession.
+  // If k rays agree, a fraction of about 1 / (k + 2) may not: rule of succession.
   const double enough = std::sqrt(scratch.kernel.norm_squared() / allowed) - 2;
   if (!(enough < LinkRays::kMostRays) || (!smooth && pair.view == View::kClear))
     return split(pair, pair.view);
@@ -171,8 +172,8 @@ LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const 
   if (is_doubtful(pair.b) && !b.is_leaf()) return {Outcome::Kind::kSplitB, View::kMixed, {}};
   const double error_squared = visible.part * visible.part * kernel.residual_squared() +
                                visible.spread * kernel.norm_squared();
-  // Where some children see each other and others do not, a wall may be between them, and light
-  // would leak through it.
+  // If some children see each other and others do not, a wall may be between them, and light would
+  // leak through it.
   if (visible.divided || !(error_squared < allowed_squared(a, b))) {
     return split(pair, View::kMixed);
   }
@@ -192,14 +193,14 @@ LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const P
                    .gradient_b = to_float3(visible.part * kernel.gradient_b())}};
 }
 
-/// Of the larger of the two, as they see each other: their distance is the same.
+/// Splits the node that looks larger from the other: the distance is the same for both.
 LinkRefinement::Outcome LinkRefinement::split(const Candidate& pair, View view) const {
   const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
   const bool first = b.is_leaf() || (!a.is_leaf() && a.radius >= b.radius);
   return {first ? Outcome::Kind::kSplitA : Outcome::Kind::kSplitB, view, {}};
 }
 
-/// Merges the outcomes in order; what is split makes the next generation.
+/// Merges the outcomes in order; pairs that are split make the next generation.
 std::vector<LinkRefinement::Candidate> LinkRefinement::take(
     const std::vector<Candidate>& generation, const std::vector<Outcome>& outcomes) {
   std::vector<Candidate> next;

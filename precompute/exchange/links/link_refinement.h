@@ -14,54 +14,55 @@
 
 namespace rebounce {
 
-/// The exchange of two nodes of a LinkTree, for all pairs of their patches at once: between a point
-/// x of a and a point y of b the kernel is taken as
-///   (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b).
+/// The exchange of two nodes of a LinkTree, for all pairs of their patches together. Between a
+/// point x of a and a point y of b the kernel is approximated by
+///  (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b).
 struct Link {
   std::uint32_t a, b;
-  float exchange_area;        ///< m²
-  float unoccluded_area;      ///< m²: what it would be with nothing between; the most it can be
-  float visibility_variance;  ///< of exchange_area / unoccluded_area
+  float exchange_area;            ///< m²
+  float unoccluded_area;          ///< m²: the exchange area with nothing between, the upper limit
+  float visibility_variance;      ///< of exchange_area / unoccluded_area
   Float3 gradient_a, gradient_b;  ///< m
 };
 
-/// Hierarchical refinement (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical radiosity
-/// algorithm", SIGGRAPH 1991): a pair of nodes is linked where what it is taken for is near enough
-/// to what it is, and otherwise the node that is larger as seen from the other is split.
+/// Hierarchical refinement (P. Hanrahan, D. Salzman and L. Aupperle, "A rapid hierarchical
+/// radiosity algorithm", SIGGRAPH 1991): a pair of nodes gets a link if the approximation is close
+/// enough, otherwise the node that looks larger from the other is split.
 ///
-/// What differs. The kernel is taken as affine over either node and not as constant, so that
-/// fewer links do. Its error is that of all its entries in the sense of Frobenius,
-///   sqrt(area_a area_b variance of (kernel x visibility) about what it is taken for),
-/// found from the kernel between the nodes' cells; what cannot be told from cells, that patches in
-/// one cell face different ways, counts as error. Rays between stratified points find the
-/// visibility; a pair gets the more rays the more it exchanges, so that what they may have missed
-/// is below link_epsilon too, and pairs of which nothing is seen end there. Parts of a pair whose
-/// rays disagree get all rays: few would mostly miss what little is seen through a door. Pairs of
-/// patches have the kernel and the rays that they have when all pairs are looked at.
+/// There are these differences. The kernel is affine over both nodes instead of constant, so that
+/// fewer links are enough. The error of a link is that of all its entries in the Frobenius norm,
+///  sqrt(area_a area_b variance of (kernel x visibility) about the approximation),
+/// estimated from the kernel between the cells of the nodes. What cells cannot show, patches of one
+/// cell that face different ways, counts as error. Rays between stratified points measure the
+/// visibility. A pair gets more rays the more light it exchanges, so that the light that rays may
+/// miss is below link_epsilon too; pairs without any visible light end there. Parts of a pair whose
+/// rays disagree get all rays, because few rays mostly miss the little light that passes a door.
+/// Pairs of patches have the same kernel and rays as in raw_exchange.h.
 ///
-/// Pairs are refined in generations, each shared out among OpenMP threads; the bits do not depend
-/// on how many there are. Throws Cancelled when a `progress` says so.
+/// Pairs are refined in generations. OpenMP threads share each generation; the bits do not depend
+/// on their number. Throws Cancelled if `progress` asks to stop.
 class LinkRefinement {
  public:
-  /// Refers to all but the settings' values, which must outlive it.
+  /// All arguments but the values of the settings must outlive the object.
   LinkRefinement(const LinkTree& tree, const ShadowRays& shadow_rays, const RayTracer& tracer,
                  const FormFactorSettings& settings);
 
   /// Refines from the root.
   void run(const Progress& progress);
 
-  /// Looks again at every link of a patch that is `doubtful` [n]: with all rays, and where these
-  /// disagree from that patch alone instead of from a node that it is in.
+  /// Examines every link of a patch that is `doubtful` [n] again, with all rays. Where the rays
+  /// disagree, the link is split down to that patch.
   void revise(const std::vector<bool>& doubtful, const Progress& progress);
 
-  /// Every pair of patches that can exchange light is in one link or in none. Links whose
-  /// exchange area is 0 are pairs that are hidden from each other.
+  /// Every pair of patches that can exchange light is in at most one link. Links with an exchange
+  /// area of 0 are pairs that are hidden from each other.
   std::span<const Link> links() const { return links_; }
-  std::uint64_t candidate_count() const { return candidate_count_; }  ///< pairs of nodes looked at
+  /// Pairs of nodes that were examined.
+  std::uint64_t candidate_count() const { return candidate_count_; }
   std::uint64_t ray_count() const { return ray_count_; }
 
  private:
-  /// What the last rays between ancestors of a pair found.
+  /// The result of the last rays between ancestors of a pair.
   enum class View : std::uint8_t { kUnknown, kClear, kMixed };
   struct Candidate {
     std::uint32_t a, b;
@@ -70,7 +71,7 @@ class LinkRefinement {
   struct Outcome {
     enum class Kind : std::uint8_t { kNothing, kLink, kSplitA, kSplitB };
     Kind kind = Kind::kNothing;
-    View view = View::kUnknown;  ///< of what is split
+    View view = View::kUnknown;  ///< of the node pair that is split
     Link link;
   };
   struct Scratch;
@@ -99,8 +100,9 @@ class LinkRefinement {
   const FormFactorSettings settings_;
   const LinkRays rays_;
   std::vector<Link> links_;
-  std::vector<std::uint8_t> doubtful_;  ///< [nodes] holds a doubtful patch; empty: none does
-  double done_ = 0;                     ///< of all pairs of points, the part that is settled
+  /// [nodes] nonzero if a node holds a doubtful patch; empty if none does.
+  std::vector<std::uint8_t> doubtful_;
+  double done_ = 0;  ///< fraction of all pairs of points that is settled
   std::uint64_t candidate_count_ = 0, ray_count_ = 0;
 };
 

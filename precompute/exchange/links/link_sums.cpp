@@ -8,18 +8,19 @@
 namespace rebounce {
 namespace {
 
-constexpr int kScalingSteps = 30;  // each about halves what is left
-constexpr double kScaled = 1e-6;   // row sums nearer to their targets than this are there
+constexpr int kScalingSteps = 30;  // each step about halves the rest
+constexpr double kScaled = 1e-6;   // a row sum this near to its target is scaled
 constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
 
-// What patches exchange that see next to nothing has leaked through nodes on both sides of a wall:
-// it may go.
+// Least factor of patches that see almost nothing: their exchange has leaked through nodes on both
+// sides of a wall and may be removed.
 constexpr double kLeastFactorUnseeing = 1e-6;
 
-// Relative deviation of a row sum that links amount to, from penumbrae that they average; measured.
+// Relative deviation of the row sum of links, from penumbrae that links average. Measured:
+// notes/links.md.
 constexpr double kSumDeviation = 0.01;
 
-/// A sum over a node, and its first moment about the node's centre.
+/// A sum over a node, and its first moment about the center of the node.
 struct Moments {
   double sum = 0;
   glm::dvec3 first{0};
@@ -48,7 +49,7 @@ std::vector<Moments> pull(const LinkTree& tree, std::span<const double> x) {
   return mean;
 }
 
-/// What arrives at each node along its links.
+/// The light that arrives at each node along its links.
 std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<const Link> links) {
   std::vector<Moments> arrived(mean.size());
   const auto add = [&](std::uint32_t to, std::uint32_t from, double exchange,
@@ -65,7 +66,7 @@ std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<co
   return arrived;
 }
 
-/// What arrives at each of `patch_count` patches, with all nodes that it is part of.
+/// The light that arrives at each of `patch_count` patches, summed over all nodes that contain it.
 std::vector<double> push(const LinkTree& tree, std::vector<Moments> arrived,
                          std::size_t patch_count) {
   const auto nodes = tree.nodes();
@@ -86,7 +87,7 @@ std::vector<double> push(const LinkTree& tree, std::vector<Moments> arrived,
   return out;
 }
 
-/// The targets, drawn to the sums that are there by as much as they are uncertain.
+/// The targets, moved towards the present sums by their uncertainty.
 std::vector<double> wanted_sums(std::span<const double> sum, std::span<const RowTarget> target) {
   std::vector<double> wanted(sum.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) {
@@ -97,8 +98,8 @@ std::vector<double> wanted_sums(std::span<const double> sum, std::span<const Row
   return wanted;
 }
 
-/// What patches that see nothing exchange has leaked alone, and of either sign, which scaling by
-/// sums could not take away: it goes.
+/// Patches that see nothing only exchange leaked light, of either sign. Scaling by sums cannot
+/// remove it, so the factor of such a patch is 0.
 std::vector<double> first_factors(std::span<const RowTarget> target) {
   std::vector<double> factor;
   for (const RowTarget& t : target) factor.push_back(t.sum > 0 ? 1 : 0);
@@ -112,8 +113,8 @@ std::vector<double> scaled_row_sums(const LinkTree& tree, std::span<const Link> 
   return sum;
 }
 
-/// How much factors change what is exchanged, Frobenius, each link taken as the same for all of its
-/// pairs.
+/// The relative change of the exchange by factors, Frobenius; each link counts as equal for all of
+/// its pairs.
 double relative_change(const LinkTree& tree, std::span<const Link> links,
                        std::span<const double> factor) {
   const auto nodes = tree.nodes();

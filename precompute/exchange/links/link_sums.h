@@ -9,24 +9,24 @@
 
 namespace rebounce {
 
-/// F x on links: out(i) = sum over j of F(i,j) x(j), over patches [n]. In double precision, in a
+/// F x by links: out(i) = sum over j of F(i,j) x(j), over patches [n]. In double precision and a
 /// fixed order.
 std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> links,
                                  std::span<const double> x);
 
 struct LinkScaling {
   std::vector<double> factor;   ///< [n] d, of the patches
-  std::vector<double> row_sum;  ///< [n] with it
+  std::vector<double> row_sum;  ///< [n] row sums after scaling
   ClosureReport closure;
 };
 
-/// Factors d of the patches with which rows of D F D add up to their targets, D the diagonal
-/// matrix of d: reciprocity is kept, and no link changes.
+/// Finds factors d of the patches such that the rows of D F D add up to their targets, where D is
+/// the diagonal matrix of d. Reciprocity holds, and no link changes.
 ///
-/// Symmetric scaling (P. A. Knight, D. Ruiz, B. Uçar, "A symmetry preserving algorithm for matrix
-/// scaling", 2014). A target that was measured counts for as much as it is more certain than the
-/// row sum. Factors stay in [0.5, 2], but for patches that see next to nothing, which may lose
-/// nearly all, and those whose target is 0, whose factor is.
+/// This is symmetric scaling (P. A. Knight, D. Ruiz and B. Uçar, "A symmetry preserving algorithm
+/// for matrix scaling", 2014). A measured target counts by its certainty relative to that of the
+/// row sum. Factors stay in [0.5, 2], with two exceptions: patches that see almost nothing may lose
+/// nearly all of their exchange, and where the target is 0 the factor is 0.
 LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
                         std::span<const RowTarget> target);
 

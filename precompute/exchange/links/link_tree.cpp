@@ -10,16 +10,18 @@
 namespace rebounce {
 namespace {
 
-// Normals this much alike are of one plane: single precision positions resolve no more.
+// Normals whose cosine is above this belong to one plane; positions in single precision resolve no
+// more.
 constexpr double kFlat = 1 - 1e-12;
 
-// Points nearer to a plane than this part of the nodes' size count as on it: as the kernel has it.
+// Points closer to a plane than this fraction of the size of the nodes count as on it, as in the
+// kernel.
 constexpr double kPlaneTolerance = 1e-7;
 
-// Directions in which a node is thinner than this part of its size have no gradient.
+// A node has no gradient in directions in which it is thinner than this fraction of its size.
 constexpr double kThin = 1e-3;
 
-// A mean normal shorter than this is rounding.
+// A mean normal shorter than this is a rounding error.
 constexpr double kNoAxis = 1e-6;
 
 void enclose(const FlatTriangle& t, LinkNode& node) {
@@ -32,7 +34,7 @@ void enclose(const FlatTriangle& t, LinkNode& node) {
   }
 }
 
-/// The greatest value of dot(axis, x) over node `b`, whichever of its bounds knows best.
+/// An upper bound of dot(axis, x) over node `b`: the least of its bounds.
 double highest_along(const glm::dvec3& axis, const LinkNode& b) {
   const glm::dvec3 middle = 0.5 * (b.low + b.high), half = 0.5 * (b.high - b.low);
   double highest = std::min(glm::dot(axis, b.center) + b.radius,
@@ -44,7 +46,7 @@ double highest_along(const glm::dvec3& axis, const LinkNode& b) {
   return std::min(highest, slab + tilted);
 }
 
-/// Nothing of `b` is before the plane of any patch of `a`.
+/// True if no part of `b` lies in front of the plane of any patch of `a`.
 bool is_behind(const LinkNode& a, const LinkNode& b) {
   if (a.is_flat()) {
     return highest_along(a.axis, b) <= a.lowest + kPlaneTolerance * std::max(a.radius, b.radius);
@@ -114,7 +116,7 @@ void LinkTree::bound(LinkNode& node, const PatchGeometry& geometry,
   }
 }
 
-/// The node split into parts of about equal area.
+/// Cuts the node into parts of about equal area.
 void LinkTree::choose_cells(std::uint32_t node) {
   std::vector<std::uint32_t> cells = {node};
   while (cells.size() < kCellCount) {

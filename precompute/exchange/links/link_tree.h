@@ -12,36 +12,36 @@
 
 namespace rebounce {
 
-/// What the refinement of links must know of a set of patches.
+/// The properties of a set of patches that the refinement of links needs.
 struct LinkNode {
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
   std::uint32_t begin = 0, count = 0;  ///< positions in the tree's order of patches
-  std::uint32_t first_child = kNone;   ///< the second follows it; kNone for a single patch
+  std::uint32_t first_child = kNone;   ///< the second child follows it; kNone for a single patch
   double area = 0;                     ///< m²
   glm::dvec3 center{0};                ///< area-weighted, metres
   double radius = 0;                   ///< of the sphere around `center` that holds every patch
-  glm::dvec3 low{kInfinity}, high{-kInfinity};  ///< box that holds every patch
+  glm::dvec3 low{kInfinity}, high{-kInfinity};  ///< box around all patches
   glm::dvec3 normal{0};                         ///< area-weighted mean, not of unit length
-  glm::dvec3 axis{0};                           ///< the same of unit length; 0 if there is none
+  glm::dvec3 axis{0};                           ///< `normal` at unit length; 0 if there is none
   double cone_cosine = 1;  ///< least cosine between `axis` and a patch's normal
   double lowest = kInfinity,
-         highest = -kInfinity;  ///< of all patches along `axis`, from the origin
+         highest = -kInfinity;  ///< limits of dot(axis, x) over all patches
   double weight = 1;            ///< root mean square of the patches' weights
-  /// Maps the first moment of something over the cells to its gradient: the pseudo-inverse of the
-  /// cells' second moment, 1/m⁴.
+  /// Maps the first moment of a quantity over the cells to its gradient: the pseudo-inverse of the
+  /// second moment of the cells, 1/m⁴.
   glm::dmat3 inverse_moment{0};
 
   bool is_leaf() const { return first_child == kNone; }
   bool is_flat() const;  ///< all patches face the same way
 };
 
-/// A binary tree over the patches whose leaves are single patches, with bounds, and with a few
-/// descendants of each node ("cells") that stand for it where integrals over it are estimated.
+/// A binary tree over the patches whose leaves are single patches. It stores bounds, and for each
+/// node a few descendants ("cells") that represent it in estimates of integrals.
 class LinkTree {
  public:
-  /// Cells of a node at most. More: integrals over pairs of nodes are closer, and each costs the
-  /// square.
+  /// The most cells of a node. More cells make integrals over pairs of nodes more exact, at a cost
+  /// that grows with the square.
   static constexpr std::uint32_t kCellCount = 16;
 
   /// `weight` [n] >= 0, or empty for 1 everywhere.
@@ -52,13 +52,13 @@ class LinkTree {
   std::span<const std::uint32_t> cells(std::uint32_t node) const {
     return {cells_.data() + cell_begin_[node], cells_.data() + cell_begin_[node + 1]};
   }
-  std::span<const std::uint32_t> patches() const { return patch_; }  ///< [n] at each position
+  std::span<const std::uint32_t> patches() const { return patch_; }  ///< [n] patch at each position
   std::span<const std::uint32_t> patches(const LinkNode& node) const {
     return std::span(patch_).subspan(node.begin, node.count);
   }
   std::uint32_t leaf_patch(const LinkNode& leaf) const { return patch_[leaf.begin]; }
 
-  /// The patch of a node at which the part `fraction` in [0, 1) of its area is reached.
+  /// The patch of a node at which the fraction `fraction` in [0, 1) of its area is reached.
   std::uint32_t patch_at(const LinkNode& node, double fraction) const;
 
  private:
@@ -67,12 +67,12 @@ class LinkTree {
   void invert_moment(std::uint32_t node);
 
   std::vector<std::uint32_t> patch_;
-  std::vector<double> area_before_;  ///< [n + 1] area of all positions before one
+  std::vector<double> area_before_;  ///< [n + 1] area of all positions before each
   std::vector<LinkNode> nodes_;      ///< level by level
   std::vector<std::uint32_t> cell_begin_, cells_;
 };
 
-/// True if it is certain that no two patches of `a` and `b` exchange light.
+/// True if it is certain that no patch of `a` exchanges light with a patch of `b`.
 bool cannot_exchange(const LinkNode& a, const LinkNode& b);
 
 }  // namespace rebounce

@@ -12,9 +12,9 @@ using Eigen::Index;
 /// A patch of a list.
 struct Member {
   std::uint32_t position;  ///< in the order of the links
-  std::uint32_t place;     ///< in the list
+  std::uint32_t place;     ///< index in the list
   Float3 centroid;
-  float weight;  ///< scale times the root of the area
+  float weight;  ///< scale times the square root of the area
 };
 
 using Range = std::span<const Member>;
@@ -26,8 +26,8 @@ float dot(const float* gradient, const Float3& point, const Float3& center) {
 
 }  // namespace
 
-/// Fills in the entries between two lists of patches: walks down the tree to all nodes that hold a
-/// patch of the shorter one ("near"), and takes of their links those that lead to the other
+/// Writes the entries between two lists of patches. It walks down the tree to all nodes that hold a
+/// patch of the shorter list ("near"), and uses those of their links that lead to the other list
 /// ("far").
 class LinkedMatrix::Filler {
  public:
@@ -101,7 +101,7 @@ class LinkedMatrix::Filler {
 
   const LinkedMatrix& matrix_;
   std::vector<Member> near_, far_;         ///< by position
-  std::vector<std::uint32_t> far_before_;  ///< [n + 1] far patches before a position
+  std::vector<std::uint32_t> far_before_;  ///< [n + 1] number of far patches before each position
   float* entries_;
   Index near_stride_, far_stride_;
 };

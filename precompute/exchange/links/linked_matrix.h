@@ -13,13 +13,13 @@
 namespace rebounce {
 
 /// G = A^1/2 F A^-1/2 from links between sets of patches: one matrix for all channels. Entries are
-/// those that the links stand for; the pairs themselves are nowhere kept.
+/// those that the links stand for; the pairs themselves are not stored.
 class LinkedMatrix final : public SymmetricMatrix {
  public:
-  /// Links and patches must outlive it. Throws Error if the links are not of these patches.
+  /// Links and patches must outlive the object. Throws Error if the links are not of these patches.
   LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches);
 
-  /// `product`: the same links as they gather, which others use too.
+  /// `product` is a gathering operator of the same links that the caller shares.
   LinkedMatrix(const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
                const PatchTable& patches);
 
@@ -31,7 +31,7 @@ class LinkedMatrix final : public SymmetricMatrix {
 
  private:
   struct Node {
-    std::uint32_t begin = 0, count = 0;  ///< positions in the order of the links
+    std::uint32_t begin = 0, count = 0;  ///< range of positions in the order of the links
     double area = 0;                     ///< m²
     Float3 center{};                     ///< area-weighted, metres
   };
@@ -42,7 +42,7 @@ class LinkedMatrix final : public SymmetricMatrix {
   const FormFactorLinks& links_;
   const PatchTable& patches_;
   std::shared_ptr<const LinkedFormFactors> product_;
-  std::vector<std::uint32_t> position_;  ///< [n] of each patch
+  std::vector<std::uint32_t> position_;  ///< [n] position of each patch
   std::vector<Node> nodes_;              ///< [m]
   LinksByNode links_of_node_;
 };

@@ -16,7 +16,7 @@ void copy_tree(const LinkTree& tree, FormFactorLinks& links) {
   }
 }
 
-/// Without pairs that are hidden from each other.
+/// Leaves out pairs that are hidden from each other.
 void copy_links(std::span<const Link> from, FormFactorLinks& links) {
   for (const Link& link : from) {
     if (link.exchange_area <= 0) continue;
@@ -27,8 +27,8 @@ void copy_links(std::span<const Link> from, FormFactorLinks& links) {
   }
 }
 
-/// To what LinkedFormFactors keep, before rows are added up: everything that is made of the links
-/// is of the same F.
+/// Rounds gradients to the precision that LinkedFormFactors stores, before rows are added up:
+/// everything that is made from the links then uses the same F.
 void round_gradients(std::span<Link> links) {
   for (Link& link : links) {
     for (float& g : link.gradient_a) g = round_to_bfloat16(g);

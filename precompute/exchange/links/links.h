@@ -12,26 +12,25 @@
 
 namespace rebounce {
 
-/// Error that a link may have by default: see FormFactorSettings::link_epsilon. Measured:
-/// notes/links.md.
+/// Default of FormFactorSettings::link_epsilon for links. Measured: notes/links.md.
 inline constexpr double kLinkEpsilon = 5e-4;
 
 struct LinkBuild : EscapedLight {
   FormFactorLinks links;
   ClosureReport closure;
-  std::uint64_t ray_count = 0;        ///< with those that measure what escapes
-  std::uint64_t candidate_count = 0;  ///< pairs of nodes that were looked at
+  std::uint64_t ray_count = 0;        ///< including the rays that measure what escapes
+  std::uint64_t candidate_count = 0;  ///< pairs of nodes that were examined
 };
 
-/// Finds the form factors as links between nodes of a tree of patches, their number and the work
-/// growing about like n and not like n² (notes/links.md), scaled so that rows add up to what
-/// escape leaves of 1, reciprocity untouched.
+/// Computes the form factors as links between nodes of a tree of patches. The number of links and
+/// the work grow about with n instead of n² (notes/links.md). The links are scaled so that rows add
+/// up to 1 minus what escapes; reciprocity holds.
 ///
-/// `tracer` holds the first surface_count triangles of model.mesh. Of the settings, link_epsilon
-/// must be above 0. `weight` [n] >= 0 says what errors in the light from a patch weigh, for
-/// instance its radiosity divided by the mean ("BF refinement"); empty: 1. The bits do not depend
-/// on the number of threads. Throws Error if a setting is out of range, Cancelled when `progress`
-/// says so.
+/// `tracer` holds the first surface_count triangles of model.mesh. settings.link_epsilon must be
+/// above 0. `weight` [n] >= 0 is the weight of errors in the light from each patch, for instance
+/// its radiosity divided by the mean ("BF refinement"); empty: 1. The bits do not depend on the
+/// number of threads. Throws Error if a setting is out of range, Cancelled if `progress` asks to
+/// stop.
 LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
                       const FormFactorSettings& settings, std::span<const float> weight = {},
                       const Progress& progress = {});

@@ -7,23 +7,24 @@
 namespace rebounce {
 namespace {
 
-// Cells nearer to each other than this, in sums of their radii, are too near for the kernel between
-// their centres.
+// Cells closer than this multiple of the sum of their radii are too near for the kernel between
+// their centers.
 constexpr double kNear = 1.0;
-// Patches nearer than this get the kernel of patches instead, with this tolerance.
+// Pairs of patches closer than this use the kernel of patches instead, with this tolerance.
 constexpr double kNearPatches = 3.0, kPatchTolerance = 1e-2;
-// Mean square distance of a cell's points from a plane through its centre, in squares of its
+// Mean squared distance of the points of a cell from a plane through its center, in squares of its
 // radius.
 constexpr double kSpread = 0.1;
-// Nodes nearer to each other than this are not worth a look: their kernel is never nearly affine.
+// Nodes closer than this are not examined: their kernel is never nearly affine.
 constexpr double kTouching = 0.75;
 
-/// Of a cosine, because normals differ within a cell.
+/// Variance of a cosine, because normals differ within a cell.
 double normal_variance(const LinkNode& cell) {
   return 1 - std::min(1.0, glm::dot(cell.normal, cell.normal));
 }
 
-/// Because a part of `cell` may be before a plane and the rest behind: of the height above it.
+/// Variance of the height above a plane, because a part of `cell` may lie in front of the plane and
+/// the rest behind it.
 double horizon_variance(double height, const LinkNode& cell) {
   return std::abs(height) < cell.radius ? kSpread * cell.radius * cell.radius : 0;
 }
@@ -85,7 +86,7 @@ double PairKernel::exchange_of_patches(const LinkNode& p, const LinkNode& q) con
   return shadow_rays_.unoccluded(std::min(i, j), std::max(i, j), kPatchTolerance);
 }
 
-/// Least squares: the mean of the kernel, and its first moments over either node.
+/// Least-squares fit: the mean of the kernel, and its first moments over both nodes.
 void PairKernel::fit(const LinkNode& a, Cells cells_a, const LinkNode& b, Cells cells_b) {
   glm::dvec3 moment_a(0), moment_b(0);
   unoccluded_ = 0;

@@ -10,28 +10,30 @@
 
 namespace rebounce {
 
-/// What two nodes exchange with nothing between, as the kernel between their cells has it, and how
-/// far that is from affine.
+/// The exchange of two nodes with nothing between them, estimated from the kernel between their
+/// cells, and its distance from an affine kernel.
 class PairKernel {
  public:
   PairKernel(const LinkTree& tree, const ShadowRays& shadow_rays)
       : tree_(tree), shadow_rays_(shadow_rays) {}
 
-  /// Estimates the pair (a, b). False where cells are too near each other to tell; then nothing
-  /// else holds.
+  /// Estimates the pair (a, b). Returns false if cells are too near each other; the results are
+  /// then undefined.
   bool estimate(std::uint32_t a, std::uint32_t b);
 
-  double unoccluded() const { return unoccluded_; }             ///< exchange area, m²
-  const glm::dvec3& gradient_a() const { return gradient_a_; }  ///< of it, m; see Link
+  double unoccluded() const { return unoccluded_; }  ///< exchange area, m²
+  /// Of the exchange area, m; see Link.
+  const glm::dvec3& gradient_a() const { return gradient_a_; }
   const glm::dvec3& gradient_b() const { return gradient_b_; }
 
-  /// The integral over both nodes of (kernel - what it is taken for)², of dimension 1.
+  /// The integral over both nodes of (kernel - affine approximation)², without dimension.
   double residual_squared() const { return residual_squared_; }
 
-  /// True if some cells face each other and some do not: light would leak to what is behind.
+  /// True if some cells face each other and some do not: a link would leak light to surfaces
+  /// behind.
   bool faces_in_part() const { return faces_in_part_; }
 
-  /// The integral of kernel² likewise.
+  /// The integral of kernel² over both nodes, without dimension.
   double norm_squared() const { return norm_squared_; }
 
  private:
@@ -49,7 +51,7 @@ class PairKernel {
   const ShadowRays& shadow_rays_;
   std::array<double, LinkTree::kCellCount * LinkTree::kCellCount> kernel_;  ///< of cells, 1/m²
   bool faces_in_part_ = false;
-  double uncertain_ = 0;  ///< integral of the kernel's variance within cells
+  double uncertain_ = 0;  ///< integral of the variance of the kernel within cells
   double unoccluded_ = 0, residual_squared_ = 0, norm_squared_ = 0;
   glm::dvec3 gradient_a_{0}, gradient_b_{0};
 };

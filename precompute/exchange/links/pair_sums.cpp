@@ -54,7 +54,7 @@ void LinkedPairs::block(PositionRange rows, PositionRange columns,
                         std::span<float> exchange) const {
   const auto of_rows = patch_.subspan(rows.begin, rows.count);
   const auto of_columns = patch_.subspan(columns.begin, columns.count);
-  // Column by column as Eigen has it: of the transposed block.
+  // Eigen matrices are column-major: this is the transposed block.
   Eigen::Map<Eigen::MatrixXf> entries(exchange.data(), columns.count, rows.count);
   matrix_.entries(0, of_columns, of_rows, entries);
   for (std::uint32_t r = 0; r < rows.count; ++r) {

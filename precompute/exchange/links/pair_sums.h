@@ -21,18 +21,19 @@ struct PositionRange {
   std::uint32_t end() const { return begin + count; }
 };
 
-/// Exchange areas of pairs of patches by positions in the order of a tree.
+/// Exchange areas of pairs of patches, by positions in the order of a tree.
 class PairSource {
  public:
   virtual ~PairSource() = default;
 
-  /// Those of `rows` with `columns`, which are the same or come after, row by row, m²; 0 for pairs
-  /// without light. Of the same positions only those with columns from the row on count.
+  /// Writes the exchange areas of `rows` with `columns`, row-major, in m²; 0 for pairs without
+  /// light. The columns equal the rows or come after them. If they are equal, only entries on and
+  /// above the diagonal count.
   virtual void block(PositionRange rows, PositionRange columns,
                      std::span<float> exchange) const = 0;
 };
 
-/// All pairs that exchange light.
+/// All pairs that exchange light, stored.
 class SortedPairs final : public PairSource {
  public:
   /// `patch` [n] is the patch at each position.
@@ -46,17 +47,18 @@ class SortedPairs final : public PairSource {
     float exchange;  ///< m²
   };
 
-  /// Those of a row whose columns are in a range, ascending.
+  /// The pairs of a row whose columns are in a range, ascending.
   std::span<const Pair> of_row(std::uint32_t row, PositionRange columns) const;
 
   std::vector<std::uint64_t> begin_;  ///< [n + 1]
   std::vector<Pair> pairs_;
 };
 
-/// The pairs that links stand for; nowhere kept.
+/// The pairs that links stand for, computed on demand.
 class LinkedPairs final : public PairSource {
  public:
-  /// Refers to all; `patch` [n] is the patch at each position, in any order.
+  /// All arguments must outlive the object; `patch` [n] is the patch at each position, in any
+  /// order.
   LinkedPairs(const FormFactorLinks& links, const PatchTable& patches,
               std::span<const std::uint32_t> patch)
       : matrix_(links, patches), patches_(patches), patch_(patch) {}
@@ -71,29 +73,30 @@ class LinkedPairs final : public PairSource {
 
 /// Sums over the pairs of a block of positions.
 struct PairSums {
-  double count = 0;     ///< of the pairs
-  double squared = 0;   ///< of A^1/2 F A^-1/2: its entries' squares
-  double exchange = 0;  ///< m²
-  /// Of the exchange area times the centroid on either side, m³.
+  double count = 0;     ///< number of pairs
+  double squared = 0;   ///< sum of the squared entries of A^1/2 F A^-1/2
+  double exchange = 0;  ///< sum of the exchange areas, m²
+  /// Sums of the exchange area times the centroid on either side, m³.
   Eigen::Vector3d of_rows = Eigen::Vector3d::Zero(), of_columns = Eigen::Vector3d::Zero();
 
   PairSums& operator+=(const PairSums& other);
   PairSums& operator-=(const PairSums& other);
 };
 
-/// Sums over any part of a block of pairs, each from four of a table (F. C. Crow, "Summed-area
-/// tables for texture mapping", SIGGRAPH 1984). Keeps its storage from block to block.
+/// Sums over any part of a block of pairs, each from four entries of a table (F. C. Crow,
+/// "Summed-area tables for texture mapping", SIGGRAPH 1984). Its memory is reused from block to
+/// block.
 class SummedPairs {
  public:
-  /// Refers to both; `patch` [n] is the patch at each position.
+  /// Both must outlive the object; `patch` [n] is the patch at each position.
   SummedPairs(const PairSource& pairs, const PatchTable& patches,
               std::span<const std::uint32_t> patch)
       : pairs_(pairs), patches_(patches), patch_(patch) {}
 
-  /// Adds up the pairs of `rows`, all before `columns`.
+  /// Sums up the pairs of `rows`, all before `columns`.
   void add_up(PositionRange rows, PositionRange columns);
 
-  /// Those of some of the rows and some of the columns.
+  /// The sums over some of the rows and some of the columns.
   PairSums of(PositionRange rows, PositionRange columns) const;
 
  private:
@@ -110,7 +113,8 @@ class SummedPairs {
   std::span<const std::uint32_t> patch_;
   PositionRange rows_, columns_;
   std::vector<float> exchange_;  ///< [rows][columns]
-  std::vector<PairSums> table_;  ///< [rows + 1][columns + 1] all before a row and a column
+  /// [rows + 1][columns + 1] sums over all entries before a row and a column.
+  std::vector<PairSums> table_;
 };
 
 }  // namespace rebounce

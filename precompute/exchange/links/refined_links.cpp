@@ -5,8 +5,8 @@
 namespace rebounce {
 namespace {
 
-// Rows of links err by some 1 % from the penumbrae that links average, which scaling mends. What is
-// off by more is not seen where it should be, or seen where it should not.
+// Row sums of links are off by about 1 % because links average penumbrae; scaling corrects this. A
+// row that is off by more misses light or has light that is hidden.
 constexpr double kLinkRowSumTolerance = 0.02;
 
 std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tracer,

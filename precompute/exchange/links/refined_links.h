@@ -14,18 +14,19 @@
 
 namespace rebounce {
 
-/// Links of a whole scene, once refined and once revised where rows do not add up.
+/// Links of a whole scene after refinement and one revision where rows do not add up.
 struct RefinedLinks {
   LinkTree tree;
   std::vector<Link> links;
   std::vector<Escape> escape;     ///< [n]
   std::vector<RowTarget> target;  ///< [n]
-  std::uint64_t ray_count = 0;    ///< without those of the escape
+  std::uint64_t ray_count = 0;    ///< without the rays that measure what escapes
   std::uint64_t candidate_count = 0;
 };
 
-/// Refines links to settings.link_epsilon, measures what escapes, and revises the links of
-/// patches whose row sum disagrees with that. `weight` as for LinkTree. Throws Cancelled.
+/// Refines links to settings.link_epsilon, measures what escapes, and revises the links of patches
+/// whose row sum disagrees with it. `weight` is that of LinkTree. Throws Cancelled if asked to
+/// stop.
 RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
                           const RayTracer& tracer, const FormFactorSettings& settings,
                           std::span<const float> weight, const Progress& progress);
