@@ -13,9 +13,8 @@ constexpr double kOtherLights = 1000, kConfidence = 0.95;
 // The quantile of the normal distribution at kConfidence.
 constexpr double kNormalQuantile = 1.645;
 
-// The tail is this part of the sample, and no fewer than kLeastTail. Of half of it bounds of 256
-// errors were a third lower, and one of a scene that has two kinds of patches broken by 9 % of
-// samples (notes/operator.md).
+// The tail is this fraction of the sample, and at least kLeastTail errors. Larger tails give lower
+// bounds that fail more often in scenes with two kinds of patches. Measured: notes/operator.md.
 constexpr std::size_t kTailPart = 8, kLeastTail = 8;
 
 }  // namespace
@@ -23,7 +22,8 @@ constexpr std::size_t kTailPart = 8, kLeastTail = 8;
 double error_bound(std::span<const double> errors) {
   std::vector<double> sorted(errors.begin(), errors.end());
   std::ranges::sort(sorted, std::greater<>());
-  while (!sorted.empty() && sorted.back() <= 0) sorted.pop_back();  // exact: no part of the tail
+  // An exact light is not part of the tail.
+  while (!sorted.empty() && sorted.back() <= 0) sorted.pop_back();
   if (sorted.empty()) return 0;
   const std::size_t tail =
       std::min(sorted.size() - 1, std::max(kLeastTail, errors.size() / kTailPart));

@@ -10,7 +10,7 @@
 namespace rebounce {
 namespace {
 
-// Measured: notes/operator.md.
+// Numbers of training lights. Measured: notes/operator.md.
 constexpr int kTrainingPointCount = 128, kTrainingSpotCount = 32, kTrainingSunCount = 32;
 constexpr int kValidationPointCount = 512;
 
@@ -32,7 +32,7 @@ DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& trace
                                     std::pair(LightKind::kSky, kTrainingSunCount)}) {
     std::ranges::move(draw(kind, count), std::back_inserter(lights.training));
   }
-  // The scene's own lamps are sure to be used.
+  // The lamps of the scene itself are certain to be used.
   std::vector<Float3> own = data.patches.emitted_exitance;
   roles.keep(PatchRoles::kSource, own);
   lights.training.push_back(own);

@@ -11,29 +11,30 @@
 
 namespace rebounce {
 
-/// Lights that the operator is fitted to, each an initial exitance [n] in lx.
+/// The lights that an operator is fitted to, each an initial exitance [n] in lx.
 struct FittingLights {
-  /// What light patches give off: errors in what such lights do weigh more than others.
+  /// Training lights. Errors under lights like these weigh more than others.
   std::span<const std::vector<Float3>> training;
-  /// Those that the tolerance is held under. Others than the first, or the error looks smaller than
-  /// it is.
+  /// Validation lights: the tolerance must hold for these. They differ from the training lights;
+  /// otherwise the measured error is too small.
   std::span<const std::vector<Float3>> validation;
 };
 
-/// Lights drawn to fit an operator to, each an initial exitance [n] in lx.
+/// Lights drawn for fitting an operator, each an initial exitance [n] in lx.
 struct DrawnLights {
   std::vector<std::vector<Float3>> training, validation;
 
-  /// Valid as long as this lives and stays as it is.
+  /// Valid as long as the object lives and does not change.
   FittingLights view() const { return {training, validation}; }
 };
 
-/// How many there are at most: in an open scene, with its own lamps.
+/// The largest numbers of lights: those of an open scene with lamps of its own.
 inline constexpr std::size_t kMostTrainingLights = 193, kMostValidationLights = 513;
 
-/// Draws the lights that the operator of a scene is fitted to: points, spots and, where it is open,
-/// suns to shape it, other points to judge it, and for both the light of the scene's own lamps,
-/// which judge first; all as far as sources give them off. The same `seed`, the same lights.
+/// Draws the lights that the operator of a scene is fitted to. Training lights are point lights,
+/// spot lights and, in an open scene, suns; validation lights are other point lights. Both contain
+/// the light of the scene's own lamps, which comes first among the validation lights. All are cut
+/// to what sources emit. The same `seed` gives the same lights.
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
                                 std::uint64_t seed, const PatchRoles& roles = {});
 

@@ -16,11 +16,12 @@ namespace {
 
 using Exitances = std::vector<std::vector<Float3>>;
 
-// Of a compressed operator, and of one that has rounding errors alone.
+// Lights of a kind for a compressed operator, and for an operator that has rounding errors alone.
 constexpr int kLightCount = 256, kRoundedLightCount = 16;
 
-// Of the initial exitance: rounding errors are above it. Of the reflected light, in parts of the
-// tolerance: a thousandth of an error hangs on it at most (notes/operator.md).
+// Residuals of the reference: relative to the initial exitance, where rounding errors are above it;
+// and relative to the reflected light, in parts of the tolerance, where it changes an error by a
+// thousandth at most (notes/operator.md).
 constexpr double kReferenceResidual = 1e-10, kResidualOfTolerance = 0.02;
 
 KindError summary(LightKind kind, std::size_t light_count, const std::vector<double>& errors) {
@@ -33,7 +34,7 @@ KindError summary(LightKind kind, std::size_t light_count, const std::vector<dou
           error_bound(errors)};
 }
 
-/// The errors of lights, less those from which nothing arrives.
+/// Returns the errors of lights, without those from which nothing arrives.
 using ErrorsOf = std::function<std::vector<double>(const Exitances&, const Progress&)>;
 
 std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer, int light_count,

@@ -19,12 +19,12 @@ using Exitance = std::vector<Float3>;
 
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
 
-// How near a point light comes to the surfaces: a part of the free way between them, and a mean
-// patch size where there is as much room. What is nearer lights parts of patches, which patches
-// cannot tell.
+// The least distance of a point light from surfaces: a fraction of the free way between them, and a
+// mean patch size where there is enough room. Nearer lights light parts of patches, which patches
+// cannot resolve.
 constexpr double kLeastPart = 0.1;
 
-/// Lights of different kinds are drawn apart from the same seed.
+/// Lights of different kinds are independent, from the same seed.
 std::uint64_t bits_of(LightKind kind, std::uint64_t seed, int k) {
   return mix_bits(mix_bits(seed + static_cast<std::uint64_t>(kind)) + 0x51ED270BULL * k);
 }
@@ -36,7 +36,7 @@ Float3 random_direction(std::uint64_t bits) {
   return to_float3(glm::dvec3(r * std::cos(phi), r * std::sin(phi), z));
 }
 
-/// Chooses sources in proportion to their areas.
+/// Draws sources with probability in proportion to their areas.
 class PatchChoice {
  public:
   PatchChoice(std::span<const float> area, const PatchRoles& roles) {
@@ -80,7 +80,7 @@ std::vector<Light> random_suns(int count, std::uint64_t seed) {
   return lights;
 }
 
-/// One patch that gives off 1 lx for each of `count` lights.
+/// For each of `count` lights, one patch that emits 1 lx.
 std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::uint64_t seed,
                                      const PatchRoles& roles) {
   const PatchChoice choice(patches.area, roles);
@@ -91,8 +91,8 @@ std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::
   return exitances;
 }
 
-/// What direct light of each of `lights`, and of the sky before them if it has any luminance, makes
-/// sources give off.
+/// The initial exitance of sources under each of `lights`, and before them under the sky if it has
+/// any luminance.
 std::vector<Exitance> lit_by(const TransferData& data, const RayTracer& tracer,
                              const PatchRoles& roles, std::span<const Light> lights,
                              const Sky& sky = {}) {

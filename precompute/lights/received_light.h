@@ -7,19 +7,19 @@
 
 namespace rebounce {
 
-/// What errors at receivers are relative to: what arrives there of a light or, where that is more,
-/// what usually does, the same part of all that arrives of it as of other lights (their root mean
-/// square). So a lamp in another room counts as it does among all patches, unless all lamps are in
-/// other rooms. Where all patches are receivers it is what arrives.
+/// The reference of errors at receivers. It is the light that arrives at receivers or, if that is
+/// more, the usual share of the light that arrives anywhere: the root mean square of that share
+/// over all lights. A lamp in another room therefore counts as it does among all patches, unless
+/// all lamps are in other rooms. If all patches are receivers, it is the light that arrives.
 class ReceivedLight {
  public:
-  /// Of the next light: the area norms of what arrives at receivers and at all patches.
+  /// Adds a light: the area norms of what arrives at receivers and at all patches.
   void add(double received, double all);
 
-  /// That of a light, in the order of adding.
+  /// The reference of a light, numbered in the order of adding.
   double reference(std::size_t light) const;
 
-  /// The geometric mean over the lights of their references, in parts of all that arrives.
+  /// The geometric mean of the references over the lights, as a fraction of all that arrives.
   double part() const;
 
  private:
@@ -28,11 +28,11 @@ class ReceivedLight {
   };
 
   std::vector<Norms> lights_;
-  double squares_ = 0;  ///< sum of the squares of the parts
+  double squares_ = 0;  ///< sum of the squared fractions
 };
 
-/// The area norm of values - truth over `reference`; the relative difference where that is the norm
-/// of the truth.
+/// The area norm of values - truth, divided by `reference`. If that is the norm of `truth`, this is
+/// the relative difference.
 double received_error(std::span<const Float3> values, std::span<const Float3> truth,
                       std::span<const float> area, double reference);
 

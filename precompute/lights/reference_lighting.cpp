@@ -9,12 +9,12 @@
 namespace rebounce {
 namespace {
 
-// Lights that the matrix is read for at a time.
+// Number of lights that the matrix is read for at a time.
 constexpr std::size_t kBatch = 64;
 
 using Lights = std::span<const std::vector<Float3>>;
 
-/// One channel of the products with some lights.
+/// Computes one channel of the products with some lights.
 void multiply_channel(const SymmetricMatrix& matrix, int channel, Lights lights,
                       std::span<std::vector<Float3>> results) {
   const std::span<const float> area = matrix.area();
@@ -75,7 +75,7 @@ void ReferenceLighting::leave_out_dark() {
     std::swap(truths_[kept], truths_[k]);
     ++kept;
   }
-  if (kept == 0) return;  // light arrives nowhere: the matrix is zero
+  if (kept == 0) return;  // the matrix is zero: light arrives nowhere
   lights_.resize(kept);
   truths_.resize(kept);
 }

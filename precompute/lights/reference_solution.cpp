@@ -16,13 +16,14 @@ using Form = ReferenceSolver::Form;
 
 constexpr int kMaxSteps = 10000;
 
-// Down to this residual, in parts of the reflected light, links gather in single precision, twice
-// as fast: what that rounds off is a hundredth of it. Lights for which it is more, as what links
-// carry too much and too little of cancels, are solved in double precision after kSingleRounds.
+// Above this residual, in parts of the reflected light, links gather in single precision, which is
+// twice as fast; the rounding error is a hundredth of the residual. For some lights it is more,
+// because what links carry too much and too little cancels: these are solved in double precision
+// after kSingleRounds.
 constexpr double kSinglePrecisionSuffices = 1e-5;
 constexpr int kSingleRounds = 2;
 
-/// A column is a patch and holds all channels of the first light, then of the next.
+/// A column is a patch. It holds all channels of the first light, then of the next.
 template <int kRows>
 using Field = Eigen::Array<double, kRows, Eigen::Dynamic>;
 
@@ -58,7 +59,7 @@ Field<kRows> times(const std::shared_ptr<const LinkedFormFactors>& links, const 
   return gather_along<double>(*links, in);
 }
 
-/// Light after light, in single precision.
+/// One light after the other, in single precision.
 template <int kRows>
 Field<kRows> times(const CompressedFormFactors& compressed, const Field<kRows>& in) {
   Field<kRows> out(kRows, in.cols());
@@ -76,17 +77,17 @@ Field<kRows> times(const CompressedFormFactors& compressed, const Field<kRows>& 
   return out;
 }
 
-/// What the system is and how it is solved.
+/// The system and how it is solved.
 struct System {
   const Form& form;
   const PatchTable& patches;
   const TransferOperator* nearly_inverse;  ///< may be null
 };
 
-/// That of (I - rho F) B = M0; solved is what has either.
+/// The residual of (I - rho F) B = M0. A light is solved if one of the two is small enough.
 struct Residual {
-  double of_initial_exitance;  ///< in parts of M0
-  double of_reflected_light;   ///< in parts of rho H
+  double of_initial_exitance;  ///< relative to M0
+  double of_reflected_light;   ///< relative to rho H
 };
 
 /// kLights lights on one scene, solved together.
@@ -101,7 +102,7 @@ class ConjugateGradients {
     Field radiosity, indirect_irradiance;
   };
 
-  /// `lights`: kLights of them at most.
+  /// `lights` has at most kLights entries.
   ConjugateGradients(const System& system, Lights lights)
       : form_(system.form),
         nearly_inverse_(system.nearly_inverse),
@@ -150,8 +151,8 @@ class ConjugateGradients {
   using Products = Eigen::Array<double, kRows, 1>;  ///< by light and channel
   using Totals = Eigen::Array<double, kLights, 1>;  ///< by light
 
-  /// Moves `z`, the residual of which is `r`, until that is small enough by its own recursion
-  /// (M. R. Hestenes, E. Stiefel, 1952).
+  /// Improves `z`, with residual `r`, until the residual is small enough by the recursion of
+  /// conjugate gradients (M. R. Hestenes and E. Stiefel, 1952).
   void descend(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z, int& steps) const {
     Field p = r;
     Products rr = product(r, r);
@@ -165,9 +166,9 @@ class ConjugateGradients {
     } while (++steps < kMaxSteps && !(exitance_squares(r) <= allowed).all());
   }
 
-  /// The same, preconditioned by I + R Y R, which is nearly the inverse of I - R F R. Directions
-  /// are kept conjugate though it is rounded (G. H. Golub, Q. Ye, 1999). Returns false, with `z` as
-  /// near as it came, if Y is so wrong that it is not positive.
+  /// The same, preconditioned by I + R Y R, an approximate inverse of I - R F R. Directions stay
+  /// conjugate although it is rounded (G. H. Golub and Q. Ye, 1999). Returns false, with `z` as far
+  /// as it came, if Y is so wrong that the preconditioner is not positive.
   bool descend_conditioned(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z,
                            int& steps) const {
     Field y = condition(r), p = y;
@@ -186,7 +187,7 @@ class ConjugateGradients {
     }
   }
 
-  /// F times `in`; links alone gather in single precision where that is enough.
+  /// F times `in`; links gather in single precision where that is enough.
   Field gather(const Field& in, Arithmetic arithmetic) const {
     using Links = std::shared_ptr<const LinkedFormFactors>;
     if (const Links* links = std::get_if<Links>(&form_);
@@ -233,7 +234,7 @@ class ConjugateGradients {
     return products.reshaped(kChannelCount, kLights).colwise().sum().transpose();
   }
 
-  /// 0 where there is nothing to divide by: channels that are dark or solved.
+  /// a / b; 0 where b is 0: channels that are dark or solved.
   static Products quotient(const Products& a, const Products& b) {
     return (b > 0).select(a / b, 0);
   }
@@ -255,7 +256,7 @@ Form best_form(const TransferData& data) {
 
 enum class Quantity { kRadiosity, kIndirectIrradiance };
 
-/// Appends the solutions [n] of kLights lights at most.
+/// Appends the solutions [n] of at most kLights lights.
 template <int kLights>
 void solve_together(const System& system, std::span<const std::vector<Float3>> lights,
                     const Residual& residual, Quantity quantity,

@@ -14,46 +14,47 @@
 
 namespace rebounce {
 
-/// The radiosity system in double precision, solved by conjugate gradients: the truth that
-/// everything faster is measured against.
+/// Solves the radiosity system in double precision by conjugate gradients: the reference that
+/// faster methods are measured against.
 ///
 /// B = M0 + R z with R = rho^1/2 and (I - R F R) z = R F M0, positive definite in the area-weighted
 /// inner product as long as no reflectance is 1; black patches have z = 0 (notes/solvers.md). The
-/// residual is that of (I - rho F) B = M0, computed anew from the solution before it is believed.
-/// The same bits for any number of threads.
+/// residual is that of (I - rho F) B = M0, recomputed from the solution at the end. The bits do not
+/// depend on the number of threads.
 class ReferenceSolver {
  public:
   using Double3 = std::array<double, 3>;
 
-  /// Lights for which F is read together: what is gathered for them just fills the registers.
+  /// The number of lights for which F is read together: their sums just fill the registers.
   static constexpr int kBatchLights = 8;
 
-  /// What is solved with: F by pairs, as links, or compressed.
+  /// The form of F in the system: pairs, links, or compressed.
   using Form =
       std::variant<FormFactorRows, std::shared_ptr<const LinkedFormFactors>, CompressedFormFactors>;
 
   /// Compressed form factors gather in single precision: no solution with them has a smaller
-  /// residual than this, whatever is asked for.
+  /// residual than this, whatever residual is requested.
   static constexpr double kSinglePrecisionResidual = 1e-6;
 
   /// `patches` must outlive the solver. Throws Error if sizes do not agree.
   ReferenceSolver(const ExchangeMatrix& exchange, const PatchTable& patches);
   ReferenceSolver(const FormFactorLinks& links, const PatchTable& patches);
 
-  /// With links that others gather along too.
+  /// With links that other objects share.
   ReferenceSolver(std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches);
 
-  /// With what `data`, which must outlive the solver, hold F best as: pairs, else links, else
-  /// compressed. Throws Error if they hold none of them.
+  /// With the best F that `data` holds: pairs, else links, else compressed form factors. `data`
+  /// must outlive the solver. Throws Error if it holds none of them.
   explicit ReferenceSolver(const TransferData& data);
 
-  /// The same system with an operator that nearly solves it, of any error, for first guess and
-  /// preconditioner: fewer steps to the same residual, which is computed from F as ever. One that
-  /// is for some receivers and sources only is not used. Throws Error if it has other patches.
+  /// The same system with an operator that nearly solves it, of any error, as first guess and
+  /// preconditioner: fewer steps reach the same residual, which is computed from F. An operator
+  /// with roles is not used. Throws Error if it has other patches.
   ReferenceSolver preconditioned(std::shared_ptr<const TransferOperator> nearly_inverse) const;
 
-  /// Solves (I - rho F) B = M0 until the area-weighted residual is `residual` of M0 (default
-  /// 1e-10); returns the radiosity B [n] in lx. Throws Error if 10,000 steps do not get there.
+  /// Solves (I - rho F) B = M0 until the area-weighted residual is at most `residual` times that of
+  /// M0 (default 1e-10); returns the radiosity B [n] in lx. Throws Error if 10,000 steps do not
+  /// reach it.
   std::vector<Double3> radiosity(std::span<const Float3> initial_exitance,
                                  double residual = 1e-10) const;
 
@@ -65,8 +66,9 @@ class ReferenceSolver {
   std::vector<Float3> indirect_irradiance(std::span<const Float3> initial_exitance,
                                           double residual = 1e-10) const;
 
-  /// Of many lights; solved is also what leaves a residual of no more than `of_reflected_light` of
-  /// rho H, so that what arrives is as exact of a lamp in a closet as of one in the room.
+  /// The same for many lights. A light also counts as solved if its residual is at most
+  /// `of_reflected_light` times rho H, so that the light that arrives is as exact for a lamp in a
+  /// closet as for one in the room.
   std::vector<std::vector<Float3>> indirect_irradiances(
       std::span<const std::vector<Float3>> initial_exitances, double residual = 1e-10,
       double of_reflected_light = 0) const;
@@ -77,7 +79,7 @@ class ReferenceSolver {
   std::shared_ptr<const TransferOperator> nearly_inverse_;  ///< may be null
 };
 
-/// A solution [n] in single precision.
+/// Converts a solution [n] to single precision.
 std::vector<Float3> rounded(std::span<const ReferenceSolver::Double3> solution);
 
 }  // namespace rebounce

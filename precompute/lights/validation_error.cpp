@@ -11,14 +11,15 @@ namespace {
 
 constexpr double kGroup = 64, kConfidence = 0.95;
 
-// Times the mean that the largest error of a group may be.
+// The largest error of a group may be this multiple of the mean.
 constexpr double kLargestOverMean = 3;
 
-// The tail is this part of the sample, and no fewer than kLeastTail; fewer errors than kLeastSample
-// say nothing of one.
+// The tail is this fraction of the sample, and at least kLeastTail errors; fewer errors than
+// kLeastSample give no tail.
 constexpr std::size_t kTailPart = 16, kLeastTail = 8, kLeastSample = 32;
 
-/// What the largest of kGroup errors stays below with kConfidence; `falling`, largest first.
+/// The bound that the largest of kGroup errors stays below with kConfidence; `falling` is sorted,
+/// largest first.
 double largest_of_group(std::span<const double> falling) {
   if (falling.size() < kLeastSample) return falling.front();
   const std::size_t tail = std::max(kLeastTail, falling.size() / kTailPart);
