@@ -14,7 +14,7 @@ bool emits(const TransferData& data, std::uint32_t patch) {
   return data.patches.emitted_exitance[patch] != Float3{0, 0, 0};
 }
 
-/// Points at equal steps of the area of all `triangles`, one after the other.
+/// Points at equal steps of area over all `triangles`, one triangle after the other.
 std::vector<EmitterPoint> spread(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                                  int count) {
   double area = 0;

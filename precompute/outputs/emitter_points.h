@@ -11,7 +11,7 @@ namespace rebounce {
 /// A point on a surface that emits.
 struct EmitterPoint {
   Float3 position;
-  Float3 area;  ///< the front's normal times the area that the point stands for, m²
+  Float3 area;  ///< unit normal of the front times the area that the point stands for, m²
 };
 
 /// Points spread over one patch that emits.
@@ -20,9 +20,9 @@ struct EmitterPoints {
   std::vector<EmitterPoint> point;
 };
 
-/// Points on each patch of `data` that emits, in the order of the patches: `most_each`, or fewer if
-/// there would be more than `most` of them, but one at least. `shown_patch` is that of PatchModel.
-/// The same every time.
+/// Points on each patch of `data` that emits, in the order of the patches. There are `most_each`
+/// points on a patch; fewer, but at least one, if there would be more than `most` in all.
+/// `shown_patch` is that of PatchModel. Deterministic.
 std::vector<EmitterPoints> spread_over_emitters(const TransferData& data,
                                                 std::span<const std::uint32_t> shown_patch,
                                                 int most_each, int most);

@@ -16,17 +16,17 @@
 
 namespace rebounce {
 
-/// What is seen from one place, in the first N spherical harmonics of direction.
+/// The view from one place, in the first N spherical harmonics of direction.
 template <std::size_t N>
 struct HarmonicView {
   using Weight = std::array<float, N>;
 
   std::vector<std::pair<std::uint32_t, Weight>> patches;  ///< ascending
-  std::vector<std::pair<std::uint32_t, Weight>> cells;    ///< of the sky, ascending
+  std::vector<std::pair<std::uint32_t, Weight>> cells;    ///< cells of the sky, ascending
   Weight sky{};                                           ///< the sum of `cells`
 };
 
-/// Adds up what rays from one place have met.
+/// Sums up what the rays from one place meet.
 template <std::size_t N>
 class HarmonicViewer {
  public:
@@ -35,7 +35,7 @@ class HarmonicViewer {
                  const RayTracer& tracer)
       : mesh_(mesh), shown_patch_(shown_patch), tracer_(tracer) {}
 
-  /// What `rays` meet, as prefer_lit_side has it.
+  /// Traces `rays`; prefer_lit_side corrects the hits.
   void trace(std::span<const Ray> rays, std::span<Hit> hits) {
     tracer_.intersect(rays, hits);
     for (std::size_t k = 0; k < hits.size(); ++k) {
@@ -43,7 +43,7 @@ class HarmonicViewer {
     }
   }
 
-  /// `solid_angle` in sr is what each of the `rays` stands for, which met `hits`.
+  /// Makes the view from `rays` and their `hits`; each ray stands for `solid_angle` in sr.
   HarmonicView<N> sum_up(std::span<const Ray> rays, std::span<const Hit> hits, float solid_angle) {
     by_patch_.clear();
     by_cell_.clear();
@@ -67,7 +67,8 @@ class HarmonicViewer {
 
  private:
   using Weight = typename HarmonicView<N>::Weight;
-  using Seen = std::vector<std::pair<std::uint32_t, std::uint32_t>>;  // what, number of the ray
+  // Pairs of a patch or cell and the number of a ray.
+  using Seen = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
   static std::vector<std::pair<std::uint32_t, Weight>> sums(Seen& seen, std::span<const Ray> rays,
                                                             float factor) {
@@ -88,8 +89,8 @@ class HarmonicViewer {
   Seen by_patch_, by_cell_;
 };
 
-/// Appends the view of one more place to `map`, a LightProbes or SurfaceHarmonics. Throws Error
-/// with `too_much` if a file cannot number that many entries.
+/// Appends the view from one more place to `map`, a LightProbes or SurfaceHarmonics. Throws Error
+/// with the message `too_much` if a file cannot number that many entries.
 template <std::size_t N, typename Map>
 void append_view(const HarmonicView<N>& view, const char* too_much, Map& map) {
   map.sky.push_back(view.sky);

@@ -18,21 +18,22 @@ namespace rebounce {
 namespace {
 
 constexpr std::size_t kMostProbes = 65536;
-constexpr std::size_t kBatch = 64;  // probes between two looks at the progress
+constexpr std::size_t kBatch = 64;  // probes between two reports of progress
 constexpr double kLargestBackPart = 0.25;
 
-// An emitter that so many rays have met is known well; others are looked at point by point, by so
-// many points, and all of them together by so many for each ray at most.
+// An emitter that this number of rays meets is known well. Others are sampled by points: this
+// number of points each, and for all of them at most this number per ray.
 constexpr float kEnoughRays = 64;
 constexpr int kMostPoints = 16, kPointsPerRay = 2;
 
-// A ray has met a point if it ends no farther from it than this part of the way.
+// A ray reaches a point if it ends no farther from it than this fraction of the way.
 constexpr float kAtPoint = 1e-3F;
 
-using View = HarmonicView<kHarmonicCount>;  // what one probe sees
+using View = HarmonicView<kHarmonicCount>;  // the view of one probe
 
-/// Direction k of `count`, spread evenly over the sphere and turned about y by `turn` turns: the
-/// spherical Fibonacci lattice (R. Swinbank, R. J. Purser, 2006).
+/// Direction k of `count` that are spread evenly over the sphere and turned about y by `turn`
+/// turns: the spherical Fibonacci lattice (R. Swinbank and R. J. Purser, "Fibonacci grids: a novel
+/// approach to global modelling", 2006).
 Float3 fibonacci_direction(int k, int count, double turn) {
   const double y = 1 - (2 * k + 1.0) / count;
   const double r = std::sqrt(std::max(0.0, 1 - y * y));
@@ -52,7 +53,7 @@ class Viewer {
         rays_(static_cast<std::size_t>(ray_count)),
         hits_(rays_.size()) {}
 
-  /// None for a probe that sees too much of backs: it is inside of something.
+  /// Empty for a probe that sees too many backs: it is inside something.
   std::optional<View> look_around(const Float3& position, std::uint64_t number) {
     const auto count = static_cast<int>(rays_.size());
     const double turn = unit_square(mix_bits(number)).x;
@@ -76,8 +77,8 @@ class Viewer {
   }
 
  private:
-  /// Emitters are small and bright: a few rays more or less that meet one would be seen. What
-  /// `view` has of those that it sees by less than the solid angle `enough` is found anew.
+  /// Emitters are small and bright, and a few rays more or less that meet one are visible. This
+  /// replaces the part of `view` from emitters that it sees by less than the solid angle `enough`.
   void look_at_emitters(const Float3& position, float enough, View& view) {
     for (const EmitterPoints& emitter : emitters_) {
       auto seen = std::ranges::lower_bound(view.patches, emitter.patch, {},

@@ -16,15 +16,16 @@
 namespace rebounce {
 namespace {
 
-// Coordinates may leave [0, 1] by rounding.
+// Coordinates may leave [0, 1] by rounding errors.
 constexpr double kSlack = 1e-4;
 
-// A page is looked at with so many texels a side, and left out where more than this part of what is
-// covered is covered twice: charts that were packed without a gap share a few texels of their rims.
+// A page is checked at this number of texels a side, and left out if more than this fraction of its
+// covered texels is covered twice. Charts that are packed without a gap share a few texels at their
+// edges.
 constexpr int kOverlapTexels = 512;
 constexpr double kLargestOverlap = 0.01;
 
-// Texels around a page that belong to no other, and the least that a page can be.
+// Texels around a page that belong to no other page, and the least size of a page.
 constexpr double kGutter = 1;
 constexpr std::uint32_t kLeastTile = 8;
 
@@ -50,9 +51,9 @@ bool is_inside(const glm::dvec2& weight, double margin) {
   return weight.x > margin && weight.y > margin && weight.x + weight.y < 1 - margin;
 }
 
-/// A place of a triangle of the texture.
+/// A place on a triangle of the texture.
 struct Place {
-  glm::dvec2 weight{0};  ///< of its second and third corner
+  glm::dvec2 weight{0};  ///< weights of the second and third corner
   double distance_squared = std::numeric_limits<double>::max();
 };
 
@@ -74,8 +75,8 @@ Place nearest_place(const Corners& p, const glm::dvec2& at) {
   return best;
 }
 
-/// Runs visit(x, y, centre) for the texels of a square of `side` whose centres lie within `reach`
-/// of the box around a triangle, in texels.
+/// Calls visit(x, y, centre) for the texels of a square of `side` whose centres lie within `reach`,
+/// in texels, of the box around a triangle.
 template <typename Visit>
 void for_texels_near(const Corners& p, double reach, int side, const Visit& visit) {
   const auto first = [&](double low) {
@@ -93,12 +94,12 @@ void for_texels_near(const Corners& p, double reach, int side, const Visit& visi
   }
 }
 
-/// What one mesh, where it is placed once, has in the lightmap.
+/// One placed mesh in the lightmap.
 struct Page {
   std::uint32_t number = 0;             ///< in PatchModel::lightmap_page
   std::vector<std::uint32_t> triangle;  ///< of the display mesh, ascending
-  glm::dvec2 low{1}, high{0};           ///< the part of it that is used
-  double in_world = 0, in_page = 0;     ///< area: m², and that of texture coordinates
+  glm::dvec2 low{1}, high{0};           ///< the used part of the page
+  double in_world = 0, in_page = 0;     ///< area in m², and in texture coordinates
 };
 
 class LightmapPlacer {
@@ -138,7 +139,7 @@ class LightmapPlacer {
 
   double area_in_world(std::uint32_t t) const { return rebounce::area_of(corners_of(mesh(), t)); }
 
-  /// The side of surface triangle `t` that has texels; kNone if neither sees anything.
+  /// The side of surface triangle `t` that gets texels; kNone if neither side sees anything.
   std::uint32_t mapped_side(std::uint32_t t) const {
     if (model_.shown_patch[t] != kNone) return t;
     const std::uint32_t back = mesh().back_triangle[t];
@@ -190,9 +191,9 @@ class LightmapPlacer {
            std::max(page.high.x, page.high.y) > 1 + kSlack;
   }
 
-  /// Of the texels that triangles cover with their middles, the part that several do.
+  /// The fraction of covered texels, by their centres, that several triangles cover.
   double overlapping_part(const Page& page) const {
-    // Neighbours share their edge and no more; rounding is far below this.
+    // Neighbours share their edge and no more; rounding errors are far below this.
     constexpr double kMargin = 1e-6;
     std::vector<std::uint8_t> times(std::size_t{kOverlapTexels} * kOverlapTexels, 0);
     std::size_t covered = 0, twice = 0;
@@ -210,7 +211,7 @@ class LightmapPlacer {
     return covered > 0 ? static_cast<double>(twice) / static_cast<double>(covered) : 0;
   }
 
-  /// Tiles with about as many texels to the square metre everywhere.
+  /// Tiles with about the same number of texels per square metre everywhere.
   std::vector<Tile> pack(std::span<const Page> pages) const {
     std::vector<glm::dvec2> extent;
     for (const Page& page : pages) {
@@ -233,12 +234,12 @@ class LightmapPlacer {
     map.has_texels.assign(mesh().triangle.size(), 0);
     map.triangle.assign(texels, kNone);
     map.weight.assign(texels, Float2{0, 0});
-    // Beyond the padding nothing is drawn.
+    // Nothing is drawn beyond the padding.
     const double reach = settings_.padding + 0.5;
     distance_squared_.assign(texels, reach * reach);
   }
 
-  /// Gives triangle `t` the texels that no other is nearer to.
+  /// Gives triangle `t` the texels that no other triangle is nearer to.
   void draw(std::uint32_t t, const Page& page, const Tile& tile) {
     Lightmap& map = placed_.lightmap;
     const auto size = static_cast<int>(settings_.size);
@@ -264,7 +265,7 @@ class LightmapPlacer {
 
   const PatchModel& model_;
   const LightmapSettings& settings_;
-  std::vector<double> distance_squared_;  ///< [texel] of its triangle, texels²
+  std::vector<double> distance_squared_;  ///< [texel] from its triangle, texels²
   PlacedLightmap placed_;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
 
-// A lightmap of a scene that was unwrapped for one: where each of its texels lies on the surface.
+// A lightmap for a scene that is unwrapped for one: the place of each texel on the surface.
 
 #include <cstdint>
 #include <string>
@@ -11,32 +11,33 @@
 
 namespace rebounce {
 
-/// The sides that a lightmap may have, texels.
+/// The limits of the side of a lightmap, texels.
 inline constexpr std::uint32_t kSmallestLightmap = 16, kLargestLightmap = 4096;
 
 struct LightmapSettings {
-  /// Texels along each side; 0: no lightmap. More: sharper; the file grows by 12 bytes a texel.
+  /// Texels along each side; 0: no lightmap. More texels give sharper light; the file grows by 12
+  /// bytes per texel.
   std::uint32_t size = 0;
-  /// Texels by which charts are continued beyond their rim. More: safe for more levels of a
-  /// mip-map; charts that lie closer to each other share what is between them.
+  /// Texels by which charts continue beyond their edge. More padding allows more mip levels; charts
+  /// closer to each other share the texels between them.
   std::uint32_t padding = 4;
 };
 
 struct PlacedLightmap {
   Lightmap lightmap;
-  std::vector<std::string> warnings;  ///< one line for each mesh that was left out
+  std::vector<std::string> warnings;  ///< one line for each mesh that is left out
 };
 
-/// Makes the lightmap of `model`, whose assets' second texture coordinates must unwrap every mesh
-/// without overlap into [0, 1]². The pages of all meshes, each as often as it is placed, share one
-/// square texture, so that all have about as many texels to the square metre.
+/// Makes the lightmap of `model`. The second texture coordinates of its assets must unwrap every
+/// mesh without overlap into [0, 1]². The pages of all meshes, one for each placement, share one
+/// square texture, so that all have about the same number of texels per square metre.
 ///
 /// A mesh is left out, with a warning, if its coordinates leave [0, 1] or more than 1 % of what
-/// they cover is covered twice: surfaces would show the light of others. Of a double-sided triangle
-/// the front has texels, or the back if the front sees nothing.
+/// they cover is covered twice: surfaces would show the light of others. For a double-sided
+/// triangle the front has texels, or the back if the front sees nothing.
 ///
-/// Throws Error if a setting is out of range, no mesh can have a lightmap, or there is not room for
-/// all of them.
+/// Throws Error if a setting is out of range, no mesh can have a lightmap, or there is not enough
+/// room for all of them.
 PlacedLightmap place_lightmap(const PatchModel& model, const LightmapSettings& settings);
 
 }  // namespace rebounce

@@ -11,14 +11,14 @@ namespace {
 constexpr int kMostSteps = 20, kMostHalvings = 10;
 constexpr double kSmallStep = 1e-6;
 
-/// log Z + ridge/2 |mu|² and what Newton's method needs of it.
+/// log Z + ridge/2 |mu|² and its derivatives, for Newton's method.
 class Potential {
  public:
   Potential(std::span<const double> prior, std::span<const glm::dvec2> place, double ridge)
       : prior_(prior), place_(place), ridge_(ridge), weight_(prior.size()) {}
 
   double at(const glm::dvec2& mu) {
-    // The largest exponent is taken out, so that nothing overflows.
+    // Dividing by the largest exponential prevents overflow.
     double largest = -std::numeric_limits<double>::infinity();
     for (const glm::dvec2& x : place_) largest = std::max(largest, -glm::dot(mu, x));
     double z = 0;

@@ -6,18 +6,19 @@
 
 namespace rebounce {
 
-/// Shifts the `prior` weights of values at `place`, seen from the origin, so that their mean place
-/// is nearly the origin: a field that is linear in the place is then met without the error of a
-/// plain mean. Of all weights that do so the ones nearest to `prior` in relative entropy, hence
-/// positive: w_k = prior_k exp(-mu . place_k) / Z. Where the origin is outside of the places (at an
-/// edge of the surface) they lean to the nearest.
+/// Shifts the `prior` weights of values at `place`, relative to the origin, so that the weighted
+/// mean place is nearly the origin: a linear field is then interpolated without the error of a
+/// plain mean. Among all such weights these are nearest to `prior` in relative entropy, and hence
+/// positive: w_k = prior_k exp(-mu . place_k) / Z. If the origin lies outside the places (at an
+/// edge of the surface), the weights lean to the nearest.
 ///
-/// `ridge` > 0 says how firmly: mu minimises log Z + ridge/2 |mu|²; the mean place that is left is
-/// ridge mu. Source: Arroyo and Ortiz, "Local maximum-entropy approximation schemes", International
-/// Journal for Numerical Methods in Engineering 65 (2006), their constraint relaxed by the ridge.
+/// `ridge` > 0 controls how exactly: mu minimises log Z + ridge/2 |mu|², and the mean place that
+/// remains is ridge mu. Source: M. Arroyo and M. Ortiz, "Local maximum-entropy approximation
+/// schemes", International Journal for Numerical Methods in Engineering 65 (2006); the ridge
+/// relaxes their constraint.
 ///
-/// Both spans have the same size, at least one; `prior` > 0, `place` about the size of one. Returns
-/// weights whose sum is 1.
+/// Both spans have the same size, at least one; `prior` > 0, `place` is scaled to a size of about
+/// one. Returns weights whose sum is 1.
 std::vector<double> max_entropy_weights(std::span<const double> prior,
                                         std::span<const glm::dvec2> place, double ridge);
 

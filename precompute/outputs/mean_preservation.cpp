@@ -11,11 +11,11 @@ namespace {
 
 constexpr int kStepCount = 2;
 
-// Weights that are added before those of the same patch are put together: a patch may have a
-// hundred thousand triangles.
+// New weights before weights of the same patch are merged: a patch may have a hundred thousand
+// triangles.
 constexpr std::size_t kMostPending = 4096;
 
-/// Puts the weights into ascending order and those of the same patch together.
+/// Sorts the weights and merges those of the same patch.
 void collect(VertexWeights& weight) {
   std::ranges::stable_sort(weight, {}, &PatchWeight::patch);
   std::size_t kept = 0;
@@ -33,8 +33,8 @@ void append(VertexWeights& sum, double factor, const VertexWeights& weight) {
   for (const PatchWeight& w : weight) sum.push_back({w.patch, factor * w.weight});
 }
 
-/// The mean of what is shown on the triangles of a patch; empty if something there shows nothing or
-/// takes from patches that are not `good`.
+/// The mean light shown on the triangles of a patch. Empty if some vertex shows nothing or uses
+/// patches that are not `good`.
 VertexWeights shown_mean(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
                          std::span<const std::uint8_t> good,
                          const std::vector<VertexWeights>& weight) {
@@ -58,7 +58,7 @@ VertexWeights shown_mean(const DisplayMesh& mesh, std::span<const std::uint32_t>
   return mean;
 }
 
-/// The largest `count`, ascending by patch, their sum brought back to 1.
+/// Keeps the largest `count` weights, ascending by patch, scaled to a sum of 1.
 void keep_largest(VertexWeights& weight, std::size_t count) {
   if (weight.size() > count) {
     std::ranges::stable_sort(weight, [](const PatchWeight& a, const PatchWeight& b) {
@@ -84,7 +84,7 @@ VertexWeights sum_of(VertexWeights weight, double factor, const VertexWeights& c
   return weight;
 }
 
-/// As much of `change` as is sure to keep within `most_negative`: negative_sum is convex.
+/// Adds as much of `change` as certainly stays within `most_negative`: negative_sum is convex.
 VertexWeights change_weights(const VertexWeights& weight, const VertexWeights& change,
                              double most_negative) {
   VertexWeights changed = sum_of(weight, 1, change);
@@ -94,7 +94,8 @@ VertexWeights change_weights(const VertexWeights& weight, const VertexWeights& c
   return sum_of(weight, (most_negative - before) / (after - before), change);
 }
 
-/// What each patch lacks of its value on its own triangles is added to what is taken from it.
+/// Adds to each patch's contribution the difference between its value and the mean shown on its
+/// triangles.
 void add_what_is_lost(const DisplayMesh& mesh, const PatchTriangles& triangles,
                       std::span<const std::uint8_t> good, const MeanPreservation& settings,
                       std::vector<VertexWeights>& weight) {

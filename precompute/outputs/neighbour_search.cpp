@@ -12,19 +12,20 @@
 namespace rebounce {
 namespace {
 
-constexpr float kCreaseCosine = 0.766F;  // 40 degrees: rounder is meant to look smooth
+constexpr float kCreaseCosine = 0.766F;  // 40 degrees: rounder shapes are meant to look smooth
 
-// How far off its plane a vertex takes from patches, in parts of its reach.
+// The largest distance of a patch from the plane of a vertex, as a fraction of the reach.
 constexpr float kPlaneReach = 0.25F;
 
-// Points of a patch that stand for it.
+// Points that represent a patch.
 constexpr std::size_t kSampleCount = 16;
 
-// A flat surface has some 50 samples within the reach of a vertex and four times as many within
-// twice that; only where surfaces are folded (a carpet, leaves) are there more.
+// A flat surface has about 50 samples within the reach of a vertex and four times as many within
+// twice the reach. Only folded surfaces (a carpet, leaves) have more.
 constexpr std::size_t kMostSamples = 512;
 
-// Candidates that are looked at for kMostSites in sight: more only where nearly all are hidden.
+// Candidates that are examined for kMostSites visible ones; more are needed only where nearly all
+// are hidden.
 constexpr std::size_t kMostLooks = 4 * kMostSites;
 
 }  // namespace
@@ -86,7 +87,7 @@ void NeighbourSearch::find_candidates(const Receiver& receiver, float reach,
   for (const ReconstructionSite& site : scratch.candidates_) scratch.slot_[site.patch] = kNone;
 }
 
-/// Counts a sample towards what its patch gives.
+/// Adds a sample to the share of its patch.
 void NeighbourSearch::add(const Sample& sample, float distance_squared, float reach,
                           Scratch& scratch) const {
   std::uint32_t& slot = scratch.slot_[sample.patch];
@@ -103,7 +104,7 @@ void NeighbourSearch::add(const Sample& sample, float distance_squared, float re
   site.normal = sample.normal;
 }
 
-/// Finds which of the candidates [begin, end) are in sight.
+/// Finds which of the candidates [begin, end) are visible.
 void NeighbourSearch::look_at_next(const Receiver& receiver, std::size_t begin, std::size_t end,
                                    std::span<const std::uint32_t> own, Scratch& scratch) const {
   scratch.rays_.clear();

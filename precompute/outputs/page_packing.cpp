@@ -9,7 +9,8 @@
 namespace rebounce {
 namespace {
 
-// After so many halvings of its interval the largest scale that fits is known well below a texel.
+// After this number of halvings of its interval, the largest scale that fits is known well below a
+// texel.
 constexpr int kHalvings = 24;
 
 std::vector<Tile> pack(std::span<const glm::dvec2> extent, double scale, std::uint32_t size,

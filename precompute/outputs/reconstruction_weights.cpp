@@ -18,35 +18,36 @@
 namespace rebounce {
 namespace {
 
-// Height of the rays that tell whether a triangle lies in the open, as a part of its size; and how
-// far their feet are drawn in from its corners, so that they keep clear of the walls beside it.
+// Height of the rays that tell whether a triangle is open, as a fraction of its size; and the
+// distance of their origins from its corners, so that they avoid the walls beside it.
 constexpr double kProbeHeight = 0.25, kProbeInset = 0.2;
 
-// Slivers beside a contact are looked at as if they were this part of the mean patch's size, so
-// that what hangs close above them is seen.
+// Slivers beside a contact are tested as if they had this fraction of the size of a mean patch, so
+// that the test notices what hangs close above them.
 constexpr double kLeastProbeSize = 0.5;
 
-// A patch with less than this part of its area covered is open, and the other way round.
+// A patch is open if less than this fraction of its area is covered, and covered if less than this
+// is open.
 constexpr double kLittle = 0.1;
 
-// How far a vertex looks for patches, in mean sizes of its own: chosen with bench_truth
-// (notes/patches.md). Farther where all near ones are mixed.
+// The distance within which a vertex looks for patches, in its own mean patch sizes; the larger one
+// applies where all near patches are mixed. Chosen with bench_truth: notes/patches.md.
 constexpr float kReach = 1, kFartherReach = 2;
 
-// How firmly the mean place of a vertex's patches is drawn to the vertex: a compromise of what is
-// best at edges and what leaves a vertex with many patches to average (notes/patches.md).
+// How strongly the mean place of the patches is drawn to the vertex: a compromise between edges and
+// the number of patches that are averaged. Measured: notes/patches.md.
 constexpr double kRidge = 0.1;
 
-// The part of a vertex's value below which a patch is left out.
+// Patches below this fraction of the value of a vertex are left out.
 constexpr float kNegligible = 1e-3F;
 
-// Vertices between two looks at the progress.
+// Vertices between two reports of progress.
 constexpr std::size_t kBatch = 1 << 14;
 
-// What a vertex takes away of patches beyond its own, at most, for the sake of the patches' means.
+// The largest sum of negative weights of a vertex that the preservation of means may add.
 constexpr double kMostNegative = 0.5;
 
-/// How a triangle lies among the surfaces close above it.
+/// How a triangle lies relative to surfaces close above it.
 enum class Exposure : std::uint8_t { kOpen, kMixed, kCovered };
 
 Ray segment_ray(const Float3& from, const Float3& to) {
@@ -58,8 +59,8 @@ Ray segment_ray(const Float3& from, const Float3& to) {
   return ray;
 }
 
-/// Looks straight up from four points of the triangle, and between their upper ends. The rays are
-/// as long as suits a triangle of `least_size` metres at least.
+/// Traces rays straight up from four points of the triangle, and between their upper ends. Their
+/// length suits a triangle of at least `least_size` metres.
 Exposure find_exposure(const TriangleCorners& p, double least_size, const RayTracer& tracer) {
   const glm::dvec3 cross = glm::cross(p[1] - p[0], p[2] - p[0]);
   const glm::dvec3 normal = glm::normalize(cross);
@@ -81,7 +82,7 @@ Exposure find_exposure(const TriangleCorners& p, double least_size, const RayTra
   return covered > 0 || divided ? Exposure::kMixed : Exposure::kOpen;
 }
 
-/// The patches that each vertex's own triangles show.
+/// The patches that the triangles of each vertex show.
 class VertexPatches {
  public:
   VertexPatches(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch)
@@ -107,7 +108,7 @@ class VertexPatches {
     if (std::ranges::find((*this)[v], patch) == (*this)[v].end()) patch_[end_[v]++] = patch;
   }
 
-  std::vector<std::uint32_t> begin_, end_;  ///< of each vertex, in patch_
+  std::vector<std::uint32_t> begin_, end_;  ///< ranges in patch_, by vertex
   std::vector<std::uint32_t> patch_;        ///< with room for all corners
 };
 
@@ -145,7 +146,7 @@ class ReconstructionWeights {
     };
   }
 
-  /// The weights of vertices [begin, end) before the patches' means are looked after.
+  /// Computes the weights of vertices [begin, end) before the preservation of means.
   void compute_batch(const NeighbourSearch& search, std::size_t begin, std::size_t end,
                      std::vector<VertexWeights>& weights) {
 #pragma omp parallel
@@ -162,7 +163,7 @@ class ReconstructionWeights {
     }
   }
 
-  /// The root of the patches' mean area, metres.
+  /// The square root of the mean area of the patches, metres.
   double mean_patch_size() const {
     double area = 0;
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
@@ -172,8 +173,7 @@ class ReconstructionWeights {
     return std::sqrt(area / static_cast<double>(std::max<std::size_t>(absorbed_.size(), 1)));
   }
 
-  /// Measures the patches. One is mixed if the open and the covered part of its area are both worth
-  /// the name.
+  /// Classifies the patches. A patch is mixed if neither its open nor its covered part is small.
   void measure_patches() {
     const std::size_t n = triangles_.patch_count();
     area_.resize(n);
@@ -200,7 +200,7 @@ class ReconstructionWeights {
     }
   }
 
-  /// For each triangle whether it shows a patch and is covered.
+  /// For each triangle, whether it shows a patch and is covered.
   std::vector<std::uint8_t> find_covered() const {
     const double height = kCloseCover * mean_patch_size();
     std::vector<std::uint8_t> covered(mesh_.triangle.size(), 0);
@@ -246,9 +246,9 @@ class ReconstructionWeights {
     }
   }
 
-  /// Of a vertex in the open: patches in the open, if need be from farther away; else those that
-  /// are mixed, on whose rim the vertex lies; else its own. Of one that is covered: covered
-  /// patches, else mixed ones, else its own.
+  /// The patches of a vertex. An open vertex uses open patches, if necessary from farther away;
+  /// otherwise mixed ones, whose edge it lies on; otherwise its own. A covered vertex uses covered
+  /// patches, otherwise mixed ones, otherwise its own.
   std::vector<ReconstructionSite> find_sites(const NeighbourSearch& search, std::size_t v,
                                              NeighbourSearch::Scratch& scratch) const {
     const auto within = [&](float reach) {
@@ -270,7 +270,7 @@ class ReconstructionWeights {
     return near.empty() ? own_sites(v) : near;
   }
 
-  /// A vertex's own patches, all alike.
+  /// The patches of the triangles of a vertex, with equal weights.
   std::vector<ReconstructionSite> own_sites(std::size_t v) const {
     std::vector<ReconstructionSite> sites;
     for (const std::uint32_t patch : own_patches_[v]) {
@@ -302,7 +302,7 @@ class ReconstructionWeights {
     std::erase_if(sites, [](const ReconstructionSite& site) { return site.weight < kNegligible; });
   }
 
-  /// Those in the open, whose means can be trusted.
+  /// Patches in the open, whose means can be trusted.
   std::vector<std::uint8_t> good_patches() const {
     std::vector<std::uint8_t> good(exposure_.size());
     for (std::size_t i = 0; i < good.size(); ++i) {
@@ -312,8 +312,7 @@ class ReconstructionWeights {
     return good;
   }
 
-  /// What the sites say of light in the open, of which a patch shows the part that is not
-  /// absorbed.
+  /// The weights of light in the open; a patch only shows the fraction that is not absorbed.
   VertexWeights open_weights(const std::vector<ReconstructionSite>& sites) const {
     double sum = 0;
     for (const ReconstructionSite& site : sites) sum += site.weight * (1.0 - absorbed_[site.patch]);
@@ -325,7 +324,7 @@ class ReconstructionWeights {
     return weight;
   }
 
-  /// What the sites have under their covers.
+  /// The weights of light under a cover.
   static VertexWeights plain_weights(const std::vector<ReconstructionSite>& sites) {
     double sum = 0;
     for (const ReconstructionSite& site : sites) sum += site.weight;
@@ -359,8 +358,8 @@ class ReconstructionWeights {
   std::vector<glm::vec3> centroid_;       ///< [n]
   std::vector<Exposure> exposure_;        ///< [n]
   std::vector<Receiver> receivers_;       ///< [v]
-  std::vector<std::uint8_t> is_covered_;  ///< [v] all triangles that show a patch are covered
-  /// [v] It is covered or all its patches are: what they receive is shown as it is.
+  std::vector<std::uint8_t> is_covered_;  ///< [v] all its triangles that show a patch are covered
+  /// [v] The vertex is covered or all its patches are: what they receive is shown as it is.
   std::vector<std::uint8_t> shows_arriving_;
 };
 

@@ -16,9 +16,9 @@ namespace rebounce {
 namespace {
 
 constexpr int kFewestRays = 16;
-constexpr std::size_t kBatch = 256;  // patches between two looks at the progress
+constexpr std::size_t kBatch = 256;  // patches between two reports of progress
 
-using View = HarmonicView<kLinearHarmonicCount>;  // what one patch sees
+using View = HarmonicView<kLinearHarmonicCount>;  // the view of one patch
 
 /// A direction around `normal`, uniform over the hemisphere.
 glm::dvec3 hemisphere_direction(const glm::dvec3& normal, const glm::dvec2& s) {

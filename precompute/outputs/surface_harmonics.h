@@ -1,6 +1,6 @@
 #pragma once
 
-// Where the light comes from that arrives at the patches.
+// Finds the directions from which light arrives at patches.
 
 #include <cstdint>
 #include <span>
@@ -12,16 +12,16 @@
 namespace rebounce {
 
 struct SurfaceHarmonicSettings {
-  /// Rays of each patch; 0: none are found. More: less noise, in proportion to the root of the
-  /// number; a patch has at most as many entries of 17 or 20 bytes. Else at least 16.
+  /// Rays of each patch, at least 16; 0: no harmonics. The noise falls with the square root of the
+  /// number; a patch has at most as many entries, of 17 or 20 bytes, as rays.
   int ray_count = 0;
   std::uint64_t seed = 1;  ///< of the sample points
 };
 
 /// Finds the harmonics of the light of every patch by rays spread evenly over the hemispheres above
-/// points of it. `shown_patch` [t] is that of PatchModel, `tracer` holds the surface of data.mesh.
-/// The same bits for any number of OpenMP threads. Throws Error if a setting is out of range or the
-/// patches see too much for a file, Cancelled when `progress` says so.
+/// points of the patch. `shown_patch` [t] is that of PatchModel, `tracer` holds the surface of
+/// data.mesh. The bits do not depend on the number of OpenMP threads. Throws Error if a setting is
+/// out of range or the patches see too much for a file, Cancelled if `progress` asks to stop.
 SurfaceHarmonics trace_surface_harmonics(const TransferData& data,
                                          std::span<const std::uint32_t> shown_patch,
                                          const RayTracer& tracer,
