@@ -6,15 +6,15 @@
 
 namespace rebounce::cli {
 
-// Each adds its sub-command to `app`; the command runs when the command line is parsed. `options`
-// must outlive `app`.
+// Each function adds its sub-command to `app`. The command runs when the command line is parsed.
+// `options` must outlive `app`.
 void add_precompute_command(CLI::App& app, const CommonOptions& options);
 void add_info_command(CLI::App& app, const CommonOptions& options);
 void add_solve_command(CLI::App& app, const CommonOptions& options);
 void add_export_command(CLI::App& app, const CommonOptions& options);
 void add_render_command(CLI::App& app, const CommonOptions& options);
 void add_bake_command(CLI::App& app, const CommonOptions& options);
-// In builds with the viewer.
+// Only in builds with the viewer.
 void add_view_command(CLI::App& app, const CommonOptions& options);
 
 }  // namespace rebounce::cli

@@ -23,7 +23,7 @@ std::string readable_time(double seconds) {
   return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
 }
 
-/// Nothing as long as it is a guess.
+/// Empty as long as it would be a guess.
 std::string time_left(double fraction, double seconds) {
   if (fraction <= 0.02 || seconds <= 0.5) return "";
   return ", " + readable_time(seconds * (1 - fraction) / fraction) + " left";

@@ -7,21 +7,22 @@
 
 namespace rebounce::cli {
 
-/// Options that every sub-command has.
+/// Options of every sub-command.
 struct CommonOptions {
-  bool json = false;  ///< a machine-readable summary on standard output, all else on standard error
+  /// A machine-readable summary on standard output; all other text goes to standard error.
+  bool json = false;
   bool quiet = false;  ///< no progress, no summary
   int threads = 0;     ///< OpenMP threads; 0: all processors
 };
 
-/// Turns the first Ctrl-C into a request to stop at the next convenient place, and the second into
-/// an immediate end.
+/// The first Ctrl-C requests a stop at the next convenient place, the second ends the program at
+/// once.
 void install_interrupt_handler();
 bool interrupted();
 
-/// How far long work is, with time left, on `to`: on a terminal a bar, drawn ten times a second at
-/// most; elsewhere, as in a log, a line whenever `line_interval` has gone by. Always reports
-/// whether to go on, so that it can serve as a progress function.
+/// Shows the progress of long work on `to`, with the time left: on a terminal a bar, drawn at most
+/// ten times a second; elsewhere, as in a log, a line after every `line_interval`. It reports
+/// whether to continue, so that it can be used as a progress function.
 class ProgressBar {
  public:
   explicit ProgressBar(bool enabled, std::FILE* to = stderr,
@@ -30,7 +31,7 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// Shows that `fraction` of `phase` is done; false once Ctrl-C was pressed.
+  /// Shows that `fraction` of `phase` is done. Returns false after Ctrl-C.
   bool update(std::string_view phase, double fraction);
 
  private:

@@ -14,7 +14,7 @@ struct ExportOptions {
   std::string file, what, output;
 };
 
-/// Arrays to write, and the memory of those that had to be made.
+/// The arrays to write, and the memory of those that are computed.
 struct Export {
   std::vector<NumpyArray> arrays;
   std::vector<double> form_factor;
@@ -69,7 +69,7 @@ void add_transfer(const TransferData& data, Export& out) {
   out.arrays.push_back(numpy_array("reflectance", view(data.patches.reflectance)));
 }
 
-/// Indices and other triples of 32-bit numbers as [n, 3].
+/// Index triples, or other triples of 32-bit numbers, as [n, 3].
 NumpyArray index_array(std::string name, const std::vector<Uint3>& values) {
   return {std::move(name), NumpyType::kU4, {values.size(), 3}, std::as_bytes(view(values))};
 }

@@ -12,7 +12,8 @@
 namespace rebounce::cli {
 namespace {
 
-/// JSON text of the file's own making; a file by another hand may hold anything.
+/// The JSON text that a build writes; text that is no JSON is returned as a string, because other
+/// programs may write anything.
 nlohmann::json parse_or_text(const std::string& text) {
   nlohmann::json parsed = nlohmann::json::parse(text, nullptr, false);
   return parsed.is_discarded() ? nlohmann::json(text) : parsed;
@@ -23,7 +24,7 @@ const char* form_factors_of(const TransferData& data) {
   return data.compressed_form_factors ? "pairs, compressed" : "pairs";
 }
 
-/// How many patches light is brought to, taken from, both and neither.
+/// The number of patches that are receivers, sources, both, and neither.
 nlohmann::json counts_of(const PatchRoles& roles, std::size_t patch_count) {
   const std::size_t receivers = roles.count(PatchRoles::kReceiver, patch_count),
                     sources = roles.count(PatchRoles::kSource, patch_count);

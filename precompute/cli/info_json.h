@@ -7,7 +7,7 @@
 
 namespace rebounce::cli {
 
-/// What is inside a transfer file of `file_bytes`, under the keys that scripts rely on.
+/// Describes a transfer file of `file_bytes`, under stable keys that scripts rely on.
 nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes);
 
 }  // namespace rebounce::cli

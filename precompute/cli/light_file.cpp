@@ -28,7 +28,7 @@ float length_of(const Float3& v) {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/// `words` as in "a, b and c".
+/// Joins `words` as in "a, b and c".
 template <typename Words>
 std::string listed(const Words& words, const char* last) {
   std::string text;
@@ -62,7 +62,7 @@ std::vector<const LampField*> all_fields() {
   return fields;
 }
 
-/// Refuses a field of a light that its kind does not use.
+/// Throws Error if a light has a field that its kind does not use.
 void refuse_other(const Field& light, const LampField& field) {
   std::vector<std::string> users;
   for (const LampKind* kind : lamp_kinds()) {
@@ -92,8 +92,8 @@ void read_cone(const Field& light_field, Light& light) {
   }
 }
 
-/// The direction in which a rectangle's first side lies, and in which the horizontal angles of a
-/// profile begin: by default x, or z where the light travels along x.
+/// The direction of the first side of a rectangle, from which the horizontal angles of a profile
+/// count: by default x, or z if the light travels along x.
 Float3 read_tangent(const Field& field, const Float3& direction) {
   const Float3 fallback = std::abs(direction[0]) < 0.9F ? Float3{1, 0, 0} : Float3{0, 0, 1};
   const Float3 t = field.triple("tangent", kAnyNumber, fallback);
@@ -204,7 +204,7 @@ std::vector<EmitterScale> read_emitters(const Field& root) {
   return emitters;
 }
 
-/// Scales what the surfaces of a material emit. Throws Error if there are none of that name.
+/// Scales the emission of a material. Throws Error if the scene has no material of that name.
 void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> patch_material,
                    TransferData& data) {
   bool found = false;

@@ -10,7 +10,7 @@
 
 namespace rebounce::cli {
 
-/// How much of what the scene says a material emits.
+/// The factor on the emission of a material.
 struct EmitterScale {
   std::string material;
   Float3 scale{1, 1, 1};
@@ -30,8 +30,8 @@ LightSetup read_lights(const std::filesystem::path& path);
 /// there is no light at all: no lamp, no sky and no patch that emits.
 LightSetup choose_lights(const std::filesystem::path& path, const TransferData& data);
 
-/// Loads a transfer file whose surfaces emit what the light file says, and the lights: as
-/// choose_lights finds them. Throws Error if a material is not in the scene.
+/// Loads a transfer file, with the emission of its materials scaled as the light file says, and the
+/// lights that choose_lights finds. Throws Error if a material is not in the scene.
 std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& file,
                                                    const std::filesystem::path& lights,
                                                    LightSetup& setup);

@@ -49,7 +49,7 @@ LightMotion read_keys(const json& keys, const Field& parent, const Light& light)
     const Field field{keys[k], fmt::format("{}.keys: key {}", parent.where, k)};
     if (!keys[k].is_object()) throw Error(field.where + ": must be an object");
     field.check_names({"time", "position", "direction", "color", "intensity"});
-    // What a key does not name stays as it was.
+    // Values that a key does not name stay as they were in the key before.
     key.time = field.number("time", key.time, key.time);
     key.position = field.triple("position", kAnyNumber, key.position);
     key.direction = field.unit_vector("direction", key.direction);
@@ -66,7 +66,8 @@ Field part_of(const Field& motion, const std::string& name) {
   return {part, motion.where + "." + name};
 }
 
-/// The motion that `field` names, of something at rest as `light` is; nothing if it names none.
+/// The motion that `field` describes, of an object that is like `light` at rest; empty if there is
+/// none.
 std::optional<LightMotion> read_motion(const Field& field, const Light& light) {
   const auto kinds =
       field.object.count("circle") + field.object.count("swing") + field.object.count("keys");

@@ -26,8 +26,8 @@ void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options
       });
 }
 
-/// What is wrong with the command line, in one line. CLI11 complains of the missing command first,
-/// and keeps a word that it does not know to itself.
+/// The error in the command line, in one line. CLI11 reports a missing command first and does not
+/// name a word that it does not know.
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   const std::vector<std::string> unknown = app.remaining();
   const std::string what = app.get_subcommands().empty() && !unknown.empty()

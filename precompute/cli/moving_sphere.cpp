@@ -10,13 +10,13 @@
 namespace rebounce::cli {
 namespace {
 
-// Of the way through the scene to what is ahead.
+// Position, amplitude and largest radius, as fractions of the way through the scene.
 constexpr float kPlace = 0.5F, kSwing = 0.3F, kLargestRadius = 0.1F;
-constexpr float kApparentRadius = 0.07F;  // of the way from the camera
+constexpr float kApparentRadius = 0.07F;  // as a fraction of the distance from the camera
 constexpr float kProbeCount = 600;
 
-/// Metres along the unit `direction` from `origin` to where the box begins and ends; as 0 and 0
-/// where the line misses it.
+/// The distances in metres from `origin` along the unit `direction` at which a ray enters and
+/// leaves the box; {0, 0} if it misses the box.
 std::array<float, 2> way_through(const Box& box, const glm::vec3& origin,
                                  const glm::vec3& direction) {
   const glm::vec3 a = (box.low - origin) / direction, b = (box.high - origin) / direction;
@@ -26,7 +26,7 @@ std::array<float, 2> way_through(const Box& box, const glm::vec3& origin,
   return {begin, end};
 }
 
-/// Metres that are free from `origin` along the unit `direction`, at most `most`.
+/// The free distance in metres from `origin` along the unit `direction`, at most `most`.
 float free_way(const RayTracer& tracer, const glm::vec3& origin, const glm::vec3& direction,
                float most) {
   const std::array ray = {Ray{
@@ -42,7 +42,7 @@ ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const T
   const Box box = box_around(data.mesh.position);
   const glm::vec3 eye = to_glm(camera.position), ahead = -to_glm(camera.backward);
   const auto [begin, end] = way_through(box, eye, ahead);
-  // A camera that looks past the scene has the sphere as far away as the scene is large.
+  // If the camera looks past the scene, the sphere is as far away as the scene is large.
   const float most = end > 0 ? end : glm::length(box.extent());
   const float way = free_way(tracer, eye, ahead, most) - begin;
   const glm::vec3 middle = eye + (begin + kPlace * way) * ahead;
@@ -64,7 +64,7 @@ ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const T
 LightProbes make_probes_for_view(const TransferData& data) {
   const Box box = box_around(data.mesh.position);
   const glm::vec3 extent = box.extent();
-  // A scene that is flat still has probes no closer than this.
+  // In a flat scene, too, probes are no closer to each other than this.
   const float least = glm::length(extent) / 32;
   ProbeSettings settings;
   settings.spacing = std::max(std::cbrt(extent.x * extent.y * extent.z / kProbeCount), least);

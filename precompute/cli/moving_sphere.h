@@ -9,7 +9,7 @@ namespace rebounce::cli {
 /// A sphere that swings from side to side in front of `camera`, as far as there is room.
 ViewerSphere sphere_ahead(const Camera& camera, const RayTracer& tracer, const TransferData& data);
 
-/// Light probes for a file that has none: a few hundred of them in a grid over the scene.
+/// Light probes for a file that has none: some hundred in a grid over the scene.
 LightProbes make_probes_for_view(const TransferData& data);
 
 }  // namespace rebounce::cli

@@ -6,7 +6,7 @@
 
 namespace rebounce::cli {
 
-/// Throws Error before long work, not after it, if its result could not be written to `path`.
+/// Throws Error if a result cannot be written to `path`. Call it before long work.
 inline void check_can_write(const std::filesystem::path& path) {
   const AtomicFile never_committed(path);
 }

@@ -61,7 +61,7 @@ std::string described(const CostEstimate& estimate) {
   return line;
 }
 
-/// What of an error's lights is no part of it.
+/// A note about lights that an error leaves out.
 std::string left_out(const FormFactorError& error) {
   return error.dark_count == 0
              ? ""
@@ -128,7 +128,7 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
 }
 
-/// The file is written all the same, with the errors that it has.
+/// The file is written even if a tolerance is not reached; it holds the measured errors.
 void check_tolerances(const BuildRecord& record, const BuildReport& report) {
   if (record.tolerance > 0 && record.error_mean > record.tolerance) {
     throw Error(fmt::format(
@@ -215,7 +215,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   check_tolerances(data.record, report);
 }
 
-// The options below are kept by CLI11 for as long as `command` lives, and so must `chosen` be.
+// CLI11 keeps references to these values for as long as `command` lives, and so must `chosen` live.
 
 void add_scene_options(CLI::App& command, PrecomputeOptions& chosen) {
   SubdivisionSettings& subdivision = chosen.settings.subdivision;

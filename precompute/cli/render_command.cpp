@@ -26,7 +26,7 @@ struct RenderOptions {
   bool key_light = false;
 };
 
-/// Of each patch, against double precision.
+/// The error of each patch, against a solution in double precision.
 std::vector<float> errors_of(const Engine& engine) {
   const TransferData& data = engine.data();
   const ReferenceSolver solver(data);

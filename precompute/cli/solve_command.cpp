@@ -21,7 +21,7 @@
 namespace rebounce::cli {
 namespace {
 
-// F as methods see it.
+// The names of the forms of F.
 constexpr const char *kExact = "exact", *kCompressed = "compressed", *kLinks = "links";
 
 struct SolveOptions {
@@ -36,8 +36,8 @@ struct Solution {
   double microseconds = 0;
 };
 
-/// Median of the microseconds that `work` says it took, repeated for about half a second but at
-/// least three times.
+/// Median of the microseconds that `work` returns, repeated for about half a second but at least
+/// three times.
 template <typename Work>
 double median_microseconds(const Work& work) {
   std::vector<double> times;
@@ -119,7 +119,7 @@ void write_solution(const std::string& path, const Engine& engine, const Solutio
   write_csv(path, columns);
 }
 
-/// What --method names; for the product, a method that reads F least.
+/// The method of --method; for the product, the method that reads F least.
 SolveMethod method_of(const SolveOptions& chosen) {
   if (chosen.method == kHierarchicalMethod) return SolveMethod::kJacobi;
   const auto* named = std::ranges::find(kSolveMethods, chosen.method, &NamedSolveMethod::name);
@@ -135,7 +135,8 @@ Solution find_solution(const SolveOptions& chosen, Engine& engine,
   return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
 }
 
-/// What was asked for, or the best that the file holds; hierarchical radiosity is on links.
+/// The form that was asked for, or the best one that the file holds; hierarchical radiosity needs
+/// links.
 std::string form_factors_of(const SolveOptions& chosen, const TransferData& data) {
   const bool hierarchical = chosen.method == kHierarchicalMethod;
   if (hierarchical && !chosen.form_factors.empty() && chosen.form_factors != kLinks) {

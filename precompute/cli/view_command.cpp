@@ -47,7 +47,7 @@ bool emits(const TransferData& data) {
                              [](const Float3& m) { return m[0] > 0 || m[1] > 0 || m[2] > 0; });
 }
 
-/// The lights that were asked for or are the scene's own, or a lamp where there would be none.
+/// The lights that were asked for, or those of the scene, or one lamp if there would be none.
 LightSetup lights_to_begin_with(const ViewOptions& chosen, const Engine& engine) {
   const TransferData& data = engine.data();
   if (!chosen.lights.empty() || !data.lights.empty() || emits(data)) {
