@@ -8,18 +8,19 @@
 namespace rebounce {
 namespace {
 
-// A difference of one in normal, reflectance or cover weighs like this many mean patch sizes of
-// distance.
+// A difference of one in normal, reflectance or cover counts like a distance of this number of mean
+// patch sizes.
 constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0, kCoverWeight = 1.0;
 
-// Only pieces of the mesh up to this many times the length that may merge around itself are things
-// and not walls.
+// Pieces of the mesh up to this multiple of the largest length that may merge around itself are
+// objects, larger ones walls.
 constexpr double kSmallPiece = 4;
 
-// Mergings between two looks of who watches.
+// Mergings between two calls of the watch.
 constexpr std::size_t kWatchInterval = 1024;
 
-/// The largest of the elements of both, by area and then by number: so are those of each in order.
+/// The largest elements of both clusters, by area and then by number; the witnesses of each are in
+/// this order.
 void choose_witnesses(const Elements& elements, const Cluster& a, const Cluster& b,
                       Cluster& whole) {
   std::array<std::uint32_t, 2 * kWitnessCount> all{};
@@ -33,7 +34,7 @@ void choose_witnesses(const Elements& elements, const Cluster& a, const Cluster&
   std::copy_n(all.begin(), count, whole.witness.begin());
 }
 
-/// What the square of a distance between the features of two counts, m².
+/// The factor of the squared distance between the mean features of two clusters, m².
 double joint_weight(const Cluster& a, const Cluster& b) {
   return a.area * b.area / (a.area + b.area);
 }
@@ -158,19 +159,19 @@ void ClusterMerging::merge_cheapest(std::size_t count, const Watch& watch) {
   }
 }
 
-/// What counts for little may be longer.
+/// Clusters of low weight may be longer.
 bool ClusterMerging::is_too_long(const Cluster& a, const Cluster& b) const {
   const double scale = std::sqrt((a.surface + b.surface) / (a.area + b.area));
   return joint_length(a, b) > limits_.largest * scale;
 }
 
-/// What the walls between two add to merging_cost().
+/// The cost that walls between two clusters add to merging_cost().
 double ClusterMerging::cost_of_walls(std::uint32_t a, std::uint32_t b) const {
   const double sa = clusters_[a].surface, sb = clusters_[b].surface;
   return hidden_part(a, b) * limits_.wall * limits_.wall * sa * sb / (sa + sb);
 }
 
-/// The part of the view between two that is blocked, 0 if most is free.
+/// The fraction of the lines of sight between two clusters that is blocked; 0 if most are free.
 double ClusterMerging::hidden_part(std::uint32_t a, std::uint32_t b) const {
   const double length = joint_length(clusters_[a], clusters_[b]);
   if (length <= limits_.detail) return 0;
@@ -183,7 +184,7 @@ double ClusterMerging::hidden_part(std::uint32_t a, std::uint32_t b) const {
   return 1 - static_cast<double>(free) / static_cast<double>(lines.count);
 }
 
-/// Looks along the lines between all witnesses of both, until most are free.
+/// Tests the lines of sight between all witnesses of both clusters, until most are free.
 ClusterMerging::SightCount ClusterMerging::look_between(std::uint32_t a, std::uint32_t b) const {
   const std::size_t to_count = clusters_[b].witness_count;
   SightCount lines{0, 0, clusters_[a].witness_count * to_count};
@@ -211,7 +212,7 @@ bool ClusterMerging::is_in_sight(std::uint32_t a, std::uint32_t b) const {
   return triangle == kNone || what_is_at(triangle, a, b) == Sight::kFree;
 }
 
-/// What a triangle between clusters a and b is to them. What is small hides nothing.
+/// The meaning of a triangle between the clusters a and b. Small objects hide nothing.
 ClusterMerging::Sight ClusterMerging::what_is_at(std::uint32_t triangle, std::uint32_t a,
                                                  std::uint32_t b) const {
   if (triangle >= scene_.elements_of.size()) return Sight::kWall;
@@ -255,7 +256,7 @@ void ClusterMerging::merge(const Candidate& pair) {
   neighbours_.push_back(std::move(all));
 }
 
-/// Takes what is alive of the neighbours of a and b.
+/// Joins the neighbours of a and b that are still alive.
 void ClusterMerging::join_neighbours(std::uint32_t a, std::uint32_t b,
                                      std::vector<std::uint32_t>& all) {
   for (const std::uint32_t part : {a, b}) {
@@ -282,9 +283,9 @@ std::uint32_t ClusterMerging::current(std::uint32_t c) const {
   return c;
 }
 
-/// Lets every cluster point to the one that it is part of now, so that chains stay short.
+/// Makes every cluster point to the cluster that it is part of, so that chains stay short.
 void ClusterMerging::shorten_chains() {
-  for (std::size_t c = clusters_.size(); c-- > 0;) {  // what merged comes after its parts
+  for (std::size_t c = clusters_.size(); c-- > 0;) {  // merged clusters come after their parts
     const std::uint32_t next = merged_into_[c];
     if (next != kNone && !is_alive(next)) merged_into_[c] = merged_into_[next];
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-// Greedy merging of clusters of elements, the cheapest pair first.
+// Greedy merging of clusters of elements, the pair of least cost first.
 
 #include <array>
 #include <cstddef>
@@ -17,18 +17,18 @@
 
 namespace rebounce {
 
-/// Elements of a cluster between which lines of sight are drawn.
+/// Elements of a cluster that lines of sight are drawn between.
 inline constexpr std::size_t kWitnessCount = 4;
 
-/// Elements taken together.
+/// A set of elements.
 struct Cluster {
   static constexpr std::size_t kFeatureCount = 10;
 
   double surface = 0;  ///< m²
-  double area = 0;     ///< m², each element's times its density_weight
+  double area = 0;     ///< m², areas times density_weight, summed over the elements
   std::array<double, kFeatureCount>
-      sum{};                  ///< of area x feature: place, normal, reflectance, cover
-  glm::vec3 low{0}, high{0};  ///< box around it, metres
+      sum{};                  ///< of area x feature: position, normal, reflectance, cover
+  glm::vec3 low{0}, high{0};  ///< box around the cluster, metres
   std::array<std::uint32_t, kWitnessCount> witness{};  ///< its largest elements
   std::uint8_t witness_count = 0;
   bool emits = false;
@@ -36,76 +36,78 @@ struct Cluster {
   glm::dvec3 centroid() const { return glm::dvec3(sum[0], sum[1], sum[2]) / area; }
 };
 
-/// A cluster of element `e` alone. A difference of one in normal, reflectance or cover weighs like
-/// some patches of `size` metres of distance.
+/// A cluster of element `e` alone. A difference of one in normal, reflectance or cover counts like
+/// a distance of some patches of `size` metres.
 Cluster make_cluster(const Elements& elements, std::uint32_t e, double size);
 
-/// Two clusters as one.
+/// The union of two clusters.
 Cluster join(const Elements& elements, const Cluster& a, const Cluster& b);
 
-/// Metres from corner to corner of the box around both.
+/// Length of the diagonal of the box around both, metres.
 double joint_length(const Cluster& a, const Cluster& b);
 
-/// How much more the elements of both differ from their mean if they are one: J. H. Ward's
-/// criterion, in m² of area x m² of distance between features.
+/// The increase of the squared deviation of the elements from their mean if the two are merged: J.
+/// H. Ward's criterion, in m² of area x m² of distance between features.
 double merging_cost(const Cluster& a, const Cluster& b);
 
-/// What clusters may merge, and what it costs: see merge_elements(). Lengths are in metres.
+/// Which clusters may merge, and at what cost: see merge_elements(). Lengths are in metres.
 struct MergingLimits {
-  double detail;    ///< pairs that are no longer together merge through what stands between them
-  double small;     ///< longer ones must not merge around themselves
-  double largest;   ///< patch that may be made
-  double thing;     ///< pieces of the mesh that are longer hide what is behind them
-  double fragment;  ///< m²: a smaller cluster may join what it does not see
-  double wall;      ///< what stands between a pair weighs like this distance
-  double cost = std::numeric_limits<double>::infinity();  ///< the most that a merging may cost
+  double detail;    ///< longest pair that may merge through obstacles
+  double small;     ///< longest pair that may merge around itself
+  double largest;   ///< longest patch
+  double thing;     ///< longest piece of the mesh that hides nothing
+  double fragment;  ///< m²: a smaller cluster may join clusters that it does not see
+  double wall;      ///< an obstacle between a pair counts like this distance
+  double cost = std::numeric_limits<double>::infinity();  ///< limit of the cost of a merging
 };
 
-/// What all merging of the elements of a scene shares.
+/// What all mergings of the elements of a scene share.
 struct MergingScene {
   const Elements& elements;
   const RayTracer& tracer;
   std::vector<std::array<std::uint32_t, 2>>
-      elements_of;                  ///< [surface triangle, up to the last with any] or kNone
-  std::vector<float> piece_length;  ///< metres: the connected piece of the mesh of each element
+      elements_of;  ///< [surface triangle, up to the last with an element], kNone without one
+  /// Metres: length of the connected piece of the mesh of each element.
+  std::vector<float> piece_length;
 };
 
-/// Clusters, which of them may become one, and the merging of these.
+/// A set of clusters, the pairs of neighbours among them that may merge, and their merging.
 class ClusterMerging {
  public:
-  /// A merging that was done: the result has the next number after all clusters before it.
+  /// A merging: its result has the next free cluster number.
   struct Step {
-    float height;        ///< the most that a merging up to this one has cost
+    float height;        ///< largest cost of a merging up to this one
     std::uint32_t a, b;  ///< numbers of clusters
   };
 
-  /// Called with the number of clusters left now and then.
+  /// Called from time to time with the number of clusters that are left.
   using Watch = std::function<void(std::size_t)>;
 
-  /// `clusters` are all of which element `e` may be: it is in number_of[e] - first, where that is
-  /// below their number.
+  /// `clusters` contain every element: element `e` is in cluster number_of[e] - first, if that is
+  /// below the number of clusters.
   ClusterMerging(const MergingScene& scene, std::vector<Cluster> clusters,
                  std::span<const std::uint32_t> number_of, std::uint32_t first);
 
   void set_limits(const MergingLimits& limits) { limits_ = limits; }
 
-  /// Makes neighbours of pairs of clusters, unless only one of them emits.
+  /// Makes pairs of clusters neighbours, unless only one of the two emits.
   void connect(const Pairs& pairs);
 
-  /// The same for those that are detail, or one of them a fragment, or have nothing between them.
+  /// The same for pairs that are short, have a fragment in them, or have nothing between them.
   void connect_in_sight(const Pairs& pairs);
 
-  /// Gives neighbours that were refused another chance.
+  /// Offers refused pairs of neighbours again.
   void queue_neighbours();
 
-  /// Merges neighbours, the cheapest first, until `count` clusters are left or none may merge.
+  /// Merges neighbours, the pair of least cost first, until `count` clusters are left or no pair
+  /// may merge.
   void merge_cheapest(std::size_t count, const Watch& watch = {});
 
   std::size_t alive_count() const { return alive_; }
-  /// Numbers of the clusters that are left.
+  /// The numbers of the clusters that are left.
   std::vector<std::uint32_t> alive() const;
   const Cluster& operator[](std::uint32_t c) const { return clusters_[c]; }
-  /// The cluster that has become of start cluster `c`.
+  /// The cluster that contains the start cluster `c`.
   std::uint32_t current(std::uint32_t c) const;
   const std::vector<Step>& steps() const { return steps_; }
 
@@ -113,8 +115,9 @@ class ClusterMerging {
   struct Candidate {
     double cost;
     std::uint32_t a, b;
-    bool is_final;                                  ///< what stands between is in the cost
-    bool operator<(const Candidate& other) const {  // the cheapest is the greatest
+    bool is_final;  ///< the cost includes obstacles between the pair
+    // The queue returns the greatest: the one of least cost.
+    bool operator<(const Candidate& other) const {
       if (cost != other.cost) return cost > other.cost;
       return std::pair(a, b) > std::pair(other.a, other.b);
     }

@@ -10,11 +10,11 @@ namespace {
 
 using Feature = Eigen::Matrix<double, 6, 1>;
 
-// Two patches that face opposite ways are as far apart as two that are this part of the scene's
-// size away from each other. Measured: notes/operator.md.
+// Opposite normals count like a distance of this fraction of the size of the scene. Measured:
+// notes/operator.md.
 constexpr double kNormalWeight = 0.25;
 
-/// Position in units of the scene's size, and weighted normal.
+/// Positions in units of the size of the scene, and weighted normals.
 std::vector<Feature> make_features(const PatchTable& patches) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::max()), high = -low;
   for (const Float3& p : patches.centroid) {
@@ -72,8 +72,9 @@ class TreeBuilder {
     tree_.clusters.push_back({cluster.begin + first, cluster.count - first});
   }
 
-  /// Sorts the patches by their groups, and returns the size of a first child that ends where one
-  /// does, nearest to the middle; 0 if there is but one group, or all are in the same run.
+  /// Sorts the patches by group. Returns the size of a first child that ends at the boundary of a
+  /// group, the one nearest to the middle; 0 if there is only one group or all are in the same run
+  /// of the alignment.
   std::uint32_t part_groups(std::span<std::uint32_t> members, std::uint32_t count) const {
     if (group_.empty()) return 0;
     std::ranges::sort(members, [&](std::uint32_t a, std::uint32_t b) {
@@ -85,7 +86,7 @@ class TreeBuilder {
     std::uint32_t best = 0;
     for (std::uint32_t k = 1; k < members.size(); ++k) {
       if (group_[members[k - 1]] == group_[members[k]]) continue;
-      // The run that both groups share begins the second child, and is then the first of its own.
+      // The run that both groups share begins the second child, and is the first run of it.
       const std::uint32_t first = std::max(k / alignment_ * alignment_, alignment_);
       if (first < count && (best == 0 || off_middle(first) < off_middle(best))) best = first;
     }
@@ -109,8 +110,8 @@ class TreeBuilder {
     });
   }
 
-  /// The size of the first child that leaves the least variance along the axis, among the
-  /// middle half.
+  /// The size of the first child, in the middle half, that leaves the least variance along the
+  /// axis.
   std::uint32_t best_split(std::span<const std::uint32_t> members, std::uint32_t count) const {
     std::vector<double> sum(members.size() + 1, 0.0);
     for (std::size_t k = 0; k < members.size(); ++k) sum[k + 1] = sum[k] + projection_[members[k]];

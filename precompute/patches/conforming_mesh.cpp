@@ -22,7 +22,7 @@ std::array<float, N> mix(const std::array<float, N>& a, const std::array<float, 
   return mixed;
 }
 
-// Both are of one triangle, hence of one page.
+// Both belong to one triangle, hence to one page.
 LightmapTexcoord mix(const LightmapTexcoord& a, const LightmapTexcoord& b, double part) {
   return {mix(a.texcoord, b.texcoord, part), a.page};
 }
@@ -106,7 +106,7 @@ ConformingMesh::EdgeSplit ConformingMesh::split_edge(EdgeKey key, double part) {
   return split;
 }
 
-/// Triangle t = (a, b, c), counted from `corner`, becomes (a, m, c), and a new one is (m, b, c).
+/// Triangle t = (a, b, c), counted from `corner`, becomes (a, m, c); a new one is (m, b, c).
 std::uint32_t ConformingMesh::split_triangle(std::uint32_t t, int corner, std::uint32_t middle,
                                              std::vector<EdgeKey>& new_edges) {
   const Uint3 old = scene_.triangle[t];

@@ -10,14 +10,14 @@
 
 namespace rebounce {
 
-/// The triangles of a scene, joined where their edges have the same end points, whatever their
-/// materials. Edges are split in all triangles that share them, so no T-junction ever appears.
+/// The triangles of a scene, connected where their edges have the same end points, whatever their
+/// materials. Edges are split in all triangles that share them, so no T-junction appears.
 class ConformingMesh {
  public:
-  /// Names an edge by the numbers of its ends' positions (WeldedPositions).
+  /// An edge, named by the numbers of the positions of its ends (WeldedPositions).
   using EdgeKey = std::uint64_t;
 
-  /// What a split made of one triangle: `kept` is what is left of it, `added` the rest.
+  /// The two parts of a triangle after a split: `kept` keeps its number, `added` is new.
   struct TriangleSplit {
     std::uint32_t kept, added;
   };
@@ -27,38 +27,40 @@ class ConformingMesh {
     std::vector<EdgeKey> new_edges;
   };
 
-  /// `scene` is changed in place and must outlive this. No triangle may have corners at the same
-  /// position.
+  /// `scene` is changed in place and must outlive the object. No triangle may have two corners at
+  /// the same position.
   explicit ConformingMesh(Scene& scene);
 
   const Scene& scene() const { return scene_; }
   std::uint32_t triangle_count() const { return static_cast<std::uint32_t>(source_.size()); }
 
-  /// The triangle of the scene as it was that triangle `t` came from.
+  /// The original triangle of the scene that contains triangle `t`.
   std::uint32_t source(std::uint32_t t) const { return source_[t]; }
 
   /// The edge of triangle `t` from a corner to the next.
   EdgeKey edge(std::uint32_t t, int corner) const;
 
-  /// Triangles that share an edge, in the order in which they were joined to it.
+  /// The triangles that share an edge, in the order in which they were connected.
   std::span<const HalfEdge> triangles(EdgeKey key) const;
 
-  /// Metres squared.
+  /// Squared length of an edge, m².
   float length_squared(EdgeKey key) const;
 
-  /// True if vertex `v` is the end of the edge from which split_edge measures.
+  /// True if vertex `v` is the end that split_edge measures from.
   bool is_begin(EdgeKey key, std::uint32_t v) const { return position_id_[v] == key >> 32; }
 
-  /// Splits an edge at the part 0 < `part` < 1 of the way between its ends. Vertex attributes are
-  /// interpolated; vertices that were apart at the ends (seams) are apart in between.
+  /// Splits an edge at the fraction 0 < `part` < 1 of the way between its ends. Vertex attributes
+  /// are interpolated; vertices that are separate at the ends (seams) are separate at the new
+  /// point.
   EdgeSplit split_edge(EdgeKey key, double part);
 
-  /// Moves vertex `v` by `part` of the way to vertex `to`, attributes and all. The surface stays as
-  /// it was if both are corners of pieces of one flat triangle, and `v` of no others.
+  /// Moves vertex `v` by the fraction `part` of the way to vertex `to`, with its attributes. The
+  /// surface keeps its shape if both are corners of pieces of one flat triangle, and `v` of no
+  /// others.
   void move_vertex(std::uint32_t v, std::uint32_t to, double part);
 
-  /// Puts the triangles into their final order, those that come from one together; returns the
-  /// source of each. The mesh must not be used afterwards.
+  /// Brings the triangles into their final order, where parts of one original triangle are
+  /// neighbours; returns the source of each. The mesh must not be used afterwards.
   std::vector<std::uint32_t> finish();
 
  private:
@@ -74,8 +76,9 @@ class ConformingMesh {
   std::vector<std::uint32_t> position_id_;
   std::uint32_t position_count_ = 0;
   std::vector<std::uint32_t> source_;
-  std::vector<std::uint32_t> next_;  ///< list of triangles in their final order
-  EdgeTable first_edges_;  ///< those of the mesh as it was; what is split is no longer asked for
+  std::vector<std::uint32_t> next_;  ///< linked list of triangles in their final order
+  /// Edges of the original mesh; edges that are split are not looked up again.
+  EdgeTable first_edges_;
   std::unordered_map<EdgeKey, std::vector<HalfEdge>> new_edges_;
 };
 

@@ -1,6 +1,5 @@
-// Bisection: longest_edges.h.
-// Vertices moved onto the line before edges are cut: F. Labelle and J. R. Shewchuk, "Isosurface
-// stuffing" (2007), there in three dimensions.
+// Bisection: longest_edges.h. Moving vertices onto the line before edges are cut: F. Labelle and J.
+// R. Shewchuk, "Isosurface stuffing" (2007), there in three dimensions.
 
 #include "precompute/patches/contact_cuts.h"
 
@@ -21,19 +20,20 @@
 namespace rebounce {
 namespace {
 
-// All in units of the patch size, the root of a patch's area.
+// All in units of the patch size, the square root of the area of a patch.
 constexpr double kShortestContact = 0.5;
 constexpr double kTolerance = 1.0 / 1024;  // far below what a patch resolves
-constexpr double kGap = 1.0 / 2;           // light that gets through below does not get far
+constexpr double kGap = 1.0 / 2;           // light through a smaller gap does not reach far
 
-// The tolerance is never less than this part of the largest coordinate, which is some tens of its
-// rounding errors: a vertex put on a line must count as lying there.
+// The tolerance is at least this fraction of the largest coordinate, some tens of its rounding
+// errors: a vertex that is moved onto a line must count as lying on it.
 constexpr double kRounding = 1.0 / (1 << 18);
 
-// A cut that passes an end of an edge by less than this part of the edge moves that end.
+// A cut that passes an end of an edge at less than this fraction of the edge moves that end
+// instead.
 constexpr double kSnap = 0.2;
 
-// Such a move may leave of a triangle's area this part at least.
+// Such a move must leave at least this fraction of the area of a triangle.
 constexpr double kLeastArea = 0.4;
 
 double largest_coordinate(const Scene& scene) {
@@ -59,14 +59,14 @@ class ContactCuts {
     });
   }
 
-  /// Cuts at the longest contacts first, until `most_added` triangles have been added by cuts;
-  /// bisection only does what subdivision would do anyway.
+  /// Cuts at the longest contacts first, until cuts have added `most_added` triangles. Bisection
+  /// does not count: subdivision would do the same.
   void run(std::size_t most_added) {
     for (const Contact& contact : contacts_) refine(contact);
     const std::size_t most = mesh_.triangle_count() + most_added;
     std::size_t count = 0;
     while (count < contacts_.size() && mesh_.triangle_count() < most) cut(contacts_[count++]);
-    // A vertex that was moved for one may have brought a triangle under the end of another.
+    // A vertex that was moved for one contact may have brought a triangle under the end of another.
     bool changed = count > 0;
     while (changed) {
       changed = false;
@@ -94,7 +94,7 @@ class ContactCuts {
     }
   }
 
-  /// Bisects the longest edge of a triangle, but first that of any neighbour with a longer one.
+  /// Bisects the longest edge of a triangle, but first that of a neighbour with a longer one.
   void bisect(std::uint32_t t) {
     const EdgeKey wanted = longest_edge(mesh_, t);
     EdgeKey key = wanted;
@@ -104,7 +104,7 @@ class ContactCuts {
     } while (key != wanted);
   }
 
-  /// Makes a contact an edge of the mesh; returns whether it was none.
+  /// Makes a contact an edge of the mesh. Returns true if the mesh changed.
   bool cut(const Contact& contact) {
     const std::vector<std::uint32_t>& pieces = pieces_of(contact);
     bool changed = false;
@@ -118,7 +118,7 @@ class ContactCuts {
     return changed;
   }
 
-  /// Keeps what lies on a contact from being moved off it by another.
+  /// Prevents vertices on a contact from being moved off it by another contact.
   void hold_vertices_on(const Contact& contact) {
     for (const std::uint32_t t : pieces_of(contact)) {
       for (const std::uint32_t v : scene_.triangle[t]) {
@@ -127,7 +127,7 @@ class ContactCuts {
     }
   }
 
-  /// Takes a step towards a piece that the contact no longer crosses.
+  /// Does one step towards a piece that the contact does not cross.
   void cut_piece(std::uint32_t t, const Contact& contact) {
     const std::array<double, 3> across = distances(t, contact.line);
     int corner = 0;
@@ -141,7 +141,7 @@ class ContactCuts {
     is_free_.back() = false;
   }
 
-  /// Moves vertex `v` towards `to`, if it may be moved and no triangle loses too much of its area.
+  /// Moves vertex `v` towards `to`, if it is free to move and no triangle loses too much area.
   bool try_move(std::uint32_t v, std::uint32_t to, double part, const Contact& contact) {
     if (!is_free_[v]) return false;
     is_free_[v] = false;
@@ -173,8 +173,8 @@ class ContactCuts {
 
   glm::dvec3 position(std::uint32_t v) const { return to_dvec3(scene_.position[v]); }
 
-  /// Distances of a triangle's corners from a contact, 0 if they count as lying on it. Free
-  /// vertices do not: they can be moved onto it.
+  /// Distances of the corners of a triangle from a contact, 0 for corners that count as lying on
+  /// it. Free vertices do not: they can be moved onto it.
   std::array<double, 3> distances(std::uint32_t t, const ContactLine& line) const {
     std::array<double, 3> across;
     for (int k = 0; k < 3; ++k) {
@@ -194,9 +194,9 @@ class ContactCuts {
   Scene& scene_;
   ConformingMesh mesh_;
   std::vector<Contact> contacts_;  ///< longest first
-  /// What became of each triangle with contacts.
+  /// The pieces of each triangle with contacts.
   std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> pieces_;
-  std::vector<bool> is_free_;      ///< vertices inside of a triangle that lie on no contact yet
+  std::vector<bool> is_free_;      ///< vertices inside a triangle that lie on no contact yet
   double patch_size_, tolerance_;  ///< metres
 };
 

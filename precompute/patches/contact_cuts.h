@@ -7,15 +7,15 @@
 
 namespace rebounce {
 
-/// Splits the scene's triangles along the lines where others pass through them or stand on them
-/// (contacts.h), so that no patch lies on two sides of a wall. The mesh stays conforming, no area
-/// is lost and no surface changes; parts of one triangle follow one another.
+/// Splits triangles of the scene along the lines where other surfaces pass through them or stand on
+/// them (contacts.h), so that no patch lies on two sides of a wall. The mesh stays conforming, and
+/// neither area nor surface changes; parts of one triangle follow one another.
 ///
 /// Triangles are bisected around such lines until they are about as large as the patches that
-/// `settings` ask for; free vertices near a line are then moved onto it, and edges that still cross
-/// it are split there. Lines shorter than half of a patch are left alone, and so are the shortest
-/// ones once half as many triangles as wanted patches have been added: a detailed object does not
-/// shred the floor it stands on. Deterministic.
+/// `settings` ask for. Free vertices near a line are then moved onto it, and edges that still cross
+/// it are split. Lines shorter than half a patch are ignored. The shortest lines are also ignored
+/// once half as many triangles as wanted patches have been added, so that a detailed object does
+/// not shred the floor that it stands on. Deterministic.
 void cut_at_contacts(Scene& scene, const SubdivisionSettings& settings);
 
 }  // namespace rebounce

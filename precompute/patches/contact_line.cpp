@@ -34,7 +34,7 @@ class LineJoiner {
   }
 
  private:
-  /// Of a line along another one.
+  /// A range of distances along a line.
   struct Interval {
     double low, high;  ///< metres
     std::uint32_t line;
@@ -46,7 +46,7 @@ class LineJoiner {
     return boxes;
   }
 
-  /// The box around a line that is longer by `more` metres at each end.
+  /// The box around a line that is extended by `more` metres at each end.
   Box box_around(const ContactLine& line, double more) const {
     const glm::vec3 margin(static_cast<float>(width_ + tolerance_));
     Box box;
@@ -56,7 +56,7 @@ class LineJoiner {
   }
 
   ContactLine with_all_that_goes_on(ContactLine line) {
-    // Twice as far each time, so that what is looked at is about as long as what is joined.
+    // Each step looks twice as far, so that the region stays about as long as the joined line.
     for (double before = 0; line.length() > before;) {
       before = line.length();
       line = grow(line, intervals_near(line));
@@ -64,7 +64,7 @@ class LineJoiner {
     return line;
   }
 
-  /// Of lines that are still free and near enough to the line of another, as far as its length from
+  /// The ranges of lines that are still free and close enough to a line, up to its length beyond
   /// its ends; the lowest first.
   std::vector<Interval> intervals_near(const ContactLine& line) {
     tree_.find({box_around(line, line.length()), {}}, found_);
@@ -80,7 +80,7 @@ class LineJoiner {
     return intervals;
   }
 
-  /// A line with those that touch it, or one another from it on.
+  /// Joins a line with the ranges that touch it, and with those that touch one another from it on.
   ContactLine grow(const ContactLine& line, const std::vector<Interval>& intervals) {
     double first = 0, last = line.length();
     const auto take = [&](const Interval& interval) {
@@ -99,7 +99,7 @@ class LineJoiner {
 
   std::vector<ContactLine> lines_;
   double width_, tolerance_;  ///< metres
-  BoxTree tree_;              ///< over them
+  BoxTree tree_;              ///< over the lines
   std::vector<bool> is_joined_;
   std::vector<std::uint32_t> found_;
 };

@@ -13,7 +13,8 @@
 namespace rebounce {
 namespace {
 
-// Lines this many tolerances apart are one: two would leave a strip of slivers between them.
+// Lines within this multiple of the tolerance count as one: two lines would leave a strip of
+// slivers between them.
 constexpr double kSameLine = 8;
 
 using Corners = TriangleCorners;
@@ -26,7 +27,7 @@ double longest_edge(const Corners& p) {
       {glm::distance(p[0], p[1]), glm::distance(p[1], p[2]), glm::distance(p[2], p[0])});
 }
 
-/// A triangle whose contacts are looked for.
+/// A triangle whose contacts are searched.
 struct Touched {
   std::uint32_t triangle;
   Corners corner;
@@ -34,7 +35,7 @@ struct Touched {
   bool both_sides;
 };
 
-/// Leaves one of each kind that is there once, and none of the others.
+/// Keeps edges that occur exactly once, and drops all others.
 void keep_single(std::vector<Edge>& edges) {
   std::ranges::sort(edges);
   std::size_t kept = 0;
@@ -81,7 +82,7 @@ class ContactFinder {
     return boxes;
   }
 
-  /// The box around a triangle, larger by `margin` metres on each side.
+  /// The box around a triangle, extended by `margin` metres on each side.
   Box box_of(std::uint32_t t, double margin) const {
     Box box;
     for (const std::uint32_t v : scene_.triangle[t]) box.add(to_glm(scene_.position[v]));
@@ -94,9 +95,9 @@ class ContactFinder {
     return {t, p, front_normal(p), scene_.materials[scene_.triangle_material[t]].double_sided};
   }
 
-  /// The contacts of a triangle. Far more pieces lie around it, in its plane, than touch it (one
-  /// that is a thread of a thin tube has the whole tube around it): only those that touch make
-  /// lines, and only lines that cross it are followed beyond it.
+  /// The contacts of a triangle. Far more pieces lie around it, in its plane, than touch it (a
+  /// triangle of a thin tube has the whole tube around it). Only pieces that touch make lines, and
+  /// only lines that cross the triangle are followed beyond it.
   std::vector<ContactLine> lines_on(const Touched& t) const {
     std::vector<ContactLine> whole;
     for (const ContactLine& line : crossing_lines(pieces_in(prism_around(t), t), t)) {
@@ -109,7 +110,7 @@ class ContactFinder {
     return lines;
   }
 
-  /// Pieces joined to lines, those that cross a triangle.
+  /// Joins pieces to lines and keeps those that cross a triangle.
   std::vector<ContactLine> crossing_lines(std::vector<ContactLine> pieces, const Touched& t) const {
     std::vector<ContactLine> lines = join_lines(std::move(pieces), width_, settings_.tolerance);
     std::erase_if(lines, [&](const ContactLine& line) { return !crosses(line, t); });
@@ -122,7 +123,7 @@ class ContactFinder {
     return line.crosses(t.corner, across, settings_.tolerance);
   }
 
-  /// What is above a triangle or below it.
+  /// The region above and below a triangle.
   ConvexRegion prism_around(const Touched& t) const {
     ConvexRegion region = {box_of(t.triangle, settings_.gap + width_), {}};
     for (int k = 0; k < 3; ++k) {
@@ -134,7 +135,8 @@ class ContactFinder {
     return region;
   }
 
-  /// What is above or below a line on a triangle, no farther beyond that than the shortest contact.
+  /// The region above and below a line on a triangle, at most the shortest contact beyond the
+  /// triangle.
   ConvexRegion strip_around(const ContactLine& line, const Touched& t) const {
     const double reach = settings_.gap + settings_.shortest + width_;
     ConvexRegion region = {box_of(t.triangle, reach), {}};
@@ -144,10 +146,11 @@ class ContactFinder {
     return region;
   }
 
-  /// The part of a region that is near enough to a triangle's plane, and not wholly behind it.
+  /// The part of a region that is near enough to the plane of a triangle, and not entirely behind
+  /// it.
   ConvexRegion layer_of(ConvexRegion region, const Touched& t) const {
     const double height = glm::dot(t.normal, t.corner[0]);
-    // A tolerance more than what is asked of each triangle later.
+    // One tolerance more than the limit that triangles are tested against later.
     const double above = settings_.gap + settings_.tolerance;
     const double below = t.both_sides ? above : 2 * settings_.tolerance;
     region.sides.push_back({t.normal, height + above});
@@ -155,7 +158,7 @@ class ContactFinder {
     return region;
   }
 
-  /// Contacts with large triangles, in pieces as small as these, as far as they meet a region.
+  /// Contacts with large triangles, in pieces of this size, as far as they meet a region.
   std::vector<ContactLine> pieces_in(const ConvexRegion& region, const Touched& t) const {
     std::vector<std::uint32_t> near;
     tree_.find(layer_of(region, t), near);
@@ -186,8 +189,8 @@ class ContactFinder {
     return std::abs(distance) <= tolerance ? 0 : distance;
   }
 
-  /// Edges in a region. Of those the tree finds every triangle that is not behind, so that single
-  /// ones are outlines.
+  /// Adds the edges in a region. The tree finds every triangle at these edges that is not behind,
+  /// so that edges that occur once are outlines.
   void add_edges(std::uint32_t t, const ConvexRegion& region, std::vector<Edge>& edges) const {
     for (int k = 0; k < 3; ++k) {
       const Float3& a = scene_.position[scene_.triangle[t][k]];
@@ -196,7 +199,8 @@ class ContactFinder {
     }
   }
 
-  /// Where the triangle `q` passes through a plane or, failing that, stands close above it.
+  /// The segment where the triangle `q` passes through a plane or, otherwise, stands close above
+  /// it.
   std::optional<Segment> meet(const Corners& q, const Heights& height) const {
     const std::optional<Segment> through = meet(q, height, settings_.tolerance);
     return through ? through : meet(q, height, settings_.gap);
@@ -213,11 +217,11 @@ class ContactFinder {
         end[count++] = glm::mix(q[k], q[next], height[k] / (height[k] - height[next]));
       }
     }
-    if (count != 2) return {};  // it is clear of the plane, or touches it with a corner
+    if (count != 2) return {};  // it does not meet the plane, or only with a corner
     return Segment{end[0], end[1]};
   }
 
-  /// Adds a segment, moved into the triangle's plane, to `pieces`.
+  /// Adds a segment to `pieces`, moved into the plane of the triangle.
   void add(Segment segment, const Touched& t, std::vector<ContactLine>& pieces) const {
     for (glm::dvec3& end : segment) end -= glm::dot(end - t.corner[0], t.normal) * t.normal;
     if (glm::distance(segment[0], segment[1]) <= settings_.tolerance) return;
@@ -226,7 +230,7 @@ class ContactFinder {
 
   const Scene& scene_;
   const ContactSettings& settings_;
-  double width_;                      ///< of what counts as one line, metres to either side
+  double width_;                      ///< largest distance of pieces of one line from it, metres
   std::vector<std::uint32_t> large_;  ///< triangles that may cut and be cut
   BoxTree tree_;                      ///< over them
 };

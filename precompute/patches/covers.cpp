@@ -13,16 +13,16 @@ namespace {
 
 using EdgeKey = ConformingMesh::EdgeKey;
 
-// Points of a triangle at which it is looked for covers before it is bisected.
+// Points of a triangle at which covers are searched before it is bisected.
 constexpr std::uint32_t kPoints = kMostCoverPoints;
 
-// Points that tell whether all of it is covered, beside its three corners, this part of the way to
-// the middle.
+// Points that tell whether all of a triangle is covered, beside its three corners, which are moved
+// this fraction of the way to the middle.
 constexpr std::uint32_t kPointsOfWhole = 12;
 constexpr double kInset = 0.05;
 const glm::dvec2 kCentroid(1.0 / 3);
 
-// Triangles whose longest edge is no longer than this many patch sizes are fine enough.
+// Triangles whose longest edge is at most this number of patch sizes are fine enough.
 constexpr double kFinest = 0.3;
 
 class CoverRefinement {
@@ -38,7 +38,7 @@ class CoverRefinement {
     while (!suspects.empty() && mesh_.triangle_count() < most) {
       std::vector<std::uint32_t> mixed = find_mixed(suspects);
       suspects.clear();
-      // What is left when there are enough triangles is the smallest.
+      // The largest come first; the smallest are left if there are enough triangles.
       std::ranges::stable_sort(mixed, [this](std::uint32_t a, std::uint32_t b) {
         return longest_squared(a) > longest_squared(b);
       });
@@ -83,8 +83,8 @@ class CoverRefinement {
     return part > 0 && part < 1;
   }
 
-  /// Bisects the longest edge of a triangle, and before it those of its neighbours' that are
-  /// longer; what is new joins `suspects`, once.
+  /// Bisects the longest edge of a triangle, and before it the longer edges of its neighbours; adds
+  /// each new triangle to `suspects` once.
   void bisect(std::uint32_t t, std::vector<std::uint32_t>& suspects) {
     const EdgeKey wanted = longest_edge(mesh_, t);
     EdgeKey key = wanted;
@@ -109,8 +109,8 @@ class CoverRefinement {
   std::vector<std::uint8_t> is_new_;  ///< of each triangle: made in this round
 };
 
-/// How many points of a triangle's front have something within `height` metres above them; none of
-/// one without area: cuts through triangles as thin as floats can tell leave some.
+/// The number of points of the front of a triangle that have a surface within `height` metres above
+/// them; 0 for a triangle without area, which cuts may leave.
 std::size_t count_covered(const TriangleCorners& corners, std::span<const glm::dvec2> points,
                           const RayTracer& tracer, double height) {
   if (area_vector(corners) == glm::dvec3(0)) return 0;

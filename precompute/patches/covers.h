@@ -1,7 +1,6 @@
 #pragma once
 
-// Surfaces that others lie close above: the wall behind a panel, the floor under a rug or a
-// curtain.
+// Surfaces that others cover closely: the wall behind a panel, the floor under a rug or a curtain.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,32 +13,31 @@
 
 namespace rebounce {
 
-/// What hangs higher above a surface than this many mean patch sizes does not cover it.
+/// A surface higher above another than this number of mean patch sizes does not cover it.
 inline constexpr double kCoverHeight = 0.5;
 
-/// Points of a triangle at which covers are looked for, at most.
+/// The largest number of points of a triangle at which covers are searched.
 inline constexpr std::uint32_t kMostCoverPoints = 16;
 
-/// The part of a triangle's front above which something lies within `height` metres, as rays
-/// straight up from `count` of its points have it: from 1 to kMostCoverPoints.
+/// The fraction of the front of a triangle above which a surface lies within `height` metres, from
+/// rays straight up at `count` of its points, 1 to kMostCoverPoints.
 double covered_part(const TriangleCorners& corners, const RayTracer& tracer, double height,
                     std::uint32_t count);
 
-/// What hangs no higher above a surface than this many mean patch sizes ends the smooth light on
-/// it. Under what hangs higher one can see.
+/// A surface no higher above another than this number of mean patch sizes ends the smooth light on
+/// it. Below a higher one the surface is visible.
 inline constexpr double kCloseCover = 1.0 / 32;
 
-/// Whether all of a triangle's front is covered by what hangs no higher than `height` metres, as a
-/// few points of it have it. What is covered in part shows the light beside the cover: it is what
-/// stands out from under it that is seen.
+/// True if all of the front of a triangle is covered by surfaces no higher than `height` metres,
+/// from a few of its points. A triangle that is covered in part shows the light beside the cover,
+/// because its open part is the visible one.
 bool is_covered(const TriangleCorners& corners, const RayTracer& tracer, double height);
 
-/// Bisects triangles of which a part is covered and a part is in the open, until they are small
-/// beside a patch of `patch_size` metres: so patches can end about where covers do, whatever these
-/// are made of. `sides` [t] are those of the triangles, and only those that are lit count; `tracer`
-/// holds the same surface. Adds no more than about `most_added` triangles. The mesh stays
-/// conforming. Returns for each triangle the one it came from, those of one following each other.
-/// Deterministic.
+/// Bisects triangles that are covered in part until they are small relative to a patch of
+/// `patch_size` metres, so that patches can end about where covers end. `sides` [t] are those of
+/// the triangles; only lit sides count. `tracer` holds the same surface. Adds at most about
+/// `most_added` triangles. The mesh stays conforming. Returns for each triangle the one that it
+/// came from; parts of one triangle follow each other. Deterministic.
 std::vector<std::uint32_t> refine_at_covers(Scene& scene, std::span<const TriangleSides> sides,
                                             const RayTracer& tracer, double patch_size,
                                             std::size_t most_added);

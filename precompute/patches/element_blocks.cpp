@@ -14,13 +14,13 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kBlockSize = 1 << 12;  // elements: what they need fits into a cache
+constexpr std::size_t kBlockSize = 1 << 12;  // elements: their data fits into a cache
 
-// Each element's nearest others that may join it without an edge between.
+// Each element's nearest others that may join it without a shared edge.
 constexpr std::size_t kNearCount = 8;
 
-// Two flat squares that make a patch of the mean area cost size^4 / 8 to merge. Mergings up to this
-// part of it leave clusters of a sixteenth of that area.
+// Merging two flat squares into a patch of the mean area costs size^4 / 8. Mergings up to this
+// fraction of it leave clusters of a sixteenth of that area.
 constexpr double kBlockCost = 1.0 / 256;
 
 using Steps = std::vector<ClusterMerging::Step>;
@@ -109,7 +109,7 @@ class BlockMerging {
     return merging.steps();
   }
 
-  /// Takes the most expensive steps back where there are too many.
+  /// Undoes the steps of highest cost if too many were done.
   void leave_enough(std::vector<Steps>& steps) const {
     std::size_t count = 0;
     for (const Steps& s : steps) count += s.size();
@@ -123,7 +123,7 @@ class BlockMerging {
     }
     const auto limit = height.begin() + static_cast<std::ptrdiff_t>(allowed);
     std::ranges::nth_element(height, limit);
-    // A block's heights never sink.
+    // The heights of a block never decrease.
     for (Steps& of_block : steps) {
       std::erase_if(of_block, [&](const ClusterMerging::Step& s) { return s.height >= *limit; });
     }
@@ -140,7 +140,7 @@ class BlockMerging {
         into[s.a] = into[s.b] = static_cast<std::uint32_t>(cluster.size());
         cluster.push_back(join(scene_.elements, cluster[s.a], cluster[s.b]));
       }
-      for (std::size_t c = cluster.size(); c-- > 0;) {  // what merged comes after its parts
+      for (std::size_t c = cluster.size(); c-- > 0;) {  // merged clusters come after their parts
         if (into[c] != kNone) {
           number[c] = number[into[c]];
           continue;
@@ -155,7 +155,7 @@ class BlockMerging {
 
   const MergingScene& scene_;
   const BlockSettings& settings_;
-  std::vector<std::uint32_t> order_;  ///< elements, those of a block together
+  std::vector<std::uint32_t> order_;  ///< elements, block by block
   std::vector<std::uint32_t> place_;  ///< [e] in order_
   std::vector<std::uint32_t> begin_;  ///< of each block in order_
   MergingLimits limits_;

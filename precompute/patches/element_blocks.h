@@ -9,24 +9,24 @@
 
 namespace rebounce {
 
-/// Clusters that elements were merged into.
+/// Clusters that elements are merged into.
 struct ElementClusters {
   std::vector<Cluster> cluster;
-  std::vector<std::uint32_t> of_element;  ///< [e]
+  std::vector<std::uint32_t> of_element;  ///< [e] number of its cluster
 };
 
-/// Every element a cluster of its own. `size` as for make_cluster().
+/// Makes every element a cluster of its own; `size` is that of make_cluster().
 ElementClusters one_each(const Elements& elements, double size);
 
 struct BlockSettings {
-  double size;        ///< the mean patch's, metres: see make_cluster()
-  std::size_t least;  ///< leave no fewer clusters
+  double size;        ///< mean patch size, metres: see make_cluster()
+  std::size_t least;  ///< least number of clusters that are left
   MergingLimits limits;
 };
 
-/// Merges elements within blocks of neighbours, one after the other on each thread, as far as
-/// merging all of them the cheapest first would do in any case: to about a sixteenth of a mean
-/// patch. Memory for neighbours and queues is that of one block for each thread.
+/// Merges elements within blocks of neighbours, one block after the other on each thread, as far as
+/// a merging of all elements by cost would merge them in any case: to about a sixteenth of a mean
+/// patch. Neighbours and queues take the memory of one block per thread.
 ElementClusters merge_in_blocks(const MergingScene& scene, const BlockSettings& settings,
                                 const Progress& progress);
 

@@ -14,31 +14,32 @@
 namespace rebounce {
 namespace {
 
-// Elements are merged in blocks first where they are not few and this many times as many as
-// patches; so many times as many clusters as patches are left then, at least.
+// Elements are merged in blocks first if there are more than kFewElements of them and more than
+// kManyElements per patch; at least kLeastClusters clusters per patch are left then.
 constexpr std::size_t kFewElements = 1 << 16, kManyElements = 16, kLeastClusters = 8;
 
-// Each cluster's nearest others that may join it without an edge between.
+// Each cluster's nearest others that may join it without a shared edge.
 constexpr std::size_t kNearCount = 8;
 
-// A patch is no longer than this many mean sizes: else, where much must not merge because of the
-// leak test, the walls around it would, at any price.
+// A patch is at most this number of mean sizes long. Without this limit the walls around things
+// that must not merge would merge at any cost, because the leak test leaves few other pairs.
 constexpr double kLongest = 4;
 
-// What is no longer than these parts of the mean size merges without leak test; may merge around
-// itself; hides nothing.
+// Clusters up to these fractions of the mean size merge without leak test; may merge around
+// themselves; hide nothing.
 constexpr double kDetail = 1.0 / 16, kSmall = 0.5, kThing = 0.5;
 
-// A cluster of this part of the mean area may join neighbours that it does not see. To lie on two
-// sides of a wall costs like being this many mean sizes apart: patches may be half as long, so that
-// what matters is kept apart, and fragments, of which hidden places have thousands, are not.
+// A cluster below this fraction of the mean area may join neighbours that it does not see. Lying on
+// two sides of a wall costs like a distance of kWall mean sizes: patches may be half as long, so
+// that relevant surfaces are kept apart, while fragments, which hidden places have by the thousand,
+// are not.
 constexpr double kFragment = 1.0 / 16, kWall = 8;
 
-// Where there are still too many patches, rounds in which those that lie near each other become
-// neighbours. In the last of them patches may be twice as long each time.
+// Rounds in which patches that lie near each other become neighbours, while there are too many
+// patches. In the last rounds the longest patch doubles each time.
 constexpr int kRounds = 8, kRoundsOfLength = 6;
 
-// The part of the progress that is for blocks.
+// The fraction of the progress for blocks.
 constexpr double kBlocksProgress = 0.6;
 
 class ElementMerging {
@@ -90,7 +91,7 @@ class ElementMerging {
     limits_.largest = settings_.largest > 0 ? std::min<double>(settings_.largest, length) : length;
   }
 
-  /// Finds how long the connected piece of the mesh is that each element is of.
+  /// Finds the length of the connected piece of the mesh that each element belongs to.
   void measure_pieces(const Pairs& edges) {
     const Elements& elements = scene_.elements;
     std::vector<std::uint32_t> piece(elements.size());
@@ -103,7 +104,7 @@ class ElementMerging {
       const std::uint32_t low = std::min(find(a), find(b)), high = std::max(find(a), find(b));
       piece[high] = low;
     }
-    std::vector<std::array<glm::vec3, 2>> box;  // of each piece, by its first element's number
+    std::vector<std::array<glm::vec3, 2>> box;  // of each piece, by the number of its first element
     std::vector<std::uint32_t> number(elements.size());
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
       if (find(e) == e) {
@@ -128,7 +129,7 @@ class ElementMerging {
                            part_of(progress, 0, kBlocksProgress));
   }
 
-  /// Makes neighbours of clusters that meet at an edge, or that lie near each other in sight.
+  /// Makes clusters neighbours that share an edge, or that lie near each other and see each other.
   void connect(const ElementClusters& start, Pairs edges, ClusterMerging& merging) const {
     for (auto& [a, b] : edges) {
       const auto [low, high] = std::minmax(start.of_element[a], start.of_element[b]);
@@ -179,7 +180,7 @@ class ElementMerging {
 
   MergingScene scene_;
   const ClusterSettings& settings_;
-  double size_;  ///< the mean patch's, metres
+  double size_;  ///< mean patch size, metres
   MergingLimits limits_{};
 };
 

@@ -10,7 +10,7 @@
 namespace rebounce {
 namespace {
 
-/// The two sides of one triangle.
+/// True for the two sides of one triangle.
 bool are_two_sides(const Uint3& a, const Uint3& b) {
   Uint3 x = a, y = b;
   std::ranges::sort(x);
@@ -23,8 +23,8 @@ void sort_and_unique(Pairs& pairs) {
   pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
 }
 
-// How far lines of sight are lifted off the surface, as a part of their length: half a circle's
-// rounding is passed over, a wall is not.
+// The height of lines of sight above the surface, as a fraction of their length: they pass over the
+// curvature of half a circle, but not over a wall.
 constexpr float kLift = 0.3F;
 
 Ray segment(const glm::vec3& from, const glm::vec3& to) {

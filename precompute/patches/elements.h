@@ -9,23 +9,23 @@
 
 namespace rebounce {
 
-/// The lit sides of display triangles, each an element of some patch.
+/// The lit sides of display triangles; each belongs to one patch.
 struct Elements {
   std::vector<Float3> position;         ///< [p] metres; no two are the same
-  std::vector<std::uint32_t> triangle;  ///< [e] that of the surface which it is a side of
+  std::vector<std::uint32_t> triangle;  ///< [e] surface triangle of the side
   std::vector<Uint3> corner;            ///< [e] positions
   std::vector<Float3> normal;           ///< [e] unit
   std::vector<float> area;              ///< [e] m² of what stops light, > 0
   std::vector<Float3> reflectance;      ///< [e] [0, 1]
-  std::vector<std::uint8_t> emits;      ///< [e] 1 if it does
-  std::vector<float> density_weight;    ///< [e] (0, 1] what its area counts for
-  std::vector<float> covered;           ///< [e] part of it above which something lies close
+  std::vector<std::uint8_t> emits;      ///< [e] 1 if it emits
+  std::vector<float> density_weight;    ///< [e] (0, 1] factor of its area
+  std::vector<float> covered;           ///< [e] fraction of its area that is covered closely
 
   std::size_t size() const { return area.size(); }
   void resize(std::size_t count);
 
   Float3 centroid(std::size_t e) const;
-  glm::vec3 low(std::size_t e) const;  ///< of the box around it
+  glm::vec3 low(std::size_t e) const;  ///< corners of the box around an element
   glm::vec3 high(std::size_t e) const;
 };
 

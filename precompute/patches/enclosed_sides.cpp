@@ -12,28 +12,28 @@
 namespace rebounce {
 namespace {
 
-// What meets nothing within this part of the scene's diagonal is out, nor need it go farther than
-// these metres: where a person can stand there may be lamps.
+// A path is outside if it meets nothing within this fraction of the diagonal of the scene, or
+// within kRoom metres: where a person can stand, there may be lamps.
 constexpr double kReach = 1.0 / 4, kRoom = 1.5;
 
-// At each bounce goes on what the surface reflects, but half of the paths at least; none is
-// followed for longer than this.
+// At each bounce the reflected fraction of the paths continues, but at least half of them; no path
+// has more bounces than this.
 constexpr double kLeastSurvival = 0.5;
 constexpr int kBounces = 32;
 
-// Texture samples for what a triangle reflects.
+// Texture samples for the reflectance of a triangle.
 constexpr int kTextureSamples = 16;
 
-/// A look at a side by itself, by so many paths all in all: it is inside if no more than `inside`
-/// of them are out and lit if no fewer than `lit` are; else it is looked at again.
+/// One step of the test of a single side, by this total number of paths: the side is inside if at
+/// most `inside` of them are outside, lit if at least `lit` are, and tested further otherwise.
 struct Look {
   std::uint32_t paths;
   int inside, lit;
 };
 
-// A sequential test (A. Wald, 1945), cut short: a side of whose paths 8 % get out is taken for
-// inside once in eight times, one of 12 % once in fifty; one of 1 % is taken for lit once in 250
-// times.
+// A sequential test (A. Wald, 1945), truncated. A side with 8 % of its paths outside is taken for
+// inside once in eight times, one with 12 % once in fifty; one with 1 % is taken for lit once in
+// 250 times.
 constexpr std::array<Look, 10> kLooks{{{4, -1, 2},
                                        {12, -1, 3},
                                        {20, -1, 3},
@@ -45,33 +45,34 @@ constexpr std::array<Look, 10> kLooks{{{4, -1, 2},
                                        {112, 4, 6},
                                        {128, 5, 6}}};
 
-// Of a side smaller than the square of this part of the reach little depends: it is inside if of so
-// many paths no more than so many are out, and else lit.
+// A side smaller than the square of this fraction of the reach matters little: it gets one look.
 constexpr double kTiny = 1.0 / 64;
 constexpr Look kLookAtTiny{32, 1, 2};
 
-// Sides of triangles that follow each other, no farther apart than this part of the reach, are
-// first judged together: by so many paths in all, then by so many of each side and no fewer than
-// kLeastPaths in all, then by four times as many.
+// Consecutive sides of triangles no farther apart than this fraction of the reach are first tested
+// together: by a number of paths in all, then by a number for each side, at least kLeastPaths in
+// all, then by four times as many.
 constexpr std::size_t kGroup = 16;
 constexpr double kGroupReach = 1.0 / 8;
 constexpr std::size_t kFirstPaths = 16, kPathsOfSide = 4, kLeastPaths = 32;
 
-// All of them are lit where this part of the first paths is out, or this of all; all are inside
-// where none is. What is still in doubt then is lit if it has that part out in a group that has
-// more than the last part out, and inside if it has none out in a group that has no more.
+// All sides of a group are lit if the fraction kFirstLit of the first paths, or kLitPart of all, is
+// outside; all are inside if no path is. Of the rest, a side is lit if it has the fraction kLitPart
+// outside in a group with more than kFew, and inside if it has none in a group with at most kFew.
 constexpr double kFirstLit = 1.0 / 4, kLitPart = 1.0 / 8, kFew = 1.0 / 32;
 
-// Of a triangle larger than the square of this part of the reach none may be out of so many paths
-// for each such square, up to a largest number: a wall's triangle may look out from behind a board.
+// A triangle larger than the square of this fraction of the reach is only inside if none of a
+// number of paths for each such square is outside, up to a largest number: a triangle of a wall may
+// extend beyond a board that hides most of it.
 constexpr double kLarge = 1.0 / 8;
 constexpr std::uint32_t kPathsOfSquare = 32, kMostPaths = 2048;
 
-// A ray's id is the number of its path, and above so many bits that of the side in its group.
+// The id of a ray holds the number of its path in the low bits, and that of the side in its group
+// above.
 constexpr int kPathBits = 16;
 static_assert(kMostPaths <= 1U << kPathBits);
 
-// Groups between two looks at the progress.
+// Groups between two reports of progress.
 constexpr std::size_t kBatch = 1 << 13;
 
 class EnclosedSides {
@@ -100,27 +101,27 @@ class EnclosedSides {
  private:
   enum class Verdict : std::uint8_t { kDoubt, kInside, kLit };
 
-  /// What is known of a side.
+  /// A side under test, and its paths so far.
   struct Suspect {
     std::uint32_t side;
-    std::uint32_t paths = 0;  ///< that were followed
-    int out = 0;              ///< of them
+    std::uint32_t paths = 0;  ///< paths that were followed
+    int out = 0;              ///< paths that are outside
     Verdict verdict = Verdict::kDoubt;
   };
 
-  /// What paths meet at a triangle. Backs of one-sided surfaces absorb, and so does what is buried.
+  /// How a triangle treats paths. Backs of one-sided surfaces and buried sides absorb them.
   struct Surface {
     Float3 normal;  ///< of the front
     bool emits, front_reflects, back_reflects;
-    float survival;  ///< the part of the paths that go on where it reflects
+    float survival;  ///< fraction of the paths that continue where it reflects
   };
 
   struct Scratch {
-    std::vector<Ray> rays;  ///< of the paths that go on
+    std::vector<Ray> rays;  ///< of the paths that continue
     std::vector<Hit> hits;
   };
 
-  /// Sides are numbered by their triangles, fronts even and backs odd.
+  /// Sides are numbered by their triangles: fronts even, backs odd.
   SideKind& kind(std::uint32_t side) {
     return side % 2 == 0 ? sides_[side / 2].front : sides_[side / 2].back;
   }
@@ -140,7 +141,7 @@ class EnclosedSides {
     return 0.5 * glm::cross(q - p, r - p);
   }
 
-  /// In such squares as are large.
+  /// The area in squares of kLarge.
   double area(std::uint32_t t) const {
     const double side = kLarge * reach_;
     return glm::length(area_vector(t)) / (side * side);
@@ -188,7 +189,7 @@ class EnclosedSides {
     group_begin_.push_back(candidates_.size());
   }
 
-  /// Judges groups [begin, end), and buries what is inside.
+  /// Tests the groups [begin, end), and buries the sides that are inside.
   void judge_groups(std::size_t begin, std::size_t end) {
 #pragma omp parallel
     {
@@ -215,7 +216,7 @@ class EnclosedSides {
     }
   }
 
-  /// Judges those sides of a group that are like the others.
+  /// Decides the sides of a group that are like the others.
   void judge_together(std::span<Suspect> group, Scratch& scratch) const {
     const std::size_t enough = std::max(kPathsOfSide, divide_up(kLeastPaths, group.size()));
     follow(group, divide_up(kFirstPaths, group.size()), scratch);
@@ -240,7 +241,7 @@ class EnclosedSides {
     return (a + b - 1) / b;
   }
 
-  /// The part of all paths of a group that is out.
+  /// The fraction of all paths of a group that is outside.
   static double part_out(std::span<const Suspect> group) {
     int out = 0;
     std::uint32_t paths = 0;
@@ -335,7 +336,7 @@ class EnclosedSides {
     return hit.front ? surface.front_reflects : surface.back_reflects;
   }
 
-  /// Goes on from where `ray` has met something, in a direction that `bits` choose.
+  /// Continues from the hit of `ray`, in a direction that `bits` choose.
   Ray reflect(const Ray& ray, const Hit& hit, std::uint64_t bits) const {
     const glm::vec3 place = to_glm(ray.origin) + hit.t * to_glm(ray.direction);
     const Float3 n = normal(hit.triangle, hit.front);

@@ -9,22 +9,23 @@
 
 namespace rebounce {
 
-/// Makes lit sides of double-sided triangles kBuried that are inside of a closed shell: a cushion,
-/// a bottle, a cupboard. Nothing there can be seen, yet such insides hold up to a third of the area
-/// of a furnished room, and where they are white the least leak fills them with light.
+/// Marks lit sides of double-sided triangles kBuried if they are inside a closed shell: a cushion,
+/// a bottle, a cupboard. Nothing in there is visible, but such sides are up to a third of the area
+/// of a furnished room, and if they are white the smallest leak fills them with light.
 ///
-/// Diffuse paths are followed from each side, on from where they meet something; at every bounce
-/// what the surface reflects of them goes on, but half at least: so a wall that closes a shell, or
-/// passes through it, is inside where it is, and the crevices of a white sofa are lit. A path is
-/// out where it meets no surface within 1.5 m or a quarter of the scene's diagonal, or one that
-/// emits; a side of whose paths no more than 4 % get out is inside. So a shell may have cracks, and
-/// a room is none.
+/// Diffuse paths start from each side and continue at each hit. At every bounce the reflected
+/// fraction continues, but at least half: a wall that closes a shell, or passes through it, is
+/// therefore inside only there, and the crevices of a white sofa are lit. A path is outside if it
+/// meets no surface within 1.5 m or a quarter of the diagonal of the scene, or a surface that
+/// emits. A side is inside if at most 4 % of its paths are outside. A shell may therefore have
+/// cracks, and a room is no shell.
 ///
-/// Up to sixteen sides close together are judged by 16 paths of theirs where these say that they
-/// are lit, by 64 where they are alike; only those that differ from the others, or are in between,
-/// by up to 128 of their own, by 32 where they are tiny.
+/// Up to sixteen sides close together are tested together: by 16 paths in all if these show that
+/// they are lit, by 64 if the sides are alike. Only sides that differ from the others, or are in
+/// between, get up to 128 paths of their own; tiny ones get 32.
 ///
-/// `scene`, `tracer` and `sides` [t] as for find_lit_sides(). Deterministic. Throws Cancelled.
+/// `scene`, `tracer` and `sides` [t] are those of find_lit_sides(). Deterministic. Throws Cancelled
+/// if asked to stop.
 void bury_enclosed_sides(const Scene& scene, const RayTracer& tracer,
                          std::vector<TriangleSides>& sides, const Progress& progress);
 

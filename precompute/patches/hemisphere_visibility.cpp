@@ -8,7 +8,8 @@
 namespace rebounce {
 namespace {
 
-// What sees less than the first counts less; nothing counts less than the second.
+// A surface that sees less than kFullView counts less; nothing counts less than
+// kLeastDensityWeight.
 constexpr double kFullView = 0.25, kLeastDensityWeight = 1.0 / 64;
 
 }  // namespace

@@ -1,7 +1,7 @@
 #pragma once
 
-// How much of their view surfaces exchange light with: outer walls see next to nothing of the
-// scene.
+// The fraction of their view over which surfaces exchange light: outer walls see almost nothing of
+// the scene.
 
 #include <cstdint>
 
@@ -10,13 +10,14 @@
 
 namespace rebounce {
 
-/// The part of `count` cosine-distributed rays from a triangle's front that meet a surface.
+/// The fraction of `count` cosine-distributed rays from the front of a triangle that meet a
+/// surface.
 double hemisphere_visibility(const TriangleCorners& corners, const RayTracer& tracer,
                              std::uint32_t count, std::uint64_t seed);
 
-/// What a surface counts for where patches are shared out, against the same area inside of a room:
-/// 1 if it sees surfaces in a quarter of its view or more, less where it sees less, and in
-/// proportion. In (0, 1].
+/// The weight of a surface in the distribution of patches, relative to the same area inside a room,
+/// in (0, 1]: 1 if it sees surfaces in at least a quarter of its view, less in proportion if it
+/// sees less.
 double density_weight(double hemisphere_visibility);
 
 }  // namespace rebounce

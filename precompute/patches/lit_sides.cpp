@@ -11,23 +11,22 @@
 namespace rebounce {
 namespace {
 
-// A side that sees less than about one part in this many of other surfaces counts as seeing none.
-// Most see one at once: the first ray is traced alone, and then as many as make four times as many.
+// A side that sees other surfaces in less than about one of kRaysPerSide rays counts as seeing
+// none. Most sides see one at once: the first ray is traced alone, then the number grows fourfold.
 constexpr std::uint32_t kRaysPerSide = 256, kFirstRays = 1;
 
-// Backs nearer than this part of the scene's diagonal may be of the solid that a side is in; those
-// farther off may be of a room that is lit.
+// Backs within this fraction of the diagonal of the scene may belong to the solid that a side is
+// in; backs farther away may belong to a lit room.
 constexpr double kBuriedReach = 1.0 / 16;
 
-// Triangles between two looks at the progress, which is this far when sides have been looked at by
-// themselves.
+// Triangles between two reports of progress, and the progress when every side was tested alone.
 constexpr std::size_t kBatch = 1 << 15;
 constexpr double kAfterLooking = 0.4;
 
-// Points at which a side is looked at for copies of itself.
+// Points at which a side is tested for copies of itself.
 constexpr std::uint32_t kPointsPerSide = 32;
 
-// Rays by which a side that touches another looks for something solid, on either face.
+// Rays, on either face, by which a side that touches another looks for a solid.
 constexpr std::uint32_t kRaysPerContact = 64;
 
 class LitSides {
@@ -45,7 +44,7 @@ class LitSides {
       report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
       look_at(begin, std::min(begin + kBatch, count), covers);
     }
-    // Later triangles give way to earlier ones that have not given way themselves.
+    // Later triangles yield to earlier ones that have not yielded themselves.
     std::ranges::sort(covers, [](const Cover& a, const Cover& b) {
       return a.triangle != b.triangle ? a.triangle > b.triangle : a.front && !b.front;
     });
@@ -60,7 +59,7 @@ class LitSides {
  private:
   struct Cover;
 
-  /// Looks at the sides of triangles [begin, end) by themselves.
+  /// Tests the sides of triangles [begin, end) alone.
   void look_at(std::size_t begin, std::size_t end, std::vector<Cover>& covers) {
 #pragma omp parallel
     {
@@ -92,7 +91,7 @@ class LitSides {
     std::vector<CoincidentSide> sides;
   };
 
-  /// A side, and those that together cover it.
+  /// A side, and the sides that together cover it.
   struct Cover {
     std::uint32_t triangle;
     bool front;
@@ -116,9 +115,9 @@ class LitSides {
     return side;
   }
 
-  /// Tells by rays what a side sees: kLit if it sees a side of a surface, kBuried if near backs
-  /// only, else kUnlit. Stops as soon as that is certain; a one-sided triangle is only asked
-  /// whether it is buried.
+  /// Classifies a side by what its rays see: kLit if it sees a side of a surface, kBuried if it
+  /// only sees near backs, otherwise kUnlit. Stops as soon as this is certain; a one-sided triangle
+  /// is only tested for kBuried.
   SideKind look_around(std::uint32_t t, bool front, Scratch& scratch) const {
     const Side side = side_of(t, front);
     bool buried = true;
@@ -138,9 +137,9 @@ class LitSides {
     return buried ? SideKind::kBuried : SideKind::kUnlit;
   }
 
-  /// True if at least half of the rays from one of the faces of a side's plane meet backs of
-  /// one-sided surfaces: there is something solid, such as the box that stands on a floor. Two
-  /// surfaces back to back that make up a sheet have none on either face.
+  /// True if at least half of the rays from one of the faces of a side meet backs of one-sided
+  /// surfaces: a solid is there, such as the box that stands on a floor. Two surfaces back to back
+  /// that form a sheet have no solid on either face.
   bool is_beside_solid(const Side& side, std::uint32_t t, Scratch& scratch) const {
     const std::span rays = std::span(scratch.rays).first(kRaysPerContact);
     scratch.hits.resize(rays.size());
@@ -155,10 +154,10 @@ class LitSides {
     return false;
   }
 
-  /// Looks at points all over a side for other surfaces in the same place. Returns kUnlit if it
-  /// lies on fronts everywhere, with something solid behind one of the two; else adds to `covers`
-  /// the sides that together cover it, unless some point is bare. One that covers a point is enough
-  /// for it: that of the earliest triangle.
+  /// Looks for other surfaces in the same place, at points all over a side. Returns kUnlit if it
+  /// lies on fronts everywhere, with a solid behind one of the two. Otherwise adds the sides that
+  /// together cover it to `covers`, unless some point is free. One side is enough for a point: that
+  /// of the earliest triangle.
   SideKind look_for_contact(std::uint32_t t, bool front, Scratch& scratch,
                             std::vector<Cover>& covers) const {
     std::vector<CoincidentSide> cover;

@@ -7,12 +7,12 @@
 
 namespace rebounce {
 
-/// The longest edge of triangle `t`; of equal ones always the same.
+/// The longest edge of triangle `t`; among equal ones always the same.
 ConformingMesh::EdgeKey longest_edge(const ConformingMesh& mesh, std::uint32_t t);
 
-/// Where the longest-edge propagation path from an edge ends: an edge that is the longest of all
-/// triangles that share it. To bisect `key` itself and keep all angles bounded, this one is split
-/// in the middle over and over, until it is `key`.
+/// The end of the longest-edge propagation path from an edge: an edge that is the longest of all
+/// triangles that share it. To bisect `key` itself and keep all angles bounded, split this edge in
+/// the middle again and again until it is `key`.
 ConformingMesh::EdgeKey end_of_longest_edge_path(const ConformingMesh& mesh,
                                                  ConformingMesh::EdgeKey key);
 

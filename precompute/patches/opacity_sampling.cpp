@@ -19,14 +19,14 @@ using Map = std::vector<std::uint8_t>;
 
 constexpr double kTexelsPerMicroTriangle = 4;
 
-// A micro-triangle is sampled in the middles of its parts this many levels further on.
+// A micro-triangle is sampled at the centres of its parts, this number of levels finer.
 constexpr int kSampleLevels = 1;
 
 bool is_opaque(const Material& material) {
   return material.alpha_mode == AlphaMode::kOpaque && material.transmission == 0;
 }
 
-/// What a material that emits would transmit is taken for stopped.
+/// A material that emits counts as if it transmitted nothing.
 double untransmitted_part(const Material& material) {
   const bool emits = material.emitted_luminance != Float3{0, 0, 0};
   return emits ? 1 : 1 - static_cast<double>(material.transmission);
@@ -89,7 +89,7 @@ class TriangleSampler {
     return at;
   }
 
-  /// Drops the finest level if it tells nothing.
+  /// Drops the finest level if it contains no information.
   static bool drop_level(Map& map) {
     if (map.size() == 1) return false;
     for (std::size_t k = 0; k < map.size(); k += 4) {
@@ -106,8 +106,8 @@ class TriangleSampler {
   const std::array<Float2, 3> texcoord_;
 };
 
-/// Puts the maps into one array, equal ones once; a wholly opaque one is none. `map_of`
-/// is the map of each triangle, or kNone.
+/// Collects the maps in one array, equal ones once; a fully opaque triangle has none. `map_of` is
+/// the map of each triangle, or kNone.
 OpacityMaps collect(const std::vector<Map>& maps, std::span<const std::uint32_t> map_of) {
   OpacityMaps collected;
   std::unordered_map<std::string_view, std::uint32_t> known;
@@ -133,7 +133,7 @@ OpacityMaps collect(const std::vector<Map>& maps, std::span<const std::uint32_t>
   return collected;
 }
 
-/// What decides a triangle's map: its material and the bits of its texture coordinates.
+/// The key of the map of a triangle: its material and the bits of its texture coordinates.
 std::array<std::uint32_t, 7> sampling_key(std::uint32_t material,
                                           const std::array<Float2, 3>& texcoord) {
   std::array<std::uint32_t, 7> key{material};

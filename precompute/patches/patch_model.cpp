@@ -21,20 +21,20 @@
 namespace rebounce {
 namespace {
 
-// How far the work is when these are done; measured on scenes of some 300,000 triangles.
+// The progress after each step. Measured on scenes of about 300,000 triangles.
 constexpr double kAfterContacts = 0.08, kAfterSides = 0.25, kAfterElements = 0.33,
                  kAfterClusters = 0.92;
 
-// Triangles that are added where others are covered in part, for each patch that is wanted: at
-// most.
+// The largest number of triangles, per wanted patch, that are added where others are covered in
+// part.
 constexpr double kMostAtCovers = 4;
 
-// What is covered counts for so much less where patches are shared out: it is dark, and gets its
-// light from close by.
+// Covered surfaces count by this fraction less in the distribution of patches: they are dark, and
+// their light comes from nearby.
 constexpr double kLessCovered = 0.75;
 
-// An element of more than this part of a mean patch is looked at for covers at so many points, and
-// by so many rays for what it sees; a smaller one at one, and is taken to see much.
+// An element above this fraction of a mean patch gets this number of points for covers and rays for
+// its visibility. A smaller one gets one point, and counts as seeing much.
 constexpr double kSmallElement = 1.0 / 16;
 constexpr std::uint32_t kCoverPoints = 8, kSightRays = 64;
 
@@ -56,7 +56,7 @@ class PatchModelBuilder {
     const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
     inherit_sides(subdivide(scene_, patches_per_triangle(), settings, density_weights(tracer)));
     refine(tracer, scene_size);
-    drop_thin(0);  // what is as thin as floats can tell has lost its area by cuts
+    drop_thin(0);  // cuts leave triangles without area at the precision of floats
   }
 
   PatchModel build() {
@@ -86,8 +86,8 @@ class PatchModelBuilder {
     return count;
   }
 
-  /// Makes triangles that are covered in part small beside patches; `scene_size` is the root of the
-  /// area of all lit sides, metres.
+  /// Makes triangles that are covered in part small relative to patches; `scene_size` is the square
+  /// root of the area of all lit sides, metres.
   void refine(const RayTracer& tracer, double scene_size) {
     const double patch_size =
         settings_.patch_count > 0
@@ -99,8 +99,8 @@ class PatchModelBuilder {
                                    static_cast<std::size_t>(kMostAtCovers * wanted)));
   }
 
-  /// What each triangle counts for: as much as the more important of its lit sides. Nothing where
-  /// patches are to have a size.
+  /// The density weight of each triangle: the larger one of its lit sides. Empty if patches have a
+  /// given size.
   std::vector<float> density_weights(const RayTracer& tracer) const {
     if (settings_.patch_size > 0) return {};
     const double mean_area =
@@ -135,7 +135,7 @@ class PatchModelBuilder {
     return scene_.materials[model_.mesh.triangle_material[t]].double_sided;
   }
 
-  /// Takes the scene's surface over: what is left of the scene is its materials.
+  /// Moves the surface out of the scene; only its materials are left there.
   void take_surface() {
     DisplayMesh& mesh = model_.mesh;
     mesh.position = std::move(scene_.position);
@@ -190,7 +190,7 @@ class PatchModelBuilder {
     }
   }
 
-  /// Finds what light passes through, now that the triangles are cut.
+  /// Finds the openings, after the triangles are cut.
   void find_openings() {
     DisplayMesh& mesh = model_.mesh;
     mesh.opacity =
@@ -211,7 +211,7 @@ class PatchModelBuilder {
     return 0.5 * glm::length(glm::cross(q - p, r - p));
   }
 
-  /// Samples of its textures that a display triangle of a patch needs: the patch has them all.
+  /// Texture samples of a display triangle: the triangles of a patch share its samples.
   int sample_count(std::uint32_t t) const {
     const double part = area_of(t) / patch_area_;
     return static_cast<int>(
@@ -241,7 +241,7 @@ class PatchModelBuilder {
     return exitance;
   }
 
-  /// What a patch has of area if there are as many as are wanted, m².
+  /// The mean area of a patch if there are as many as wanted, m².
   double mean_patch_area() const {
     if (settings_.patch_count == 0) return std::pow(static_cast<double>(settings_.patch_size), 2);
     double area = 0;
@@ -249,7 +249,7 @@ class PatchModelBuilder {
     return area / static_cast<double>(settings_.patch_count);
   }
 
-  /// For each vertex the number of its position among those of the elements.
+  /// The number of the position of each vertex, among the positions of the elements.
   std::vector<std::uint32_t> weld_elements() {
     WeldedPositions welded = weld_positions(model_.mesh.position);
     elements_.position.resize(welded.count);
@@ -259,7 +259,7 @@ class PatchModelBuilder {
     return std::move(welded.id);
   }
 
-  /// The lit sides, with what they reflect and emit, and how they are covered.
+  /// Makes the elements from the lit sides, with reflectance, emission and cover.
   void make_elements(const RayTracer& tracer) {
     for (std::uint32_t t = 0; t < kind_.size(); ++t) {
       if (kind_[t] == SideKind::kLit) element_triangle_.push_back(t);
@@ -309,7 +309,7 @@ class PatchModelBuilder {
     average_elements(merged);
   }
 
-  /// Fills the table of patches with the means of their elements, by area.
+  /// Fills the table of patches with the area-weighted means of their elements.
   void average_elements(const ElementPatches& merged) {
     const std::size_t n = merged.patch_count;
     std::vector<double> area(n, 0.0);
@@ -349,15 +349,15 @@ class PatchModelBuilder {
     return reflectance;
   }
 
-  /// Takes out triangles whose height is below the precision of rays: what stands on them or looks
-  /// at them cannot be told.
+  /// Removes triangles whose height is below the precision of rays: what stands on them or sees
+  /// them cannot be determined.
   void drop_slivers() {
     model_.sliver_count = drop_thin(ray_offset_distance(scene_.position));
     if (scene_.triangle.empty()) throw Error("scene " + scene_.name + " has nothing but slivers");
   }
 
-  /// Takes out triangles that are no higher than this, metres, and their sides if these are known.
-  /// Returns how many.
+  /// Removes triangles no higher than `thinnest` metres, and their sides if these are known.
+  /// Returns their number.
   std::size_t drop_thin(double thinnest) {
     std::size_t kept = 0;
     for (std::size_t t = 0; t < scene_.triangle.size(); ++t) {
@@ -380,7 +380,7 @@ class PatchModelBuilder {
     return dropped;
   }
 
-  /// Covered sides show the light of what covers them at their middle.
+  /// Covered sides show the light of the surface that covers them at their middle.
   void find_shown_patches(const RayTracer& tracer) {
     const DisplayMesh& mesh = model_.mesh;
     model_.shown_patch = mesh.triangle_patch;
@@ -413,7 +413,7 @@ class PatchModelBuilder {
   std::vector<std::uint32_t> surface_of_;        ///< surface triangle of each display triangle
   std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
   Elements elements_;
-  double patch_area_ = 0;  ///< the mean patch's, m²
+  double patch_area_ = 0;  ///< of the mean patch, m²
   PatchModel model_;
   std::size_t clamped_count_ = 0;
 };

@@ -18,10 +18,10 @@ namespace {
 
 constexpr std::string_view kBox = "box:", kMesh = "mesh:", kMaterial = "material:";
 
-// Names that a message about a missing one lists.
+// The number of names that a message about a missing name lists.
 constexpr std::size_t kListedNames = 8;
 
-/// In quotes and on one line, whatever is in it.
+/// The text in quotes and on one line.
 std::string in_quotes(std::string_view text) {
   return nlohmann::json(std::string(text))
       .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -31,8 +31,8 @@ char lower(char c) {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
-/// Letters to add, leave out or change to make one text the other (V. I. Levenshtein, 1966),
-/// whatever their case.
+/// The number of letters to add, remove or change to turn one text into the other (V. I.
+/// Levenshtein, 1966), ignoring case.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -47,7 +47,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-/// Those of `names` that come nearest to `name`, the nearest first.
+/// The `names` that are most similar to `name`, the most similar first.
 std::vector<std::string> nearest(std::string_view name, const std::set<std::string>& names) {
   std::vector<std::pair<std::size_t, std::string>> all;
   for (const std::string& other : names) {
@@ -211,7 +211,7 @@ double wanted_part(const PatchRoles& roles, std::size_t patch_count) {
   const double receivers = static_cast<double>(roles.count(PatchRoles::kReceiver, patch_count)) / n;
   const double sources = static_cast<double>(roles.count(PatchRoles::kSource, patch_count)) / n;
   const double both = static_cast<double>(std::ranges::count(roles.role, PatchRoles::kBoth)) / n;
-  // Pairs that want light both ways are counted once.
+  // Pairs whose light is wanted both ways count once.
   return 2 * receivers * sources - both * both;
 }
 

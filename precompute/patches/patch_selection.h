@@ -12,8 +12,8 @@
 
 namespace rebounce {
 
-/// The entries of a comma-separated list of what PatchSelection takes, with the commas of boxes in
-/// them. A name that has a comma of its own cannot be in such a list.
+/// Splits a comma-separated list of entries of PatchSelection; the commas inside boxes do not
+/// separate. Names with a comma cannot be in such a list.
 std::vector<std::string> split_selection(std::string_view list);
 
 /// Some of a scene's surface by name or place. Each entry is one of
@@ -23,15 +23,15 @@ std::vector<std::string> split_selection(std::string_view list);
 ///   box:X0,Y0,Z0,X1,Y1,Z1    patches with their centroid between two corners, metres in the world
 class PatchSelection {
  public:
-  /// `list` is how messages call the entries. Throws Error if an entry is malformed or the scene
-  /// has nothing of that name, with the names that come nearest.
+  /// `list` is the name of the list in messages. Throws Error if an entry is malformed or the scene
+  /// has nothing of that name; the message then lists the most similar names.
   PatchSelection(std::span<const std::string> entries, const Scene& scene, std::string list);
   PatchSelection() = default;
 
   bool empty() const { return boxes_.empty() && meshes_.empty() && materials_.empty(); }
 
-  /// [n] 1 for patches that have a triangle of a surface that is named, or lie in a box; 0 for
-  /// others. `model` is of the scene. Throws Error if there are none.
+  /// [n] 1 for patches with a triangle of a named surface or with their centroid in a box, 0 for
+  /// others. `model` is that of the scene. Throws Error if there are none.
   std::vector<std::uint8_t> patches(const PatchModel& model) const;
 
  private:
@@ -45,16 +45,16 @@ class PatchSelection {
 
   std::string list_;
   std::vector<Box> boxes_;
-  std::vector<std::uint32_t> meshes_, materials_;  ///< numbers in the scene
+  std::vector<std::uint32_t> meshes_, materials_;  ///< indices in the scene
 };
 
-/// The roles of a model's patches with these receivers and sources, where an empty selection stands
-/// for all patches. What emits is a source, named or not. Throws Error as PatchSelection::patches.
+/// The roles of the patches of a model with these receivers and sources; an empty selection means
+/// all patches. Patches that emit are always sources. Throws Error as PatchSelection::patches does.
 PatchRoles choose_roles(const PatchModel& model, const PatchSelection& receivers,
                         const PatchSelection& sources);
 
-/// Of all pairs of so many patches, the part between which light is wanted in either direction:
-/// what of an operator is compressed and stored.
+/// The fraction of all pairs of patches between which light is wanted in either direction: the
+/// fraction of an operator that is compressed and stored.
 double wanted_part(const PatchRoles& roles, std::size_t patch_count);
 
 }  // namespace rebounce

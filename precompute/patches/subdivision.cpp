@@ -42,7 +42,7 @@ class Subdivision {
         const Uint3& v = scene.triangle[t];
         const glm::vec3 side =
             to_glm(scene.position[v[corner]]) - to_glm(scene.position[v[(corner + 1) % 3]]);
-        if (is_short(glm::dot(side, side))) continue;  // as long as it may count
+        if (is_short(glm::dot(side, side))) continue;  // the least length that can still count
         const EdgeKey key = mesh_.edge(t, corner);
         if (mesh_.triangles(key).front().triangle() == t) enqueue(key);
       }
@@ -74,7 +74,7 @@ class Subdivision {
   std::vector<std::uint32_t> finish() { return mesh_.finish(); }
 
  private:
-  /// True if such an edge is not split, now or later: there are never fewer patches.
+  /// True if such an edge is never split: the number of patches only grows.
   bool is_short(float length_squared) const {
     const bool enough = settings_.patch_count > 0 && patch_count_ >= settings_.patch_count &&
                         length_squared <= longest_ * longest_;
@@ -87,7 +87,7 @@ class Subdivision {
     return density_weight_.empty() ? 1 : density_weight_[source];
   }
 
-  /// Of the triangles at an edge.
+  /// The largest density weight of the triangles at an edge.
   float largest_density_weight(EdgeKey key) const {
     float largest = 0;
     for (const HalfEdge& side : mesh_.triangles(key)) {
@@ -96,7 +96,7 @@ class Subdivision {
     return largest;
   }
 
-  /// mean_patch_size() with areas as they count.
+  /// mean_patch_size() with weighted areas.
   double important_patch_size(const Scene& scene) const {
     double area = 0;
     for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
@@ -114,7 +114,7 @@ class Subdivision {
   std::span<const std::uint8_t> patches_per_triangle_;
   const SubdivisionSettings& settings_;
   std::span<const float> density_weight_;
-  std::unordered_set<EdgeKey> split_before_;  ///< edges that were longer than one in the queue
+  std::unordered_set<EdgeKey> split_before_;  ///< edges that were longer than an edge in the queue
   std::size_t patch_count_ = 0;
   double longest_ = 0;  ///< metres: shorter edges are split only while there are too few patches
   std::priority_queue<QueuedEdge> queue_;

@@ -10,7 +10,7 @@
 namespace rebounce {
 namespace {
 
-// Samples along one side of a triangle, whose square is the number of samples: 16 catch the slope
+// The least number of samples along one side of a triangle; its square, 16, resolves the slope
 // inside a texel.
 constexpr int kMinSubdivision = 4;
 
@@ -30,7 +30,8 @@ const std::array<float, 256>& linear_of_srgb() {
   return table;
 }
 
-// Brings a coordinate into [0, 1] the way the sampler says. One that is not finite becomes 0.
+// Brings a coordinate into [0, 1] by the mode of the sampler. A coordinate that is not finite
+// becomes 0.
 double wrapped(double coordinate, TextureWrap wrap) {
   if (!std::isfinite(coordinate)) return 0;
   switch (wrap) {
@@ -46,7 +47,7 @@ double wrapped(double coordinate, TextureWrap wrap) {
   return coordinate - std::floor(coordinate);
 }
 
-// The two texels between which a coordinate lies, and the weight of the second.
+// The two texels that a coordinate lies between, and the weight of the second.
 struct TexelPair {
   int first;
   int second;
@@ -91,7 +92,7 @@ Float3 mixed(const Float3& a, const Float3& b, float weight) {
   return result;
 }
 
-// What `value` makes of the pixels around `texcoord`, mixed.
+// Interpolates `value` of the pixels around `texcoord`.
 template <typename Value>
 auto bilinear(const Texture& texture, const Image& image, Float2 texcoord, const Value& value) {
   const TexelPair column = texel_pair(texcoord[0], image.width, texture.wrap_s);
@@ -114,8 +115,8 @@ std::array<float, N> interpolated(const std::array<std::array<float, N>, 3>& cor
   return result;
 }
 
-// How many parts to divide each side into for about one sample per texel that the triangle touches:
-// its area in texels, and as many as its longest side crosses; for no more than about `most`.
+// The number of parts of each side for about one sample per texel that the triangle touches: texels
+// in its area and along its longest side; bounded so that there are at most about `most` samples.
 int subdivision(const Image& image, const std::array<Float2, 3>& texcoord,
                 int most = kMostTextureSamples) {
   std::array<std::array<double, 2>, 3> side{};
@@ -133,9 +134,9 @@ int subdivision(const Image& image, const std::array<Float2, 3>& texcoord,
   return std::max(kMinSubdivision, static_cast<int>(parts < finest ? parts : finest));
 }
 
-// Averages value(barycentric) over the triangle: one sample in each of n² congruent parts, its
-// place in the part from the R2 sequence, so that no texture that repeats with the parts can hide
-// between the samples. The same samples every time.
+// Averages value(barycentric) over the triangle: one sample in each of n² congruent parts. Its
+// place in the part follows the R2 sequence, so that a texture with the period of the parts cannot
+// hide between the samples. Deterministic.
 template <typename Sum, typename Value>
 Sum stratified_mean(int n, const Value& value) {
   Sum sum{0.0};
@@ -153,7 +154,7 @@ Sum stratified_mean(int n, const Value& value) {
   return sum / (static_cast<double>(n) * n);
 }
 
-// The mean of `value` weighted by `weight`; the plain mean where that is 0 everywhere.
+// The mean of `value` weighted by `weight`; the plain mean if the weight is 0 everywhere.
 template <typename Value, typename Weight>
 Float3 mean_color(int n, const Value& value, const Weight& weight) {
   constexpr double kLeast = 1e-6;

@@ -4,16 +4,16 @@
 
 namespace rebounce {
 
-/// What a side of a triangle is to the exchange of light.
+/// The role of a side of a triangle in the exchange of light.
 enum class SideKind : std::uint8_t {
   kLit,      ///< it has a patch
-  kUnlit,    ///< it sees nothing that lights it, or is the back of a one-sided triangle
-  kCovered,  ///< another triangle that faces the same way lies in the same place, and has the patch
-  kBuried,   ///< it lies inside of something solid, or of a closed shell
-  kOpening,  ///< light passes through it as if nothing were there
+  kUnlit,    ///< sees nothing that lights it, or is the back of a one-sided triangle
+  kCovered,  ///< another triangle in the same place faces the same way and has the patch
+  kBuried,   ///< lies inside a solid or a closed shell
+  kOpening,  ///< light passes through as if nothing were there
 };
 
-/// Front and back of one triangle.
+/// The sides of one triangle.
 struct TriangleSides {
   SideKind front = SideKind::kLit;
   SideKind back = SideKind::kUnlit;

@@ -14,8 +14,8 @@
 namespace rebounce {
 namespace {
 
-// Where an edge is looked across: this part of it away from the vertex, and by this part of the way
-// to the third corner on either side.
+// The place where an edge is tested: this fraction of it away from the vertex, and on either side
+// this fraction of the way to the third corner.
 constexpr double kAlongEdge = 0.25, kAwayFromEdge = 0.1;
 
 /// The display triangles around each vertex, in ascending order.
@@ -55,8 +55,8 @@ class VertexSplitter {
     }
   }
 
-  /// Writes to `label` the groups of the `around` triangles of a vertex that share it: numbers in
-  /// order of first use.
+  /// Writes the groups of the `around` triangles of a vertex that share it to `label`, numbered in
+  /// the order of first use.
   void find_groups(std::uint32_t v, std::span<const std::uint32_t> around,
                    std::span<std::uint32_t> label) const {
     std::iota(label.begin(), label.end(), 0U);
@@ -68,15 +68,16 @@ class VertexSplitter {
       }
     }
     std::uint32_t count = 0;
-    for (std::size_t k = 0; k < label.size(); ++k) {  // a group's number is that of its first
+    // A group has the number of its first triangle.
+    for (std::size_t k = 0; k < label.size(); ++k) {
       label[k] = label[k] == k ? count++ : label[label[k]];
     }
   }
 
  private:
   /// True if both triangles `a` and `b` are covered or neither is, they share an edge from `v`, and
-  /// nothing stands on it. What has no patch joins the open: what little of it can be seen is
-  /// there.
+  /// nothing stands on the edge. Triangles without a patch join the open ones, because only their
+  /// open parts are visible.
   bool are_joined(std::uint32_t v, std::uint32_t a, std::uint32_t b) const {
     return is_covered_[a] == is_covered_[b] &&
            std::ranges::any_of(mesh_.triangle[a], [&](std::uint32_t u) {
@@ -85,7 +86,7 @@ class VertexSplitter {
            });
   }
 
-  /// A point of triangle `t` beside its edge from `v` to `u`.
+  /// A point of triangle `t` near its edge from `v` to `u`.
   PatchPoint beside_edge(std::uint32_t v, std::uint32_t u, std::uint32_t t) const {
     const auto [a, b, c] = mesh_.triangle[t];
     const std::uint32_t third = a != v && a != u ? a : b != v && b != u ? b : c;
@@ -97,7 +98,7 @@ class VertexSplitter {
 
   const DisplayMesh& mesh_;
   const RayTracer& tracer_;
-  std::vector<std::uint8_t> is_covered_;  ///< [t] it shows a patch, under something
+  std::vector<std::uint8_t> is_covered_;  ///< [t] it shows a patch and is covered
 };
 
 }  // namespace

@@ -8,13 +8,13 @@ WeldedPositions weld_positions(std::span<const Float3> position) {
   const auto hash = [](const Float3& p) {
     std::uint64_t bits = 0;
     for (const float x : p) {
-      // Adding zero makes -0 and +0 one.
+      // Adding zero makes -0 and +0 equal.
       bits = (bits ^ std::bit_cast<std::uint32_t>(x + 0.0F)) * 0x9E3779B97F4A7C15ULL;
       bits ^= bits >> 29;
     }
     return bits;
   };
-  // Vertices by the hash of their positions, each at its place or at the next that was free.
+  // A hash table of vertices by position, with linear probing.
   std::vector<std::uint32_t> table(std::bit_ceil(position.size() + position.size() / 2 + 1), kNone);
   WeldedPositions welded;
   welded.id.reserve(position.size());

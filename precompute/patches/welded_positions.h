@@ -8,7 +8,7 @@
 
 namespace rebounce {
 
-/// For each vertex the number of its position, equal for vertices at the same place, in [0, count).
+/// For each vertex the number of its position in [0, count), equal for vertices at the same place.
 struct WeldedPositions {
   std::vector<std::uint32_t> id;  ///< [v]
   std::uint32_t count = 0;

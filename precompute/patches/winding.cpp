@@ -19,24 +19,28 @@
 namespace rebounce {
 namespace {
 
-// A piece of a thousandth of the scene's area sends and gets some hundred of these.
+// A piece with a thousandth of the area of the scene sends and receives about a hundred of these
+// rays.
 constexpr std::uint32_t kRayCount = 1U << 18;
 constexpr std::uint32_t kRaysPerBatch = 1U << 10;
 
-// Fewer rays on a piece than this say nothing: 16 of one kind and none of the other could still be
-// one in six.
+// Fewer rays on a piece tell nothing: with 16 of one kind and none of the other, the true fraction
+// may still be one in six.
 constexpr std::uint32_t kFewestHits = 16;
 
-// A piece whose front gets more than one in fifty of the rays that meet it is seen from there.
+// A piece whose front gets more than this fraction of the rays that meet it is visible from its
+// front.
 constexpr double kLargestFrontShare = 0.02;
 
-// A back that gets less than this of what it would get in a closed room is seen through cracks.
+// A back that gets less than this fraction of what it would get in a closed room is visible through
+// cracks only.
 constexpr double kLeastBackCoverage = 0.02;
 
-// Fronts of which fewer see something belong to a scene without exchange of light.
+// If a smaller fraction of rays from fronts meets something, the fronts of the scene exchange no
+// light.
 constexpr double kNoExchange = 1e-3;
 
-// [t] The piece of each triangle, numbered by their first triangles.
+// [t] The piece of each triangle, numbered by the first triangle of the piece.
 std::vector<std::uint32_t> find_pieces(const Scene& scene, const WeldedPositions& place) {
   const auto corner = [&](std::uint32_t t) {
     const auto& [a, b, c] = scene.triangle[t];
@@ -53,8 +57,8 @@ std::vector<std::uint32_t> find_pieces(const Scene& scene, const WeldedPositions
   return piece;
 }
 
-// [t] Whether another triangle has the same corners: one of the two is the other's second side, and
-// which of them a ray meets is chance.
+// [t] Whether another triangle has the same corners. One of the two is then the second side of the
+// other, and it is arbitrary which of them a ray meets.
 std::vector<bool> find_coincident(const Scene& scene, const WeldedPositions& place) {
   std::vector<std::pair<Uint3, std::uint32_t>> corners(scene.triangle.size());
   for (std::uint32_t t = 0; t < corners.size(); ++t) {
@@ -72,13 +76,13 @@ std::vector<bool> find_coincident(const Scene& scene, const WeldedPositions& pla
   return coincident;
 }
 
-// What a ray met, and where it came from.
+// A hit of a ray, and the triangle that it comes from.
 struct Sight {
   std::uint32_t from = kNone, to = kNone;  // triangles
   bool front = false;                      // it met the front of `to`
 };
 
-// Rays from the sides of the scene's triangles, as many as they have area.
+// Rays from the sides of the triangles of the scene, in proportion to their area.
 class Sights {
  public:
   Sights(const Scene& scene, const RayTracer& tracer) : scene_(scene), tracer_(tracer) {
@@ -97,7 +101,8 @@ class Sights {
   // The area that one ray stands for.
   double area_per_ray() const { return area_end_.back() / kRayCount; }
 
-  // From the fronts, and from both sides of double-sided triangles; or from the backs of one-sided.
+  // Traces rays from the fronts, and from both sides of double-sided triangles; or from the backs
+  // of one-sided triangles.
   std::vector<Sight> trace(bool from_fronts) const {
     std::vector<Sight> sights(kRayCount);
 #pragma omp parallel
@@ -134,10 +139,10 @@ class Sights {
 
   const Scene& scene_;
   const RayTracer& tracer_;
-  std::vector<double> area_end_;  // [t] of the sides up to and with this triangle's
+  std::vector<double> area_end_;  // [t] sum of the areas of the sides up to this triangle
 };
 
-// What was seen of a piece by the others.
+// How much of a piece the others see.
 struct Exposure {
   double area = 0;
   std::uint32_t front_hits = 0, back_hits = 0;
