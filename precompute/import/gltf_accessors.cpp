@@ -11,13 +11,13 @@
 namespace rebounce::gltf {
 namespace {
 
-// Elements that an accessor may claim without any byte behind them: 16 Mi zeros, more than any
-// asset uses and harmless.
+// The most elements that an accessor may have without data: 16 Mi zeros, more than any asset uses
+// and harmless.
 constexpr std::size_t kMaxUnbackedElements = std::size_t{1} << 24;
 
 static_assert(std::endian::native == std::endian::little, "glTF data is little-endian");
 
-// Elements of a known size at a regular distance: everything in range was checked.
+// Elements of a known size at a regular distance, all checked to be in range.
 struct Strided {
   const std::uint8_t* first = nullptr;
   std::size_t stride = 0;
@@ -50,7 +50,7 @@ Strided checked_elements(const Document& document, int buffer_view, std::size_t 
     throw Error(fmt::format("bufferViews[{}].byteStride {} is smaller than an element of {} bytes",
                             buffer_view, stride, element_bytes));
   }
-  // Divides instead of multiplying: count comes from the file and the product could wrap around.
+  // Division avoids the overflow of a product: count comes from the file.
   const bool starts_inside = byte_offset <= view.size();
   const std::size_t room = starts_inside ? view.size() - byte_offset : 0;
   const bool ends_inside =
@@ -64,7 +64,7 @@ Strided checked_elements(const Document& document, int buffer_view, std::size_t 
   return {view.data() + byte_offset, stride};
 }
 
-// Gathers the raw elements of an accessor, tightly packed, sparse ones replaced.
+// Gathers the raw elements of an accessor, tightly packed, with sparse ones replaced.
 class RawElements {
  public:
   RawElements(const Document& document, const tinygltf::Accessor& accessor)
@@ -127,7 +127,7 @@ std::vector<float> converted(const std::vector<std::uint8_t>& packed, float scal
   for (std::size_t i = 0; i < values.size(); ++i) {
     Stored stored;
     std::memcpy(&stored, packed.data() + i * sizeof(Stored), sizeof(Stored));
-    // The smallest signed value would be just below -1.
+    // Without the limit, the smallest signed value would be just below -1.
     const float value = static_cast<float>(stored) * scale;
     values[i] = scale == 1 ? value : std::max(value, -1.0F);
   }
@@ -153,7 +153,7 @@ std::vector<float> to_floats(const std::vector<std::uint8_t>& packed,
   }
 }
 
-// Runs `read` and puts the accessor's name before what it throws.
+// Runs `read` and prepends the name of the accessor to the message of any Error.
 template <typename Read>
 auto with_name(int accessor, const Read& read) {
   try {

@@ -21,21 +21,21 @@ struct FloatElements {
   }
 };
 
-/// Reads a scalar or vector accessor of 8 or 16-bit integers (normalised ones become [0, 1] or
-/// [-1, 1], glTF 2.0 section 3.11) or floats: tightly packed or with a stride, sparse, or without
-/// data (zeros). `accessor` is an index in range. Throws Error, which names the accessor, for every
-/// other component type and where any byte would lie outside its buffer view.
+/// Reads a scalar or vector accessor of floats or of 8 or 16-bit integers (normalised ones become
+/// [0, 1] or [-1, 1], glTF 2.0 section 3.11): tightly packed or with a stride, sparse, or without
+/// data (zeros). `accessor` is an index in range. Throws Error, which names the accessor, for any
+/// other component type, and if a byte lies outside its buffer view.
 FloatElements read_floats(const Document& document, int accessor);
 
 /// The number of components of an accessor's type. Throws Error for a matrix.
 std::size_t component_count(int type);
 
-/// Converts elements, tightly packed, of the type, component type and normalisation of `accessor`,
-/// likewise.
+/// Converts tightly packed elements of the type, component type and normalisation of `accessor`, in
+/// the same way.
 FloatElements unpack_floats(const tinygltf::Accessor& accessor,
                             const std::vector<std::uint8_t>& packed);
 
-/// Reads an accessor of unsigned scalars, likewise.
+/// Reads an accessor of unsigned scalars, in the same way.
 std::vector<std::uint32_t> read_indices(const Document& document, int accessor);
 
 }  // namespace rebounce::gltf

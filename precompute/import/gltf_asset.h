@@ -14,29 +14,30 @@
 
 namespace rebounce::gltf {
 
-/// An image as the asset carries it.
+/// An image as the asset stores it.
 struct EncodedImage {
-  Bytes bytes;          ///< empty where it could not be had
-  std::string problem;  ///< why, then
+  Bytes bytes;          ///< empty if it could not be read
+  std::string problem;  ///< the reason, in that case
 };
 
-/// Where a primitive's compressed geometry lies (KHR_draco_mesh_compression).
+/// The compressed geometry of a primitive (KHR_draco_mesh_compression).
 struct DracoSource {
   int buffer_view = -1;
-  std::map<std::string, std::uint32_t> unique_id;  ///< of the attributes in there, by name
-  std::optional<std::size_t> index_count;  ///< of the primitive's index accessor, where it has one
-  bool has_fallback = false;               ///< the asset holds the geometry uncompressed as well
+  std::map<std::string, std::uint32_t> unique_id;  ///< of its attributes, by name
+  /// Of the index accessor of the primitive, if it has one.
+  std::optional<std::size_t> index_count;
+  bool has_fallback = false;  ///< the asset also holds the geometry uncompressed
 };
 
-/// A glTF asset with checked indices: its structure in tinygltf's types, its data as bytes.
+/// A glTF asset with checked indices: its structure in the types of tinygltf, its data as bytes.
 struct Document {
-  tinygltf::Model model;       ///< without buffers and images: those are below
-  std::vector<Bytes> buffers;  ///< byteLength bytes each; empty where the asset has no data for it
-  std::vector<Bytes> decoded_views;  ///< of the compressed buffer views, empty for the others
+  tinygltf::Model model;       ///< without buffers and images, which are below
+  std::vector<Bytes> buffers;  ///< byteLength bytes each; empty if the asset has no data for it
+  std::vector<Bytes> decoded_views;  ///< of the compressed buffer views, empty for others
   std::vector<EncodedImage> images;
   std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco;  ///< by mesh and primitive
   std::string hash;                                                  ///< as Scene::hash
-  std::deque<std::vector<std::uint8_t>> storage;  ///< what the views above look into
+  std::deque<std::vector<std::uint8_t>> storage;                     ///< memory of the views above
 };
 
 }  // namespace rebounce::gltf

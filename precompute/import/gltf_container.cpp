@@ -17,7 +17,7 @@ constexpr std::uint32_t kBinaryChunk = 0x004E4942;  // "BIN"
 constexpr std::size_t kHeaderBytes = 12;
 constexpr std::size_t kChunkHeaderBytes = 8;
 
-// tinygltf takes the length as 32 bits and its base64 decoder counts in int.
+// tinygltf takes the length as 32 bits, and its base64 decoder counts in int.
 constexpr std::size_t kMaxJsonBytes = std::size_t{1} << 30;
 // Real files reach about 15 levels.
 constexpr int kMaxJsonDepth = 100;
@@ -34,7 +34,7 @@ struct Chunk {
   Bytes data;
 };
 
-// Takes the next chunk off the front of `rest`.
+// Removes the next chunk from the front of `rest`.
 Chunk take_chunk(Bytes& rest) {
   if (rest.size() < kChunkHeaderBytes) {
     throw Error("the .glb is truncated in a chunk header; get a complete copy");
@@ -50,8 +50,8 @@ Chunk take_chunk(Bytes& rest) {
   return chunk;
 }
 
-// How deeply brackets are nested outside strings. Counted beforehand: the parser's own callback
-// makes it quadratic in the length of an array.
+// The nesting depth of brackets outside strings. It is counted before parsing, because the callback
+// of the parser takes quadratic time in the length of an array.
 int nesting_depth(Bytes text) {
   int depth = 0;
   int deepest = 0;

@@ -17,15 +17,15 @@ struct Container {
   std::optional<Bytes> binary;
 };
 
-/// Reads a regular file whole. Throws Error where there is none or it cannot be read.
+/// Reads a whole regular file. Throws Error if there is none or it cannot be read.
 std::vector<std::uint8_t> read_file(const std::filesystem::path& path);
 
-/// Splits a file into its chunks. A file that starts with "glTF" is taken for a .glb and must have
-/// a sound header and chunks (Error otherwise); everything else is taken for JSON.
+/// Splits a file into its chunks. A file that starts with "glTF" must be a .glb with a valid header
+/// and valid chunks (otherwise Error); any other file counts as JSON.
 Container split_container(Bytes file);
 
-/// Parses the JSON part. Throws Error where it is not JSON, not an object, or nested so deeply that
-/// reading it recursively could exhaust the stack.
+/// Parses the JSON part. Throws Error if it is not JSON, is not an object, or is nested so deeply
+/// that recursive reading could exhaust the stack.
 nlohmann::json parse_json(Bytes text);
 
 }  // namespace rebounce::gltf

@@ -34,13 +34,13 @@ class Hash {
   std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_;
 };
 
-// The objects of the array `key`, none where there is no such array.
+// The objects of the array `key`; empty if there is no such array.
 json& elements(json& parent, const char* key) {
   static json none = json::array();
   return parent.contains(key) ? parent[key] : none;
 }
 
-// Keeps what `uri` names for as long as the document lives.
+// Keeps the data of `uri` for the lifetime of the document.
 Bytes store_resource(Document& document, Hash& hash, const std::filesystem::path& folder,
                      const std::string& uri) {
   Resource resource = read_resource(folder, uri);
@@ -90,7 +90,7 @@ const json* draco_extension(const json& primitive) {
   return found != extensions->end() && found->is_object() ? &*found : nullptr;
 }
 
-// The accessor that `holder` names as `key`, null where it names none.
+// The accessor that `holder` names as `key`; null if it names none.
 const json* accessor_of(const json& root, const json& holder, const char* key) {
   const auto index = holder.find(key);
   if (index == holder.end()) return nullptr;
@@ -125,10 +125,10 @@ std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco_sources(json& r
   return sources;
 }
 
-// What the asset's structure is read from: without the data, which was read above, without what a
-// static diffuse scene has no use for, and without Draco's extension, which is taken separately:
-// tinygltf's decoder (where it was built with it) would look for the data, and its check of indices
-// refuses those that are nowhere else.
+// The JSON that tinygltf reads the structure from. It leaves out the data, which is read before,
+// and all that a static diffuse scene does not use. It also leaves out the Draco extension, which
+// is read separately: the decoder of tinygltf (in builds with it) would look for the data, and its
+// check of indices refuses indices that are nowhere else.
 std::string structure_text(json root) {
   for (const char* key : {"buffers", "images", "animations", "skins", "extras"}) root.erase(key);
   for (json& material : elements(root, "materials")) {
@@ -157,8 +157,8 @@ tinygltf::Model parse_structure(const json& root) {
   std::string warning;
   const bool loaded = loader.LoadASCIIFromString(&model, &error, &warning, text.data(),
                                                  static_cast<unsigned>(text.size()), "");
-  // tinygltf reports some faults and goes on without the object that has them: indices would
-  // then point at something else.
+  // tinygltf reports some errors and continues without the object in question; indices would then
+  // point at other objects.
   if (!loaded || !error.empty()) {
     throw Error(error.empty() ? "tinygltf could not read it" : error);
   }

@@ -30,7 +30,7 @@ T take(draco::DecoderBuffer& buffer) {
   return value;
 }
 
-// The start of a Draco stream, read with the format's own rules (Draco bitstream 2.2, sections 3.1
+// The start of a Draco stream, read by the rules of the format (Draco bitstream 2.2, sections 3.1
 // and 5.1).
 class Header {
  public:
@@ -48,7 +48,8 @@ class Header {
 
   bool is_mesh() const { return is_mesh_; }
 
-  // How many triangles the stream claims. The decoder would reserve memory for them at once.
+  // The number of triangles that the stream declares. The decoder would reserve memory for all of
+  // them at once.
   std::uint32_t triangle_count() {
     if (has_metadata_) {
       draco::GeometryMetadata metadata;
@@ -64,7 +65,7 @@ class Header {
   }
 
  private:
-  // A count, which has a variable length from version `major`.`minor` on.
+  // Reads a count, whose length is variable from version `major`.`minor` on.
   std::uint32_t take_count(std::uint8_t major, std::uint8_t minor) {
     if (version_ < DRACO_BITSTREAM_VERSION(major, minor)) return take<std::uint32_t>(buffer_);
     std::uint32_t count = 0;

@@ -10,19 +10,19 @@ class Mesh;
 
 namespace rebounce::gltf {
 
-/// A primitive's geometry, decoded from KHR_draco_mesh_compression: triangles over vertices.
+/// The geometry of a primitive, decoded from KHR_draco_mesh_compression: triangles over vertices.
 class DracoMesh {
  public:
-  /// Decodes `encoded`. Throws Error where that is no mesh of at most `max_triangles`, or damaged.
+  /// Decodes `encoded`. Throws Error if it is no mesh of at most `max_triangles`, or damaged.
   DracoMesh(Bytes encoded, std::size_t max_triangles);
   ~DracoMesh();
 
-  /// Three for each triangle. Not checked against the number of vertices.
+  /// Three per triangle. They are not checked against the number of vertices.
   std::vector<std::uint32_t> indices() const;
 
-  /// The attribute with this unique id, as `accessor` describes it: its type, component type and
-  /// normalisation, not its count, which encoders that split vertices leave as it was. Throws Error
-  /// where there is none or its values do not fit.
+  /// The attribute with this unique id, with the type, component type and normalisation of
+  /// `accessor`. Its count is ignored, because encoders that split vertices do not update it.
+  /// Throws Error if there is no such attribute or its values do not fit.
   FloatElements read_floats(std::uint32_t unique_id, const tinygltf::Accessor& accessor) const;
 
  private:

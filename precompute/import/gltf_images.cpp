@@ -37,8 +37,8 @@ bool is_webp(Bytes encoded) {
          starts_with(encoded.subspan(kFormOffset), kWebp);
 }
 
-// Width and height; empty for what is not PNG, JPEG or WebP. glTF and its extension allow these
-// only; stb would take many more formats, each with its own way to be damaged.
+// Width and height; empty for data that is not PNG, JPEG or WebP. glTF and its extension allow only
+// these; stb would accept many more formats, each with its own ways of being damaged.
 std::optional<std::array<std::uint64_t, 2>> pixel_size(Bytes encoded) {
   constexpr std::array<std::uint8_t, 4> kPng{0x89, 'P', 'N', 'G'};
   constexpr std::array<std::uint8_t, 3> kJpeg{0xFF, 0xD8, 0xFF};

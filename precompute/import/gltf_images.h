@@ -7,14 +7,14 @@
 
 namespace rebounce::gltf {
 
-/// A picture, and the bytes that stand for it in a Texture.
+/// A decoded image, and the bytes that represent it in a Texture.
 struct DecodedImage {
   Image image;                       ///< 8-bit RGBA, rows from the top
-  std::vector<std::uint8_t> stored;  ///< `encoded` itself; a PNG of what was WebP
+  std::vector<std::uint8_t> stored;  ///< `encoded` itself; for WebP a PNG
 };
 
-/// Decodes PNG, JPEG or WebP bytes. Empty where they cannot be decoded (animated WebP for one).
-/// Throws Error where the picture would take more than 1 GiB.
+/// Decodes PNG, JPEG or WebP bytes. Empty if they cannot be decoded (for example animated WebP).
+/// Throws Error if the image would take more than 1 GiB.
 std::optional<DecodedImage> decode_image(Bytes encoded);
 
 }  // namespace rebounce::gltf

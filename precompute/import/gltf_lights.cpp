@@ -17,7 +17,7 @@ bool is_finite(const Float3& v) {
   return std::all_of(v.begin(), v.end(), [](float value) { return std::isfinite(value); });
 }
 
-// The unit vector along `v`, empty where it has none.
+// The unit vector along `v`; empty if it has no direction.
 std::optional<glm::dvec3> direction_of(const glm::dvec3& v) {
   const double length = glm::length(v);
   if (!std::isfinite(length) || length == 0) return {};
@@ -38,7 +38,7 @@ void take_cone(const tinygltf::SpotLight& source, Light& light) {
   light.inner_cone_angle = static_cast<float>(std::clamp(source.innerConeAngle, 0.0, outer));
 }
 
-// The light in its place; empty, with the reason, where it cannot be used.
+// The light in the world; empty, with the reason, if it cannot be used.
 std::optional<Light> place_light(const tinygltf::Light& source, const tinygltf::Node& node,
                                  const glm::dmat4& world, double scale, std::string& problem) {
   const auto type = light_type(source.type);
@@ -72,8 +72,8 @@ std::optional<Light> place_light(const tinygltf::Light& source, const tinygltf::
   return problem.empty() ? std::optional(light) : std::nullopt;
 }
 
-// The camera in its place, looking along the node's -z with the node's +y upwards; empty, with the
-// reason, where it cannot be used.
+// The camera in the world, looking along the -z axis of the node with its +y axis upwards; empty,
+// with the reason, if it cannot be used.
 std::optional<Camera> place_camera(const tinygltf::Camera& source, const tinygltf::Node& node,
                                    const glm::dmat4& world, std::string& problem) {
   if (source.type != "perspective") {
@@ -102,7 +102,7 @@ std::optional<Camera> place_camera(const tinygltf::Camera& source, const tinyglt
   return camera;
 }
 
-// The index of the node's light, -1 where it has none.
+// The index of the light of the node, -1 if it has none.
 int light_of(const tinygltf::Node& node) {
   const auto extension = node.extensions.find("KHR_lights_punctual");
   return extension == node.extensions.end() ? -1 : extension->second.Get("light").GetNumberAsInt();

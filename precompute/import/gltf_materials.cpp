@@ -15,7 +15,7 @@ namespace {
 
 constexpr auto kNegativeFactors = "{} material colours were negative and were set to 0";
 
-// What the importer needs of a textureInfo object, wherever it stood.
+// The parts of a textureInfo object that the importer uses, from any of its places.
 struct TextureReference {
   int texture = -1;
   TexcoordSource texcoord;
@@ -43,7 +43,7 @@ TextureReference reference(const tinygltf::TextureInfo& info) {
   return result;
 }
 
-// The same from an object inside an extension, which tinygltf leaves as it is.
+// The same from an object inside an extension, which tinygltf leaves unparsed.
 TextureReference reference(const tinygltf::Value& info) {
   TextureReference result{info.Get("index").GetNumberAsInt(), {}};
   if (info.Has("texCoord")) result.texcoord.set = info.Get("texCoord").GetNumberAsInt();
@@ -64,7 +64,7 @@ TextureWrap to_wrap(int code) {
   }
 }
 
-// The asset's images that may serve a texture, the preferred one first.
+// The images of the asset that a texture can use, the preferred one first.
 std::vector<int> sources_of(const tinygltf::Texture& texture) {
   std::vector<int> sources;
   const auto webp = texture.extensions.find("EXT_texture_webp");
@@ -75,13 +75,14 @@ std::vector<int> sources_of(const tinygltf::Texture& texture) {
   return sources;
 }
 
-// Adds textures to the scene on first use; the same image wrapped the same way is one texture.
+// Adds textures to the scene at their first use. The same image with the same wrapping is one
+// texture.
 class TextureImport {
  public:
   TextureImport(const Document& document, Scene& scene, Warnings& warnings)
       : document_(document), scene_(scene), warnings_(warnings) {}
 
-  // The scene's texture for the asset's, or kNone (white) where there is no picture.
+  // The texture of the scene for that of the asset, or kNone (white) if it has no image.
   std::uint32_t operator()(int index) {
     const auto& texture = document_.model.textures.at(static_cast<std::size_t>(index));
     const std::vector<int> sources = sources_of(texture);
@@ -104,7 +105,7 @@ class TextureImport {
     return kNone;
   }
 
-  // The mean of the red channel of the asset's texture, a fraction; 1 where there is no picture.
+  // The mean of the red channel of a texture of the asset, a fraction; 1 if it has no image.
   double mean_red(int index) const {
     const auto& texture = document_.model.textures.at(static_cast<std::size_t>(index));
     for (const int source : sources_of(texture)) {
@@ -166,7 +167,7 @@ struct BaseColor {
   TextureReference texture;
 };
 
-// A number that stands for a fraction, in [0, 1].
+// Clamps a number to [0, 1].
 float to_fraction(double value) {
   if (!std::isfinite(value)) throw Error("a factor is not a finite number");
   return static_cast<float>(std::clamp(value, 0.0, 1.0));
@@ -305,7 +306,7 @@ class MaterialImport {
 }  // namespace
 
 Float2 TexcoordSource::transformed(Float2 texcoord) const {
-  // Translation x rotation x scale, counter-clockwise in a space whose v points down.
+  // Translation x rotation x scale, counter-clockwise in a space whose v axis points down.
   const double u = static_cast<double>(scale[0]) * texcoord[0];
   const double v = static_cast<double>(scale[1]) * texcoord[1];
   const double cosine = std::cos(rotation);

@@ -19,21 +19,21 @@
 namespace rebounce::gltf {
 namespace {
 
-// A triangle without area: its height is 1e-12 of its longest side, far below what positions in
-// single precision can express.
+// A triangle counts as having no area if its height is below 1e-12 of its longest side, far below
+// the precision of positions in single precision.
 constexpr double kDegenerateAreaRatio = 1e-12;
 
-// Below this a stored normal has no direction worth the name: quantised ones are within 1 % of 1.
+// A shorter stored normal has no reliable direction; quantised ones are within 1 % of 1.
 constexpr double kShortestNormal = 1e-6;
 
-// The matrix of cofactors: the inverse transpose times the determinant, and of use where the
-// inverse does not exist. It takes the cross product of two vectors to that of their images.
+// The matrix of cofactors: the inverse transpose times the determinant, which exists even if the
+// inverse does not. It maps the cross product of two vectors to that of their images.
 glm::dmat3 cofactors(const glm::dmat3& m) {
   return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
 }
 
-// Puts one primitive into the world and appends what is left of it to the scene, as of the last of
-// its placed meshes.
+// Transforms one primitive to the world and appends its valid triangles to the scene, as part of
+// the last of its placed meshes.
 class Placement {
  public:
   Placement(const Primitive& primitive, const glm::dmat4& world, std::uint32_t lightmap_page,
@@ -79,7 +79,7 @@ class Placement {
     }
   }
 
-  // The unit normal of a triangle of this primitive, empty where it has no area.
+  // The unit normal of a triangle of this primitive; empty if it has no area.
   std::optional<glm::dvec3> geometric_normal(const Uint3& triangle) const {
     const glm::dvec3 a = to_dvec3(position_[triangle[0]]);
     const glm::dvec3 b = to_dvec3(position_[triangle[1]]);
@@ -92,8 +92,8 @@ class Placement {
     return cross / twice_area;
   }
 
-  // The scene's vertex for a corner: shared where the asset has normals, the triangle's own where
-  // it has none and the surface is faceted.
+  // The vertex of the scene for a corner. It is shared if the asset has normals; otherwise the
+  // triangle has its own and the surface is faceted.
   std::uint32_t vertex(std::uint32_t local, const glm::dvec3& geometric) {
     if (primitive_.normal.empty()) return add_vertex(local, geometric);
     if (scene_vertex_[local] == kNone) {
@@ -129,11 +129,11 @@ class Placement {
   bool mirrored_;
   glm::dmat3 normal_transform_;
   Scene& scene_;
-  std::vector<std::uint32_t> scene_vertex_;  // [v] where a vertex went, kNone before
+  std::vector<std::uint32_t> scene_vertex_;  // [v] vertex in the scene, kNone if there is none yet
   std::vector<Float3> position_;             // [v] in the world
 };
 
-// The meshes of an asset, each read when it is first asked for.
+// The meshes of an asset, each read at its first use.
 class Meshes {
  public:
   Meshes(const Document& document, std::span<const MaterialTexcoords> texcoords, Warnings& warnings)
@@ -156,13 +156,13 @@ class Meshes {
   std::vector<std::optional<std::vector<Primitive>>> primitives_;
 };
 
-// Gives every mesh a page of the lightmap wherever it is placed, as its primitives are unwrapped
+// Gives every placement of a mesh a page of the lightmap; the primitives of a mesh are unwrapped
 // together.
 class LightmapPages {
  public:
   explicit LightmapPages(std::vector<std::string>& names) : names_(names) {}
 
-  // kNone where the primitive has no place in a lightmap. `use` is the number of the node.
+  // kNone if the primitive has no place in a lightmap. `use` is the number of the node.
   std::uint32_t page(const Primitive& primitive, std::size_t use, std::size_t instance) {
     if (primitive.lightmap_texcoord.empty()) return kNone;
     const auto [entry, is_new] =
@@ -176,8 +176,8 @@ class LightmapPages {
   std::map<std::pair<std::size_t, std::size_t>, std::uint32_t> pages_;
 };
 
-// Runs visit(primitive, placed, instances) for each use of a primitive that has triangles.
-// Instances are read again on every call: kept for all nodes they could fill the memory.
+// Calls visit(primitive, placed, instances) for each use of a primitive with triangles. Instances
+// are read again at every call: keeping those of all nodes could fill the memory.
 template <typename Visit>
 void for_each_use(const Document& document, std::span<const PlacedNode> nodes, Meshes& meshes,
                   const Visit& visit) {
@@ -193,7 +193,7 @@ void for_each_use(const Document& document, std::span<const PlacedNode> nodes, M
   }
 }
 
-// Reserves room for all triangles, so that the scene never exists twice while it grows.
+// Reserves memory for all triangles, so that the scene never exists twice while it grows.
 void reserve(const Document& document, std::span<const PlacedNode> nodes, Meshes& meshes,
              Scene& scene) {
   std::size_t triangles = 0;

@@ -10,8 +10,8 @@
 namespace rebounce::gltf {
 
 /// Adds the triangles of every mesh that `nodes` place to `scene`, in world space. `texcoords` is
-/// what import_materials returned. Throws Error, which names mesh and primitive, where geometry
-/// cannot be trusted; triangles without area are dropped and counted.
+/// the result of import_materials. Throws Error, which names mesh and primitive, for invalid
+/// geometry; triangles without area are dropped and counted.
 void import_meshes(const Document& document, std::span<const PlacedNode> nodes,
                    std::span<const MaterialTexcoords> texcoords, Scene& scene, Warnings& warnings);
 

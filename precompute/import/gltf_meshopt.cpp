@@ -15,10 +15,10 @@ using nlohmann::json;
 
 constexpr std::array kExtensions{"KHR_meshopt_compression", "EXT_meshopt_compression"};
 
-// The codec spends at least two bits on 16 bytes of vertices, and a byte on a triangle or an index.
+// The codec uses at least two bits for 16 bytes of vertices, and a byte for a triangle or an index.
 constexpr std::size_t kMaxExpansion = 64;
 
-// The extension object of a buffer or buffer view, null where it has neither.
+// The extension object of a buffer or buffer view; null if it has none.
 const json* meshopt_extension(const json& parent) {
   const auto extensions = parent.find("extensions");
   if (extensions == parent.end() || !extensions->is_object()) return nullptr;
@@ -29,7 +29,7 @@ const json* meshopt_extension(const json& parent) {
   return nullptr;
 }
 
-// What the extension says of one view; its members were checked to be of their types.
+// The extension of one view; the types of its members are checked.
 struct CompressedView {
   explicit CompressedView(const json& extension)
       : buffer(extension.at("buffer").get<std::size_t>()),
@@ -53,7 +53,7 @@ bool allows_stride(const CompressedView& view) {
   return view.stride % 4 == 0 && view.stride > 0 && view.stride <= 256;
 }
 
-// meshoptimizer takes all of this on trust.
+// meshoptimizer does not check any of this.
 void check_layout(const CompressedView& view) {
   if (view.mode != "ATTRIBUTES" && view.mode != "TRIANGLES" && view.mode != "INDICES") {
     throw Error(fmt::format("its mode \"{}\" is unknown", view.mode));
@@ -76,8 +76,8 @@ void check_layout(const CompressedView& view) {
   }
 }
 
-// The stream's first byte names codec and version; those of vertex streams from version 1 on came
-// after the library that is built with.
+// The first byte of a stream names codec and version. The linked library does not read vertex
+// streams from version 1 on.
 void check_version(Bytes compressed) {
   constexpr std::uint8_t kVertexCodec = 0xA0;
   if (compressed.empty() || (compressed[0] & 0xF0) != kVertexCodec) return;
@@ -131,7 +131,7 @@ bool has_fallback(const Document& document, std::size_t view) {
   return source.byteOffset <= size && source.byteLength <= size - source.byteOffset;
 }
 
-// Views may overlap: together they must not claim more than all of the data could expand to.
+// Views may overlap: all together must not declare more than all of the data could expand to.
 void check_total(const json& views, const Document& document) {
   std::size_t available = 0;
   for (const Bytes buffer : document.buffers) available += buffer.size();

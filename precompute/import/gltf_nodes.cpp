@@ -12,8 +12,8 @@
 namespace rebounce::gltf {
 namespace {
 
-// A node with several parents is placed several times, and so are its children: a small file could
-// otherwise fill the memory.
+// The limit of placed nodes. A node with several parents is placed several times, and so are its
+// children, so that a small file could fill the memory.
 constexpr std::size_t kMaxPlacedNodes = std::size_t{1} << 20;
 
 glm::dmat4 local_transform(const tinygltf::Node& node) {
@@ -40,7 +40,7 @@ std::vector<int> root_nodes(const tinygltf::Model& model) {
   return roots;
 }
 
-// Walks the hierarchy depth first with a stack of its own: a hierarchy may be of any depth.
+// Walks the hierarchy depth first with an explicit stack, because its depth is not limited.
 class Traversal {
  public:
   explicit Traversal(const tinygltf::Model& model)
@@ -64,8 +64,8 @@ class Traversal {
 
  private:
   struct Step {
-    PlacedNode placed;  ///< `world` is still the parent's
-    bool leaves;        ///< after the node's last descendant
+    PlacedNode placed;  ///< `world` is still that of the parent
+    bool leaves;        ///< visited after the last descendant of the node
   };
 
   void mark_root(std::size_t node) {
@@ -105,7 +105,8 @@ class Traversal {
 
   const tinygltf::Model& model_;
   std::vector<bool> is_root_;
-  std::vector<bool> is_open_;  // entered and not yet left: the ancestors of the current node
+  // Nodes that are entered and not left: the ancestors of the current node.
+  std::vector<bool> is_open_;
   std::vector<Step> pending_;
   std::vector<PlacedNode> placed_;
 };
@@ -115,7 +116,7 @@ class Traversal {
 glm::dmat4 Trs::matrix() const {
   glm::dmat4 transform = glm::translate(glm::dmat4(1.0), translation);
   const glm::dquat quaternion(rotation.w, rotation.x, rotation.y, rotation.z);
-  // Exporters round: without this a rotation would scale. A zero one is no rotation.
+  // Exporters round: without this a rotation would scale. A quaternion of zero is no rotation.
   const double length = glm::length(quaternion);
   if (length > 0) transform *= glm::mat4_cast(quaternion / length);
   return glm::scale(transform, scale);

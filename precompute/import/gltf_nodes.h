@@ -7,13 +7,13 @@
 
 namespace rebounce::gltf {
 
-/// A node of the scene and where it stands.
+/// A node of the scene and its place.
 struct PlacedNode {
   std::size_t node = 0;   ///< index in the model's nodes
-  glm::dmat4 world{1.0};  ///< from the node's space to the world
+  glm::dmat4 world{1.0};  ///< from the space of the node to the world
 };
 
-/// A transform in glTF's parts, applied from the last to the first.
+/// A transform in the parts of glTF, applied from the last to the first.
 struct Trs {
   glm::dvec3 translation{0.0};
   glm::dvec4 rotation{0.0, 0.0, 0.0, 1.0};  ///< quaternion x, y, z, w of any length; 0: none
@@ -22,11 +22,11 @@ struct Trs {
   glm::dmat4 matrix() const;
 };
 
-/// The nodes of the default scene (the first where none is named, every root node where there are
+/// The nodes of the default scene (the first scene if none is named, every root node if there are
 /// no scenes), parents before children, siblings in order. A node with several parents, which glTF
-/// forbids and exporters write, stands below each of them. Throws Error where a node is its own
-/// ancestor, a root more than once, or both a root and a child. `scale`
-/// turns the asset's unit into metres.
+/// forbids and exporters write, is placed below each of them. Throws Error if a node is its own
+/// ancestor, or is a root twice or both a root and a child. `scale` converts the unit of the asset
+/// into metres.
 std::vector<PlacedNode> place_nodes(const tinygltf::Model& model, double scale);
 
 }  // namespace rebounce::gltf

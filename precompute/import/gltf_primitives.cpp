@@ -24,7 +24,7 @@ bool draws_triangles(int mode) {
          mode == TINYGLTF_MODE_TRIANGLE_FAN;
 }
 
-// Corners i, j, k of triangle `t` in the sequence of vertices, glTF 2.0 section 3.7.2.1.
+// Corners of triangle `t` in the sequence of vertices, glTF 2.0 section 3.7.2.1.
 Uint3 corners(int mode, std::uint32_t t) {
   switch (mode) {
     case TINYGLTF_MODE_TRIANGLE_STRIP:
@@ -50,7 +50,7 @@ std::vector<Uint3> assemble_triangles(int mode, std::span<const std::uint32_t> i
 
 class PrimitiveReader {
  public:
-  // `compressed` is null where the primitive has no Draco data.
+  // `compressed` is null if the primitive has no Draco data.
   PrimitiveReader(const Document& document, const tinygltf::Primitive& source,
                   const DracoSource* compressed, Warnings& warnings)
       : document_(document), source_(source), compressed_(compressed), warnings_(warnings) {}
@@ -99,7 +99,8 @@ class PrimitiveReader {
     return found == source_.attributes.end() ? -1 : found->second;
   }
 
-  // An attribute with one of the allowed numbers of components and one element for each vertex.
+  // Reads an attribute with one of the allowed numbers of components and one element for each
+  // vertex.
   FloatElements read(int accessor, const std::string& name,
                      std::initializer_list<std::size_t> allowed_components) const {
     FloatElements elements = read_elements(accessor, name);
@@ -196,7 +197,7 @@ class PrimitiveReader {
     return texcoords;
   }
 
-  // TEXCOORD_1 as it is: what unwraps for lightmaps writes it there.
+  // Reads TEXCOORD_1 without a transform: programs that unwrap for lightmaps write it.
   void read_lightmap_texcoords(Primitive& primitive) {
     const int accessor = attribute("TEXCOORD_1");
     if (accessor < 0) return;
@@ -244,7 +245,7 @@ class PrimitiveReader {
   std::size_t vertex_count_ = 0;
 };
 
-// Whether there is something to read; counts what is passed over.
+// True if there are triangles to read; counts what is skipped.
 bool is_wanted(const tinygltf::Primitive& source, Warnings& warnings) {
   if (!draws_triangles(source.mode)) {
     if (source.mode > TINYGLTF_MODE_TRIANGLE_FAN) {
@@ -263,8 +264,8 @@ bool is_wanted(const tinygltf::Primitive& source, Warnings& warnings) {
   return true;
 }
 
-// Keeps the vertices that a triangle uses, in order. A primitive costs as much to place as it has
-// vertices, however often it is placed.
+// Keeps only vertices that a triangle uses, in order: the cost of each placement of a primitive is
+// in proportion to its vertices.
 void drop_unused_vertices(Primitive& primitive) {
   std::vector<std::uint32_t> kept(primitive.position.size(), kNone);
   for (const Uint3& triangle : primitive.triangle) {

@@ -11,7 +11,7 @@
 namespace rebounce::gltf {
 namespace {
 
-// Data URIs can be megabytes long; a message shows their head.
+// Data URIs can be megabytes long; a message shows the beginning.
 std::string shown(const std::string& uri) {
   constexpr std::size_t kShownCharacters = 80;
   return uri.size() <= kShownCharacters ? uri : uri.substr(0, kShownCharacters) + "...";
@@ -43,7 +43,7 @@ std::string percent_decoded(const std::string& uri) {
   return decoded;
 }
 
-// A colon before the first slash makes it a scheme (RFC 3986), or a drive letter.
+// A colon before the first slash ends a scheme (RFC 3986) or a drive letter.
 bool has_scheme(const std::string& uri) {
   const auto colon = uri.find(':');
   return colon != std::string::npos && colon < uri.find('/');
@@ -55,7 +55,7 @@ bool leaves(const std::filesystem::path& folder, const std::filesystem::path& fi
   return relative.empty() || *relative.begin() == "..";
 }
 
-// The file that a relative reference names.
+// The file of a relative reference.
 std::filesystem::path contained_path(const std::filesystem::path& folder, const std::string& uri) {
   const std::string decoded = percent_decoded(uri);
   const bool absolute = std::filesystem::path(decoded).is_absolute();

@@ -7,19 +7,19 @@
 
 namespace rebounce::gltf {
 
-/// What a URI of an asset led to.
+/// The data of a URI of an asset.
 struct Resource {
   std::vector<std::uint8_t> bytes;
-  bool external = false;  ///< from a file of its own, not from a data URI
+  bool external = false;  ///< from a separate file, not from a data URI
 };
 
-/// Reads what `uri` names: a base64 data URI, or a file by a relative path that stays inside
-/// `folder` (percent-encoding is undone). Throws Error for every other URI, and where the data
-/// cannot be had.
+/// Reads the data of `uri`: a base64 data URI, or a file with a relative path that stays inside
+/// `folder` (percent-encoding is decoded). Throws Error for any other URI, and if the data cannot
+/// be read.
 Resource read_resource(const std::filesystem::path& folder, const std::string& uri);
 
-/// Throws Error where read_resource would refuse `uri` on principle, whatever is on the disk: an
-/// absolute path, one that leaves the folder, another scheme.
+/// Throws Error if read_resource refuses `uri` without reading the disk: an absolute path, a path
+/// that leaves the folder, another scheme.
 void check_uri(const std::filesystem::path& folder, const std::string& uri);
 
 }  // namespace rebounce::gltf

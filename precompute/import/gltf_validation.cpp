@@ -31,7 +31,7 @@ constexpr std::array kSupportedExtensions{
     std::string_view{"KHR_materials_pbrSpecularGlossiness"},
     std::string_view{"KHR_materials_unlit"},
     // These change how light is reflected or transmitted, not how much of it a diffuse surface of
-    // the same base colour returns: read as if they were not there.
+    // the same base colour returns: they are ignored.
     std::string_view{"KHR_materials_anisotropy"},
     std::string_view{"KHR_materials_clearcoat"},
     std::string_view{"KHR_materials_diffuse_transmission"},
@@ -82,8 +82,8 @@ void check_version(const json& root) {
   }
 }
 
-// Walks the JSON with the name of the place it is at, for messages like
-// "accessors[3].bufferView is 7, but there are 2 bufferViews".
+// Walks the JSON and tracks the name of each place, for messages like "accessors[3].bufferView is
+// 7, but there are 2 bufferViews".
 class StructureCheck {
  public:
   explicit StructureCheck(json& root) : root_(root) {}
@@ -129,7 +129,7 @@ class StructureCheck {
     return at.empty() ? key : at + "." + key;
   }
 
-  // The member `key`, or null where it is absent (Error where it is required).
+  // The member `key`, or null if it is missing (Error if it is required).
   static json* member(json& parent, const char* key, const std::string& at, bool required = false) {
     const auto found = parent.find(key);
     if (found != parent.end()) return &*found;
@@ -149,7 +149,7 @@ class StructureCheck {
     return value;
   }
 
-  // The extension `name` of `parent`, or null. As tinygltf does, passes over what is no object.
+  // The extension `name` of `parent`, or null. Like tinygltf, ignores values that are no objects.
   static json* extension(json& parent, const char* name) {
     const auto extensions = parent.find("extensions");
     if (extensions == parent.end() || !extensions->is_object()) return nullptr;
@@ -168,7 +168,7 @@ class StructureCheck {
     }
   }
 
-  // Makes `value` an integer in [0, 2^53] or throws.
+  // Converts `value` to an integer in [0, 2^53], or throws Error.
   static std::uint64_t whole_number(json& value, const std::string& place) {
     constexpr double kExactIntegers = 9007199254740992.0;
     if (value.is_number()) {
@@ -185,7 +185,7 @@ class StructureCheck {
     return value.is_number() ? value.dump() : std::string(value.type_name());
   }
 
-  // Sizes and codes. tinygltf keeps some of them as int, and no real asset has more.
+  // Checks sizes and codes. tinygltf stores some of them as int, and no real asset has larger ones.
   static void check_size(json& value, const std::string& place) {
     if (whole_number(value, place) <= std::numeric_limits<int>::max()) return;
     throw Error(fmt::format("{} is {}, above the limit of 2147483647", place, value.dump()));

@@ -4,15 +4,15 @@
 
 namespace rebounce::gltf {
 
-/// Throws Error where the asset needs a glTF version, or an extension, that is not supported.
+/// Throws Error if the asset needs an unsupported glTF version or extension.
 void check_version_and_extensions(const nlohmann::json& root);
 
-/// Checks everything in the JSON that the importer will use, and that tinygltf would take on trust:
-/// that what should be an array, object or number is one, that every index lies inside its
-/// array, that vectors have their length. Throws Error that names the first offence.
+/// Checks everything in the JSON that the importer uses and tinygltf does not check: arrays,
+/// objects and numbers have the right type, every index lies inside its array, vectors have the
+/// right length. Throws Error that names the first violation.
 ///
-/// Brings numbers into the form that tinygltf reads without loss: sizes and indices that were
-/// written as 3.0 become integers, reals that were written as 3 become floating point.
+/// Converts numbers to the form that tinygltf reads without loss: sizes and indices written as 3.0
+/// become integers, reals written as 3 become floating point.
 void check_structure(nlohmann::json& root);
 
 }  // namespace rebounce::gltf

@@ -7,11 +7,11 @@
 
 namespace rebounce::gltf {
 
-/// What the import of one file left out or changed without refusing it: single lines, and lines
-/// that count how often something happened. Order of first appearance.
+/// The warnings of an import: what it left out or changed. Entries are single lines, or lines that
+/// count how often something happened, in the order of first appearance.
 class Warnings {
  public:
-  /// Adds a line of its own.
+  /// Adds a single line.
   void add(std::string line) { entries_.emplace_back(std::move(line), 0); }
 
   /// Counts `amount` more occurrences. `format` is a line with one {} for the total.
@@ -20,7 +20,7 @@ class Warnings {
   std::vector<std::string> lines() const;
 
  private:
-  std::vector<std::pair<std::string, std::size_t>> entries_;  ///< a count of 0: a plain line
+  std::vector<std::pair<std::string, std::size_t>> entries_;  ///< a count of 0 marks a single line
 };
 
 }  // namespace rebounce::gltf

@@ -16,7 +16,7 @@
 namespace rebounce {
 namespace {
 
-// The default material comes last, for the primitives that name none.
+// The default material is the last; primitives that name no material use it.
 void drop_unused_default_material(Scene& scene) {
   const auto last = static_cast<std::uint32_t>(scene.materials.size() - 1);
   const auto& used = scene.triangle_material;
@@ -25,7 +25,8 @@ void drop_unused_default_material(Scene& scene) {
   }
 }
 
-// Beyond these a scene is hardly what its file says it is: in millimetres, inches, a miniature.
+// A larger scene is probably not in metres but in millimetres or inches, a smaller one is a
+// miniature.
 constexpr float kLargestLikelySize = 500;
 constexpr float kSmallestLikelySize = 0.2F;
 
@@ -69,7 +70,7 @@ Scene import_document(const gltf::Document& document, double scale, gltf::Warnin
   return scene;
 }
 
-// Messages quote names from the file, and some of tinygltf's have several lines.
+// Messages quote names from the file, and some messages of tinygltf have several lines.
 std::string one_line(const std::string& text) {
   std::string line;
   for (const char character : text) {
