@@ -18,33 +18,33 @@
 namespace rebounce {
 namespace {
 
-// What each stage holds at its peak. Arrays that grow by doubling are counted with what they may
-// have to spare, and while they are copied to a larger place with both.
+// Memory of each stage at its peak. Arrays that grow by doubling count with their spare capacity,
+// and with both copies while they move.
 
 // An entry of an ExchangeMatrix: a column and an exchange area.
 constexpr std::size_t kEntryBytes = sizeof(std::uint32_t) + sizeof(float);
 
-// A pair while form factors are made: in rows, and in the matrix that they are copied to.
+// A pair while form factors are computed: in rows, and in the matrix that they are copied to.
 constexpr std::size_t kPairBytesMade = sizeof(ExchangeEntry) + 3 * kEntryBytes;
 
-// A pair beside a dense inverse: in the matrix, and expanded to rows that hold it both ways.
+// A pair beside a dense inverse: in the matrix, and expanded to rows that hold it twice.
 constexpr std::size_t kPairBytesKept = 2 * kEntryBytes + 2 * kEntryBytes;
 
-// A link while links are found: as it was refined, its copy, and the flat arrays.
+// A link during refinement: the link, its copy, and the flat arrays.
 constexpr std::size_t kLinkBytesFound = 4 * sizeof(Link);
 
-// A link afterwards: the flat arrays, and by both nodes as they gather.
+// A link afterwards: the flat arrays, and the gathering order by both nodes.
 constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.exchange_area[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
 constexpr std::size_t kLinkBytesKept = 2 * kFlatLinkBytes + LinkedFormFactors::kBytesPerLink;
 
-// A patch beside links, an upper estimate: its triangles, in the mesh and in the ray tracer;
-// radiosities under 274 lights; compressed form factors, which are only known later.
+// Upper estimate of the memory of a patch beside links: its triangles, in the mesh and in the ray
+// tracer; radiosities under 274 lights; compressed form factors.
 constexpr std::size_t kPatchBytes = 8000;
 
-// Links of a patch over the cube root of the number of patches, an upper estimate until they are
-// known: a furnished room has 10.5 with 4,000 patches and 10.0 with 64,000, a bare one a quarter.
+// Upper estimate of the links of a patch over the cube root of the number of patches, that of
+// furnished rooms: notes/links.md.
 constexpr double kFurnishedLinks = 11;
 
 std::uint64_t machine_memory_bytes() {

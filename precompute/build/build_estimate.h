@@ -12,15 +12,16 @@
 
 namespace rebounce {
 
-/// What the build may take: as it was set, or half of the machine's memory.
+/// The memory that a build may take: the limit of the settings, or half of the memory of the
+/// machine.
 std::uint64_t memory_limit_bytes(const BuildSettings& settings);
 
-/// Peak of form factors and operator from pairs, where half of all patches face each other.
+/// Peak memory of form factors and operator from pairs, if half of all patches face each other.
 /// `matrix_count`: distinct reflectance channels; `kind`: not kAutomatic.
 std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_count,
                                   OperatorKind kind);
 
-/// What the memory of a build from links follows from.
+/// The quantities that the memory of a build from links depends on.
 struct LinkedBuild {
   std::size_t patch_count = 0;
   std::size_t link_count = 0;
@@ -29,17 +30,17 @@ struct LinkedBuild {
   double tolerance = 0.005;  ///< of the operator
 };
 
-/// Peak of finding the links.
+/// Peak memory of finding the links.
 std::uint64_t peak_bytes_of_links(const LinkedBuild& build);
 
-/// Peak of all that comes after links, with the threads that fit the limit, one at least.
+/// Peak memory of all stages after links, with as many threads as the limit allows, at least one.
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
-/// What of a limit is left for build_matrix_free_transfer; 1 where it is nothing.
+/// The part of a limit that remains for build_matrix_free_transfer; 1 if nothing remains.
 std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes);
 
-/// The memory that form factors and operator need; no times. `decided`: settings that leave nothing
-/// open. Links are taken to be as many as in a furnished room, until they are known.
+/// The memory that form factors and operator need, without times. `decided`: settings that leave
+/// nothing open. The number of links is that of a furnished room until links are found.
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
                            const BuildSettings& decided);
 
@@ -48,7 +49,7 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
 void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildSettings& decided,
                   const Progress& progress, CostEstimate& estimate);
 
-/// The memory of what comes after links.
+/// The memory of the stages after links.
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
 /// Throws Error if an estimate is above `limit_bytes`.

@@ -54,7 +54,7 @@ std::string settings_json(const BuildSettings& settings) {
       .dump();
 }
 
-/// Times differ from run to run and do not go into the file.
+/// Times differ from run to run, so they are not in the file.
 std::string report_json(const BuildReport& report, const std::vector<KindError>& errors) {
   nlohmann::json by_kind = nlohmann::json::object();
   for (const KindError& e : errors) {

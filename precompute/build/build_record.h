@@ -8,9 +8,9 @@
 
 namespace rebounce {
 
-/// What a file says of its build: the settings, as they were decided, the part of `report` that is
-/// the same in every run, and the errors. Mean and largest are those of point lights, which the
-/// tolerance is about; the bound holds for every kind. Leaves the rest of `record` as it is.
+/// Writes the record of a build for a file: the decided settings, the part of `report` that is the
+/// same in every run, and the errors. Mean and largest error are those of point lights, which the
+/// tolerance refers to; the bound holds for every kind. Leaves the rest of `record` as it is.
 void record_build(const BuildSettings& decided, const BuildReport& report,
                   const std::vector<KindError>& errors, BuildRecord& record);
 

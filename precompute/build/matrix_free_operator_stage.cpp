@@ -19,22 +19,23 @@
 namespace rebounce {
 namespace {
 
-// Lights that compressed form factors are measured under, and validation points of the operator's
-// that judge them too.
+// Lights that compressed form factors are measured under, and point lights among the validation
+// lights of the operator that are also validation lights of the form factors.
 constexpr int kTestLightCount = 16;
 constexpr std::size_t kFormFactorValidationCount = 64;
 
-// Residual of the radiosities that form factors are fitted to and measured with: what light patches
-// give off matters there, not its third digit.
+// Residual of the radiosities that form factors are fitted to and measured with. Their third digit
+// does not matter.
 constexpr double kFittingResidual = 1e-2;
 
-// Of form factors in half precision, whose rounding is not far below.
+// Lower limit of the tolerance of form factors in half precision, whose rounding error is not far
+// below.
 constexpr double kLeastTolerance = 1e-4;
 
 using Lights = std::vector<std::vector<Float3>>;
 using Exitances = std::span<const std::vector<Float3>>;
 
-/// The radiosities that initial exitances give rise to. Throws Cancelled if asked to stop.
+/// The radiosities of initial exitances. Throws Cancelled if asked to stop.
 Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
                       const Progress& progress) {
   Lights radiosities;
@@ -54,7 +55,7 @@ Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
   return radiosities;
 }
 
-/// What the compressions are fitted to and measured by.
+/// The training, validation and test lights of the compressions.
 struct FittedLights {
   DrawnLights exitances, radiosities;
   Lights test_radiosities;
@@ -84,8 +85,7 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
   return lights;
 }
 
-/// The part that errors at receivers are relative to of all light that patches give off after the
-/// first time.
+/// The reference of errors at receivers, as a fraction of all light that patches reflect.
 double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
                      const PatchRoles& roles, std::span<const float> area) {
   ReceivedLight received;
@@ -101,8 +101,8 @@ double received_part(const DrawnLights& exitances, const DrawnLights& radiositie
   return received.part();
 }
 
-/// What was asked for, or a part of the operator's tolerance: errors of F spread everywhere, and
-/// those of the operator are relative to what arrives at receivers.
+/// The tolerance of the settings, or a fraction of that of the operator. Errors of F spread
+/// everywhere, and those of the operator are relative to what arrives at receivers.
 double form_factor_tolerance(const BuildSettings& decided, const FittedLights& lights,
                              const PatchRoles& roles, std::span<const float> area) {
   if (decided.form_factor_tolerance > 0) return decided.form_factor_tolerance;
@@ -117,7 +117,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
                               PhaseClock& clock) {
   const PatchTable& patches = data.patches;
   const std::uint64_t seed = decided.form_factors.seed;
-  // Gathered along from the first light to the last check: made once.
+  // Used from the first light to the last check, so it is made once.
   const auto links =
       std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
   const ReferenceSolver reference(links, patches);
@@ -125,7 +125,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     return fit_links(data.links, patches, kErrorPerLink, part);
   });
   const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
-    // What light patches give off matters here, not its third digit.
+    // The third digit of the radiosities does not matter here.
     const ReferenceSolver solver(
         std::make_shared<const LinkedFormFactors>(fewer, patches.area, patches.centroid), patches);
     return find_lights(tracer, data, roles, seed, solver, part);
@@ -156,7 +156,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     return measure_error(data, tracer, reference.preconditioned(data.transfer), decided.tolerance,
                          seed, part);
   });
-  // The check is the last that needs them all.
+  // The check is the last step that needs all of them.
   data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
   if (decided.store_links) report.link_count = data.links.pair.size();
   record_build(decided, report, errors, data.record);

@@ -17,7 +17,7 @@ namespace {
 // Lights that compressed form factors are measured under.
 constexpr int kTestLightCount = 16;
 
-// A residual above this is not rounding but a mistake; f32 and f16 entries.
+// A larger residual is a mistake and no rounding error, for f32 and f16 entries.
 constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
 
 void check_residual(double residual, Precision precision) {
@@ -42,7 +42,7 @@ std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
                                      {settings.tolerance, *settings.precision}, progress, roles);
 }
 
-/// Compresses the form factors of `data` and measures how well, with an operator of all patches.
+/// Compresses the form factors of `data` and measures their error, with an operator of all patches.
 void compress_form_factors_of(TransferData& data, const TransferOperator& transfer,
                               const RayTracer& tracer, const BuildSettings& settings,
                               BuildReport& report, const Progress& progress) {
@@ -62,7 +62,8 @@ void compress_form_factors_of(TransferData& data, const TransferOperator& transf
           random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed)));
 }
 
-/// Measures the operator against `exact`, or if that is null against an iterative solution.
+/// Measures the error of the operator against `exact` or, if that is null, against an iterative
+/// solution.
 void check_operator(TransferData& data, const RayTracer& tracer, const DenseOperator* exact,
                     const BuildSettings& decided, const BuildReport& report, PhaseClock& clock) {
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {

@@ -11,28 +11,28 @@
 namespace rebounce {
 
 // The last stage of a build: makes the operator of `data`, whose patches, mesh and form factors are
-// there, measures it, and records it all. `decided`: settings that leave nothing open; `roles`: of
-// the patches, other than all of both only if the operator is to be hierarchical. Throws Error if
-// the operator fails its own check, Cancelled if asked to stop.
+// complete, measures its error and records everything. `decided`: settings that leave nothing open.
+// `roles`: roles of the patches; anything but both for all patches needs a hierarchical operator.
+// Throws Error if the operator fails its own check, Cancelled if asked to stop.
 
-/// The operator's tolerance over that of the compressed form factors that it is made from, whose
-/// error it has beside its own.
+/// The tolerance of the operator over that of the compressed form factors that it is made from.
+/// Their error adds to its own.
 inline constexpr double kToleranceOverFormFactors = 5;
 
-/// In what the dense inverse is made that an operator of this kind comes from.
+/// The precision of the dense inverse that an operator of this kind is made from.
 inline Arithmetic arithmetic_of(OperatorKind kind) {
   return kind == OperatorKind::kDense ? Arithmetic::kDouble : Arithmetic::kSingle;
 }
 
-/// From data.exchange, by a dense inverse.
+/// Makes it from data.exchange, by a dense inverse.
 void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
                               const PatchRoles& roles, TransferData& data, BuildReport& report,
                               PhaseClock& clock);
 
-/// From data.links, which stay only if that was asked for: F is compressed, and what is then
-/// solved for is never there as a whole (matrix_free_transfer.h). The error is measured against the
-/// links, which know nothing of either compression. A tolerance of form factors that is still 0 is
-/// as much less than usual as receivers get less than all of the light.
+/// Makes it from data.links, which are kept only on request. F is compressed, and the inverse is
+/// solved for without being stored as a whole (matrix_free_transfer.h). The error is measured
+/// against the links, which neither compression affects. If no tolerance of form factors is set, it
+/// is reduced by the fraction of the light that receivers get.
 void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
                               const PatchRoles& roles, TransferData& data, BuildReport& report,
                               PhaseClock& clock);

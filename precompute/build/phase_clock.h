@@ -7,13 +7,13 @@
 
 namespace rebounce {
 
-/// Times the phases of a build and passes their progress on.
+/// Measures the time of the phases of a build and passes their progress on.
 class PhaseClock {
  public:
   PhaseClock(BuildReport& report, const BuildProgress& progress)
       : report_(report), progress_(progress) {}
 
-  /// What `work` returns, given a Progress. Throws Cancelled if asked to stop.
+  /// Returns the result of `work`, which is given a Progress. Throws Cancelled if asked to stop.
   template <typename Work>
   auto run(const char* phase, const Work& work) {
     const Progress progress = [this, phase](double fraction) {
