@@ -43,8 +43,8 @@ constexpr std::size_t kLinkBytesKept = 2 * kFlatLinkBytes + LinkedFormFactors::k
 // tracer; radiosities under 274 lights; compressed form factors.
 constexpr std::size_t kPatchBytes = 8000;
 
-// Upper estimate of the links of a patch over the cube root of the number of patches, that of
-// furnished rooms: notes/links.md.
+// Upper estimate of the links of a patch over the cube root of the number of patches:
+// furnished rooms have 10 to 10.5, empty ones a quarter of it.
 constexpr double kFurnishedLinks = 11;
 
 std::uint64_t machine_memory_bytes() {

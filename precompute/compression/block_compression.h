@@ -48,8 +48,8 @@ struct PartSizes {
 /// is the smallest operator of its error, and the most exact operator of its size, that the cluster
 /// tree admits.
 struct CompressionCost {
-  double multiplier =
-      0;  ///< the squared error that is worth one stored value of a coupling matrix or dense block
+  /// The squared error that is worth one stored value of a coupling matrix or dense block.
+  double multiplier = 0;
   double multiplicity = 1;  ///< 2 for a block that also stands for its mirror image
   PartSizes sizes = {};
 

@@ -19,7 +19,7 @@ struct ProbeSettings {
   int ray_count = 2048;
 };
 
-/// The centers of the cells of a grid over the box around `mesh`. Throws Error if there are more
+/// The centres of the cells of a grid over the box around `mesh`. Throws Error if there are more
 /// than 65,536. `settings` must ask for probes.
 LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings);
 

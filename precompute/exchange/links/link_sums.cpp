@@ -20,7 +20,7 @@ constexpr double kLeastFactorUnseeing = 1e-6;
 // notes/links.md.
 constexpr double kSumDeviation = 0.01;
 
-/// A sum over a node, and its first moment about the center of the node.
+/// A sum over a node, and its first moment about the centre of the node.
 struct Moments {
   double sum = 0;
   glm::dvec3 first{0};

@@ -8,11 +8,11 @@ namespace rebounce {
 namespace {
 
 // Cells closer than this multiple of the sum of their radii are too near for the kernel between
-// their centers.
+// their centres.
 constexpr double kNear = 1.0;
 // Pairs of patches closer than this use the kernel of patches instead, with this tolerance.
 constexpr double kNearPatches = 3.0, kPatchTolerance = 1e-2;
-// Mean squared distance of the points of a cell from a plane through its center, in squares of its
+// Mean squared distance of the points of a cell from a plane through its centre, in squares of its
 // radius.
 constexpr double kSpread = 0.1;
 // Nodes closer than this are not examined: their kernel is never nearly affine.
