@@ -199,10 +199,10 @@ class PieceCompressor {
     place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
     place.column_rank = place.on_diagonal() ? place.row_rank
                                             : static_cast<std::uint32_t>(block.column_basis.cols());
-    const ResidualRanks residual_rank =
+    const ResidualRanks ranks =
         find_residual_ranks(block, {weight_of(row, column), weight_of(column, row)}, cost);
-    place.row_residual_rank = static_cast<std::uint32_t>(residual_rank.row);
-    place.column_residual_rank = static_cast<std::uint32_t>(residual_rank.column);
+    place.row_residual_rank = static_cast<std::uint32_t>(ranks.row);
+    place.column_residual_rank = static_cast<std::uint32_t>(ranks.column);
     BlockPart part{{place}, {}, 0};
     append_columns(block.row_basis, part.values);
     append_columns(block.column_basis, part.values);

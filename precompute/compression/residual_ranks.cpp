@@ -60,16 +60,16 @@ ResidualRanks find_residual_ranks(const LowRankBlock& block, const BlockWeights&
   const bool on_diagonal = block.column_basis.cols() == 0 && block.row_basis.cols() > 0;
   const BasisEnd row{block.row_basis, weights.row};
   const BasisEnd column{on_diagonal ? block.row_basis : block.column_basis, weights.column};
-  ResidualRanks residual_rank;
-  residual_rank.row = residual_rank_of(row, column, block.couplings, cost);
+  ResidualRanks ranks;
+  ranks.row = residual_rank_of(row, column, block.couplings, cost);
   if (on_diagonal) {
-    residual_rank.column = residual_rank.row;
-    return residual_rank;
+    ranks.column = ranks.row;
+    return ranks;
   }
   std::vector<MatrixXd> transposed;
   for (const MatrixXd& coupling : block.couplings) transposed.push_back(coupling.transpose());
-  residual_rank.column = residual_rank_of(column, row, transposed, cost);
-  return residual_rank;
+  ranks.column = residual_rank_of(column, row, transposed, cost);
+  return ranks;
 }
 
 }  // namespace rebounce
