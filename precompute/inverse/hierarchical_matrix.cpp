@@ -18,7 +18,7 @@ using ConstMap = Eigen::Map<const Vectors>;
 constexpr std::uint32_t kStrip = 512;
 
 // Vectors that one thread multiplies with at a time.
-constexpr Index kBatchLights = 32;
+constexpr Index kBatchVectors = 32;
 
 /// Computes to = matrix from, or to += matrix from with kAdd. matrix is [rows][columns], the
 /// vectors have `width` columns; all are row-major.
@@ -245,8 +245,8 @@ MatrixXf HierarchicalMatrix::multiply(std::uint32_t matrix, const MatrixXf& x) c
   load_blas();
   MatrixXf result(x.rows(), x.cols());
 #pragma omp parallel for schedule(dynamic, 1)
-  for (Index begin = 0; begin < x.cols(); begin += kBatchLights) {
-    const Index width = std::min(kBatchLights, x.cols() - begin);
+  for (Index begin = 0; begin < x.cols(); begin += kBatchVectors) {
+    const Index width = std::min(kBatchVectors, x.cols() - begin);
     Vectors in = Vectors::Zero(position_count(), width), out;
     for (std::size_t k = 0; k < position_.size(); ++k) {
       in.row(static_cast<Index>(k)) = x.row(storage_.patch[k]).segment(begin, width);
