@@ -92,11 +92,11 @@ class PieceCompressor {
   WideBlock weighted_block(const TransferBlock& place, std::uint32_t row,
                            std::uint32_t column) const {
     WideBlock block = wide_block(place);
-    if (const auto* weight = weight_of(row, column)) weight->put_left(block.entries);
+    if (const auto* weight = weight_of(row, column)) weight->weigh_rows(block.entries);
     const ClusterWeight* const column_weight = weight_of(column, row);
     if (column_weight == nullptr) return block;
     for (Index m = 0; m < matrix_count(); ++m) {
-      column_weight->put_right(
+      column_weight->weigh_columns(
           block.entries.middleCols(m * place.column_count, place.column_count));
     }
     return block;
@@ -180,12 +180,12 @@ class PieceCompressor {
 
   /// Turns the factors of the weighted block into factors of the block itself. The bases are made
   /// orthonormal again, so that bases and coupling matrices stay in the range of half precision.
-  void take_weights_away(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
-    if (const auto* weight = weight_of(row, column)) weight->take_away(block.row_basis);
+  void unweigh(LowRankBlock& block, std::uint32_t row, std::uint32_t column) const {
+    if (const auto* weight = weight_of(row, column)) weight->unweigh_rows(block.row_basis);
     const Eigen::MatrixXd row_factor = make_orthonormal(block.row_basis);
     Eigen::MatrixXd column_factor = row_factor;
     if (row != column) {
-      if (const auto* weight = weight_of(column, row)) weight->take_away(block.column_basis);
+      if (const auto* weight = weight_of(column, row)) weight->unweigh_rows(block.column_basis);
       column_factor = make_orthonormal(block.column_basis);
     }
     for (Eigen::MatrixXd& coupling : block.couplings)
@@ -194,7 +194,7 @@ class PieceCompressor {
 
   BlockPart low_rank_part(TransferBlock place, LowRankBlock block, std::uint32_t row,
                           std::uint32_t column, const CompressionCost& cost) const {
-    take_weights_away(block, row, column);
+    unweigh(block, row, column);
     place.kind = TransferBlock::Kind::kLowRank;
     place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
     place.column_rank = place.on_diagonal() ? place.row_rank

@@ -54,13 +54,13 @@ Principal principal_directions(const MatrixXd& sample) {
 
 }  // namespace
 
-void ClusterWeight::put_left(Eigen::Ref<MatrixXd> matrix) const {
+void ClusterWeight::weigh_rows(Eigen::Ref<MatrixXd> matrix) const {
   matrix = background_.asDiagonal() * matrix;
   const MatrixXd part = strength_.asDiagonal() * (directions_.transpose() * matrix);
   matrix.noalias() += directions_ * part;
 }
 
-void ClusterWeight::put_right(Eigen::Ref<MatrixXd> matrix) const {
+void ClusterWeight::weigh_columns(Eigen::Ref<MatrixXd> matrix) const {
   matrix = matrix * background_.asDiagonal();
   const MatrixXd part = (matrix * directions_) * strength_.asDiagonal();
   matrix.noalias() += part * directions_.transpose();
@@ -76,7 +76,7 @@ double ClusterWeight::squared_norm() const {
   return sum;
 }
 
-void ClusterWeight::take_away(MatrixXd& basis) const {
+void ClusterWeight::unweigh_rows(MatrixXd& basis) const {
   const VectorXd inverse = (strength_.array() / (1 + strength_.array())).matrix();
   const MatrixXd part = inverse.asDiagonal() * (directions_.transpose() * basis);
   basis.noalias() -= directions_ * part;

@@ -25,17 +25,17 @@ class ClusterWeight {
         strength_(std::move(strength)) {}
 
   /// matrix = W^T matrix.
-  void put_left(Eigen::Ref<Eigen::MatrixXd> matrix) const;
+  void weigh_rows(Eigen::Ref<Eigen::MatrixXd> matrix) const;
 
   /// matrix = matrix W.
-  void put_right(Eigen::Ref<Eigen::MatrixXd> matrix) const;
+  void weigh_columns(Eigen::Ref<Eigen::MatrixXd> matrix) const;
 
   /// The sum of the squares of the entries of W. Independent errors of equal size at all positions
   /// grow by this factor in squared norm under W^T, relative to the error at one position.
   double squared_norm() const;
 
   /// basis = W^-T basis.
-  void take_away(Eigen::MatrixXd& basis) const;
+  void unweigh_rows(Eigen::MatrixXd& basis) const;
 
  private:
   Eigen::VectorXd background_;

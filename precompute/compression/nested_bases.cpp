@@ -205,7 +205,7 @@ class Nesting {
 
   void weigh(NestedEnd& end) const {
     MatrixXd other = basis(end.block, !end.is_row).transpose().cast<double>();
-    if (end.receives) frame_.weights[end.other].put_left(other);
+    if (end.receives) frame_.weights[end.other].weigh_rows(other);
     const MatrixXd gram = other.transpose() * other;
     for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
       MatrixXd s = coupling(end.block, m).cast<double>();
@@ -223,7 +223,7 @@ class Nesting {
     const Index first = range.begin - tree_.clusters[end.cluster].begin;
     MatrixXd part =
         basis(end.block, end.is_row).middleCols(first, range.count).transpose().cast<double>();
-    if (bases_[c].weighed) weight_of_cell(c).put_left(part);
+    if (bases_[c].weighed) weight_of_cell(c).weigh_rows(part);
     return part;
   }
 
@@ -285,7 +285,7 @@ class Nesting {
     CellBasis& own = bases_[c];
     own.directions.conservativeResize(Eigen::NoChange, own.rank);
     own.vectors = own.directions;
-    if (own.weighed) weight_of_cell(c).take_away(own.vectors);
+    if (own.weighed) weight_of_cell(c).unweigh_rows(own.vectors);
     own.norm = own.vectors.colwise().norm();
     for (Index k = 0; k < own.rank; ++k) own.vectors.col(k) /= own.norm[k];
     constexpr double kLeast = 1e-3;

@@ -20,7 +20,7 @@ struct BasisEnd {
 /// Inner products of the vectors of a basis under its weight.
 MatrixXd weighted_gram(const BasisEnd& end) {
   MatrixXd weighted = end.basis;
-  if (end.weight != nullptr) end.weight->put_left(weighted);
+  if (end.weight != nullptr) end.weight->weigh_rows(weighted);
   return weighted.transpose() * weighted;
 }
 

@@ -89,7 +89,7 @@ struct Weighted {
 
   MatrixXd matrix() const {
     MatrixXd w = MatrixXd::Identity(32, 32);
-    weight.put_right(w);
+    weight.weigh_columns(w);
     return w;
   }
 };
@@ -110,9 +110,9 @@ TEST(ClusterWeights, ArePutOnEitherSideAndTakenAway) {
   const Weighted weighted;
   const MatrixXd before = random_matrix(32, 5);
   MatrixXd left = before;
-  weighted.weight.put_left(left);
+  weighted.weight.weigh_rows(left);
   EXPECT_LE((left - weighted.matrix().transpose() * before).norm(), 1e-9 * left.norm());
-  weighted.weight.take_away(left);
+  weighted.weight.unweigh_rows(left);
   EXPECT_LE((left - before).norm(), 1e-9 * before.norm());
 }
 

@@ -84,12 +84,12 @@ TEST(ClusterWeights, SquaredNormIsThatOfTheMatrix) {
   const ClusterWeight lit(VectorXd::LinSpaced(kSize, 1, 3), VectorXd::Unit(kSize, 5),
                           VectorXd::Constant(1, 4));
   MatrixXd whole = MatrixXd::Identity(kSize, kSize);
-  lit.put_right(whole);
+  lit.weigh_columns(whole);
   EXPECT_NEAR(lit.squared_norm(), whole.squaredNorm(), 1e-9 * whole.squaredNorm());
   // So are errors that are as large at all positions, in the mean.
   MatrixXd errors = random_errors(20000);
   const double before = errors.squaredNorm() / kSize;
-  lit.put_right(errors);
+  lit.weigh_columns(errors);
   EXPECT_NEAR(errors.squaredNorm() / before, lit.squared_norm(), 0.02 * lit.squared_norm());
 }
 
