@@ -145,7 +145,7 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report) {
 }
 
 /// --probes NX,NY,NZ or --probes SPACING.
-void take_probes(const std::vector<float>& numbers, ProbeSettings& settings) {
+void parse_probes(const std::vector<float>& numbers, ProbeSettings& settings) {
   if (numbers.empty()) return;
   const auto is_count = [](float x) { return x >= 1 && x <= 65536 && x == std::floor(x); };
   if (numbers.size() == 1 && numbers[0] > 0) {
@@ -177,7 +177,7 @@ std::vector<std::string> precision_names() {
 
 void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
-  take_probes(chosen.probes, settings.probes);
+  parse_probes(chosen.probes, settings.probes);
   settings.receivers = split_lists(chosen.receivers);
   settings.sources = split_lists(chosen.sources);
   if (chosen.form_factors == "pairs") settings.exchange_source = ExchangeSource::kPairs;

@@ -133,7 +133,7 @@ class Nesting {
 #pragma omp parallel for schedule(dynamic, 1)
     for (std::size_t c = 0; c < bases_.size(); ++c) make_basis(c);
 #pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t e = 0; e < ends_.size(); ++e) take_coefficients(ends_[e]);
+    for (std::size_t e = 0; e < ends_.size(); ++e) find_coefficients(ends_[e]);
     for (NestedEnd& end : ends_) fold(end);
     fit_couplings();
 #pragma omp parallel for schedule(dynamic, 1)
@@ -294,7 +294,7 @@ class Nesting {
         (own.energies.head(own.rank) / std::max(most, 1e-300)).array().pow(0.125).max(kLeast);
   }
 
-  void take_coefficients(NestedEnd& end) {
+  void find_coefficients(NestedEnd& end) {
     const CellBasis &first = bases_[end.first_cell], &last = bases_[end.last_cell - 1];
     end.cluster_coefficients.resize(end.rank(),
                                     last.first_coefficient + last.rank - first.first_coefficient);

@@ -35,7 +35,7 @@ struct Chunk {
 };
 
 // Removes the next chunk from the front of `rest`.
-Chunk take_chunk(Bytes& rest) {
+Chunk next_chunk(Bytes& rest) {
   if (rest.size() < kChunkHeaderBytes) {
     throw Error("the .glb is truncated in a chunk header; get a complete copy");
   }
@@ -97,11 +97,11 @@ Container split_container(Bytes file) {
                             length, file.size()));
   }
   Bytes rest = file.subspan(kHeaderBytes, length - kHeaderBytes);
-  const Chunk json = take_chunk(rest);
+  const Chunk json = next_chunk(rest);
   if (json.type != kJsonChunk) throw Error("the first chunk of the .glb is not JSON");
   Container container{json.data, std::nullopt};
   if (!rest.empty()) {
-    const Chunk second = take_chunk(rest);
+    const Chunk second = next_chunk(rest);
     if (second.type == kBinaryChunk) container.binary = second.data;
   }
   return container;

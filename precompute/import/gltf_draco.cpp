@@ -57,16 +57,16 @@ class Header {
     }
     if (method_ == draco::MESH_EDGEBREAKER_ENCODING) {
       take<std::uint8_t>(buffer_);  // the kind of traversal
-      if (version_ < DRACO_BITSTREAM_VERSION(2, 2)) take_count(2, 0);
-      take_count(2, 0);  // vertices
-      return take_count(2, 0);
+      if (version_ < DRACO_BITSTREAM_VERSION(2, 2)) read_count(2, 0);
+      read_count(2, 0);  // vertices
+      return read_count(2, 0);
     }
-    return take_count(2, 2);
+    return read_count(2, 2);
   }
 
  private:
   // Reads a count, whose length is variable from version `major`.`minor` on.
-  std::uint32_t take_count(std::uint8_t major, std::uint8_t minor) {
+  std::uint32_t read_count(std::uint8_t major, std::uint8_t minor) {
     if (version_ < DRACO_BITSTREAM_VERSION(major, minor)) return take<std::uint32_t>(buffer_);
     std::uint32_t count = 0;
     if (!draco::DecodeVarint(&count, &buffer_)) refuse_damaged();

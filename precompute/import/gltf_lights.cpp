@@ -32,7 +32,7 @@ std::optional<LightType> light_type(const std::string& name) {
 }
 
 // KHR_lights_punctual: 0 <= inner < outer <= pi/2.
-void take_cone(const tinygltf::SpotLight& source, Light& light) {
+void read_cone(const tinygltf::SpotLight& source, Light& light) {
   const double outer = std::clamp(source.outerConeAngle, 0.0, std::numbers::pi / 2);
   light.outer_cone_angle = static_cast<float>(outer);
   light.inner_cone_angle = static_cast<float>(std::clamp(source.innerConeAngle, 0.0, outer));
@@ -55,7 +55,7 @@ std::optional<Light> place_light(const tinygltf::Light& source, const tinygltf::
   }
   light.intensity = static_cast<float>(source.intensity);
   light.range = static_cast<float>(std::max(source.range, 0.0) * scale);
-  if (*type == LightType::kSpot) take_cone(source.spot, light);
+  if (*type == LightType::kSpot) read_cone(source.spot, light);
 
   const auto direction = direction_of(-glm::dvec3(world[2]));
   if (direction) light.direction = to_float3(*direction);

@@ -251,9 +251,9 @@ class MaterialImport {
     material.alpha_mode = alpha_mode(source);
     material.alpha_cutoff = alpha_cutoff(source);
     material.base_alpha = color.alpha;
-    take_transmission(source, material);
+    read_transmission(source, material);
     texcoords.uses_alpha = material.alpha_mode != AlphaMode::kOpaque;
-    take_emission(source, material, texcoords.emissive);
+    read_emission(source, material, texcoords.emissive);
     warn_of_what_is_simplified(source, material);
     return material;
   }
@@ -267,7 +267,7 @@ class MaterialImport {
     return texture;
   }
 
-  void take_transmission(const tinygltf::Material& source, Material& material) {
+  void read_transmission(const tinygltf::Material& source, Material& material) {
     const auto [factor, texture] = transmission(source);
     material.transmission = to_fraction(factor);
     if (material.transmission == 0 || texture < 0) return;
@@ -275,7 +275,7 @@ class MaterialImport {
     warnings_.count("the transmission textures of {} materials are taken for their mean");
   }
 
-  void take_emission(const tinygltf::Material& source, Material& material,
+  void read_emission(const tinygltf::Material& source, Material& material,
                      TexcoordSource& texcoord) {
     const Float3 luminance = emitted_luminance(source, warnings_);
     if (is_black(luminance)) return;

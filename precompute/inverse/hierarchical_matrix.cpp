@@ -67,12 +67,12 @@ HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage)
   for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
     low_rank_count_ = std::max<Index>(low_rank_count_, Index{cluster.coefficient} + cluster.rank);
   }
-  if (!storage_.scale_exponent.empty()) take_scales();
+  if (!storage_.scale_exponent.empty()) fold_scales();
   sort_blocks();
 }
 
 /// Passes on R K R instead of K. R holds powers of two, so nothing is rounded.
-void HierarchicalMatrix::take_scales() {
+void HierarchicalMatrix::fold_scales() {
   std::vector<float> scale(static_cast<std::size_t>(position_count()), 1.0F);
   for (std::size_t k = 0; k < position_.size(); ++k) scale[k] = storage_.position_scale(k);
   storage_.scale_exponent.clear();

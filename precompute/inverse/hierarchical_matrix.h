@@ -48,7 +48,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   /// The places of such a list, by position.
   struct Places;
 
-  void take_scales();
+  void fold_scales();
   void sort_blocks();
   /// The entries of a block in the given rows and columns.
   Eigen::MatrixXf block_entries(std::uint32_t matrix, std::size_t block,

@@ -60,7 +60,7 @@ class PatchModelBuilder {
   }
 
   PatchModel build() {
-    take_surface();
+    move_surface();
     add_second_sides();
     find_openings();
     const RayTracer tracer = make_surface_tracer(model_.mesh);
@@ -136,7 +136,7 @@ class PatchModelBuilder {
   }
 
   /// Moves the surface out of the scene; only its materials are left there.
-  void take_surface() {
+  void move_surface() {
     DisplayMesh& mesh = model_.mesh;
     mesh.position = std::move(scene_.position);
     mesh.normal = std::move(scene_.normal);

@@ -95,25 +95,25 @@ std::vector<std::string> split_selection(std::string_view list) {
 PatchSelection::PatchSelection(std::span<const std::string> entries, const Scene& scene,
                                std::string list)
     : list_(std::move(list)) {
-  for (const std::string& entry : entries) take(entry, scene);
+  for (const std::string& entry : entries) add(entry, scene);
   std::ranges::sort(meshes_);
   std::ranges::sort(materials_);
 }
 
-void PatchSelection::take(const std::string& entry, const Scene& scene) {
+void PatchSelection::add(const std::string& entry, const Scene& scene) {
   const std::string_view text = entry;
   if (text.starts_with(kBox)) {
-    take_box(entry);
+    add_box(entry);
   } else if (text.starts_with(kMesh)) {
-    take_name(text.substr(kMesh.size()), true, false, scene);
+    add_name(text.substr(kMesh.size()), true, false, scene);
   } else if (text.starts_with(kMaterial)) {
-    take_name(text.substr(kMaterial.size()), false, true, scene);
+    add_name(text.substr(kMaterial.size()), false, true, scene);
   } else {
-    take_name(text, true, true, scene);
+    add_name(text, true, true, scene);
   }
 }
 
-void PatchSelection::take_box(const std::string& entry) {
+void PatchSelection::add_box(const std::string& entry) {
   std::array<float, 6> corner{};
   const char* at = entry.data() + kBox.size();
   const char* const end = entry.data() + entry.size();
@@ -138,8 +138,8 @@ void PatchSelection::take_box(const std::string& entry) {
   }
 }
 
-void PatchSelection::take_name(std::string_view name, bool of_meshes, bool of_materials,
-                               const Scene& scene) {
+void PatchSelection::add_name(std::string_view name, bool of_meshes, bool of_materials,
+                              const Scene& scene) {
   const std::size_t before = meshes_.size() + materials_.size();
   for (std::uint32_t k = 0; of_meshes && k < scene.placed_meshes.size(); ++k) {
     const PlacedMesh& mesh = scene.placed_meshes[k];

@@ -39,9 +39,9 @@ class PatchSelection {
     Float3 low, high;
   };
 
-  void take(const std::string& entry, const Scene& scene);
-  void take_box(const std::string& entry);
-  void take_name(std::string_view name, bool of_meshes, bool of_materials, const Scene& scene);
+  void add(const std::string& entry, const Scene& scene);
+  void add_box(const std::string& entry);
+  void add_name(std::string_view name, bool of_meshes, bool of_materials, const Scene& scene);
 
   std::string list_;
   std::vector<Box> boxes_;

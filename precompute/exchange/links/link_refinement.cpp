@@ -68,7 +68,7 @@ void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& p
   while (!generation.empty()) {
     outcomes.assign(generation.size(), {});
     decide(generation, outcomes, progress);
-    generation = take(generation, outcomes);
+    generation = merge(generation, outcomes);
   }
 }
 
@@ -201,7 +201,7 @@ LinkRefinement::Outcome LinkRefinement::split(const Candidate& pair, View view) 
 }
 
 /// Merges the outcomes in order; pairs that are split make the next generation.
-std::vector<LinkRefinement::Candidate> LinkRefinement::take(
+std::vector<LinkRefinement::Candidate> LinkRefinement::merge(
     const std::vector<Candidate>& generation, const std::vector<Outcome>& outcomes) {
   std::vector<Candidate> next;
   const double whole = tree_[0].area * tree_[0].area;

@@ -88,8 +88,8 @@ class LinkRefinement {
                     const LinkRays::Visibility& visible) const;
   Outcome split(const Candidate& pair, View view) const;
   double allowed_squared(const LinkNode& a, const LinkNode& b) const;
-  std::vector<Candidate> take(const std::vector<Candidate>& generation,
-                              const std::vector<Outcome>& outcomes);
+  std::vector<Candidate> merge(const std::vector<Candidate>& generation,
+                               const std::vector<Outcome>& outcomes);
   void append_children(const Candidate& pair, const Outcome& outcome,
                        std::vector<Candidate>& next) const;
   bool needs_all_rays(const Candidate& pair) const;
