@@ -2,7 +2,7 @@
 
 #include <glm/glm.hpp>
 
-#include "precompute/patches/seen_patch.h"
+#include "precompute/patches/hit_patch.h"
 #include "precompute/sampling/hemisphere_rays.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/patch_points.h"

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/patches/seen_patch.h"
+#include "precompute/patches/hit_patch.h"
 #include "runtime/outputs/spherical_harmonics.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/base/error.h"

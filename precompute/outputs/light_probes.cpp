@@ -8,7 +8,7 @@
 
 #include "precompute/outputs/emitter_points.h"
 #include "precompute/outputs/harmonic_view.h"
-#include "precompute/patches/seen_patch.h"
+#include "precompute/patches/hit_patch.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "precompute/exchange/pairs/exchange_results.h"
+#include "precompute/patches/hit_patch.h"
 #include "precompute/patches/patch_model.h"
-#include "precompute/patches/seen_patch.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/ray_tracer.h"
 

@@ -9,7 +9,7 @@
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/outputs/light_probes.h"
 #include "precompute/outputs/surface_harmonics.h"
-#include "precompute/patches/seen_patch.h"
+#include "precompute/patches/hit_patch.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/lights/sky_model.h"
 #include "runtime/outputs/probe_irradiance.h"

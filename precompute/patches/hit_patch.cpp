@@ -1,4 +1,4 @@
-#include "precompute/patches/seen_patch.h"
+#include "precompute/patches/hit_patch.h"
 
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/triangle.h"
