@@ -1,6 +1,6 @@
 #include "precompute/exchange/links/links.h"
 
-#include "precompute/exchange/links/link_sums.h"
+#include "precompute/exchange/links/link_scaling.h"
 #include "precompute/exchange/links/refined_links.h"
 #include "transfer/base/bfloat16.h"
 #include "transfer/base/error.h"

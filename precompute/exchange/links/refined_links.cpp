@@ -1,6 +1,6 @@
 #include "precompute/exchange/links/refined_links.h"
 
-#include "precompute/exchange/links/link_sums.h"
+#include "precompute/exchange/links/link_scaling.h"
 
 namespace rebounce {
 namespace {

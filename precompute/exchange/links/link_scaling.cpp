@@ -1,4 +1,4 @@
-#include "precompute/exchange/links/link_sums.h"
+#include "precompute/exchange/links/link_scaling.h"
 
 #include <algorithm>
 #include <cmath>
