@@ -141,7 +141,7 @@ class BlockFitting {
   }
 
   const SpreadTree& tree_;
-  SummedPairs sums_;
+  SummedPairTable sums_;
   const double multiplier_;
   Subtree a_, b_;
   std::vector<Choice> choice_;  ///< [a][b]

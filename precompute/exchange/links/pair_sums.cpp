@@ -84,7 +84,7 @@ PairSums& PairSums::operator-=(const PairSums& other) {
   return *this;
 }
 
-PairSums SummedPairs::sums_of(std::uint32_t row, std::uint32_t column, float exchange) const {
+PairSums SummedPairTable::sums_of(std::uint32_t row, std::uint32_t column, float exchange) const {
   const std::uint32_t i = patch_[row], j = patch_[column];
   const Float3 &x = patches_.centroid[i], &y = patches_.centroid[j];
   const double s = exchange;
@@ -97,7 +97,7 @@ PairSums SummedPairs::sums_of(std::uint32_t row, std::uint32_t column, float exc
   return sums;
 }
 
-void SummedPairs::add_up(PositionRange rows, PositionRange columns) {
+void SummedPairTable::add_up(PositionRange rows, PositionRange columns) {
   rows_ = rows;
   columns_ = columns;
   exchange_.resize(std::size_t{rows.count} * columns.count);
@@ -113,7 +113,7 @@ void SummedPairs::add_up(PositionRange rows, PositionRange columns) {
   }
 }
 
-PairSums SummedPairs::of(PositionRange rows, PositionRange columns) const {
+PairSums SummedPairTable::of(PositionRange rows, PositionRange columns) const {
   const std::uint32_t top = rows.begin - rows_.begin, left = columns.begin - columns_.begin;
   const std::uint32_t bottom = top + rows.count, right = left + columns.count;
   PairSums sums = at(bottom, right);

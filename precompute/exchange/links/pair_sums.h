@@ -86,11 +86,11 @@ struct PairSums {
 /// Sums over any part of a block of pairs, each from four entries of a table (F. C. Crow,
 /// "Summed-area tables for texture mapping", SIGGRAPH 1984). Its memory is reused from block to
 /// block.
-class SummedPairs {
+class SummedPairTable {
  public:
   /// Both must outlive the object; `patch` [n] is the patch at each position.
-  SummedPairs(const PairSource& pairs, const PatchTable& patches,
-              std::span<const std::uint32_t> patch)
+  SummedPairTable(const PairSource& pairs, const PatchTable& patches,
+                  std::span<const std::uint32_t> patch)
       : pairs_(pairs), patches_(patches), patch_(patch) {}
 
   /// Sums up the pairs of `rows`, all before `columns`.
