@@ -12,7 +12,7 @@
 #include "precompute/exchange/links/links.h"
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/exchange/pairs/patch_geometry.h"
-#include "precompute/exchange/pairs/row_targets.h"
+#include "precompute/exchange/pairs/row_sum_targets.h"
 #include "precompute/exchange/pairs/shadow_rays.h"
 #include "runtime/rays/box.h"
 
@@ -141,7 +141,7 @@ class SceneBench {
       escape.push_back(measure_escape(model_, triangles[patch], patch, tracer_,
                                       settings_.hemisphere_rays, settings_.seed, scratch));
     }
-    const std::vector<RowTarget> target = row_targets(escape, settings_.hemisphere_rays);
+    const std::vector<RowSumTarget> target = row_sum_targets(escape, settings_.hemisphere_rays);
     for (std::size_t k = 0; k < target.size(); ++k) {
       auto& row = rows_.form_factor[k];
       double sum = std::accumulate(row.begin(), row.end(), 0.0);

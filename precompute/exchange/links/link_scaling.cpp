@@ -26,7 +26,7 @@ struct Moments {
   glm::dvec3 first{0};
 };
 
-double least_factor(const RowTarget& target) {
+double least_factor(const RowSumTarget& target) {
   return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
 }
 
@@ -88,7 +88,7 @@ std::vector<double> push(const LinkTree& tree, std::vector<Moments> arrived,
 }
 
 /// The targets, moved towards the present sums by their uncertainty.
-std::vector<double> wanted_sums(std::span<const double> sum, std::span<const RowTarget> target) {
+std::vector<double> wanted_sums(std::span<const double> sum, std::span<const RowSumTarget> target) {
   std::vector<double> wanted(sum.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const double variance = kSumDeviation * kSumDeviation,
@@ -100,9 +100,9 @@ std::vector<double> wanted_sums(std::span<const double> sum, std::span<const Row
 
 /// Patches that see nothing only exchange leaked light, of either sign. Scaling by sums cannot
 /// remove it, so the factor of such a patch is 0.
-std::vector<double> first_factors(std::span<const RowTarget> target) {
+std::vector<double> first_factors(std::span<const RowSumTarget> target) {
   std::vector<double> factor;
-  for (const RowTarget& t : target) factor.push_back(t.sum > 0 ? 1 : 0);
+  for (const RowSumTarget& t : target) factor.push_back(t.sum > 0 ? 1 : 0);
   return factor;
 }
 
@@ -148,7 +148,7 @@ std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> lin
 }
 
 LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
-                        std::span<const RowTarget> target) {
+                        std::span<const RowSumTarget> target) {
   LinkScaling result;
   std::vector<double>&factor = result.factor, &row = result.row_sum;
   row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));

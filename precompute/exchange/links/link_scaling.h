@@ -28,6 +28,6 @@ struct LinkScaling {
 /// row sum. Factors stay in [0.5, 2], with two exceptions: patches that see almost nothing may lose
 /// nearly all of their exchange, and where the target is 0 the factor is 0.
 LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
-                        std::span<const RowTarget> target);
+                        std::span<const RowSumTarget> target);
 
 }  // namespace rebounce

@@ -34,7 +34,7 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
   LinkRefinement refinement(result.tree, shadow_rays, tracer, settings);
   refinement.run(part_of(progress, 0.0, 0.5));
   result.escape = measure_escapes(model, tracer, settings);
-  result.target = row_targets(result.escape, settings.hemisphere_rays);
+  result.target = row_sum_targets(result.escape, settings.hemisphere_rays);
   const std::vector<double> ones(model.patches.size(), 1.0);
   const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
   refinement.revise(find_doubtful_rows(sum, result.target, kLinkRowSumTolerance),

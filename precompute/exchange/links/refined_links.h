@@ -9,7 +9,7 @@
 #include "precompute/exchange/links/link_tree.h"
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/exchange/pairs/form_factor_settings.h"
-#include "precompute/exchange/pairs/row_targets.h"
+#include "precompute/exchange/pairs/row_sum_targets.h"
 #include "precompute/exchange/pairs/shadow_rays.h"
 
 namespace rebounce {
@@ -18,9 +18,9 @@ namespace rebounce {
 struct RefinedLinks {
   LinkTree tree;
   std::vector<Link> links;
-  std::vector<Escape> escape;     ///< [n]
-  std::vector<RowTarget> target;  ///< [n]
-  std::uint64_t ray_count = 0;    ///< without the rays that measure what escapes
+  std::vector<Escape> escape;        ///< [n]
+  std::vector<RowSumTarget> target;  ///< [n]
+  std::uint64_t ray_count = 0;       ///< without the rays that measure what escapes
   std::uint64_t candidate_count = 0;
 };
 

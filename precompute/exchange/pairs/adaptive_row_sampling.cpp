@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/exchange/pairs/row_targets.h"
+#include "precompute/exchange/pairs/row_sum_targets.h"
 
 namespace rebounce {
 namespace {
@@ -17,7 +17,7 @@ constexpr double kWorthwhile = 0.25;
 }  // namespace
 
 AdaptiveRowSampling::AdaptiveRowSampling(std::span<const double> sum,
-                                         std::span<const RowTarget> target, double tolerance)
+                                         std::span<const RowSumTarget> target, double tolerance)
     : target_(target), tolerance_(tolerance), trial_(sum.size()) {
   error_.reserve(sum.size());
   std::array<std::vector<std::uint32_t>, kKinds> rows;

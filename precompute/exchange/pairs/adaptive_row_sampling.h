@@ -17,7 +17,7 @@ namespace rebounce {
 class AdaptiveRowSampling {
  public:
   /// `sum` and `target` [n] of the rows; `tolerance` as in is_doubtful_row().
-  AdaptiveRowSampling(std::span<const double> sum, std::span<const RowTarget> target,
+  AdaptiveRowSampling(std::span<const double> sum, std::span<const RowSumTarget> target,
                       double tolerance);
 
   /// [n] true for the rows of the trial.
@@ -34,7 +34,7 @@ class AdaptiveRowSampling {
   std::size_t kind_of(std::size_t row) const;
 
   std::vector<double> error_;  ///< [n]
-  std::span<const RowTarget> target_;
+  std::span<const RowSumTarget> target_;
   double tolerance_;
   std::vector<std::uint32_t> doubtful_;  ///< row numbers
   std::vector<bool> trial_;              ///< [n]

@@ -24,7 +24,7 @@ double dot(const Vector& a, const Vector& b) {
 class NormalEquations {
  public:
   NormalEquations(const ExchangeRows& rows, std::span<const double> area,
-                  std::span<const RowTarget> target)
+                  std::span<const RowSumTarget> target)
       : rows_(rows), diagonal_(rows.size(), 0.0) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (const ExchangeEntry& entry : rows[i]) {
@@ -138,7 +138,7 @@ std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> a
   return sum;
 }
 
-double largest_row_error(std::span<const double> sum, std::span<const RowTarget> target,
+double largest_row_error(std::span<const double> sum, std::span<const RowSumTarget> target,
                          bool certain) {
   double largest = 0;
   for (std::size_t i = 0; i < sum.size(); ++i) {
@@ -149,7 +149,7 @@ double largest_row_error(std::span<const double> sum, std::span<const RowTarget>
 }
 
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
-                              std::span<const RowTarget> target) {
+                              std::span<const RowSumTarget> target) {
   const Areas original = exchange_areas(rows);
   ClosureReport report;
   Vector sum = row_sums(rows, area);

@@ -25,7 +25,7 @@ using ExchangeRows = std::vector<std::vector<ExchangeEntry>>;
 
 /// The target of a row sum of F and its uncertainty (0: certain). A sum of 0 means that no ray met
 /// anything.
-struct RowTarget {
+struct RowSumTarget {
   double sum;
   double deviation;
 };
@@ -34,7 +34,7 @@ struct RowTarget {
 std::vector<double> row_sums(const ExchangeRows& rows, std::span<const double> area);
 
 /// The largest error of a row sum, over all rows or over those with a certain target.
-double largest_row_error(std::span<const double> sum, std::span<const RowTarget> target,
+double largest_row_error(std::span<const double> sum, std::span<const RowSumTarget> target,
                          bool certain);
 
 /// Corrects the exchange areas so that rows add up to their targets; reciprocity holds.
@@ -47,6 +47,6 @@ double largest_row_error(std::span<const double> sum, std::span<const RowTarget>
 /// An entry changes by at most half of its value. An entry that reaches this bound is fixed there,
 /// with variance 0, and the others share the rest.
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
-                              std::span<const RowTarget> target);
+                              std::span<const RowSumTarget> target);
 
 }  // namespace rebounce

@@ -10,7 +10,7 @@
 #include "precompute/base/parallel_progress.h"
 #include "precompute/exchange/pairs/adaptive_row_sampling.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
-#include "precompute/exchange/pairs/row_targets.h"
+#include "precompute/exchange/pairs/row_sum_targets.h"
 
 namespace rebounce {
 namespace {
@@ -77,7 +77,7 @@ class RawExchangeBuilder {
     for_each_patch(
         all, [&](std::uint32_t i, Scratch& scratch) { compute_row(i, every, scratch, rows[i]); },
         [&](double done) { return 0.2 + 0.6 * triangle(done); });
-    const std::vector<RowTarget> target = row_targets(escape, settings_.hemisphere_rays);
+    const std::vector<RowSumTarget> target = row_sum_targets(escape, settings_.hemisphere_rays);
     const AdaptiveRowSampling look(row_sums(rows, geometry_.areas()), target, row_sum_tolerance());
     const auto refine = [&](const std::vector<bool>& doubtful, double begin) {
       for_each_patch(

@@ -19,8 +19,8 @@ inline constexpr double kVisibilityVarianceFloor = 1e-6;
 /// The exchange of all pairs of patches from rays and kernels, before closure.
 struct RawExchange {
   ExchangeRows rows;
-  std::vector<Escape> escape;     ///< [n]
-  std::vector<RowTarget> target;  ///< [n]
+  std::vector<Escape> escape;        ///< [n]
+  std::vector<RowSumTarget> target;  ///< [n]
   std::uint64_t ray_count = 0;
   std::uint64_t pair_count = 0;  ///< pairs that face each other and got shadow rays
 };

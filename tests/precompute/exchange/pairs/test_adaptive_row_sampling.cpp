@@ -23,7 +23,7 @@ std::size_t count(const std::vector<bool>& rows) {
   return static_cast<std::size_t>(std::ranges::count(rows, true));
 }
 
-const std::vector<RowTarget> kTarget(kRows, {1, 0});
+const std::vector<RowSumTarget> kTarget(kRows, {1, 0});
 
 TEST(AdaptiveRowSampling, TriesSomeOfEachKind) {
   const AdaptiveRowSampling look(sums(1.5e-3, 0.1), kTarget, kTolerance);

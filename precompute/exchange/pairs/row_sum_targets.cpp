@@ -1,10 +1,10 @@
-#include "precompute/exchange/pairs/row_targets.h"
+#include "precompute/exchange/pairs/row_sum_targets.h"
 
 #include <cmath>
 
 namespace rebounce {
-std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count) {
-  std::vector<RowTarget> target;
+std::vector<RowSumTarget> row_sum_targets(std::span<const Escape> escape, int ray_count) {
+  std::vector<RowSumTarget> target;
   target.reserve(escape.size());
   for (const Escape& e : escape) {
     const double lost = e.sky + e.absorbed, count = ray_count;
@@ -21,12 +21,12 @@ std::vector<RowTarget> row_targets(std::span<const Escape> escape, int ray_count
   return target;
 }
 
-bool is_doubtful_row(double sum, const RowTarget& target, double tolerance) {
+bool is_doubtful_row(double sum, const RowSumTarget& target, double tolerance) {
   return std::abs(sum - target.sum) > tolerance + 3 * target.deviation;
 }
 
-std::vector<bool> find_doubtful_rows(std::span<const double> sum, std::span<const RowTarget> target,
-                                     double tolerance) {
+std::vector<bool> find_doubtful_rows(std::span<const double> sum,
+                                     std::span<const RowSumTarget> target, double tolerance) {
   std::vector<bool> doubtful(sum.size());
   for (std::size_t i = 0; i < sum.size(); ++i) {
     doubtful[i] = is_doubtful_row(sum[i], target[i], tolerance);
