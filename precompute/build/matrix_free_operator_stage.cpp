@@ -9,9 +9,9 @@
 #include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/links/link_fitting.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "precompute/lights/error_reference.h"
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
-#include "precompute/lights/received_light.h"
 #include "precompute/lights/reference_solution.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/error.h"
@@ -88,7 +88,7 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
 /// The reference of errors at receivers, as a fraction of all light that patches reflect.
 double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
                      const PatchRoles& roles, std::span<const float> area) {
-  ReceivedLight received;
+  ErrorReference received;
   for (std::size_t k = 0; k < exitances.training.size(); ++k) {
     std::vector<Float3> reflected = radiosities.training[k];
     for (std::size_t i = 0; i < reflected.size(); ++i) {

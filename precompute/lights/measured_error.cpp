@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "precompute/lights/error_bound.h"
-#include "precompute/lights/received_light.h"
+#include "precompute/lights/error_reference.h"
 #include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
 #include "transfer/base/area_norm.h"
@@ -63,7 +63,7 @@ std::vector<LightError> light_errors(const TransferData& data,
   const std::vector<float>& area = data.patches.area;
   std::vector<Float3> indirect_irradiance(data.patches.size());
   std::vector<float> workspace(data.transfer->workspace_size());
-  ReceivedLight received;
+  ErrorReference received;
   std::vector<std::vector<Float3>> arrived, results;
   std::vector<LightError> errors;
   for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kBatchLights) {

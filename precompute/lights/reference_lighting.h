@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "precompute/base/symmetric_matrix.h"
-#include "precompute/lights/received_light.h"
+#include "precompute/lights/error_reference.h"
 #include "transfer/operator/transfer_operator.h"
 
 namespace rebounce {
@@ -25,9 +25,9 @@ class ReferenceLighting {
 
   std::size_t light_count() const { return lights_.size(); }
 
-  const ReceivedLight& received() const { return received_; }
+  const ErrorReference& received() const { return received_; }
 
-  /// The relative area-weighted L2 error of `transfer` under each light (received_light.h). It has
+  /// The relative area-weighted L2 error of `transfer` under each light (error_reference.h). It has
   /// the roles of the matrix.
   std::vector<double> errors(const TransferOperator& transfer) const;
 
@@ -45,7 +45,7 @@ class ReferenceLighting {
 
   std::vector<float> area_;
   std::vector<std::vector<Float3>> lights_, truths_;
-  ReceivedLight received_;
+  ErrorReference received_;
 };
 
 }  // namespace rebounce

@@ -12,7 +12,7 @@
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "precompute/lights/received_light.h"
+#include "precompute/lights/error_reference.h"
 #include "precompute/lights/reference_lighting.h"
 #include "tests/support/exchange_samples.h"
 #include "tests/support/scene_data.h"
@@ -231,8 +231,8 @@ TEST(MeasuredError, LeavesOutAndCountsLightsFromWhichNothingArrives) {
   EXPECT_LT(found->max, 1e-5);
 }
 
-TEST(ReceivedLight, ErrorsAreRelativeToWhatUsuallyArrives) {
-  ReceivedLight far, all;
+TEST(ErrorReference, ErrorsAreRelativeToWhatUsuallyArrives) {
+  ErrorReference far, all;
   far.add(1, 2);
   far.add(0, 2);
   far.add(2, 2);

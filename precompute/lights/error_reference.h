@@ -11,7 +11,7 @@ namespace rebounce {
 /// more, the usual share of the light that arrives anywhere: the root mean square of that share
 /// over all lights. A lamp in another room therefore counts as it does among all patches, unless
 /// all lamps are in other rooms. If all patches are receivers, it is the light that arrives.
-class ReceivedLight {
+class ErrorReference {
  public:
   /// Adds a light: the area norms of what arrives at receivers and at all patches.
   void add(double received, double all);

@@ -1,4 +1,4 @@
-#include "precompute/lights/received_light.h"
+#include "precompute/lights/error_reference.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,17 +7,17 @@
 
 namespace rebounce {
 
-void ReceivedLight::add(double received, double all) {
+void ErrorReference::add(double received, double all) {
   lights_.push_back({received, all});
   if (all > 0) squares_ += std::pow(received / all, 2);
 }
 
-double ReceivedLight::reference(std::size_t light) const {
+double ErrorReference::reference(std::size_t light) const {
   const double usual = std::sqrt(squares_ / static_cast<double>(lights_.size()));
   return std::max(lights_[light].received, usual * lights_[light].all);
 }
 
-double ReceivedLight::part() const {
+double ErrorReference::part() const {
   double logarithms = 0;
   int count = 0;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
