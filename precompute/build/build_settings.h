@@ -67,8 +67,8 @@ struct BuildSettings {
   /// stored, and from links solved for; light goes by way of all patches nevertheless. What emits
   /// is a source, named or not. The operator is then hierarchical.
   std::vector<std::string> receivers, sources;
-  /// Limit of the memory beside the form factors, bytes; 0: none. A lower limit means fewer threads
-  /// and panels at a time: slower, with the same bits.
+  /// Refuses to start what needs more, bytes; 0: half of the machine's memory. With links, a lower
+  /// limit means that less of the operator is made at a time: slower, with the same bits.
   std::uint64_t memory_limit_bytes = 0;
   /// With kLinks: folder that what is done of the operator is kept in, so that a build that was
   /// killed has that done when it is started again with the same scene and settings. It stays

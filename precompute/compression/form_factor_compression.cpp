@@ -14,7 +14,7 @@ namespace {
 
 /// Sweeps read the light at positions, so form factors have no cluster bases.
 HierarchicalSettings without_cluster_bases(HierarchicalSettings settings) {
-  settings.cluster_coefficients = false;
+  settings.cluster_bases = false;
   return settings;
 }
 

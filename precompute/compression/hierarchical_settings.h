@@ -14,7 +14,7 @@ struct HierarchicalSettings {
   /// of a block then includes the time of its product. Sweeps over compressed form factors do not
   /// support them. Patches are equilibrated (HierarchicalOperator) with cluster bases and wherever
   /// bases are integers.
-  bool cluster_coefficients = true;
+  bool cluster_bases = true;
 };
 
 }  // namespace rebounce

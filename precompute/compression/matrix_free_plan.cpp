@@ -30,8 +30,6 @@ constexpr double kOperatorBytes = 10.5e3, kOperatorTolerance = 0.005, kOperatorG
 
 }  // namespace
 
-/// The plan with the most threads, at most those of OpenMP, that keeps to the limit of `settings`.
-/// Only a plan with one thread and one panel may be above the limit: no plan takes less.
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings) {
   constexpr std::size_t kBlasBytes = 45'000'000;  // of OpenBLAS, for each thread that multiplies

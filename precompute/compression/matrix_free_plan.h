@@ -31,8 +31,8 @@ struct MatrixFreeTransferPlan {
   std::size_t peak_bytes = 0;
 };
 
-/// The plan with the most threads, those of OpenMP at most and one at least, that keeps to the
-/// limit of `settings`. Above it is only the plan with one thread: less cannot be done with.
+/// The plan with the most threads, at most those of OpenMP, that keeps to the limit of `settings`.
+/// Only a plan with one thread and one panel may be above the limit: no plan takes less.
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings = {});
 

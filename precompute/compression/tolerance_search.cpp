@@ -63,7 +63,7 @@ PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_cou
   PartSizes sizes;
   sizes.basis_value =
       hierarchical_precision(settings.precision).bases == BasisPrecision::kQ8 ? 0.55 : 1;
-  if (settings.cluster_coefficients) {
+  if (settings.cluster_bases) {
     const double part = std::min(1.0, static_cast<double>(patch_count) / kSizedPatches);
     sizes.vector += kVectorSize * part;
     sizes.block += kBlockSize * part;
@@ -75,8 +75,8 @@ PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_cou
 /// positions, and do not know cluster coefficients.
 CompressionOptions options_of(const HierarchicalSettings& settings) {
   return {.equilibrated = are_integers(hierarchical_precision(settings.precision).bases) ||
-                          settings.cluster_coefficients,
-          .nested = settings.cluster_coefficients};
+                          settings.cluster_bases,
+          .nested = settings.cluster_bases};
 }
 
 /// The best operator that the search has met: the smallest within the limit, or the most exact.
@@ -103,7 +103,7 @@ class Best {
 /// The multiplier that a search begins with.
 double search_start(const HierarchicalSettings& settings, std::size_t patch_count) {
   const double usual = initial_multiplier(settings.tolerance, patch_count);
-  if (!settings.cluster_coefficients) return kPlainStart * usual;
+  if (!settings.cluster_bases) return kPlainStart * usual;
   const double times = static_cast<double>(patch_count) / kStartPatches;
   return usual * std::clamp(std::pow(times, kStartGrowth), 1.0, kHighestStart);
 }
@@ -114,9 +114,6 @@ double initial_multiplier(double tolerance, std::size_t patch_count) {
   return kInitialMultiplier * tolerance * tolerance / static_cast<double>(patch_count);
 }
 
-/// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. `checkpoint`, made for
-/// these arguments, keeps the results of each round; parts that it holds are reused. The bits are
-/// the same with and without it.
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress,

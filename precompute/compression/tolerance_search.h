@@ -15,9 +15,9 @@ namespace rebounce {
 /// The multiplier at which searches begin, for one value per patch.
 double initial_multiplier(double tolerance, std::size_t patch_count);
 
-/// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. What each round of the
-/// search does is kept in `checkpoint`, made for all that is given here, and taken from there: the
-/// bits are the same.
+/// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. `checkpoint`, made for
+/// these arguments, keeps the results of each round; parts that it holds are reused. The bits are
+/// the same with and without it.
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress = {},

@@ -302,13 +302,12 @@ TEST(NestedBases, AreTakenForATolerance) {
   const CompressedBox& box = large_box();
   const auto training = spots(box.patches, 24, 1), validation = spots(box.patches, 24, 3);
   std::size_t bytes[2];
-  for (const bool cluster_coefficients : {false, true}) {
-    const auto op =
-        compress_to_tolerance(box.matrix, box.patches, {training, validation},
-                              {.tolerance = 0.002, .cluster_coefficients = cluster_coefficients});
-    EXPECT_EQ(op->storage().coefficient_scale.empty(), !cluster_coefficients);
+  for (const bool cluster_bases : {false, true}) {
+    const auto op = compress_to_tolerance(box.matrix, box.patches, {training, validation},
+                                          {.tolerance = 0.002, .cluster_bases = cluster_bases});
+    EXPECT_EQ(op->storage().coefficient_scale.empty(), !cluster_bases);
     EXPECT_LT(box.mean_error(*op), 0.002);
-    bytes[cluster_coefficients ? 1 : 0] = op->bytes();
+    bytes[cluster_bases ? 1 : 0] = op->bytes();
   }
   EXPECT_LT(bytes[1], bytes[0]);
 }
