@@ -16,37 +16,46 @@ import pathlib
 import re
 import sys
 
-# The rooms, lowest first. A unit may include units of its own room and of rooms above it in this
-# list. A file belongs to the room with the longest path that it lies in.
-ROOMS = (
-    "transfer/format",
-    "transfer/kernels",
-    "transfer/operator",
-    "transfer/exchange",
-    "transfer/file",
-    "runtime/rays",
-    "runtime/lights",
-    "runtime/outputs",
-    "runtime/frame",
-    "runtime/solvers",
-    "runtime/demo",
-    "runtime/demo/viewer",
-    "precompute/base",
-    "precompute/sampling",
-    "precompute/import",
-    "precompute/patches",
-    "precompute/exchange/pairs",
-    "precompute/exchange/links",
-    "precompute/lights",
-    "precompute/inverse",
-    "precompute/compression",
-    "precompute/outputs",
-    "precompute/build",
-    "precompute/cli",
-    "tests/scenes",  # what tests and bench share
-    "bench",
-    "tests",
-)
+# The rooms, lowest first, each with what it is for. A unit may include units of its own room and of
+# rooms above it in this list. A file belongs to the room with the longest path that it lies in.
+ROOMS = {
+    "transfer/base": "Small types, errors, half floats, norms, and the loop that a scheduler runs.",
+    "transfer/data": "What a scene is described by: patches' roles, lamps, sky, probes, lightmap.",
+    "transfer/format": "How the numbers of an operator lie in memory and in a file.",
+    "transfer/kernels": "Products with those numbers, a file for each instruction set.",
+    "transfer/operator": "Y as dense, hierarchical and low-rank operators, and their product.",
+    "transfer/exchange": "Form factors as they are stored, their product and their sweeps.",
+    "transfer/file": "The transfer file: reading, checking and writing it.",
+    "runtime/rays": "Triangles, boxes, sample points, and the one file that calls Embree.",
+    "runtime/lights": "Kinds of lamps, a file each; skies; what of their light arrives at a point.",
+    "runtime/outputs": "Light of patches taken to vertices, texels and probes.",
+    "runtime/frame": "One frame: direct light, one product, radiosity; the same for C.",
+    "runtime/solvers": "The same light by iteration.",
+    "runtime/demo/image": "Images, colours, exposure, tone curve, textures, PNG.",
+    "runtime/demo/shading": "What arrives at a point of the surface, and what it reflects.",
+    "runtime/demo/picture": "Cameras, and a picture without a window.",
+    "runtime/demo/bake": "A lit scene as a .glb.",
+    "runtime/demo/motion": "What moves from frame to frame, and how a frame is solved.",
+    "runtime/demo/viewer/gl": "The picture by OpenGL.",
+    "runtime/demo/viewer/window": "The viewer: window, panels, controls.",
+    "precompute/base": "BLAS, sets, tables, progress, and files of numbers.",
+    "precompute/sampling": "Points and rays on triangles and hemispheres, and boxes to find them.",
+    "precompute/import": "A glTF file to a scene.",
+    "precompute/patches": "A scene to patches: cuts, clusters, sides that are seen, selections.",
+    "precompute/exchange/pairs": "Form factors between all pairs of patches, and their closure.",
+    "precompute/exchange/links": "Form factors between sets of patches.",
+    "precompute/lights": "Lights to fit and to measure operators with, and exact solutions.",
+    "precompute/inverse": "Y from form factors: dense, or column by column.",
+    "precompute/compression": "Y and form factors to a tolerance, as blocks of low rank.",
+    "precompute/outputs": "Lightmap, probes, bent normals and weights of vertices.",
+    "precompute/build": "The offline stage from end to end.",
+    "precompute/cli": "The command line.",
+    "tests/scenes": "Scenes that tests, benchmarks and pages share.",
+    "tests/support": "Made-up scenes, readers and counters that tests and benchmarks share.",
+    "bench": "Benchmarks, the report and the references that it measures against.",
+    "tests": "A folder for each room of the libraries; files of every format in golden.",
+}
+ROOM_ORDER = {room: place for place, room in enumerate(ROOMS)}
 
 # The rooms of public headers without a source of the same name, as "FLOOR/NAME": ROOM.
 PUBLIC_HEADER_ROOMS: dict[str, str] = {}
@@ -320,7 +329,7 @@ def upward_includes(tree):
     for unit in tree.units.values():
         for key, arrows in unit.includes.items():
             room = tree.units[key].room
-            if {unit.room, room} <= set(ROOMS) and ROOMS.index(room) > ROOMS.index(unit.room):
+            if {unit.room, room} <= set(ROOMS) and ROOM_ORDER[room] > ROOM_ORDER[unit.room]:
                 rooms = f"up from {unit.room} to {room}"
                 for file, line, other in arrows:
                     yield f"{file.path}:{line}: includes {other.path}, {rooms}"
@@ -407,6 +416,8 @@ def print_rooms(tree):
             continue
         lines = sum(unit.code_lines for unit in units)
         print(f"{room or 'in no room'}: {len(units)} units, {lines} lines of code")
+        if room:
+            print(f"  {ROOMS[room]}")
         for unit in sorted(units, key=lambda unit: unit.key):
             print(f"  {unit.code_lines:5} {unit.key}")
 

@@ -22,7 +22,7 @@ SOUND = {
     "runtime/include/rebounce/engine.h": '#include "rebounce/apply.h"\n',
     "precompute/cli/main.cpp": '#include "rebounce/engine.h"\n#include "console.h"\n',
     "precompute/cli/console.h": "",
-    "runtime/demo/main.cpp": "",
+    "runtime/demo/picture/main.cpp": "",
     "tests/transfer/kernels/test_multiply.cpp": '#include "transfer/kernels/multiply_impl.h"\n',
 }
 
@@ -108,13 +108,8 @@ class IncludeGraphTest(unittest.TestCase):
         self.assert_only(lines, "transfer/file/read.cpp:1", "from transfer/file to runtime/frame")
 
     def test_the_longest_path_names_the_room(self):
-        lines = violations(
-            {
-                "runtime/demo/picture.cpp": '#include "runtime/demo/viewer/window.h"\n',
-                "runtime/demo/viewer/window.h": "",
-            }
-        )
-        self.assert_only(lines, "from runtime/demo to runtime/demo/viewer")
+        lines = violations({"tests/scenes/room.h": '#include "tests/all.h"\n', "tests/all.h": ""})
+        self.assert_only(lines, "from tests/scenes to tests")
 
     def test_finds_files_in_no_room(self):
         self.assert_only(violations({"precompute/lost.h": ""}), "precompute/lost.h", "no room")
@@ -214,6 +209,13 @@ class IncludeGraphTest(unittest.TestCase):
             self.assertEqual(file.code_lines, 7)
 
 
+class RoomsTest(unittest.TestCase):
+    def test_the_page_says_of_each_room_what_it_is_for(self):
+        page = (pathlib.Path(__file__).resolve().parents[2] / "notes/design.md").read_text("utf-8")
+        for room, purpose in include_graph.ROOMS.items():
+            self.assertIn(f"| `{room}` | {purpose} |\n", page)
+
+
 class CommandTest(unittest.TestCase):
     def run_on(self, files, *arguments):
         output, error = io.StringIO(), io.StringIO()
@@ -234,6 +236,7 @@ class CommandTest(unittest.TestCase):
         status, output, _ = self.run_on(SOUND, "--list")
         self.assertEqual(status, 0)
         self.assertIn("transfer/kernels: 2 units, 2 lines of code\n", output)
+        self.assertIn(f"  {include_graph.ROOMS['transfer/kernels']}\n", output)
         self.assertIn("      1 transfer/kernels/avx2\n", output)
 
     def test_shows_who_includes_a_unit(self):
