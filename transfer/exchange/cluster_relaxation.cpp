@@ -89,7 +89,7 @@ class ClusterRelaxation final : public Relaxation {
         received_(positions()),
         sent_(plan_.coefficient_count),
         arrived_(plan_.coefficient_count),
-        taken_(plan_.largest_taken) {}
+        scratch_(plan_.largest_scratch) {}
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     area_ = problem.area;
@@ -225,7 +225,7 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void multiply(std::span<const CouplingBlock> couplings) {
-    couplings_.multiply(couplings, lanes_, 1, sent_.from(0), arrived_.to(0), taken_.data());
+    couplings_.multiply(couplings, lanes_, 1, sent_.from(0), arrived_.to(0), scratch_.data());
   }
 
   void add_dense(std::span<const DenseBlock> blocks, Planes& to) {
@@ -332,7 +332,7 @@ class ClusterRelaxation final : public Relaxation {
   Planes lower_, upper_, received_;   ///< L x, L^T x, and L x + L^T x + D x
   /// Coefficients of x, and their products with coupling matrices.
   CoefficientArray sent_, arrived_;
-  std::vector<float> taken_;  ///< input copies of one coupling matrix
+  std::vector<float> scratch_;  ///< input copies of one coupling matrix
   std::span<const float> area_;
   Known known_ = Known::kNothing;
   bool rows_are_sent_ = false;  ///< whether the coefficients of row ends are those of the current x

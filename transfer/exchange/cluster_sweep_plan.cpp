@@ -53,7 +53,7 @@ class Planner {
     add_bases();
     add_products();
     plan_.coefficient_count = layout_.coefficient_count;
-    plan_.largest_taken = layout_.largest_taken;
+    plan_.largest_scratch = layout_.largest_scratch;
   }
 
  private:

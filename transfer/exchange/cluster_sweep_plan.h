@@ -65,7 +65,7 @@ struct ClusterSweepPlan {
   Products to_ending_columns;     ///< at the step in which their columns end
   Products from_ending_columns;   ///< products with rows, at the step in which the columns end
   std::uint32_t coefficient_count = 0;
-  std::size_t largest_taken = 0;  ///< as in HierarchicalLayout
+  std::size_t largest_scratch = 0;  ///< as in HierarchicalLayout
 };
 
 }  // namespace rebounce

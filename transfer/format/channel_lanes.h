@@ -14,7 +14,7 @@ constexpr std::size_t end_size(std::size_t coefficients) {
 }
 
 /// Floats in which a coupling matrix keeps what it takes.
-constexpr std::size_t taken_size(std::size_t rows, std::size_t columns) {
+constexpr std::size_t scratch_size(std::size_t rows, std::size_t columns) {
   return end_size(rows) + end_size(columns);
 }
 

@@ -150,9 +150,10 @@ void HierarchicalLayout::place_couplings(std::span<const TransferBlock> blocks,
       add_coefficients(place.row, block.row_count);
       place.column = place.row;
       if (!block.on_diagonal()) add_coefficients(place.column, block.column_count);
-      largest_taken = std::max(largest_taken, taken_size(block.row_count, block.column_count));
+      largest_scratch =
+          std::max(largest_scratch, scratch_size(block.row_count, block.column_count));
     } else {
-      largest_taken = std::max(largest_taken, taken_size(block.row_rank, block.column_rank));
+      largest_scratch = std::max(largest_scratch, scratch_size(block.row_rank, block.column_rank));
       coupling_value_count +=
           std::uint64_t{matrix_count} * block.row_rank * std::uint64_t{block.column_rank};
     }

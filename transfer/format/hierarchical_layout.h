@@ -51,7 +51,7 @@ struct HierarchicalLayout {
   std::uint64_t basis_value_count = 0;
   std::uint64_t coupling_value_count = 0;  ///< of coupling matrices and dense blocks
   std::uint32_t coefficient_count = 0;
-  std::size_t largest_taken = 0;  ///< the largest taken_size() of all coupling matrices
+  std::size_t largest_scratch = 0;  ///< the largest scratch_size() of all coupling matrices
   std::uint32_t rank_group;  ///< ranks that are interleaved: kRankGroup for integers, otherwise 1
   std::uint32_t cluster_coefficient_count = 0;
 

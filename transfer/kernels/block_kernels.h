@@ -85,12 +85,13 @@ struct ChannelLanes {
 /// matrix, for each matrix and light in turn. Overwrites the output, also where `out` is `in`.
 /// Input coefficients of residuals are added to the coefficients they belong to; output
 /// coefficients of residuals are written too. Reads sixteen values from the beginning of each
-/// entry, so the array must be padded. `taken` has room for taken_size() of each coupling matrix.
+/// entry, so the array must be padded. `scratch` has room for scratch_size() of each coupling
+/// matrix.
 template <typename Value>
 using CouplingKernel = void (*)(const Value* values, std::span<const CouplingBlock> couplings,
                                 const ChannelLanes& lanes, std::size_t light_count,
                                 Coefficients<const float> in, Coefficients<float> out,
-                                float* taken);
+                                float* scratch);
 
 /// A dense block of an operator with one matrix: [rows][columns], both multiples of
 /// HierarchicalFormat::kAlignment.

@@ -28,7 +28,7 @@ REBOUNCE_INLINE inline void load_row(const Entries& entry, const Value* row, std
 }
 
 /// The input coefficients of a coupling matrix.
-struct TakenEnds {
+struct EndInputs {
   const float *row, *column;
 };
 
@@ -39,7 +39,7 @@ struct TakenEnds {
 template <typename V, Direction kDirection, std::size_t kWide, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_columns(const Value* values, const CouplingBlock& coupling,
                                              std::size_t begin, const ChannelLanes& lanes,
-                                             const TakenEnds& taken, float* out) {
+                                             const EndInputs& inputs, float* out) {
   constexpr bool kToRows = kDirection != Direction::kToColumns;
   constexpr bool kToColumns = kDirection != Direction::kToRows;
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes, kLast = kWide - 1;
@@ -48,8 +48,8 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const Coupling
   const std::size_t last_lanes =
       (std::min(coupling.columns - begin, kWide * kEntries) - kLast * kEntries) * kChannelLanes;
   const Value* const s = values + begin * lanes.matrix_count;
-  const float* const row_in = taken.row;
-  const float* const column_in = taken.column + begin * kChannelLanes;
+  const float* const row_in = inputs.row;
+  const float* const column_in = inputs.column + begin * kChannelLanes;
   float* const row_out = out + coupling.row * kChannelLanes;
   float* const column_out = out + (coupling.column + begin) * kChannelLanes;
   V from_columns[kWide], to_columns[kWide];
@@ -89,13 +89,13 @@ REBOUNCE_INLINE inline void multiply_columns(const Value* values, const Coupling
 
 template <typename V, Direction kDirection, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_coupling(const Value* values, const CouplingBlock& coupling,
-                                              const ChannelLanes& lanes, const TakenEnds& taken,
+                                              const ChannelLanes& lanes, const EndInputs& inputs,
                                               float* out) {
   constexpr std::size_t kEntries = V::kWidth / kChannelLanes;
   for_each_rows<V::kCouplingVectors>((coupling.columns + kEntries - 1) / kEntries,
                                      [&]<std::size_t kWide>(std::size_t first) REBOUNCE_INLINE {
                                        multiply_columns<V, kDirection, kWide, Entries>(
-                                           values, coupling, first * kEntries, lanes, taken, out);
+                                           values, coupling, first * kEntries, lanes, inputs, out);
                                      });
 }
 
@@ -103,11 +103,11 @@ REBOUNCE_INLINE inline void multiply_coupling(const Value* values, const Couplin
 // compiler vectorises.
 
 /// Returns the input coefficients of one end, with those of residuals added. It copies them to
-/// `taken` if residuals change them or the product overwrites them; otherwise it returns `in`.
+/// `scratch` if residuals change them or the product overwrites them; otherwise it returns `in`.
 template <typename V>
-REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
-                                             std::size_t residual_rank, bool in_place,
-                                             float* taken) {
+REBOUNCE_INLINE inline const float* end_input(const float* in, std::size_t rank,
+                                              std::size_t residual_rank, bool in_place,
+                                              float* scratch) {
   if (!in_place && residual_rank == 0) return in;
   const V scale = V::broadcast(1 / HierarchicalFormat::kResidualScale);
   const std::size_t count = rank * kChannelLanes, rest = residual_rank * kChannelLanes;
@@ -117,9 +117,9 @@ REBOUNCE_INLINE inline const float* take_end(const float* in, std::size_t rank,
       const V residual = V::load_some(in + count + k, std::min(rest - k, V::kWidth));
       coefficients = multiply_add(residual, scale, coefficients);
     }
-    coefficients.store(taken + k);
+    coefficients.store(scratch + k);
   }
-  return taken;
+  return scratch;
 }
 
 /// Writes the output coefficients of residuals.
@@ -139,18 +139,18 @@ REBOUNCE_INLINE inline void spread_residuals(float* out, std::size_t rank,
 template <typename V, Direction kDirection, typename Entries, typename Value>
 REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CouplingBlock& coupling,
                                           const ChannelLanes& lanes, const float* in, float* out,
-                                          float* taken) {
+                                          float* scratch) {
   const std::size_t row = std::size_t{coupling.row} * kChannelLanes;
   const std::size_t column = std::size_t{coupling.column} * kChannelLanes;
   const bool in_place = in == out;
-  TakenEnds ends{};
+  EndInputs ends{};
   if constexpr (kDirection != Direction::kToColumns) {
-    ends.column =
-        take_end<V>(in + column, coupling.columns, coupling.column_residual_rank, in_place, taken);
+    ends.column = end_input<V>(in + column, coupling.columns, coupling.column_residual_rank,
+                               in_place, scratch);
   }
   if constexpr (kDirection != Direction::kToRows) {
-    ends.row = take_end<V>(in + row, coupling.rows, coupling.row_residual_rank, in_place,
-                           taken + end_size(coupling.columns));
+    ends.row = end_input<V>(in + row, coupling.rows, coupling.row_residual_rank, in_place,
+                            scratch + end_size(coupling.columns));
   }
   multiply_coupling<V, kDirection, Entries>(values, coupling, lanes, ends, out);
   if constexpr (kDirection != Direction::kToColumns) {
@@ -174,7 +174,8 @@ inline void ask_for_two_lines(const void* p) {
 template <typename V, typename Entries, typename Value>
 void multiply_couplings_with(const Value* values, std::span<const CouplingBlock> couplings,
                              const ChannelLanes& lanes, std::size_t light_count,
-                             Coefficients<const float> in, Coefficients<float> out, float* taken) {
+                             Coefficients<const float> in, Coefficients<float> out,
+                             float* scratch) {
   for (std::size_t l = 0; l < light_count; ++l) {
     const float* const from = in.data + l * in.stride;
     float* const to = out.data + l * out.stride;
@@ -186,13 +187,13 @@ void multiply_couplings_with(const Value* values, std::span<const CouplingBlock>
       }
       switch (coupling.direction) {
         case Direction::kBoth:
-          multiply_ends<V, Direction::kBoth, Entries>(s, coupling, lanes, from, to, taken);
+          multiply_ends<V, Direction::kBoth, Entries>(s, coupling, lanes, from, to, scratch);
           break;
         case Direction::kToRows:
-          multiply_ends<V, Direction::kToRows, Entries>(s, coupling, lanes, from, to, taken);
+          multiply_ends<V, Direction::kToRows, Entries>(s, coupling, lanes, from, to, scratch);
           break;
         case Direction::kToColumns:
-          multiply_ends<V, Direction::kToColumns, Entries>(s, coupling, lanes, from, to, taken);
+          multiply_ends<V, Direction::kToColumns, Entries>(s, coupling, lanes, from, to, scratch);
           break;
       }
     }
@@ -202,16 +203,16 @@ void multiply_couplings_with(const Value* values, std::span<const CouplingBlock>
 template <typename V, typename Value>
 void multiply_couplings(const Value* values, std::span<const CouplingBlock> couplings,
                         const ChannelLanes& lanes, std::size_t light_count,
-                        Coefficients<const float> in, Coefficients<float> out, float* taken) {
+                        Coefficients<const float> in, Coefficients<float> out, float* scratch) {
   if constexpr (V::kWidth == 16) {
     if (lanes.matrix_count == 1) {
       using Entries = typename V::OneMatrixEntries;
       return multiply_couplings_with<V, Entries>(values, couplings, lanes, light_count, in, out,
-                                                 taken);
+                                                 scratch);
     }
   }
   using Entries = typename V::template EntryLanes<Value>;
-  multiply_couplings_with<V, Entries>(values, couplings, lanes, light_count, in, out, taken);
+  multiply_couplings_with<V, Entries>(values, couplings, lanes, light_count, in, out, scratch);
 }
 
 }  // namespace

@@ -78,10 +78,10 @@ class CouplingProducts {
 
   void multiply(std::span<const CouplingBlock> couplings, const ChannelLanes& lanes,
                 std::size_t light_count, Coefficients<const float> in, Coefficients<float> out,
-                float* taken) const {
+                float* scratch) const {
     std::visit(
         [&](const auto& on) {
-          on.kernels->multiply(on.values, couplings, lanes, light_count, in, out, taken);
+          on.kernels->multiply(on.values, couplings, lanes, light_count, in, out, scratch);
         },
         on_);
   }

@@ -40,7 +40,7 @@ struct WorkVectors {
   std::size_t light_count;
   PlanarVectors<float> x;           ///< [positions] exitance times the root of the area
   Coefficients<float> coefficient;  ///< of x in the bases, later of y
-  PlanarVectors<float> taken;       ///< input copies of the coupling matrices, for each part
+  PlanarVectors<float> scratch;     ///< input copies of the coupling matrices, for each part
   PlanarVectors<float> y;           ///< [positions] what arrives
 
   WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
@@ -51,7 +51,7 @@ struct WorkVectors {
     const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
     x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
     coefficient = {take(light_count * coefficients), coefficients};
-    taken = {take(kParts * layout.largest_taken), layout.largest_taken, kParts};
+    scratch = {take(kParts * layout.largest_scratch), layout.largest_scratch, kParts};
     y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
   }
 
@@ -59,7 +59,7 @@ struct WorkVectors {
                           std::size_t light_count) {
     return (2 * kChannelCount * vector_size(positions, layout) + coefficients_size(layout)) *
                light_count +
-           kParts * layout.largest_taken;
+           kParts * layout.largest_scratch;
   }
 
  private:
@@ -156,7 +156,7 @@ class Phases {
   /// Multiplies with the coupling matrices of one part.
   void multiply(std::span<const CouplingBlock> couplings, std::size_t part) const {
     couplings_.multiply(couplings, lanes_, work_.light_count, constant(work_.coefficient),
-                        work_.coefficient, work_.taken.data + part * work_.taken.stride);
+                        work_.coefficient, work_.scratch.data + part * work_.scratch.stride);
   }
 
   void multiply_dense(std::span<const DenseBlock> blocks) const {

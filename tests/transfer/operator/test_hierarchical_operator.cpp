@@ -775,10 +775,10 @@ template <typename Value>
 void check_in_place(CouplingKernel<Value> multiply_couplings, const std::vector<Value>& values,
                     const CouplingBlock& coupling, const ChannelLanes& lanes, std::size_t lights,
                     const std::vector<float>& in, const std::vector<float>& out) {
-  std::vector<float> both = in, taken(taken_size(coupling.rows, coupling.columns));
+  std::vector<float> both = in, scratch(scratch_size(coupling.rows, coupling.columns));
   const std::size_t stride = in.size() / lights;
   multiply_couplings(values.data(), {&coupling, 1}, lanes, lights, {both.data(), stride},
-                     {both.data(), stride}, taken.data());
+                     {both.data(), stride}, scratch.data());
   for (std::size_t k = 0; k < both.size(); ++k) {
     EXPECT_EQ(both[k], out[k] == kUntouched ? in[k] : out[k]) << k;
   }
@@ -798,10 +798,10 @@ void check_coupling(CouplingKernel<Value> multiply_couplings, const std::vector<
   for (const Direction direction : {Direction::kBoth, Direction::kToRows, Direction::kToColumns}) {
     const CouplingBlock coupling{8, rows, columns, kRow, kColumn, direction};
     std::vector<float> out(lights * kEnd * kChannelLanes, kUntouched);
-    std::vector<float> taken(taken_size(rows, columns));
+    std::vector<float> scratch(scratch_size(rows, columns));
     multiply_couplings(values.data(), {&coupling, 1}, lanes, lights,
                        {in.data(), kEnd * kChannelLanes}, {out.data(), kEnd * kChannelLanes},
-                       taken.data());
+                       scratch.data());
     check_in_place(multiply_couplings, values, coupling, lanes, lights, in, out);
     for (std::size_t v = 0; v < 3 * lights; ++v) {
       const auto at = [v](std::size_t k) { return (v / 3 * kEnd + k) * kChannelLanes + v % 3; };
@@ -968,11 +968,11 @@ TEST(BlockKernels, ResidualsBelongToTheFirstCoefficients) {
   for (const KernelSet* set : kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
     std::vector<float> expected(kEnd * kChannelLanes, kUntouched), out = expected, both = sent;
-    std::vector<float> taken(taken_size(kRows, kColumns));
+    std::vector<float> scratch(scratch_size(kRows, kColumns));
     const auto multiply = [&](const CouplingBlock& block, const std::vector<float>& in,
                               std::vector<float>& to) {
       set->blocks.couplings_f32.multiply(values.data(), {&block, 1}, lanes, 1, {in.data(), 0},
-                                         {to.data(), 0}, taken.data());
+                                         {to.data(), 0}, scratch.data());
     };
     multiply(plain, whole, expected);
     multiply(coupling, sent, out);
