@@ -49,7 +49,7 @@ struct Places {
   bool are_positions(std::uint64_t begin, std::uint64_t count) const {
     return are_aligned(begin, count) && begin + count <= position_count;
   }
-  bool are_moments(std::uint64_t begin, std::uint64_t count) const {
+  bool are_cluster_coefficients(std::uint64_t begin, std::uint64_t count) const {
     return are_aligned(begin, count) && begin >= position_count &&
            begin + count <= position_count + cluster_coefficient_count;
   }
@@ -60,7 +60,7 @@ struct Places {
   }
 };
 
-void check_moments(const TransferBlock& block, const Places& places) {
+void check_cluster_basis(const TransferBlock& block, const Places& places) {
   if (!places.are_positions(block.row_begin, block.row_count))
     refuse("a cluster basis is not over positions");
   if (block.row_rank != block.column_count || block.row_rank > block.row_count ||
@@ -71,10 +71,10 @@ void check_moments(const TransferBlock& block, const Places& places) {
 }
 
 void check_block(const TransferBlock& block, const Places& places) {
-  if (is_cluster_basis(block)) return check_moments(block, places);
+  if (is_cluster_basis(block)) return check_cluster_basis(block, places);
   const auto is_range = [&](std::uint32_t begin, std::uint32_t count) {
-    return places.are_positions(begin, count) ||
-           (block.kind == TransferBlock::Kind::kLowRank && places.are_moments(begin, count));
+    return places.are_positions(begin, count) || (block.kind == TransferBlock::Kind::kLowRank &&
+                                                  places.are_cluster_coefficients(begin, count));
   };
   if (!is_range(block.row_begin, block.row_count) ||
       !is_range(block.column_begin, block.column_count)) {
@@ -110,7 +110,7 @@ void check_block(const TransferBlock& block, const Places& places) {
 
 /// Returns the number of cluster coefficients. Checks that they are numbered in the order of their
 /// blocks and that each has a finite scale.
-std::size_t checked_moment_count(const Storage& storage, std::size_t position_count) {
+std::size_t checked_cluster_coefficient_count(const Storage& storage, std::size_t position_count) {
   std::uint64_t end = position_count;
   for (const TransferBlock& block : storage.blocks) {
     if (!is_cluster_basis(block)) continue;
@@ -143,7 +143,7 @@ void check_tables(const Storage& storage) {
     refuse(error.what());
   }
   const std::size_t positions = HierarchicalFormat::position_count(n);
-  const Places places{positions, checked_moment_count(storage, positions)};
+  const Places places{positions, checked_cluster_coefficient_count(storage, positions)};
   for (const TransferBlock& block : storage.blocks) {
     check_block(block, places);
     const bool one_rank =

@@ -123,7 +123,7 @@ class Encoder {
     for (std::size_t b = 0; b < exact.blocks.size(); ++b) encode(exact.blocks[b], b);
   }
 
-  std::vector<float> take_moment_scale() { return std::move(coefficient_scale_); }
+  std::vector<float> release_coefficient_scale() { return std::move(coefficient_scale_); }
 
  private:
   static constexpr bool kIntegers = std::is_integral_v<Basis> && std::is_signed_v<Basis>;
@@ -140,7 +140,7 @@ class Encoder {
       const std::vector<float> rows =
           encode_basis(from.row, to.row, block.row_rank, block.row_count);
       if (is_cluster_basis(block)) {
-        for (const float row : rows) coefficient_scale_[moment_++] *= row;
+        for (const float row : rows) coefficient_scale_[next_coefficient_++] *= row;
         return;
       }
       const std::vector<float> columns =
@@ -201,7 +201,7 @@ class Encoder {
   std::uint32_t matrix_count_;
   Layout from_, to_;
   std::vector<float> coefficient_scale_;
-  std::size_t moment_ = 0;  ///< index of the next cluster coefficient
+  std::size_t next_coefficient_ = 0;  ///< index of the next cluster coefficient
   Basis* bases_;
   Coupling* couplings_;
 };
@@ -223,7 +223,7 @@ Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact)
           Layout::padded(basis_count + (rounded.one_array() ? layout.coupling_value_count : 0)));
       const auto encode_into = [&](Coupling* coupling_values) {
         Encoder<Basis, Coupling> encoder(exact, rounded, basis_values.data(), coupling_values);
-        rounded.coefficient_scale = encoder.take_moment_scale();
+        rounded.coefficient_scale = encoder.release_coefficient_scale();
       };
       if constexpr (std::is_same_v<Basis, Coupling>) {
         encode_into(basis_values.data() + basis_count);

@@ -106,21 +106,20 @@ std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_
   }
   std::vector<double> result;
   for (std::size_t b = 0; b < storage.blocks.size(); ++b) {
-    const TransferBlock& cluster_coefficients = storage.blocks[b];
-    if (!is_cluster_basis(cluster_coefficients) || cluster_coefficients.column_begin < rows.begin ||
-        cluster_coefficients.column_begin >= rows.begin + rows.count) {
+    const TransferBlock& basis = storage.blocks[b];
+    if (!is_cluster_basis(basis) || basis.column_begin < rows.begin ||
+        basis.column_begin >= rows.begin + rows.count) {
       continue;
     }
     const HierarchicalLayout::End& end = read.layout().places[b].row;
     const float* const scale =
-        storage.coefficient_scale.data() + cluster_coefficients.column_begin - position_count;
-    for (std::uint32_t k = 0; k < cluster_coefficients.row_count; ++k) {
-      positions.push_back(cluster_coefficients.row_begin + k);
+        storage.coefficient_scale.data() + basis.column_begin - position_count;
+    for (std::uint32_t k = 0; k < basis.row_count; ++k) {
+      positions.push_back(basis.row_begin + k);
       std::vector<double> row(columns, 0.0);
-      for (std::uint32_t m = 0; m < cluster_coefficients.row_rank; ++m) {
-        const double weight = scale[m] * read.basis(end, cluster_coefficients.row_rank, m, k);
-        const double* const from =
-            entries.data() + (cluster_coefficients.column_begin - rows.begin + m) * columns;
+      for (std::uint32_t m = 0; m < basis.row_rank; ++m) {
+        const double weight = scale[m] * read.basis(end, basis.row_rank, m, k);
+        const double* const from = entries.data() + (basis.column_begin - rows.begin + m) * columns;
         for (std::size_t c = 0; c < columns; ++c) row[c] += weight * from[c];
       }
       result.insert(result.end(), row.begin(), row.end());

@@ -38,7 +38,7 @@ struct BasisPart {
   std::uint32_t first_place, last_place;
   /// Whether the bases are over cluster coefficients instead of positions. These are never uneven
   /// in the sense of the integer kernels.
-  bool cluster_coefficients = false;
+  bool over_cluster_coefficients = false;
 };
 
 /// Products with the bases of the hierarchical operator, for one instruction set. Stored integers

@@ -226,7 +226,7 @@ void project_integers(const Value* values, std::span<const BasisPart> parts,
         const LightChunk chunk{k, std::min(part.size - k, kChunk)};
         round_light<N, Value>(from + k, x.stride, chunk.count, light);
         project_chunk<N>(values, part, chunk, light, k > 0, to);
-        if (light.uneven && !part.cluster_coefficients) {
+        if (light.uneven && !part.over_cluster_coefficients) {
           const LightRest rest(from + k, x.stride, chunk.count, light);
           round_light<N, Value>(rest.value, kChunk, chunk.count, light);
           project_chunk<N>(values, part, chunk, light, true, to);

@@ -19,10 +19,10 @@ namespace {
 constexpr std::size_t kLine = 16;
 
 // Positions that one task gathers.
-constexpr std::size_t kGathered = 1024;
+constexpr std::size_t kPositionsPerTask = 1024;
 
 // Ends of dense blocks, and cluster bases, that one task handles.
-constexpr std::size_t kDenseEndsPerTask = 64, kCoefficientsPerTask = 32;
+constexpr std::size_t kDenseEndsPerTask = 64, kClusterBasesPerTask = 32;
 
 // The light of a patch is prefetched this many positions ahead, to the second-level cache: it can
 // have more loads in flight than the first-level cache.
@@ -103,7 +103,7 @@ class Phases {
     bases_.project(parts, constant(work_.x), work_.coefficient);
   }
 
-  void take_light(const DenseEnd& end) const {
+  void copy_dense_input(const DenseEnd& end) const {
     for (std::size_t v = 0; v < work_.x.count; ++v) {
       const float* const x = work_.x.data + v * work_.x.stride + end.position;
       float* const lane = lane_of(work_.coefficient, v, end.coefficient);
@@ -112,19 +112,17 @@ class Phases {
   }
 
   /// Computes the cluster coefficients of the light from its coefficients in a cluster basis.
-  void take_coefficients(const HierarchicalPlan::ClusterCoefficients& cluster_coefficients) const {
+  void gather_cluster_coefficients(const HierarchicalPlan::ClusterBasis& basis) const {
     const std::size_t stride = work_.x.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
-      float* const lane =
-          lane_of(work_.coefficient, light * kChannelCount, cluster_coefficients.coefficient);
-      const float* const residual = lane + cluster_coefficients.rank * kChannelLanes;
-      for (std::size_t k = 0; k < cluster_coefficients.residual_rank * kChannelLanes; ++k) {
+      float* const lane = lane_of(work_.coefficient, light * kChannelCount, basis.coefficient);
+      const float* const residual = lane + basis.rank * kChannelLanes;
+      for (std::size_t k = 0; k < basis.residual_rank * kChannelLanes; ++k) {
         lane[k] += kResidual * residual[k];
       }
-      float* const x =
-          work_.x.data + light * kChannelCount * stride + cluster_coefficients.position;
-      for (std::size_t k = 0; k < cluster_coefficients.rank; ++k) {
-        const float scale = coefficient_scale_[cluster_coefficients.scale + k] / basis_scale_;
+      float* const x = work_.x.data + light * kChannelCount * stride + basis.position;
+      for (std::size_t k = 0; k < basis.rank; ++k) {
+        const float scale = coefficient_scale_[basis.scale + k] / basis_scale_;
         for (int c = 0; c < kChannelCount; ++c)
           x[c * stride + k] = scale * lane[k * kChannelLanes + c];
       }
@@ -133,21 +131,19 @@ class Phases {
 
   /// Computes the coefficients of the arriving light in a cluster basis from its cluster
   /// coefficients.
-  void put_coefficients(const HierarchicalPlan::ClusterCoefficients& cluster_coefficients) const {
+  void scatter_cluster_coefficients(const HierarchicalPlan::ClusterBasis& basis) const {
     const std::size_t stride = work_.y.stride;
     for (std::size_t light = 0; light < work_.light_count; ++light) {
-      const float* const y =
-          work_.y.data + light * kChannelCount * stride + cluster_coefficients.position;
-      float* const lane =
-          lane_of(work_.coefficient, light * kChannelCount, cluster_coefficients.coefficient);
-      for (std::size_t k = 0; k < cluster_coefficients.rank; ++k) {
-        const float scale = coefficient_scale_[cluster_coefficients.scale + k] / basis_scale_;
+      const float* const y = work_.y.data + light * kChannelCount * stride + basis.position;
+      float* const lane = lane_of(work_.coefficient, light * kChannelCount, basis.coefficient);
+      for (std::size_t k = 0; k < basis.rank; ++k) {
+        const float scale = coefficient_scale_[basis.scale + k] / basis_scale_;
         for (int c = 0; c < kChannelCount; ++c)
           lane[k * kChannelLanes + c] = scale * y[c * stride + k];
         lane[k * kChannelLanes + kChannelCount] = 0;
       }
-      float* const residual = lane + cluster_coefficients.rank * kChannelLanes;
-      for (std::size_t k = 0; k < cluster_coefficients.residual_rank * kChannelLanes; ++k) {
+      float* const residual = lane + basis.rank * kChannelLanes;
+      for (std::size_t k = 0; k < basis.residual_rank * kChannelLanes; ++k) {
         residual[k] = kResidual * lane[k];
       }
     }
@@ -167,11 +163,11 @@ class Phases {
     bases_.expand(parts, constant(work_.coefficient), work_.y);
   }
 
-  void add_light(std::span<const DenseEnd> ends) const {
+  void add_dense_output(std::span<const DenseEnd> ends) const {
     if (lanes_.matrix_count == 1) {
       couplings_.add_products(ends, constant(work_.coefficient), product_scale(), work_.y);
     } else {
-      for (const DenseEnd& end : ends) add_coefficients(end);
+      for (const DenseEnd& end : ends) add_dense_coefficients(end);
     }
   }
 
@@ -188,7 +184,7 @@ class Phases {
            v % kChannelCount;
   }
 
-  void add_coefficients(const DenseEnd& end) const {
+  void add_dense_coefficients(const DenseEnd& end) const {
     for (std::size_t v = 0; v < work_.y.count; ++v) {
       const float* const lane = lane_of(work_.coefficient, v, end.coefficient + end.first);
       float* const y = work_.y.data + v * work_.y.stride + end.position;
@@ -257,7 +253,7 @@ void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arriv
             const Phases& phases, const WorkVectors& work) {
   clear(work.y, arrival.begin, arrival.end);
   phases.expand(between(plan.expansions, arrival.first_expansion, arrival.last_expansion));
-  phases.add_light(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
+  phases.add_dense_output(between(plan.dense_out, arrival.first_dense, arrival.last_dense));
 }
 
 /// The entries of one part of a phase.
@@ -272,26 +268,26 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
               std::span<Float3> indirect_irradiance, const Scheduler& scheduler) {
   const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
   const auto gather = [&](std::size_t k) {
-    const std::size_t begin = k * kGathered;
-    exchange.gather(initial_exitance, begin, std::min(begin + kGathered, positions));
+    const std::size_t begin = k * kPositionsPerTask;
+    exchange.gather(initial_exitance, begin, std::min(begin + kPositionsPerTask, positions));
   };
   // Dense blocks of several matrices get their input in the same loop as the projections.
   const std::size_t dense_ends = piece_count(plan.dense_in.size(), kDenseEndsPerTask);
-  const auto take_light = [&](std::size_t k) { phases.take_light(plan.dense_in[k]); };
-  const auto take_piece = on_piece(plan.dense_in.size(), kDenseEndsPerTask, take_light);
+  const auto copy_dense_input = [&](std::size_t k) { phases.copy_dense_input(plan.dense_in[k]); };
+  const auto copy_piece = on_piece(plan.dense_in.size(), kDenseEndsPerTask, copy_dense_input);
   const auto project = [&](std::size_t k) {
     if (k < dense_ends) {
-      take_piece(k);
+      copy_piece(k);
     } else {
       phases.project(of_part(plan.projections, plan.projection_parts, k - dense_ends));
     }
   };
-  const std::size_t coefficients_in = plan.coefficients_in.size(),
-                    coefficients_out = plan.coefficients_out.size();
-  const auto take_coefficients = [&](std::size_t k) {
-    phases.take_coefficients(plan.coefficients_in[k]);
+  const std::size_t cluster_bases_in = plan.cluster_bases_in.size(),
+                    cluster_bases_out = plan.cluster_bases_out.size();
+  const auto gather_cluster_coefficients = [&](std::size_t k) {
+    phases.gather_cluster_coefficients(plan.cluster_bases_in[k]);
   };
-  const auto project_coefficients = [&](std::size_t k) {
+  const auto project_cluster_coefficients = [&](std::size_t k) {
     phases.project(of_part(plan.cluster_projections, plan.cluster_projection_parts, k));
   };
   const std::size_t dense_parts = plan.dense_parts.size() - 1;
@@ -303,11 +299,11 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
       phases.multiply(of_part(plan.couplings, plan.coupling_parts, part), part);
     }
   };
-  const auto arrive_at_coefficients = [&](std::size_t k) {
+  const auto arrive_at_cluster_coefficients = [&](std::size_t k) {
     arrive(plan, plan.cluster_arrivals[plan.cluster_arrivals.size() - 1 - k], phases, work);
   };
-  const auto put_coefficients = [&](std::size_t k) {
-    phases.put_coefficients(plan.coefficients_out[k]);
+  const auto scatter_cluster_coefficients = [&](std::size_t k) {
+    phases.scatter_cluster_coefficients(plan.cluster_bases_out[k]);
   };
   // In descending order.
   const auto arrive_at_patches = [&](std::size_t k) {
@@ -318,15 +314,16 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
   };
   run_in_turn(
       scheduler,
-      {{piece_count(positions, kGathered), gather},
+      {{piece_count(positions, kPositionsPerTask), gather},
        {dense_ends + plan.projection_parts.size() - 1, project},
-       {piece_count(coefficients_in, kCoefficientsPerTask),
-        on_piece(coefficients_in, kCoefficientsPerTask, take_coefficients)},
-       {coefficients_in == 0 ? 0 : plan.cluster_projection_parts.size() - 1, project_coefficients},
+       {piece_count(cluster_bases_in, kClusterBasesPerTask),
+        on_piece(cluster_bases_in, kClusterBasesPerTask, gather_cluster_coefficients)},
+       {cluster_bases_in == 0 ? 0 : plan.cluster_projection_parts.size() - 1,
+        project_cluster_coefficients},
        {dense_parts + plan.coupling_parts.size() - 1, multiply},
-       {coefficients_out == 0 ? 0 : plan.cluster_arrivals.size(), arrive_at_coefficients},
-       {piece_count(coefficients_out, kCoefficientsPerTask),
-        on_piece(coefficients_out, kCoefficientsPerTask, put_coefficients)},
+       {cluster_bases_out == 0 ? 0 : plan.cluster_arrivals.size(), arrive_at_cluster_coefficients},
+       {piece_count(cluster_bases_out, kClusterBasesPerTask),
+        on_piece(cluster_bases_out, kClusterBasesPerTask, scatter_cluster_coefficients)},
        {plan.arrivals.size(), arrive_at_patches}});
 }
 

@@ -66,8 +66,10 @@ class WantedRuns {
 };
 
 /// Marks `positions` and the cluster coefficients of the clusters that contain one of them.
-WantedRuns with_moments(const HierarchicalStorage& storage, std::vector<std::uint32_t> positions,
-                        std::size_t position_count, std::size_t cluster_coefficient_count) {
+WantedRuns with_cluster_coefficients(const HierarchicalStorage& storage,
+                                     std::vector<std::uint32_t> positions,
+                                     std::size_t position_count,
+                                     std::size_t cluster_coefficient_count) {
   const WantedRuns wanted(positions, position_count);
   for (const TransferBlock& block : storage.blocks) {
     if (!is_cluster_basis(block) || !wanted.any(block.row_begin, block.row_count)) continue;
@@ -88,13 +90,14 @@ class Planner {
         layout_(layout),
         plan_(plan),
         positions_(HierarchicalFormat::position_count(storage.area.size())),
-        wanted_(with_moments(storage, plan.targets, positions_, layout.cluster_coefficient_count)),
-        lit_(with_moments(storage, source_positions(storage), positions_,
-                          layout.cluster_coefficient_count)),
+        wanted_(with_cluster_coefficients(storage, plan.targets, positions_,
+                                          layout.cluster_coefficient_count)),
+        lit_(with_cluster_coefficients(storage, source_positions(storage), positions_,
+                                       layout.cluster_coefficient_count)),
         in_(layout.coefficient_count),
         out_(layout.coefficient_count),
-        moments_in_(layout.cluster_coefficient_count),
-        moments_out_(layout.cluster_coefficient_count) {}
+        cluster_in_(layout.cluster_coefficient_count),
+        cluster_out_(layout.cluster_coefficient_count) {}
 
   void make() {
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
@@ -103,13 +106,13 @@ class Planner {
     }
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       if (is_cluster_basis(storage_.blocks[b]))
-        add_coefficients(storage_.blocks[b], layout_.places[b].row);
+        add_cluster_basis(storage_.blocks[b], layout_.places[b].row);
     }
     mark_groups_in();
     for (const Layout::Cluster& cluster : layout_.clusters) add_projections(cluster);
-    const auto first_coefficient = static_cast<std::uint32_t>(positions_ / kAlignment);
-    add_arrivals(0, first_coefficient, plan_.arrivals);
-    add_arrivals(first_coefficient, static_cast<std::uint32_t>(wanted_.run_count()),
+    const auto first_cluster_run = static_cast<std::uint32_t>(positions_ / kAlignment);
+    add_arrivals(0, first_cluster_run, plan_.arrivals);
+    add_arrivals(first_cluster_run, static_cast<std::uint32_t>(wanted_.run_count()),
                  plan_.cluster_arrivals);
     count_bases();
     const auto values = [](const BasisPart& part) {
@@ -164,30 +167,30 @@ class Planner {
     const Positions at_columns{block.column_begin, block.column_count};
     if (to_rows) {
       add_way(dense, columns, rows);
-      mark_moments(at_columns, at_rows);
+      mark_cluster_coefficients(at_columns, at_rows);
     }
     if (to_columns) {
       add_way(dense, rows, columns);
-      mark_moments(at_rows, at_columns);
+      mark_cluster_coefficients(at_rows, at_columns);
     }
   }
 
-  void add_coefficients(const TransferBlock& block, const Layout::End& end) {
+  void add_cluster_basis(const TransferBlock& block, const Layout::End& end) {
     const auto scale = static_cast<std::uint32_t>(block.column_begin - positions_);
-    const Plan::ClusterCoefficients cluster_coefficients{
-        end.coefficient, block.row_rank, end.residual_rank, block.column_begin, scale};
+    const Plan::ClusterBasis basis{end.coefficient, block.row_rank, end.residual_rank,
+                                   block.column_begin, scale};
     const std::uint32_t count = block.row_rank + end.residual_rank;
     const auto any = [&](const std::vector<bool>& marks) {
       const auto first = marks.begin() + scale;
       return std::find(first, first + block.column_count, true) != first + block.column_count;
     };
-    if (any(moments_in_)) {
+    if (any(cluster_in_)) {
       mark(in_, end.coefficient, count);
-      plan_.coefficients_in.push_back(cluster_coefficients);
+      plan_.cluster_bases_in.push_back(basis);
     }
-    if (any(moments_out_) && wanted_.any(block.row_begin, block.row_count)) {
+    if (any(cluster_out_) && wanted_.any(block.row_begin, block.row_count)) {
       mark(out_, end.coefficient, count);
-      plan_.coefficients_out.push_back(cluster_coefficients);
+      plan_.cluster_bases_out.push_back(basis);
     }
   }
 
@@ -201,13 +204,13 @@ class Planner {
   };
 
   /// Marks the cluster coefficients that a block reads and those that it adds to.
-  void mark_moments(const Positions& from, const Positions& to) {
+  void mark_cluster_coefficients(const Positions& from, const Positions& to) {
     const auto mark_range = [this](std::vector<bool>& marks, const Positions& range) {
       if (range.begin < positions_) return;
       mark(marks, static_cast<std::uint32_t>(range.begin - positions_), range.count);
     };
-    mark_range(moments_in_, from);
-    mark_range(moments_out_, to);
+    mark_range(cluster_in_, from);
+    mark_range(cluster_out_, to);
   }
 
   /// Whether `from` contains a source and `to` a target.
@@ -267,7 +270,7 @@ class Planner {
             .last_rank = last_rank,
             .first_place = first_place,
             .last_place = last_place,
-            .cluster_coefficients = cluster.begin >= positions_};
+            .over_cluster_coefficients = cluster.begin >= positions_};
   }
 
   void add_projections(const Layout::Cluster& cluster) {
@@ -398,7 +401,7 @@ class Planner {
   WantedRuns wanted_, lit_;
   /// [coefficients] whether the input, the output of coupling matrices is needed.
   std::vector<bool> in_, out_;
-  std::vector<bool> moments_in_, moments_out_;
+  std::vector<bool> cluster_in_, cluster_out_;
   std::vector<DenseEnd> dense_out_;  ///< not yet cut at the arrivals
 };
 

@@ -33,7 +33,7 @@ class HierarchicalPlan {
 
   /// The cluster coefficients of one cluster basis. They are the coefficients in this basis times
   /// their scales.
-  struct ClusterCoefficients {
+  struct ClusterBasis {
     std::uint32_t coefficient, rank, residual_rank;
     std::uint32_t position;  ///< of the first cluster coefficient, numbered after the patches'
     std::uint32_t scale;     ///< index of the first scale
@@ -46,7 +46,7 @@ class HierarchicalPlan {
 
   std::vector<BasisPart> projections;          ///< of light at positions
   std::vector<BasisPart> cluster_projections;  ///< of cluster coefficients
-  std::vector<ClusterCoefficients> coefficients_in, coefficients_out;
+  std::vector<ClusterBasis> cluster_bases_in, cluster_bases_out;
   std::vector<CouplingBlock> couplings;
   std::vector<DenseBlock> dense;  ///< only if there is one matrix; with several, dense blocks are
                                   ///< among the coupling matrices

@@ -315,9 +315,9 @@ TEST(HierarchicalFile, RefusesScalesThatDoNotFit) {
 }
 
 TEST(HierarchicalFile, RefusesFormFactorsWithClusterBases) {
-  const auto cluster_coefficients = std::make_shared<const HierarchicalOperator>(
+  const auto nested = std::make_shared<const HierarchicalOperator>(
       encode_values(test::random_nested_storage(kPatchCount, 1, 5), Precision::kF16));
-  expect_error([&] { CompressedFormFactors{cluster_coefficients}; }, "bases are nested");
+  expect_error([&] { CompressedFormFactors{nested}; }, "bases are nested");
 }
 
 void survive_mutations(const TransferData& data) {
