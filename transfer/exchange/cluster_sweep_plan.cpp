@@ -106,8 +106,8 @@ class Planner {
             .position = cluster.begin,
             .first_rank = first,
             .last_rank = first + rank + end.residual_rank,
-            .first_place = 0,
-            .last_place = cluster.size};
+            .first_offset = 0,
+            .last_offset = cluster.size};
   }
 
   void add_bases() {

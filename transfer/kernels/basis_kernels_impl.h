@@ -198,7 +198,7 @@ void expand(const Value* values, std::span<const BasisPart> parts,
         return c + lane_of(w, coefficient.stride) + r * kChannelLanes;
       };
       expand_strips<V, kVectors, Output::kAdd>(basis, part.last_rank - part.first_rank, part.size,
-                                               at, part.first_place, part.last_place,
+                                               at, part.first_offset, part.last_offset,
                                                y.data + v * y.stride + part.position, y.stride);
     });
   }

@@ -35,7 +35,7 @@ struct BasisPart {
   std::uint32_t coefficient, position;  ///< its first coefficient and position
   std::uint32_t first_rank, last_rank;  ///< the ranks [first, last)
   /// The positions [first, last), counted from the cluster's first.
-  std::uint32_t first_place, last_place;
+  std::uint32_t first_offset, last_offset;
   /// Whether the bases are over cluster coefficients instead of positions. These are never uneven
   /// in the sense of the integer kernels.
   bool over_cluster_coefficients = false;

@@ -323,9 +323,9 @@ REBOUNCE_INLINE inline void expand_chunk(const Value* values, const BasisPart& p
                                          const IntegerCoefficients& coefficient, float* y,
                                          std::size_t y_stride) {
   float* const to = y + part.position;
-  for (std::size_t k = part.first_place; k < part.last_place;) {
+  for (std::size_t k = part.first_offset; k < part.last_offset;) {
     const std::size_t strip_end = (k / kBasisStrip + 1) * kBasisStrip;
-    const std::size_t end = std::min<std::size_t>(part.last_place, strip_end);
+    const std::size_t end = std::min<std::size_t>(part.last_offset, strip_end);
     const auto add_strips = [&]<std::size_t kSize>() {
       for (; k + kSize <= end; k += kSize) {
         expand_integer_strip<N, kSize * kRankGroup / N::kWidth>(

@@ -259,8 +259,8 @@ class Planner {
   }
 
   BasisPart part_of(const Layout::Cluster& cluster, std::uint32_t first_rank,
-                    std::uint32_t last_rank, std::uint32_t first_place,
-                    std::uint32_t last_place) const {
+                    std::uint32_t last_rank, std::uint32_t first_offset,
+                    std::uint32_t last_offset) const {
     return {.values = cluster.values,
             .rank = cluster.rank,
             .size = cluster.size,
@@ -268,8 +268,8 @@ class Planner {
             .position = cluster.begin,
             .first_rank = first_rank,
             .last_rank = last_rank,
-            .first_place = first_place,
-            .last_place = last_place,
+            .first_offset = first_offset,
+            .last_offset = last_offset,
             .over_cluster_coefficients = cluster.begin >= positions_};
   }
 

@@ -33,8 +33,8 @@ BasisPart basis_of_tile(std::size_t tile, std::size_t rank) {
           .position = static_cast<std::uint32_t>(tile * kSize),
           .first_rank = 0,
           .last_rank = ranks,
-          .first_place = 0,
-          .last_place = kSize};
+          .first_offset = 0,
+          .last_offset = kSize};
 }
 
 }  // namespace

@@ -660,8 +660,8 @@ BasisPart part_of(const PlainBasis& plain, std::size_t first_rank, std::size_t p
           .position = kFirstPosition,
           .first_rank = static_cast<std::uint32_t>(first_rank),
           .last_rank = rank,
-          .first_place = size - static_cast<std::uint32_t>(places),
-          .last_place = size};
+          .first_offset = size - static_cast<std::uint32_t>(places),
+          .last_offset = size};
 }
 
 template <typename Value>
@@ -698,7 +698,7 @@ void check_expand(const BasisKernels<Value>& kernels, const std::vector<Value>& 
     for (std::size_t k = 0; k < kStride; ++k) {
       double expected = y[v * kStride + k];
       const bool reached =
-          k >= kFirstPosition + part.first_place && k < kFirstPosition + part.last_place;
+          k >= kFirstPosition + part.first_offset && k < kFirstPosition + part.last_offset;
       for (std::size_t r = first_rank; r < plain.rank && reached; ++r) {
         expected +=
             plain.value[r * plain.size + k - kFirstPosition] * arrived[coefficient_at(v, r)];
