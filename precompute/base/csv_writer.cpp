@@ -59,7 +59,7 @@ std::size_t row_count(const std::filesystem::path& path, std::span<const CsvColu
     if (&group == &groups.front()) rows = group.values.size() / group.names.size();
     if (group.values.size() != rows * group.names.size()) {
       throw Error("cannot write " + path.string() + ": column " + group.names.front() +
-                  " has another number of rows; give all columns the same");
+                  " has a different number of rows; give all columns the same number");
     }
   }
   return rows;

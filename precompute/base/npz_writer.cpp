@@ -75,7 +75,8 @@ void check_size(const std::filesystem::path& path, const NumpyArray& array) {
   std::size_t size = traits(array.type).size;
   for (const std::size_t count : array.shape) size *= count;
   if (size != array.bytes.size()) {
-    fail(path, "array " + array.name + " has other bytes than its shape; mend the shape");
+    fail(path,
+         "array " + array.name + " has a size that does not match its shape; correct the shape");
   }
 }
 

@@ -24,7 +24,7 @@ void check_residual(double residual, Precision precision) {
   const double largest = precision == Precision::kF16 ? kLargestResidualF16 : kLargestResidualF32;
   if (residual <= largest) return;
   throw Error(
-      fmt::format("the operator fails its own check: residual {:.2e} where {:.0e} is allowed; "
+      fmt::format("the operator fails its own check: its residual is {:.2e}, the limit is {:.0e}; "
                   "please report this scene",
                   residual, largest));
 }

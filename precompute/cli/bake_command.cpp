@@ -61,14 +61,13 @@ void add_bake_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
   command->add_option("--exposure", chosen->settings.exposure,
-                      "Stops; by default what a picture from the camera would take");
+                      "Stops; by default that of a picture from the camera");
   command->add_option("--camera", chosen->camera,
-                      "Where the exposure is found from: as for render");
+                      "Camera that the exposure is computed for: as for render");
   command
-      ->add_option(
-          "--triangles", chosen->settings.triangle_target,
-          "Cut triangles without texels in a lightmap, all alike, as finely as stays below "
-          "this number")
+      ->add_option("--triangles", chosen->settings.triangle_target,
+                   "Subdivide triangles without lightmap texels evenly, as finely as keeps their "
+                   "number below this")
       ->check(CLI::Range(std::size_t{1}, std::size_t{20000000}))
       ->capture_default_str();
   command->add_option("-o,--output", chosen->output, "Scene to write (.glb)")

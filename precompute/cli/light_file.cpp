@@ -307,7 +307,7 @@ LightSetup choose_lights(const std::filesystem::path& path, const TransferData& 
     return m[0] > 0 || m[1] > 0 || m[2] > 0;
   });
   if (setup.lights.empty() && setup.sky.luminance == 0 && !emits) {
-    throw Error("there is no light: the scene has none of its own; give some with --lights");
+    throw Error("there is no light: the scene has no lights of its own; name a file with --lights");
   }
   return setup;
 }

@@ -17,7 +17,7 @@ constexpr int kBadInput = 1, kUsage = 2;
 void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options) {
   command.add_flag(
       "--json", options.json,
-      "Print a machine-readable summary on standard output, all else on standard error");
+      "Print a machine-readable summary on standard output, other text on standard error");
   command.add_flag("--quiet", options.quiet, "No progress and no summary");
   command.add_option("--threads", options.threads, "Threads to use; 0: one per processor")
       ->check(CLI::Range(0, 4096))

@@ -132,14 +132,14 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
 void check_tolerances(const BuildRecord& record, const BuildReport& report) {
   if (record.tolerance > 0 && record.error_mean > record.tolerance) {
     throw Error(fmt::format(
-        "the operator misses its tolerance: the mean error is {:.2g} and {:.2g} was asked for; "
-        "ask for less, or for --precision f32 or --operator dense",
+        "the operator misses its tolerance: the mean error is {:.2g}, the tolerance {:.2g}; "
+        "raise --tolerance, or use --precision f32 or --operator dense",
         record.error_mean, record.tolerance));
   }
   if (report.form_factor_error && report.form_factor_error->mean > report.form_factor_tolerance) {
     throw Error(fmt::format(
-        "the compressed form factors miss their tolerance: the mean error is {:.2g} and {:.2g} was "
-        "asked for; ask for less with --compress-form-factors, or go without",
+        "the compressed form factors miss their tolerance: the mean error is {:.2g}, the tolerance "
+        "{:.2g}; raise --compress-form-factors, or leave it out",
         report.form_factor_error->mean, report.form_factor_tolerance));
   }
 }
@@ -244,14 +244,15 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
                   "pairs are over the memory limit")
       ->check(CLI::IsMember({"pairs", "links"}));
   command
-      .add_option("--quality", chosen.quality,
-                  "Rays and kernels of the form factors: view factors to some 0.5 % by default, to "
-                  "0.1 % in ten times as long with high")
+      .add_option(
+          "--quality", chosen.quality,
+          "Accuracy of the form factors: default agrees with closed forms to 0.5 %, high to "
+          "0.1 % and takes ten times as long")
       ->check(CLI::IsMember({"low", "default", "high"}))
       ->capture_default_str();
   command
       .add_option("--link-epsilon", chosen.settings.form_factors.link_epsilon,
-                  "Error that a link may have, with --form-factors links; 0: the usual 0.0005")
+                  "Largest error of a link, with --form-factors links; 0: the default, 0.0005")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command.add_flag("--store-links", chosen.settings.store_links,
@@ -295,14 +296,15 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->check(CLI::IsMember(precision_names()));
   command
       .add_option("--receivers", chosen.receivers,
-                  "Surfaces whose indirect light is wanted, and none of others is stored: a list "
-                  "of names of meshes and materials (mesh:NAME or material:NAME for one kind), and "
-                  "boxes in metres, box:X0,Y0,Z0,X1,Y1,Z1; hierarchical only")
+                  "Surfaces that get indirect light; for others none is stored. A list of names of "
+                  "meshes and materials (mesh:NAME or material:NAME for one kind) and of boxes in "
+                  "metres, box:X0,Y0,Z0,X1,Y1,Z1; hierarchical only")
       ->allow_extra_args(false);
   command
-      .add_option("--sources", chosen.sources,
-                  "Surfaces that lamps may shine on, in the same way: light on others does not "
-                  "bounce; those that emit are sources all the same")
+      .add_option(
+          "--sources", chosen.sources,
+          "Surfaces that lamps may light, as a list like that of --receivers; direct light on "
+          "others does not bounce. Surfaces that emit always are sources")
       ->allow_extra_args(false);
 }
 
@@ -312,9 +314,7 @@ void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
                   "Light probes in a grid of NX,NY,NZ over the scene, or this many metres apart")
       ->delimiter(',')
       ->expected(1, 3);
-  command
-      .add_option("--probe-rays", chosen.settings.probes.ray_count,
-                  "Rays by which each light probe looks around")
+  command.add_option("--probe-rays", chosen.settings.probes.ray_count, "Rays of each light probe")
       ->check(CLI::Range(64, 1000000))
       ->capture_default_str();
   command
@@ -324,8 +324,8 @@ void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
   command
       .add_option("--surface-harmonics", chosen.settings.surface_harmonics.ray_count,
-                  "Keep from where light comes to the patches, for normal maps, found by this many "
-                  "rays of each")
+                  "Store the directions from which light arrives at patches, for normal maps; rays "
+                  "of each patch")
       ->check(CLI::Range(16, 1000000));
 }
 
@@ -343,13 +343,14 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
   add_operator_options(*command, *chosen);
   add_output_options(*command, *chosen);
   command
-      ->add_option("--memory-limit", chosen->memory_limit_gib,
-                   "Refuse to start what needs more GiB, and do less at a time of an operator from "
-                   "links where it is short; by default half of the machine's memory")
+      ->add_option(
+          "--memory-limit", chosen->memory_limit_gib,
+          "Limit in GiB: a build that needs more is refused; an operator from links is made "
+          "in smaller parts. By default half of the machine's memory")
       ->check(CLI::PositiveNumber);
   command->add_option("--checkpoint", chosen->settings.checkpoint,
-                      "Folder for what is done of an operator from links: started again, a run "
-                      "that was killed has it done. Remove it afterwards");
+                      "Folder for finished parts of an operator from links: a run that was killed "
+                      "continues when it is started again. Remove the folder afterwards");
   command->callback([chosen, &options] { run(*chosen, options); });
 }
 

@@ -140,7 +140,7 @@ Solution find_solution(const SolveOptions& chosen, Engine& engine,
 std::string form_factors_of(const SolveOptions& chosen, const TransferData& data) {
   const bool hierarchical = chosen.method == kHierarchicalMethod;
   if (hierarchical && !chosen.form_factors.empty() && chosen.form_factors != kLinks) {
-    throw Error("hierarchical is on links; go without --form-factors");
+    throw Error("--method hierarchical always uses links; leave out --form-factors");
   }
   const std::string asked = hierarchical ? kLinks : chosen.form_factors;
   if (asked == kLinks && data.links.empty()) {
@@ -213,23 +213,24 @@ void add_solve_command(CLI::App& app, const CommonOptions& options) {
       ->capture_default_str();
   command
       ->add_option("--form-factors", chosen->form_factors,
-                   "What iterative methods gather with: the exact form factors of pairs, or the "
-                   "compressed ones or the links of a file that holds them; by default exact ones "
-                   "where there are any")
+                   "Form factors of iterative methods: exact ones of pairs, compressed ones, or "
+                   "links; by default exact ones if the file holds them")
       ->check(CLI::IsMember({kExact, kCompressed, kLinks}));
   command
       ->add_option("--iterations", chosen->settings.max_sweeps,
-                   "Sweeps at most, for iterative methods")
+                   "Largest number of sweeps of an iterative method")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   command
-      ->add_option("--residual", chosen->settings.residual,
-                   "Stop an iterative method at this part of the initial exitance")
+      ->add_option(
+          "--residual", chosen->settings.residual,
+          "Stop an iterative method when its residual is this fraction of the initial exitance")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command
-      ->add_option("--time-budget", chosen->settings.time_budget_microseconds,
-                   "No new sweep of an iterative method after this many microseconds; 0: no limit")
+      ->add_option(
+          "--time-budget", chosen->settings.time_budget_microseconds,
+          "Start no sweep of an iterative method after this many microseconds; 0: no limit")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->add_option("-o,--output", chosen->output, "Result: .npz or .csv, each array [n,3]")

@@ -173,9 +173,9 @@ void add_view_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene, or "
                       "one lamp if it has none");
-  command->add_option("--camera", chosen->camera, "Where to begin: as for render");
+  command->add_option("--camera", chosen->camera, "First camera: as for render");
   command->add_option("--size", chosen->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-  command->add_option("--show", chosen->show, "What to begin with: as for render")
+  command->add_option("--show", chosen->show, "First view: as for render")
       ->check(CLI::IsMember(show_names()))
       ->capture_default_str();
   command->add_option("--exposure", chosen->exposure,
@@ -189,7 +189,7 @@ void add_view_command(CLI::App& app, const CommonOptions& options) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command->add_flag("--cold", chosen->cold,
-                    "Iterative methods begin every frame anew, not from the one before");
+                    "Iterative methods start each frame anew, not from the last solution");
   command->add_flag("--sphere", chosen->sphere,
                     "A sphere that moves in front of the camera, lit by light probes");
   add_picture_options(*command, *chosen);

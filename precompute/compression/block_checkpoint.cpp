@@ -74,7 +74,8 @@ BlockCheckpoint::BlockCheckpoint(std::filesystem::path folder, std::string key)
   std::error_code error;
   std::filesystem::create_directories(folder_, error);
   if (!std::filesystem::is_directory(folder_, error)) {
-    throw Error(folder_.string() + ": cannot be made a folder for checkpoints; name another");
+    throw Error(folder_.string() +
+                ": cannot be created as a folder for checkpoints; choose another path");
   }
 }
 

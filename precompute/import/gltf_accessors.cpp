@@ -149,7 +149,7 @@ std::vector<float> to_floats(const std::vector<std::uint8_t>& packed,
     case TINYGLTF_COMPONENT_TYPE_FLOAT:
       return converted<float>(packed, 1);
     default:
-      throw Error("32-bit integers stand where 8-bit, 16-bit or float values are needed");
+      throw Error("it has 32-bit integers instead of 8-bit, 16-bit or float values");
   }
 }
 
@@ -180,7 +180,7 @@ std::size_t component_count(int type) {
     case TINYGLTF_TYPE_VEC4:
       return 4;
     default:
-      throw Error("a matrix stands where a scalar or vector is needed");
+      throw Error("it is a matrix instead of a scalar or vector");
   }
 }
 

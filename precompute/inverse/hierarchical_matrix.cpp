@@ -54,7 +54,7 @@ struct HierarchicalMatrix::Places {
 HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage)
     : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
   if (layout_.cluster_coefficient_count > 0)
-    throw Error("hierarchical matrix: its blocks have moments");
+    throw Error("hierarchical matrix: blocks with cluster bases are not supported");
   const SharedArray<float> values = std::exchange(storage_.values_f32, {});
   bases_.assign(values.begin(), values.begin() + layout_.basis_value_count);
   const std::uint64_t count = layout_.coupling_value_count / matrix_count();

@@ -58,8 +58,8 @@ float sign(std::mt19937_64& engine) {
 
 [[noreturn]] void refuse() {
   throw Error(
-      "columns of the operator do not converge: the form factors give off more light than they "
-      "take; compress them less");
+      "columns of the operator do not converge: the compressed form factors amplify light; "
+      "compress them less");
 }
 
 Factors quotient(const Sums& a, const Sums& b) {

@@ -43,7 +43,7 @@ void factor(TiledMatrix<Scalar>& m, const StageProgress& progress) {
     auto diagonal = m.tile(k, k);
     const Eigen::LLT<typename TiledMatrix<Scalar>::Matrix> llt(diagonal);
     if (llt.info() != Eigen::Success) {
-      throw Error("the radiosity system is not positive definite; a reflectance must be 1 or more");
+      throw Error("the radiosity system is not positive definite; a reflectance is 1 or more");
     }
     diagonal = llt.matrixL();
     const std::size_t left = m.side() - k - 1;

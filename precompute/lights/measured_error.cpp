@@ -92,7 +92,8 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress) {
   if (exact == nullptr && data.exchange.empty() && data.links.empty()) {
-    throw Error("measured error: there is no truth without pairs or links; store links too");
+    throw Error(
+        "measured error: the data hold neither pairs nor links for a reference; store links");
   }
   if (exact == nullptr) {
     return measure_error(data, tracer, ReferenceSolver(data), 0, seed, progress);

@@ -144,7 +144,7 @@ class ConjugateGradients {
       }
     }
     throw Error("the reference solution did not converge in " + std::to_string(kMaxSteps) +
-                " steps; a reflectance must be too close to 1");
+                " steps; a reflectance is too close to 1");
   }
 
  private:
@@ -314,7 +314,7 @@ ReferenceSolver::ReferenceSolver(const TransferData& data)
 ReferenceSolver ReferenceSolver::preconditioned(
     std::shared_ptr<const TransferOperator> nearly_inverse) const {
   if (nearly_inverse->patch_count() != patches_.size()) {
-    throw Error("reference solution: the operator is not of these patches");
+    throw Error("reference solution: the operator has a different number of patches");
   }
   ReferenceSolver solver = *this;
   if (nearly_inverse->roles().all_are_both()) solver.nearly_inverse_ = std::move(nearly_inverse);

@@ -220,7 +220,7 @@ class LightmapPlacer {
     std::vector<Tile> tiles = pack_pages(extent, settings_.size, kLeastTile);
     if (tiles.empty()) {
       throw Error(fmt::format(
-          "a lightmap of {0} x {0} texels has not room for {1} meshes; ask for a larger one",
+          "a lightmap of {0} x {0} texels is too small for {1} meshes; ask for a larger one",
           settings_.size, pages.size()));
     }
     return tiles;

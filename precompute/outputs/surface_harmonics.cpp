@@ -73,7 +73,7 @@ SurfaceHarmonics trace_surface_harmonics(const TransferData& data,
                                          const SurfaceHarmonicSettings& settings,
                                          const Progress& progress) {
   if (settings.ray_count < kFewestRays)
-    throw Error("a patch needs at least 16 rays to look around");
+    throw Error("surface harmonics: a patch needs at least 16 rays");
   const std::size_t n = data.patches.size();
   const PatchTriangles triangles(data.mesh.triangle_patch, n);
   SurfaceHarmonics harmonics;

@@ -266,7 +266,7 @@ class PatchModelBuilder {
     }
     const std::vector<std::uint32_t> position = weld_elements();
     const std::size_t count = element_triangle_.size();
-    if (count == 0) throw Error("scene " + scene_.name + " has nothing that light falls on");
+    if (count == 0) throw Error("scene " + scene_.name + " has no surface that light can reach");
     elements_.resize(count);
     patch_area_ = mean_patch_area();
 #pragma omp parallel for schedule(dynamic, 256)
@@ -353,7 +353,8 @@ class PatchModelBuilder {
   /// them cannot be determined.
   void drop_slivers() {
     model_.sliver_count = drop_thin(ray_offset_distance(scene_.position));
-    if (scene_.triangle.empty()) throw Error("scene " + scene_.name + " has nothing but slivers");
+    if (scene_.triangle.empty())
+      throw Error("scene " + scene_.name + " has no triangles but slivers; check --scale");
   }
 
   /// Removes triangles no higher than `thinnest` metres, and their sides if these are known.

@@ -127,7 +127,7 @@ void PatchSelection::add_box(const std::string& entry) {
   }
   if (!good) {
     throw Error(
-        fmt::format("{}: {} is no box; give box: and two corners, X0,Y0,Z0,X1,Y1,Z1, in "
+        fmt::format("{}: {} is not a box; write box: and two corners, X0,Y0,Z0,X1,Y1,Z1, in "
                     "metres",
                     list_, in_quotes(entry)));
   }
@@ -176,7 +176,7 @@ std::vector<std::uint8_t> PatchSelection::patches(const PatchModel& model) const
     }
   }
   if (std::ranges::find(selected, 1) == selected.end()) {
-    throw Error(list_ + ": nothing that is named has patches; name more, or a larger box");
+    throw Error(list_ + ": the named surfaces have no patches; name more surfaces or a larger box");
   }
   return selected;
 }

@@ -135,7 +135,7 @@ FormFactorLinks without_links(const ClusterTree& tree) {
 
 void check_error_per_link(double error_per_link) {
   if (!(error_per_link > 0) || !std::isfinite(error_per_link)) {
-    throw Error("links: what each must be worth is to be above 0 and finite");
+    throw Error("links: error_per_link must be above 0 and finite");
   }
 }
 

@@ -42,7 +42,7 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
                       const FormFactorSettings& settings, std::span<const float> weight,
                       const Progress& progress) {
   check_form_factor_settings(settings);
-  if (!(settings.link_epsilon > 0)) throw Error("links: their error must be above 0");
+  if (!(settings.link_epsilon > 0)) throw Error("links: link_epsilon must be above 0");
   if (!weight.empty() && weight.size() != model.patches.size()) {
     throw Error("links: weights and patches differ in number");
   }

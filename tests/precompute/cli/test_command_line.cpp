@@ -745,7 +745,7 @@ TEST_F(CommandLine, RefusesReceiversAndSourcesThatAreNotThere) {
   attempt({"--receivers", "flor"}, R"("floor")");
   attempt({"--sources", "floor,mesh:red"}, R"(sources: the scene has no mesh "red")");
   attempt({"--sources", "box:1,2,3"}, "two corners");
-  attempt({"--sources", "box:9,9,9,10,10,10"}, "nothing that is named has patches");
+  attempt({"--sources", "box:9,9,9,10,10,10"}, "the named surfaces have no patches");
   attempt({"--receivers", "floor", "--operator", "dense"}, "hierarchical operators alone");
   attempt({"--receivers", "floor", "--operator", "low-rank"}, "hierarchical operators alone");
 }

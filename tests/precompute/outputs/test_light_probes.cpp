@@ -190,7 +190,7 @@ TEST(LightProbes, SpacingAndLimits) {
   const LightProbes probes = place_probes(data.mesh, {.spacing = 0.1F});
   EXPECT_EQ(probes.size(), std::size_t{probes.grid[0]} * probes.grid[1] * probes.grid[2]);
   EXPECT_GE(probes.grid[0], 2U);
-  test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "further apart");
+  test::expect_error([&] { place_probes(data.mesh, {.spacing = 1e-3F}); }, "larger spacing");
   LightProbes few = place_probes(data.mesh, {.grid = {1, 1, 1}});
   test::expect_error(
       [&] {

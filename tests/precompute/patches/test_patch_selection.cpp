@@ -69,9 +69,9 @@ TEST(PatchSelection, SaysWhatIsWrong) {
   test::expect_error(attempt("a\nb"), R"("a\nb")");
   for (const std::string box : {"box:", "box:1,2,3", "box:1,2,3,4,5,x", "box:1,2,3,4,5,6x",
                                 "box:1,2,3,4,5,nan", "box:1;2;3;4;5;6", "box:1,2,3,4,5,"}) {
-    test::expect_error(attempt(box), "is no box");
+    test::expect_error(attempt(box), "is not a box");
   }
-  test::expect_error(attempt("box:10,10,10,11,11,11"), "nothing that is named has patches");
+  test::expect_error(attempt("box:10,10,10,11,11,11"), "the named surfaces have no patches");
 }
 
 TEST(PatchSelection, WhatEmitsIsASource) {

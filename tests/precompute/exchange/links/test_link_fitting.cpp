@@ -235,7 +235,7 @@ TEST(LinkFitting, RefusesWhatDoesNotFit) {
   test::expect_error([&] { fit_links(ExchangeMatrix(), pairs.patches()); }, "differ in number");
   for (const double error_per_link : {0.0, -1e-3, std::numeric_limits<double>::infinity(),
                                       std::numeric_limits<double>::quiet_NaN()}) {
-    test::expect_error([&] { fitted(pairs, error_per_link); }, "worth");
+    test::expect_error([&] { fitted(pairs, error_per_link); }, "error_per_link");
   }
 }
 
