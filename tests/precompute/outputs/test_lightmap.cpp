@@ -230,7 +230,7 @@ TEST(Lightmap, RefusesWhatCannotHaveOne) {
   test::GltfBuilder many = test::unwrapped_scene(test::unwrapped_room());
   for (int k = 1; k < 6; ++k) many.add_node({{"mesh", 0}, {"translation", {10 * k, 0, 0}}});
   const PatchModel six = model_of(many);
-  test::expect_error([&] { place_lightmap(six, {.size = 16}); }, "has not room for 6 meshes");
+  test::expect_error([&] { place_lightmap(six, {.size = 16}); }, "is too small for 6 meshes");
 }
 
 TEST(Lightmap, CoordinatesThatAreNotFiniteAreNone) {
