@@ -82,7 +82,7 @@ TEST(BuildEstimate, IsRefusedAboveTheLimit) {
   estimate.peak_bytes = 3ULL << 30;
   refuse_if_too_large(estimate, estimate.peak_bytes, 12);
   test::expect_error([&] { refuse_if_too_large(estimate, estimate.peak_bytes - 1, 12); },
-                     "64000 patches (from 12 triangles) need about 3 GiB and the limit is 3 GiB");
+                     "64000 patches (from 12 triangles) need about 3 GiB, the limit is 3 GiB");
 }
 
 }  // namespace
