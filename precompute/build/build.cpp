@@ -45,7 +45,7 @@ Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
   return std::move(placed.lightmap);
 }
 
-/// The offline stage, a step at a time, each with what the steps before have left.
+/// The offline stage, step by step; each step uses the results of those before it.
 class TransferBuild {
  public:
   TransferBuild(const BuildSettings& settings, BuildReport& report, const BuildProgress& progress,
@@ -70,7 +70,8 @@ class TransferBuild {
     return scene;
   }
 
-  /// Throws Error if the rest would need more memory than it may take, or cannot be made as asked.
+  /// Makes the patches. Throws Error if the rest needs more memory than allowed, or cannot be made
+  /// with these settings.
   void make_patches(Scene scene) {
     model_ = clock_.run("patches", [&](const Progress& part) {
       return make_patch_model(std::move(scene), settings_.subdivision, part);
@@ -88,7 +89,7 @@ class TransferBuild {
     announce(report_.estimate);
   }
 
-  /// Finds what patches exchange; afterwards the patches and the mesh are the data's.
+  /// Finds the exchange of the patches; afterwards patches and mesh belong to the data.
   void find_exchange() {
     if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
@@ -108,7 +109,7 @@ class TransferBuild {
     data_.mesh = std::move(model_.mesh);
   }
 
-  /// What takes the light of patches to where it is shown.
+  /// Makes the data that brings the light of patches to where it is shown.
   void make_outputs() {
     clock_.run("weights", [&](const Progress& part) {
       compute_reconstruction_weights(model_.shown_patch, data_.patches.absorbed, *tracer_,
@@ -136,7 +137,7 @@ class TransferBuild {
     }
   }
 
-  /// Makes the operator, and measures how far off it is.
+  /// Makes the operator and measures its error.
   void make_operator() {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
@@ -147,7 +148,7 @@ class TransferBuild {
   TransferData take() { return std::move(data_); }
 
  private:
-  /// Says by short samples how long a build from pairs takes.
+  /// Forecasts the time of a build from pairs, from short samples.
   void forecast_pairs() {
     tracer_.emplace(make_surface_tracer(model_.mesh));
     clock_.run("estimate", [&](const Progress& part) {
@@ -156,14 +157,14 @@ class TransferBuild {
     });
   }
 
-  /// Throws Error if what is left needs more memory than it may take.
+  /// Reports the estimate. Throws Error if the rest needs more memory than allowed.
   void announce(const CostEstimate& estimate) {
     if (on_estimate_) on_estimate_(estimate);
     refuse_if_too_large(estimate, decided_.memory_limit_bytes, report_.triangle_count);
   }
 
   const BuildSettings& settings_;
-  BuildSettings decided_;  ///< settings_ with what was left open decided
+  BuildSettings decided_;  ///< settings_ with everything decided
   BuildReport& report_;
   const EstimateListener& on_estimate_;
   PhaseClock clock_;

@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-/// The kind of an operator from pairs, if that was left open.
+/// The kind of an operator from pairs, if the settings leave it open.
 OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& model) {
   if (settings.operator_kind != OperatorKind::kAutomatic) return settings.operator_kind;
   const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
@@ -17,7 +17,7 @@ OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& mo
                                                                      : OperatorKind::kDense;
 }
 
-/// What the operator is to be made from, if that was left open.
+/// The exchange that the operator is made from, if the settings leave it open.
 ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
   const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
                           settings.operator_kind == OperatorKind::kHierarchical;
@@ -36,6 +36,7 @@ ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchMod
 
 }  // namespace
 
+/// The settings with everything decided that was left open.
 BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   settings.memory_limit_bytes = memory_limit_bytes(settings);
   settings.exchange_source = choose_form_factors(settings, model);

@@ -12,23 +12,23 @@
 namespace rebounce {
 namespace {
 
-// Measured: notes/operator.md.
+// Positions in a leaf of the cluster tree. Measured: notes/operator.md.
 constexpr std::uint32_t kLeafSize = 32;
 
-// Pieces of a round that are kept in one file: some seconds of work where pieces are largest, and
+// Pieces of a round in one checkpoint file: some seconds of work where pieces are largest, and
 // enough for many threads to share.
 constexpr std::size_t kKeptPieces = 64;
 
 // From one round to the next, the strength of a training light changes by a factor between these.
 constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 
-// The uniform light's part of the energy of all training lights: what makes black surfaces, which
-// reflect no light, good enough as lamps.
+// The uniform light's share of the energy of all training lights. It makes black surfaces, which
+// reflect no light, exact enough as lamps.
 constexpr double kUniformShare = 0.1;
 
 using Exitances = std::span<const std::vector<Float3>>;
 
-/// The lights after one with which every patch gives off the same, black ones too.
+/// `lights`, after one under which every patch, black ones too, gives off the same.
 std::vector<std::vector<Float3>> with_uniform(std::size_t patch_count, Exitances lights) {
   std::vector<std::vector<Float3>> all(1, std::vector<Float3>(patch_count, Float3{1, 1, 1}));
   all.insert(all.end(), lights.begin(), lights.end());

@@ -43,12 +43,12 @@ struct CompressionFrame {
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
                                    std::span<const std::vector<Float3>> training);
 
-/// Beyond blocks of low rank.
+/// What an operator has beside blocks of low rank.
 struct CompressionOptions {
   bool equilibrated = false, nested = false;
 };
 
-/// Where what is done of a compression is kept, and under which names.
+/// The folder that keeps the finished parts of a compression, and their names in it.
 struct KeptParts {
   const BlockCheckpoint& checkpoint;
   std::string prefix;

@@ -17,15 +17,15 @@
 namespace rebounce {
 namespace {
 
-// Bytes a patch of lights: each, a copy and what it leads to; of those that shape, how they fall on
-// clusters too.
+// Bytes per patch of the lights: the light, a copy and its result; for training lights also their
+// directions on clusters.
 constexpr std::size_t kLightBytes =
     3 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
     sizeof(double) * kMostTrainingLights;
 
-// Bytes a patch, for each matrix, of the operator of the first stage and the rounds of the second:
-// an upper estimate, as they are only known later, at a tolerance, with the power by which less of
-// that takes more.
+// Upper estimate of the bytes per patch, for each matrix, of the operator of the first stage and
+// the rounds of the second. It holds at kOperatorTolerance and grows with this power of 1 /
+// tolerance.
 constexpr double kOperatorBytes = 10.5e3, kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
 
 }  // namespace
@@ -60,6 +60,7 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
   }
 }
 
+/// Throws Error if there is a memory limit and a plan does not fit into it.
 void check_memory(std::size_t patch_count, const MatrixFreeTransferPlan& plan,
                   const MatrixFreeTransferSettings& settings) {
   const std::uint64_t limit = settings.memory_limit_bytes;

@@ -17,20 +17,20 @@
 namespace rebounce {
 namespace {
 
-// Of the tolerance, the residual that columns are solved to. Measured: notes/operator.md.
+// The residual of solved columns, as a fraction of the tolerance. Measured: notes/operator.md.
 constexpr double kResidualPart = 0.35;
 
-// What form factors for the steps of columns are compressed to, in tolerances of the operator.
+// The tolerance of the form factors that the steps multiply with, in tolerances of the operator.
 // Measured: notes/operator.md.
 constexpr double kCoarsePart = 4;
 
-// The multiplier of a value in the first stage, in first multipliers of the search for the
-// tolerance. Errors go about like the root of the multiplier: a quarter of what the second stage
-// may do.
+// The multiplier of the first stage, in initial multipliers of the search for the tolerance. Errors
+// grow about like the square root of the multiplier: the first stage has a quarter of the error of
+// the second.
 constexpr double kFinePart = 1.0 / 16;
 
-// For the progress alone: what is done before the first panel, and again before the first round of
-// the second stage, and all rounds together, in columns that are solved for.
+// Only for progress: the work before the first panel, again before the first round of the second
+// stage, and of all rounds together, in columns that are solved for.
 constexpr double kColumnsBefore = 5500, kColumnsOfRounds = 6000;
 
 /// Form factors as the steps of columns take them.
@@ -61,7 +61,7 @@ std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
                               patches, kResidualPart * tolerance);
   const Eigen::VectorXd energies = solved.estimated_energies(settings.roles);
   const double work_after = kColumnsBefore + kColumnsOfRounds;
-  double searching = 0;  // when the search of the second stage begins
+  double searching = 0;  // fraction of the progress at which the search of the second stage begins
   HierarchicalStorage fine;
   {
     PanelMatrix matrix(solved, energies, settings.roles);

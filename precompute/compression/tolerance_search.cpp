@@ -16,29 +16,29 @@
 namespace rebounce {
 namespace {
 
-// The search for the multiplier aims at this part of the tolerance, and ends at kMost at most:
-// other lights than those that it sees may do a little worse.
+// The search for the multiplier aims at kAim of the tolerance and accepts at most kMost of it,
+// because other lights than the validation lights may have slightly larger errors.
 constexpr int kMostRounds = 8;
 constexpr double kAim = 0.76, kMost = 0.8;
 
-// Rounds that the search takes as a rule.
+// The usual number of rounds of the search.
 constexpr int kUsualRounds = 4;
 
-// What one value per patch is worth at the tolerance, to begin the search with: measured over
-// scenes and sizes, notes/operator.md.
+// The multiplier at which the search begins, for a tolerance of 1 and one value per patch. Measured
+// over scenes and sizes: notes/operator.md.
 constexpr double kInitialMultiplier = 2.5;
 
-// Operators with cluster coefficients mostly end far above it. Their search begins higher by this
-// power of how many times so many patches they have, and by so much at most. Measured:
+// Operators with cluster bases mostly end far above that. Above kStartPatches patches, their search
+// begins higher by this power of the ratio of patch counts, up to a limit. Measured:
 // notes/operator.md.
 constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
 
-// Those without, form factors, end at 2.5 to 22 times it as a rule.
+// Operators without cluster bases, form factors, usually end at 2.5 to 22 times it.
 constexpr double kPlainStart = 2;
 
-// What a vector and a block take of an apply beside their values, in values, in operators of so
-// many patches, and in part in smaller ones: coefficients that the nearest caches do not hold, and
-// loops that begin. Measured: notes/operator.md.
+// The time of a vector and of a block in a product, beside their values, in units of a value. It
+// counts in full in operators of kSizedPatches patches and in part in smaller ones: coefficients
+// that the nearest caches do not hold, and the start of loops. Measured: notes/operator.md.
 constexpr double kVectorSize = 9, kBlockSize = 96, kSizedPatches = 16384;
 
 /// The truth of a uniform light stands in for validation lights from which nothing arrives.
@@ -50,15 +50,16 @@ ReferenceLighting validation_truth(const SymmetricMatrix& matrix,
   return ReferenceLighting(matrix, std::span(&uniform, 1));
 }
 
-/// The part of the whole search that some rounds are: all alike as far as usual, and each beyond
-/// that half of what is left.
+/// The progress of a search after a number of rounds: the usual rounds take equal shares, and each
+/// further round half of the rest.
 double part_of_search(int rounds) {
   constexpr double kEach = 1.0 / kUsualRounds;
   return rounds < kUsualRounds ? rounds * kEach : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
 }
 
-/// What parts of an operator take. In bytes, with the residuals of some, a value of a basis is
-/// beside halves. One with cluster coefficients is for applies, whose time counts too.
+/// The sizes of the parts of an operator. With 8-bit values and their residuals, a value of a basis
+/// takes about as much as one in half precision, relative to coupling matrices. The time of a
+/// product counts for operators with cluster bases.
 PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_count) {
   PartSizes sizes;
   sizes.basis_value =
@@ -71,15 +72,15 @@ PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_cou
   return sizes;
 }
 
-/// Bases in integers have one step for all patches of a cluster; sweeps work on the light at
-/// positions, and do not know cluster coefficients.
+/// Bases in integers have one step for all patches of a cluster, so they need equilibration. Sweeps
+/// read the light at positions and do not support cluster bases.
 CompressionOptions options_of(const HierarchicalSettings& settings) {
   return {.equilibrated = are_integers(hierarchical_precision(settings.precision).bases) ||
                           settings.cluster_bases,
           .nested = settings.cluster_bases};
 }
 
-/// The best operator that the search has met: the smallest within the limit, or the most exact.
+/// The best operator of the search: the smallest within the limit or, if none is, the most exact.
 class Best {
  public:
   explicit Best(double limit) : limit_(limit) {}
@@ -100,7 +101,7 @@ class Best {
   std::shared_ptr<const HierarchicalOperator> best_;
 };
 
-/// The multiplier that a search begins with.
+/// The multiplier at which a search begins.
 double search_start(const HierarchicalSettings& settings, std::size_t patch_count) {
   const double usual = initial_multiplier(settings.tolerance, patch_count);
   if (!settings.cluster_bases) return kPlainStart * usual;
