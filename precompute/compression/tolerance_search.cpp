@@ -24,8 +24,8 @@ constexpr double kAim = 0.76, kMost = 0.8;
 // The usual number of rounds of the search.
 constexpr int kUsualRounds = 4;
 
-// The multiplier at which the search begins, for a tolerance of 1 and one value per patch. Measured
-// over scenes and sizes: notes/operator.md.
+// The multiplier at which the search begins, in units of the squared tolerance over the number of
+// patches. Measured over scenes and sizes: notes/operator.md.
 constexpr double kInitialMultiplier = 2.5;
 
 // Operators with cluster bases mostly end far above that. Above kStartPatches patches, their search
@@ -57,8 +57,8 @@ double part_of_search(int rounds) {
   return rounds < kUsualRounds ? rounds * kEach : 1 - std::ldexp(kEach, kUsualRounds - 1 - rounds);
 }
 
-/// The sizes of the parts of an operator. With 8-bit values and their residuals, a value of a basis
-/// takes about as much as one in half precision, relative to coupling matrices. The time of a
+/// The sizes of the parts of an operator. A value of a basis in 8 bits, with its share of
+/// residuals, takes about half of a value of a coupling matrix in half precision. The time of a
 /// product counts for operators with cluster bases.
 PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_count) {
   PartSizes sizes;
