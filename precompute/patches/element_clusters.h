@@ -34,8 +34,8 @@ struct ClusterSettings {
 /// far smaller than a patch becomes one patch.
 ///
 /// Pairs are neighbours over an edge; elements that lie near each other without a shared edge
-/// (leaves, slats); and, once none of these is left, patches that lie near each other. Emitting
-/// elements never merge with others.
+/// (leaves, slats); and, once none of these is left, patches that lie near each other. An
+/// element that emits and one that does not never merge.
 ///
 /// The leak test keeps a patch from lying on two sides of a wall or in two rooms. Lines of sight
 /// join the elements of a pair. If a piece of mesh longer than half a mean patch blocks most of

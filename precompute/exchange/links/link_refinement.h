@@ -16,7 +16,7 @@ namespace rebounce {
 
 /// The exchange of two nodes of a LinkTree, for all pairs of their patches together. Between a
 /// point x of a and a point y of b the kernel is approximated by
-///  (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b).
+///   (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b).
 struct Link {
   std::uint32_t a, b;
   float exchange_area;            ///< m²
@@ -31,7 +31,7 @@ struct Link {
 ///
 /// There are these differences. The kernel is affine over both nodes instead of constant, so that
 /// fewer links are enough. The error of a link is that of all its entries in the Frobenius norm,
-///  sqrt(area_a area_b variance of (kernel x visibility) about the approximation),
+///   sqrt(area_a area_b variance of (kernel x visibility) about the approximation),
 /// estimated from the kernel between the cells of the nodes. What cells cannot show, patches of one
 /// cell that face different ways, counts as error. Rays between stratified points measure the
 /// visibility. A pair gets more rays the more light it exchanges, so that the light that rays may
