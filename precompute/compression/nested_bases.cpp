@@ -73,7 +73,7 @@ struct NestedEnd {
   /// [rank][rank]: an error E of the basis is an error of the block. Its square is the trace of E
   /// weighted E^T, or of E plain E^T where light at the other side has no weight.
   MatrixXd weighted = {}, plain = {};
-  RowMajor cluster_coefficients = {};  ///< [rank][cluster coefficients], replaces the basis
+  RowMajor transfer_matrix = {};  ///< [rank][cluster coefficients], replaces the basis
   MatrixXd folded = {};  ///< [rank][old vectors], factor that goes into the coupling matrix
 
   Index rank() const { return plain.rows(); }
@@ -296,30 +296,29 @@ class Nesting {
 
   void find_coefficients(NestedEnd& end) {
     const CellBasis &first = bases_[end.first_cell], &last = bases_[end.last_cell - 1];
-    end.cluster_coefficients.resize(end.rank(),
-                                    last.first_coefficient + last.rank - first.first_coefficient);
+    end.transfer_matrix.resize(end.rank(),
+                               last.first_coefficient + last.rank - first.first_coefficient);
     for (std::size_t c = end.first_cell; c < end.last_cell; ++c) {
       const CellBasis& own = bases_[c];
       const MatrixXd coefficients = own.directions.transpose() * weighted_part(end, c);
-      end.cluster_coefficients.middleCols(own.first_coefficient - first.first_coefficient,
-                                          own.rank) =
+      end.transfer_matrix.middleCols(own.first_coefficient - first.first_coefficient, own.rank) =
           (own.length.cwiseInverse().asDiagonal() * coefficients).transpose().cast<float>();
     }
   }
 
-  /// Scales the vectors of cluster coefficients to norm 1, as those of bases, and moves the norms
+  /// Scales the rows of the transfer matrix to norm 1, as vectors of bases, and moves the norms
   /// into the coupling matrices. A side with more vectors than cluster coefficients keeps as many
   /// vectors as coefficients; the rest goes into the coupling matrix.
   static void fold(NestedEnd& end) {
-    if (end.rank() > end.cluster_coefficients.cols()) {
-      const MatrixXd vectors = end.cluster_coefficients.transpose().cast<double>();
+    if (end.rank() > end.transfer_matrix.cols()) {
+      const MatrixXd vectors = end.transfer_matrix.transpose().cast<double>();
       const Eigen::HouseholderQR<MatrixXd> qr(vectors);
       end.folded = qr.matrixQR().triangularView<Eigen::Upper>();
-      end.cluster_coefficients = MatrixXd(qr.householderQ()).transpose().cast<float>();
+      end.transfer_matrix = MatrixXd(qr.householderQ()).transpose().cast<float>();
     } else {
-      const VectorXd norm = end.cluster_coefficients.rowwise().norm().cast<double>();
+      const VectorXd norm = end.transfer_matrix.rowwise().norm().cast<double>();
       end.folded = (norm.array() > 0).select(norm, 1).asDiagonal();
-      end.cluster_coefficients.rowwise().normalize();
+      end.transfer_matrix.rowwise().normalize();
     }
     scale_errors(end, end.folded);
   }
@@ -376,9 +375,8 @@ class Nesting {
     for (const std::size_t e : own.ends) {
       const NestedEnd& end = ends_[e];
       const Index first = own.first_coefficient - bases_[end.first_cell].first_coefficient;
-      const MatrixXd t =
-          own.length.asDiagonal() *
-          end.cluster_coefficients.middleCols(first, own.rank).transpose().cast<double>();
+      const MatrixXd t = own.length.asDiagonal() *
+                         end.transfer_matrix.middleCols(first, own.rank).transpose().cast<double>();
       if (end.receives) arriving += (t * end.weighted).cwiseProduct(t).rowwise().sum();
       if (end.sends) leaving += (t * end.plain).cwiseProduct(t).rowwise().sum();
     }
@@ -388,7 +386,7 @@ class Nesting {
     });
   }
 
-  /// The residual rank of the cluster coefficients of a side.
+  /// The residual rank of the transfer matrix of a side.
   Index residual_rank(const NestedEnd& end) const {
     double arriving = 0, leaving = 0;
     for (std::size_t c = end.first_cell; c < end.last_cell; ++c) {
@@ -397,7 +395,7 @@ class Nesting {
       if (end.sends) leaving += own.length.squaredNorm();
     }
     return worthwhile_residual_rank(
-        end.cluster_coefficients.transpose().cast<double>(), multiplier(),
+        end.transfer_matrix.transpose().cast<double>(), multiplier(),
         [&](Index r) { return arriving * end.weighted(r, r) + leaving * end.plain(r, r); });
   }
 
@@ -460,9 +458,9 @@ class Nesting {
     if (end != nullptr) {
       const Index first = bases_[end->first_cell].first_coefficient;
       return {positions + static_cast<std::uint32_t>(first),
-              static_cast<std::uint32_t>(end->cluster_coefficients.cols()),
+              static_cast<std::uint32_t>(end->transfer_matrix.cols()),
               static_cast<std::uint32_t>(end->rank()),
-              static_cast<std::uint32_t>(residual_rank(*end)), end->cluster_coefficients};
+              static_cast<std::uint32_t>(residual_rank(*end)), end->transfer_matrix};
     }
     if (is_row) {
       return {block.row_begin, block.row_count, rank, block.row_residual_rank, basis(b, true)};

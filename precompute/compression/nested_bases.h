@@ -20,7 +20,7 @@ struct NestingFrame {
 ///
 /// Over a patch there are some tens of large blocks with some tens of vectors each. Within a small
 /// cluster, a *cell*, these are combinations of far fewer vectors. A cell therefore has one basis
-/// that all large blocks over it share, and a block stores the combinations (nested bases in one
+/// that all large blocks over it share, and a block stores transfer matrices (nested bases in one
 /// level: W. Hackbusch and S. Börm, "Data-sparse approximation by adaptive H2-matrices", 2002). The
 /// rank of a cell follows from the multiplier, as the ranks of blocks do: a vector is kept if it
 /// removes more weighted error than its values cost. If there is nothing to gain, the operator is
