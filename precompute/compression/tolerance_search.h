@@ -12,7 +12,7 @@
 
 namespace rebounce {
 
-/// The multiplier at which searches begin, for one value per patch.
+/// The multiplier at which searches begin, for a tolerance > 0 and a number of patches > 0.
 double initial_multiplier(double tolerance, std::size_t patch_count);
 
 /// Compresses `matrix` to a tolerance as build_hierarchical_transfer does. `checkpoint`, made for
