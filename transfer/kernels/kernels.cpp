@@ -3,14 +3,14 @@
 #include <array>
 #include <cstddef>
 
-#if defined(__x86_64__)
+#ifdef REBOUNCE_WITH_WIDE_KERNELS
 #include <cpuid.h>
 #endif
 
 namespace rebounce {
 namespace {
 
-#if defined(__x86_64__)
+#ifdef REBOUNCE_WITH_WIDE_KERNELS
 // Reads CPUID itself: __builtin_cpu_supports of Clang before 18 does not know the name.
 bool cpu_supports_f16c() {
   unsigned a = 0, b = 0, c = 0, d = 0;
@@ -33,7 +33,7 @@ std::size_t runnable_count() {
 }  // namespace
 
 std::span<const KernelSet* const> kernel_sets() {
-#if defined(__x86_64__)
+#ifdef REBOUNCE_WITH_WIDE_KERNELS
   static const std::array kSets = {&kKernelsPortable, &kKernelsAvx2, &kKernelsAvx512};
   return std::span(kSets).first(runnable_count());
 #else

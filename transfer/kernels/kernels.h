@@ -24,7 +24,7 @@ extern const KernelSet kKernelsAvx2;  ///< with FMA and F16C
 extern const KernelSet
     kKernelsAvx512;  ///< AVX-512 F, BW, VL and VNNI: Cascade Lake, Zen 4 and later
 
-/// The sets that this processor can run, narrowest first; kernels() is the widest of them.
+/// The sets of this build that this processor can run, narrowest first; kernels() is the widest.
 std::span<const KernelSet* const> kernel_sets();
 const KernelSet& kernels();
 
