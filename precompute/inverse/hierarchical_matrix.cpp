@@ -86,7 +86,7 @@ void HierarchicalMatrix::fold_scales() {
   for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
     const TransferBlock& block = storage_.blocks[b];
     if (block.kind != TransferBlock::Kind::kDense) continue;
-    const std::uint64_t begin = layout_.places[b].values / matrix_count();
+    const std::uint64_t begin = layout_.block_layouts[b].values / matrix_count();
     for (std::vector<float>& own : couplings_) {
       Eigen::Map<Vectors> entries(own.data() + begin, block.row_count, block.column_count);
       entries = (at(block.row_begin, block.row_count) * entries *
@@ -122,7 +122,7 @@ const float* HierarchicalMatrix::basis(const HierarchicalLayout::End& end) const
 }
 
 const float* HierarchicalMatrix::coupling(std::uint32_t matrix, std::size_t block) const {
-  return couplings_[matrix].data() + layout_.places[block].values / matrix_count();
+  return couplings_[matrix].data() + layout_.block_layouts[block].values / matrix_count();
 }
 
 void HierarchicalMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
@@ -166,10 +166,10 @@ MatrixXf HierarchicalMatrix::block_entries(std::uint32_t matrix, std::size_t ind
     for (Index k = 0; k < part.cols(); ++k) part.col(k) = whole.col(where[k].position - begin);
     return part;
   };
-  const HierarchicalLayout::Place& place = layout_.places[index];
-  const Vectors u = some(place.row, block.row_rank, block.row_begin, block.row_count, rows);
+  const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[index];
+  const Vectors u = some(block_layout.row, block.row_rank, block.row_begin, block.row_count, rows);
   const Vectors v =
-      some(place.column, block.column_rank, block.column_begin, block.column_count, columns);
+      some(block_layout.column, block.column_rank, block.column_begin, block.column_count, columns);
   const MatrixXf right = ConstMap(coupling(matrix, index), block.row_rank, block.column_rank) * v;
   entries.noalias() = u.transpose() * right;
   return entries;
@@ -223,9 +223,9 @@ void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x,
     const TransferBlock& block = storage_.blocks[b];
     if (!has_values(block)) continue;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
-    const HierarchicalLayout::Place& place = layout_.places[b];
-    const Index row = dense ? block.row_begin : place.row.coefficient;
-    const Index column = dense ? block.column_begin : place.column.coefficient;
+    const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[b];
+    const Index row = dense ? block.row_begin : block_layout.row.coefficient;
+    const Index column = dense ? block.column_begin : block_layout.column.coefficient;
     const Index rows = dense ? block.row_count : block.row_rank;
     const Index columns = dense ? block.column_count : block.column_rank;
     const Vectors& from = dense ? x : workspace.sent;

@@ -60,12 +60,12 @@ class Planner {
   void add_steps() {
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       if (!blocks_[b].on_diagonal()) continue;
-      const HierarchicalLayout::Place& place = layout_.places[b];
+      const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[b];
       plan_.steps.push_back({.diagonal = blocks_[b],
-                             .basis = basis_of(blocks_[b], place.row, blocks_[b].row_rank),
-                             .values = place.values,
-                             .coefficient = place.row.coefficient,
-                             .residual_rank = place.row.residual_rank});
+                             .basis = basis_of(blocks_[b], block_layout.row, blocks_[b].row_rank),
+                             .values = block_layout.values,
+                             .coefficient = block_layout.row.coefficient,
+                             .residual_rank = block_layout.row.residual_rank});
     }
     add_missing_steps();
     std::ranges::sort(plan_.steps, {}, [](const Step& step) { return step.diagonal.row_begin; });
@@ -115,9 +115,10 @@ class Planner {
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       const TransferBlock& block = blocks_[b];
       if (!is_below_diagonal(block) || block.kind == TransferBlock::Kind::kDense) continue;
-      const HierarchicalLayout::Place& place = layout_.places[b];
-      add_basis(rows, rows_of(block), basis_of(block, place.row, block.row_rank));
-      add_basis(columns, columns_of(block), basis_of(block, place.column, block.column_rank));
+      const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[b];
+      add_basis(rows, rows_of(block), basis_of(block, block_layout.row, block.row_rank));
+      add_basis(columns, columns_of(block),
+                basis_of(block, block_layout.column, block.column_rank));
     }
     plan_.row_bases = rows.made();
     plan_.column_bases = columns.made();
@@ -165,9 +166,9 @@ class Planner {
 
   void add_product(ProductsOfSteps& products, std::uint32_t step, std::size_t b) const {
     const TransferBlock& block = blocks_[b];
-    const HierarchicalLayout::Place& place = layout_.places[b];
+    const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[b];
     if (block.kind == TransferBlock::Kind::kDense) {
-      products.dense[step].push_back({.values = place.values,
+      products.dense[step].push_back({.values = block_layout.values,
                                       .rows = block.row_count,
                                       .columns = block.column_count,
                                       .row_position = block.row_begin,
@@ -176,14 +177,15 @@ class Planner {
                                       .column_out = 0,
                                       .direction = products.direction});
     } else {
-      products.couplings[step].push_back({.values = place.values,
-                                          .rows = block.row_rank,
-                                          .columns = block.column_rank,
-                                          .row = place.row.coefficient,
-                                          .column = place.column.coefficient,
-                                          .direction = products.direction,
-                                          .row_residual_rank = place.row.residual_rank,
-                                          .column_residual_rank = place.column.residual_rank});
+      products.couplings[step].push_back(
+          {.values = block_layout.values,
+           .rows = block.row_rank,
+           .columns = block.column_rank,
+           .row = block_layout.row.coefficient,
+           .column = block_layout.column.coefficient,
+           .direction = products.direction,
+           .row_residual_rank = block_layout.row.residual_rank,
+           .column_residual_rank = block_layout.column.residual_rank});
     }
   }
 

@@ -42,7 +42,7 @@ void check_exponents(std::span<const std::int8_t> exponents, std::size_t patch_c
 
 /// The index ranges of an operator: the positions of patches with their padding, then the cluster
 /// coefficients.
-struct Places {
+struct IndexRanges {
   std::size_t position_count, cluster_coefficient_count;
 
   /// Whether [begin, begin + count) is an aligned, non-empty range of positions.
@@ -60,8 +60,8 @@ struct Places {
   }
 };
 
-void check_cluster_basis(const TransferBlock& block, const Places& places) {
-  if (!places.are_positions(block.row_begin, block.row_count))
+void check_cluster_basis(const TransferBlock& block, const IndexRanges& ranges) {
+  if (!ranges.are_positions(block.row_begin, block.row_count))
     refuse("a cluster basis is not over positions");
   if (block.row_rank != block.column_count || block.row_rank > block.row_count ||
       block.column_rank != 0 || block.row_residual_rank > block.row_rank ||
@@ -70,11 +70,11 @@ void check_cluster_basis(const TransferBlock& block, const Places& places) {
   }
 }
 
-void check_block(const TransferBlock& block, const Places& places) {
-  if (is_cluster_basis(block)) return check_cluster_basis(block, places);
+void check_block(const TransferBlock& block, const IndexRanges& ranges) {
+  if (is_cluster_basis(block)) return check_cluster_basis(block, ranges);
   const auto is_range = [&](std::uint32_t begin, std::uint32_t count) {
-    return places.are_positions(begin, count) || (block.kind == TransferBlock::Kind::kLowRank &&
-                                                  places.are_cluster_coefficients(begin, count));
+    return ranges.are_positions(begin, count) || (block.kind == TransferBlock::Kind::kLowRank &&
+                                                  ranges.are_cluster_coefficients(begin, count));
   };
   if (!is_range(block.row_begin, block.row_count) ||
       !is_range(block.column_begin, block.column_count)) {
@@ -143,9 +143,9 @@ void check_tables(const Storage& storage) {
     refuse(error.what());
   }
   const std::size_t positions = HierarchicalFormat::position_count(n);
-  const Places places{positions, checked_cluster_coefficient_count(storage, positions)};
+  const IndexRanges ranges{positions, checked_cluster_coefficient_count(storage, positions)};
   for (const TransferBlock& block : storage.blocks) {
-    check_block(block, places);
+    check_block(block, ranges);
     const bool one_rank =
         !is_cluster_basis(block) && (block.row_rank == 0) != (block.column_rank == 0);
     if (one_rank && storage.order == HierarchicalStorage::Order::kStreamed) {

@@ -23,23 +23,23 @@ using Order = HierarchicalStorage::Order;
 
 /// Copies the values of one block from the order kByBlock to their indices in the order kStreamed.
 template <typename Value>
-void place_block(const HierarchicalLayout& layout, const TransferBlock& block,
-                 const HierarchicalLayout::Place& place, std::uint32_t matrix_count,
-                 const Value* from, Value* to) {
+void copy_block(const HierarchicalLayout& layout, const TransferBlock& block,
+                const HierarchicalLayout::BlockLayout& block_layout, std::uint32_t matrix_count,
+                const Value* from, Value* to) {
   const bool dense = block.kind == TransferBlock::Kind::kDense;
   const auto copy_basis = [&](const HierarchicalLayout::End& end, std::uint64_t count) {
     std::copy_n(from, count, to + layout.basis_index(end, 0, 0));
     from += count;
   };
   if (!dense) {
-    copy_basis(place.row, std::uint64_t{block.row_rank} * block.row_count);
+    copy_basis(block_layout.row, std::uint64_t{block.row_rank} * block.row_count);
     if (!block.on_diagonal() && !is_cluster_basis(block)) {
-      copy_basis(place.column, std::uint64_t{block.column_rank} * block.column_count);
+      copy_basis(block_layout.column, std::uint64_t{block.column_rank} * block.column_count);
     }
   }
   const std::uint64_t entries = dense ? std::uint64_t{block.row_count} * block.column_count
                                       : std::uint64_t{block.row_rank} * block.column_rank;
-  Value* const coupling = to + layout.basis_value_count + place.values;
+  Value* const coupling = to + layout.basis_value_count + block_layout.values;
   for (std::uint32_t matrix = 0; matrix < matrix_count; ++matrix) {
     for (std::uint64_t k = 0; k < entries; ++k) coupling[k * matrix_count + matrix] = *from++;
   }
@@ -54,7 +54,8 @@ SharedArray<Value> stream_array(const Storage& storage, const std::vector<Transf
   const Value* from = values.data();
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     if (has_values(blocks[b])) {
-      place_block(layout, blocks[b], layout.places[b], storage.matrix_count, from, streamed.data());
+      copy_block(layout, blocks[b], layout.block_layouts[b], storage.matrix_count, from,
+                 streamed.data());
     }
     from += storage.blocks[b].value_count(storage.matrix_count);
   }
@@ -129,7 +130,7 @@ class Encoder {
   static constexpr bool kIntegers = std::is_integral_v<Basis> && std::is_signed_v<Basis>;
 
   void encode(const TransferBlock& block, std::size_t index) {
-    const Layout::Place &from = from_.places[index], &to = to_.places[index];
+    const Layout::BlockLayout &from = from_.block_layouts[index], &to = to_.block_layouts[index];
     const float* coupling = exact_ + from_.basis_value_count + from.values;
     Coupling* encoded = couplings_ + to.values;
     if (block.kind == TransferBlock::Kind::kDense) {

@@ -29,16 +29,17 @@ bool has_bases(const TransferBlock& block) {
 /// the order of the blocks.
 template <typename Visit>
 void visit_ends(std::span<const TransferBlock> blocks,
-                std::vector<HierarchicalLayout::Place>& places, const Visit& visit) {
+                std::vector<HierarchicalLayout::BlockLayout>& block_layouts, const Visit& visit) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
     if (!has_bases(block)) continue;
-    visit(places[b].row, block.row_begin, block.row_count, block.row_rank, block.row_residual_rank);
+    visit(block_layouts[b].row, block.row_begin, block.row_count, block.row_rank,
+          block.row_residual_rank);
     if (is_cluster_basis(block)) continue;
     if (block.on_diagonal()) {
-      places[b].column = places[b].row;
+      block_layouts[b].column = block_layouts[b].row;
     } else {
-      visit(places[b].column, block.column_begin, block.column_count, block.column_rank,
+      visit(block_layouts[b].column, block.column_begin, block.column_count, block.column_rank,
             block.column_residual_rank);
     }
   }
@@ -59,7 +60,7 @@ bool has_values(const TransferBlock& block) {
 
 HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
                                        std::uint32_t matrix_count, BasisPrecision precision)
-    : places(blocks.size()),
+    : block_layouts(blocks.size()),
       rank_group(are_integers(precision) ? HierarchicalFormat::kRankGroup : 1) {
   std::uint64_t total = 0;
   for (const TransferBlock& block : blocks) {
@@ -93,7 +94,7 @@ std::uint64_t HierarchicalLayout::basis_index(const End& end, std::uint64_t rank
 }
 
 void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {
-  visit_ends(blocks, places,
+  visit_ends(blocks, block_layouts,
              [&](End&, std::uint32_t begin, std::uint32_t size, std::uint32_t, std::uint32_t) {
                clusters.push_back({.begin = begin, .size = size});
              });
@@ -114,7 +115,7 @@ std::uint32_t HierarchicalLayout::cluster_at(std::uint32_t begin, std::uint32_t 
 void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks,
                                      BasisPrecision precision) {
   // First the offset of each end within its cluster, then the offsets of the clusters.
-  visit_ends(blocks, places,
+  visit_ends(blocks, block_layouts,
              [&](End& end, std::uint32_t begin, std::uint32_t size, std::uint32_t rank,
                  std::uint32_t residual_rank) {
                end.cluster = cluster_at(begin, size);
@@ -129,7 +130,7 @@ void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks,
     coefficient_count = checked_count(coefficient_count + filled_rank(cluster));
     basis_value_count += filled_rank(cluster) * cluster.size;
   }
-  visit_ends(blocks, places,
+  visit_ends(blocks, block_layouts,
              [&](End& end, std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t) {
                end.coefficient += clusters[end.cluster].coefficient;
              });
@@ -143,13 +144,13 @@ void HierarchicalLayout::place_couplings(std::span<const TransferBlock> blocks,
   };
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const TransferBlock& block = blocks[b];
-    Place& place = places[b];
-    place.values = coupling_value_count;
+    BlockLayout& block_layout = block_layouts[b];
+    block_layout.values = coupling_value_count;
     if (block.kind == TransferBlock::Kind::kDense) {
       coupling_value_count += block.value_count(matrix_count);
-      add_coefficients(place.row, block.row_count);
-      place.column = place.row;
-      if (!block.on_diagonal()) add_coefficients(place.column, block.column_count);
+      add_coefficients(block_layout.row, block.row_count);
+      block_layout.column = block_layout.row;
+      if (!block.on_diagonal()) add_coefficients(block_layout.column, block.column_count);
       largest_scratch =
           std::max(largest_scratch, scratch_size(block.row_count, block.column_count));
     } else {

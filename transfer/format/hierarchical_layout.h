@@ -28,7 +28,7 @@ struct HierarchicalLayout {
     std::uint32_t coefficient = 0;    ///< index of the first coefficient
     std::uint32_t residual_rank = 0;  ///< residual vectors, stored after those of the basis
   };
-  struct Place {
+  struct BlockLayout {
     End row, column;           ///< equal for blocks on the diagonal
     std::uint64_t values = 0;  ///< index of S or of the entries, counted from the end of the bases
   };
@@ -46,8 +46,8 @@ struct HierarchicalLayout {
   /// counted from the beginning of its cluster.
   std::uint64_t basis_index(const End& end, std::uint64_t rank, std::uint64_t position) const;
 
-  std::vector<Cluster> clusters;  ///< by begin, then by descending size
-  std::vector<Place> places;      ///< one for each block
+  std::vector<Cluster> clusters;           ///< by begin, then by descending size
+  std::vector<BlockLayout> block_layouts;  ///< one for each block
   std::uint64_t basis_value_count = 0;
   std::uint64_t coupling_value_count = 0;  ///< of coupling matrices and dense blocks
   std::uint32_t coefficient_count = 0;

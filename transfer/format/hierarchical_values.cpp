@@ -49,14 +49,15 @@ class ValueReader {
 };
 
 /// The entries [row_count][column_count] of one matrix, over positions or cluster coefficients.
-std::vector<double> block_entries(const ValueReader& read, const HierarchicalLayout::Place& place,
+std::vector<double> block_entries(const ValueReader& read,
+                                  const HierarchicalLayout::BlockLayout& block_layout,
                                   const TransferBlock& block, std::uint32_t matrix) {
   const std::size_t rows = block.row_count, columns = block.column_count;
   const std::uint32_t matrices = read.storage().matrix_count;
   std::vector<double> entries(rows * columns, 0.0);
   if (block.kind == TransferBlock::Kind::kDense) {
     for (std::size_t k = 0; k < entries.size(); ++k) {
-      entries[k] = read.coupling(place.values + k * matrices + matrix);
+      entries[k] = read.coupling(block_layout.values + k * matrices + matrix);
     }
     return entries;
   }
@@ -66,12 +67,12 @@ std::vector<double> block_entries(const ValueReader& read, const HierarchicalLay
     std::ranges::fill(right, 0.0);
     for (std::size_t k = 0; k < column_rank; ++k) {
       const std::uint64_t entry = r * column_rank + k;
-      const double coupling = read.coupling(place.values + entry * matrices + matrix);
+      const double coupling = read.coupling(block_layout.values + entry * matrices + matrix);
       for (std::size_t j = 0; j < columns; ++j)
-        right[j] += coupling * read.basis(place.column, column_rank, k, j);
+        right[j] += coupling * read.basis(block_layout.column, column_rank, k, j);
     }
     for (std::size_t i = 0; i < rows; ++i) {
-      const double left = read.basis(place.row, row_rank, r, i);
+      const double left = read.basis(block_layout.row, row_rank, r, i);
       for (std::size_t j = 0; j < columns; ++j) entries[i * columns + j] += left * right[j];
     }
   }
@@ -111,7 +112,7 @@ std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_
         basis.column_begin >= rows.begin + rows.count) {
       continue;
     }
-    const HierarchicalLayout::End& end = read.layout().places[b].row;
+    const HierarchicalLayout::End& end = read.layout().block_layouts[b].row;
     const float* const scale =
         storage.coefficient_scale.data() + basis.column_begin - position_count;
     for (std::uint32_t k = 0; k < basis.row_count; ++k) {
@@ -153,9 +154,10 @@ Storage decode(const Storage& storage) {
   for (std::size_t b = 0; b < streamed.blocks.size(); ++b) {
     const TransferBlock& block = streamed.blocks[b];
     if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
-    copy_basis(from.places[b].row, to.places[b].row, block.row_rank, block.row_count);
+    copy_basis(from.block_layouts[b].row, to.block_layouts[b].row, block.row_rank, block.row_count);
     if (block.on_diagonal() || is_cluster_basis(block)) continue;
-    copy_basis(from.places[b].column, to.places[b].column, block.column_rank, block.column_count);
+    copy_basis(from.block_layouts[b].column, to.block_layouts[b].column, block.column_rank,
+               block.column_count);
   }
   for (std::uint64_t k = 0; k < to.coupling_value_count; ++k) {
     values[to.basis_value_count + k] = static_cast<float>(read.coupling(k));
@@ -169,7 +171,7 @@ BlockOfPositions block_of_positions(const Storage& storage, const HierarchicalLa
   const ValueReader read(storage, layout);
   const TransferBlock& block = storage.blocks[index];
   BlockOfPositions result;
-  std::vector<double> entries = block_entries(read, layout.places[index], block, matrix);
+  std::vector<double> entries = block_entries(read, layout.block_layouts[index], block, matrix);
   entries = of_positions(read, {block.row_begin, block.row_count}, block.column_count,
                          std::move(entries), result.rows);
   entries = transposed(entries, block.column_count);

@@ -102,11 +102,12 @@ class Planner {
   void make() {
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       const TransferBlock& block = storage_.blocks[b];
-      if (!is_cluster_basis(block) && has_values(block)) add_coupling(block, layout_.places[b]);
+      if (!is_cluster_basis(block) && has_values(block))
+        add_coupling(block, layout_.block_layouts[b]);
     }
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       if (is_cluster_basis(storage_.blocks[b]))
-        add_cluster_basis(storage_.blocks[b], layout_.places[b].row);
+        add_cluster_basis(storage_.blocks[b], layout_.block_layouts[b].row);
     }
     mark_groups_in();
     for (const Layout::Cluster& cluster : layout_.clusters) add_projections(cluster);
@@ -128,7 +129,7 @@ class Planner {
   }
 
  private:
-  void add_coupling(const TransferBlock& block, const Layout::Place& place) {
+  void add_coupling(const TransferBlock& block, const Layout::BlockLayout& block_layout) {
     const bool to_rows =
         leads({block.column_begin, block.column_count}, {block.row_begin, block.row_count});
     const bool to_columns = !block.on_diagonal() && leads({block.row_begin, block.row_count},
@@ -136,16 +137,16 @@ class Planner {
     if (!to_rows && !to_columns) return;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
     using Direction = CouplingBlock::Direction;
-    const CouplingBlock coupling{.values = place.values,
+    const CouplingBlock coupling{.values = block_layout.values,
                                  .rows = dense ? block.row_count : block.row_rank,
                                  .columns = dense ? block.column_count : block.column_rank,
-                                 .row = place.row.coefficient,
-                                 .column = place.column.coefficient,
+                                 .row = block_layout.row.coefficient,
+                                 .column = block_layout.column.coefficient,
                                  .direction = !to_columns ? Direction::kToRows
                                               : !to_rows  ? Direction::kToColumns
                                                           : Direction::kBoth,
-                                 .row_residual_rank = place.row.residual_rank,
-                                 .column_residual_rank = place.column.residual_rank};
+                                 .row_residual_rank = block_layout.row.residual_rank,
+                                 .column_residual_rank = block_layout.column.residual_rank};
     if (dense && storage_.matrix_count == 1) {
       plan_.dense.push_back({.values = coupling.values,
                              .rows = coupling.rows,
