@@ -319,6 +319,7 @@ void run(const ApplyOptions& options) {
 
 int main(int argc, char** argv) {
   rebounce::bench::ApplyOptions options;
+  options.settings.store_form_factors = true;
   CLI::App app("Times a relight beside the bandwidth of memory in the same run.", "bench_apply");
   rebounce::bench::add_input_option(app, options.inputs);
   rebounce::bench::add_patch_option(app, options.settings.subdivision.patch_count);

@@ -30,7 +30,7 @@ namespace {
 struct LargeOptions {
   std::vector<std::string> scenes;
   std::vector<std::size_t> patches = {1000, 4000};
-  double tolerance = 0.005;
+  double tolerance = kDefaultTolerance;
   double form_factor_tolerance = 3e-4;
   std::size_t dense_limit = 6000;  ///< patches with which the dense way is gone too
   std::vector<double> residuals;

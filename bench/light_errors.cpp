@@ -78,6 +78,7 @@ class Truth {
 /// With the form factors that the operator was made from: of a scene from links they are found once
 /// more. Throws Error if a file does not hold them.
 TransferData load_or_build_with_truth(const std::string& input, BuildSettings settings) {
+  settings.store_form_factors = settings.exchange_source != ExchangeSource::kLinks;
   TransferData data = load_or_build(input, settings);
   if (!data.exchange.empty()) return data;
   if (std::filesystem::path(input).extension() == ".safetensors") {
@@ -85,7 +86,6 @@ TransferData load_or_build_with_truth(const std::string& input, BuildSettings se
                 ": the file does not hold the pairs that its operator was made from, which the "
                 "truth is found with; give the scene, with --form-factors links");
   }
-  settings.exchange_source = ExchangeSource::kLinks;
   settings.operator_kind = OperatorKind::kNoOperator;
   data.links = load_or_build(input, settings).links;
   return data;
@@ -163,7 +163,6 @@ void run(const LightErrorOptions& options) {
 int main(int argc, char** argv) {
   using namespace rebounce::bench;
   LightErrorOptions options;
-  options.settings.operator_kind = rebounce::OperatorKind::kHierarchical;
   CLI::App app("Tries operators under fresh lights of every kind, against the bound in their files",
                "bench_light_errors");
   add_input_option(app, options.inputs);

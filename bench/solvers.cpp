@@ -281,6 +281,7 @@ void run(const SolverOptions& options) {
 
 int main(int argc, char** argv) {
   rebounce::bench::SolverOptions options;
+  options.settings.store_form_factors = true;
   options.settings.form_factor_tolerance = rebounce::bench::kDefaultTolerance;
   CLI::App app("Times sweeps and solves of the iterative methods on each form of F.",
                "bench_solvers");

@@ -75,6 +75,7 @@ class ContenderBuilder {
     build.subdivision.patch_count = settings_.patch_count;
     build.form_factors.seed = settings_.seed;
     build.operator_kind = OperatorKind::kNoOperator;
+    build.store_form_factors = true;
     build.store_links = settings_.links;
     TransferData data = build_transfer_data(scene, build, result_.report, progress_);
     for (const auto& [phase, seconds] : result_.report.seconds) {

@@ -5,13 +5,14 @@
 #include <vector>
 
 #include "bench/reference/compare.h"
+#include "precompute/compression/hierarchical_settings.h"
 #include "transfer/base/precision.h"
 
 namespace rebounce::bench {
 
 /// A hierarchical operator that takes part.
 struct OperatorChoice {
-  double tolerance = 0.005;  ///< as HierarchicalSettings has it
+  double tolerance = kDefaultTolerance;
   Precision precision = Precision::kQ8;
 };
 

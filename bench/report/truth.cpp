@@ -55,6 +55,7 @@ std::vector<Float3> better_solution(const std::string& scene, const ReportSettin
   build.form_factors.full_rays = kManyRays;
   build.form_factors.kernel_tolerance = kFineKernel;
   build.operator_kind = OperatorKind::kNoOperator;
+  build.store_form_factors = true;
   BuildReport report;
   const auto phase = [&](std::string_view name, double part) {
     return progress(fmt::format("better {}", name), part);

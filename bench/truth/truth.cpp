@@ -142,6 +142,7 @@ class TruthBench {
     BuildSettings settings;
     settings.subdivision.patch_count = patch_count;
     settings.operator_kind = OperatorKind::kNoOperator;
+    settings.store_form_factors = true;
     settings.form_factors = with_quality(quality_named(options_.quality), settings.form_factors);
     BuildReport report;
     TransferData data = build_transfer_data(

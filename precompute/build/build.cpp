@@ -14,6 +14,7 @@
 #include "precompute/patches/patch_model.h"
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
+#include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/version.h"
 
 namespace rebounce {
@@ -143,9 +144,15 @@ class TransferBuild {
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const auto make = links ? make_operator_from_links : make_operator_from_pairs;
     make(*tracer_, decided_, roles_, data_, report_, clock_);
+    data_.emitted_irradiance = irradiance_from_emitters(data_);
   }
 
-  TransferData take() { return std::move(data_); }
+  /// The data, with those form factors alone that are to be kept.
+  TransferData take() {
+    if (!settings_.store_form_factors) data_.exchange = {};
+    if (settings_.form_factor_tolerance == 0) data_.compressed_form_factors.reset();
+    return std::move(data_);
+  }
 
  private:
   /// Forecasts the time of a build from pairs, from short samples.

@@ -9,28 +9,18 @@
 namespace rebounce {
 namespace {
 
-/// The kind of an operator from pairs, if the settings leave it open.
-OperatorKind kind_from_pairs(const BuildSettings& settings, const PatchModel& model) {
-  if (settings.operator_kind != OperatorKind::kAutomatic) return settings.operator_kind;
-  const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
-  return restricted_roles || model.patches.size() > kDensePatchCount ? OperatorKind::kHierarchical
-                                                                     : OperatorKind::kDense;
-}
-
 /// The exchange that the operator is made from, if the settings leave it open.
 ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
-  const bool from_links = settings.operator_kind == OperatorKind::kAutomatic ||
-                          settings.operator_kind == OperatorKind::kHierarchical;
+  const bool from_links = settings.operator_kind == OperatorKind::kHierarchical;
   if (settings.exchange_source == ExchangeSource::kLinks && !from_links &&
       settings.operator_kind != OperatorKind::kNoOperator) {
     throw Error("from links only a hierarchical operator is made; ask for that, or for pairs");
   }
   if (settings.exchange_source != ExchangeSource::kAutomatic) return settings.exchange_source;
   const std::size_t n = model.patches.size();
-  const bool too_many =
-      n > kPairsPatchCount ||
-      peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
-                          kind_from_pairs(settings, model)) > memory_limit_bytes(settings);
+  const bool too_many = n > kPairsPatchCount ||
+                        peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
+                                            settings.operator_kind) > memory_limit_bytes(settings);
   return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
 }
 
@@ -42,9 +32,6 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   settings.exchange_source = choose_form_factors(settings, model);
   const bool links = settings.exchange_source == ExchangeSource::kLinks;
   const bool restricted_roles = !settings.receivers.empty() || !settings.sources.empty();
-  if (settings.operator_kind == OperatorKind::kAutomatic) {
-    settings.operator_kind = links ? OperatorKind::kHierarchical : kind_from_pairs(settings, model);
-  }
   const bool hierarchical = settings.operator_kind == OperatorKind::kHierarchical;
   if (restricted_roles && !hierarchical) {
     throw Error("receivers and sources are for hierarchical operators alone; ask for one");
@@ -56,7 +43,11 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (are_integers(hierarchical_precision(*settings.precision).bases) && !hierarchical) {
     throw Error("integers are for hierarchical operators alone; use f16 or f32, or ask for one");
   }
-  if (!hierarchical) settings.tolerance = 0;
+  if (links && settings.store_form_factors) {
+    throw Error(
+        "links have no form factors of pairs to store; take --compress-form-factors instead of "
+        "--store-form-factors, or --form-factors pairs");
+  }
   double& link_epsilon = settings.form_factors.link_epsilon;
   if (!links && link_epsilon > 0) {
     throw Error("the error of a link is for form factors from links; ask for these");

@@ -6,6 +6,7 @@
 #include "precompute/base/progress.h"
 #include "precompute/build/build_report.h"
 #include "precompute/build/build_settings.h"
+#include "precompute/compression/hierarchical_settings.h"
 #include "precompute/patches/patch_model.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/data/patch_roles.h"
@@ -17,7 +18,7 @@ namespace rebounce {
 std::uint64_t memory_limit_bytes(const BuildSettings& settings);
 
 /// Peak memory of form factors and operator from pairs, if half of all patches face each other.
-/// `matrix_count`: distinct reflectance channels; `kind`: not kAutomatic.
+/// `matrix_count`: distinct reflectance channels.
 std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_count,
                                   OperatorKind kind);
 
@@ -27,7 +28,7 @@ struct LinkedBuild {
   std::size_t link_count = 0;
   std::uint32_t matrix_count = 1;  ///< distinct reflectance channels
   PatchRoles roles{};
-  double tolerance = 0.005;  ///< of the operator
+  double tolerance = kDefaultTolerance;  ///< of the operator
 };
 
 /// Peak memory of finding the links.

@@ -14,7 +14,6 @@ const char* name(OperatorKind kind) {
       return "low-rank";
     case OperatorKind::kNoOperator:
       return "none";
-    case OperatorKind::kAutomatic:
     case OperatorKind::kDense:
       break;
   }
@@ -25,33 +24,39 @@ const char* name(ExchangeSource kind) {
   return kind == ExchangeSource::kLinks ? "links" : "pairs";
 }
 
-std::string settings_json(const BuildSettings& settings) {
+bool is_hierarchical(const BuildSettings& settings) {
+  return settings.operator_kind == OperatorKind::kHierarchical;
+}
+
+/// Those that had a part in the build.
+std::string settings_json(const BuildSettings& settings, double form_factor_tolerance) {
   const FormFactorSettings& f = settings.form_factors;
-  return nlohmann::json{{"operator", name(settings.operator_kind)},
-                        {"form_factors", name(settings.exchange_source)},
-                        {"tolerance", settings.tolerance},
-                        {"form_factor_tolerance", settings.form_factor_tolerance},
-                        {"rank", settings.rank},
-                        {"receivers", settings.receivers},
-                        {"sources", settings.sources},
-                        {"scale", settings.scale},
-                        {"precision", precision_name(*settings.precision)},
-                        {"patches", settings.subdivision.patch_count},
-                        {"patch_size", settings.subdivision.patch_size},
-                        {"seed", f.seed},
-                        {"probe_rays", f.probe_rays},
-                        {"full_rays", f.full_rays},
-                        {"hemisphere_rays", f.hemisphere_rays},
-                        {"link_epsilon", f.link_epsilon},
-                        {"store_links", settings.store_links},
-                        {"kernel_tolerance", f.kernel_tolerance},
-                        {"probe_grid", settings.probes.grid},
-                        {"probe_spacing", settings.probes.spacing},
-                        {"probe_rays_each", settings.probes.ray_count},
-                        {"surface_harmonic_rays", settings.surface_harmonics.ray_count},
-                        {"lightmap_size", settings.lightmap.size},
-                        {"lightmap_padding", settings.lightmap.padding}}
-      .dump();
+  nlohmann::json json{{"operator", name(settings.operator_kind)},
+                      {"form_factors", name(settings.exchange_source)},
+                      {"store_form_factors", settings.store_form_factors},
+                      {"form_factor_tolerance", form_factor_tolerance},
+                      {"receivers", settings.receivers},
+                      {"sources", settings.sources},
+                      {"scale", settings.scale},
+                      {"precision", precision_name(*settings.precision)},
+                      {"patches", settings.subdivision.patch_count},
+                      {"patch_size", settings.subdivision.patch_size},
+                      {"seed", f.seed},
+                      {"probe_rays", f.probe_rays},
+                      {"full_rays", f.full_rays},
+                      {"hemisphere_rays", f.hemisphere_rays},
+                      {"link_epsilon", f.link_epsilon},
+                      {"store_links", settings.store_links},
+                      {"kernel_tolerance", f.kernel_tolerance},
+                      {"probe_grid", settings.probes.grid},
+                      {"probe_spacing", settings.probes.spacing},
+                      {"probe_rays_each", settings.probes.ray_count},
+                      {"surface_harmonic_rays", settings.surface_harmonics.ray_count},
+                      {"lightmap_size", settings.lightmap.size},
+                      {"lightmap_padding", settings.lightmap.padding}};
+  if (is_hierarchical(settings)) json["tolerance"] = settings.tolerance;
+  if (settings.operator_kind == OperatorKind::kLowRank) json["rank"] = settings.rank;
+  return json.dump();
 }
 
 /// Times differ from run to run, so they are not in the file.
@@ -103,8 +108,8 @@ void record_build(const BuildSettings& decided, const BuildReport& report,
     record.error_mean = e.mean;
     record.error_max = e.max;
   }
-  record.tolerance = decided.tolerance;
-  record.settings_json = settings_json(decided);
+  record.tolerance = is_hierarchical(decided) ? decided.tolerance : 0;
+  record.settings_json = settings_json(decided, report.form_factor_tolerance);
   record.report_json = report_json(report, errors);
 }
 

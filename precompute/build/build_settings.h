@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "precompute/compression/hierarchical_settings.h"
 #include "precompute/exchange/pairs/form_factor_settings.h"
 #include "precompute/outputs/light_probes.h"
 #include "precompute/outputs/lightmap.h"
@@ -17,22 +18,17 @@
 namespace rebounce {
 
 enum class OperatorKind : std::uint8_t {
-  kAutomatic,  ///< dense up to kDensePatchCount patches, hierarchical above
-  kDense,
-  kHierarchical,
-  kLowRank,     ///< one rank for the whole scene: low_rank_operator.h
-  kNoOperator,  ///< nothing is made or checked: for who solves with the form factors
+  kDense,         ///< exact to rounding, with n² values a channel
+  kHierarchical,  ///< to a tolerance, in a small part of the bytes and the time
+  kLowRank,       ///< one rank for the whole scene: low_rank_operator.h
+  kNoOperator,    ///< nothing is made or checked: for who solves with the form factors
 };
-
-/// Up to this many patches the dense operator, which is exact to rounding, is small enough to have
-/// (at 5,000: 150 MB) for who has not said what error may be.
-inline constexpr std::size_t kDensePatchCount = 5000;
 
 /// What the operator is made from.
 enum class ExchangeSource : std::uint8_t {
   kAutomatic,  ///< links above kPairsPatchCount patches or where pairs are over the memory limit
   kPairs,      ///< all pairs of patches, up to n² / 4 of them, and a dense inverse
-  kLinks,      ///< links (links.h): nothing grows with n²; the file holds F compressed only
+  kLinks,      ///< links (links.h): nothing grows with n²
 };
 
 /// Above this, memory in proportion to n² is no longer asked for.
@@ -51,16 +47,19 @@ struct BuildSettings {
   ProbeSettings probes;                       ///< by default none
   LightmapSettings lightmap;                  ///< by default none
   SurfaceHarmonicSettings surface_harmonics;  ///< by default none
-  OperatorKind operator_kind = OperatorKind::kAutomatic;
-  double tolerance = 0.005;  ///< of the hierarchical operator: see HierarchicalSettings
-  std::size_t rank = 256;    ///< of kLowRank: see LowRankSettings
+  OperatorKind operator_kind = OperatorKind::kHierarchical;
+  double tolerance = kDefaultTolerance;  ///< of the hierarchical operator: see HierarchicalSettings
+  std::size_t rank = 256;                ///< of kLowRank: see LowRankSettings
   /// By default kF32 for a dense operator, kQ8 for a hierarchical one, kF16 (half the bytes, an
   /// error of some 1e-4) for others.
   std::optional<Precision> precision;
+  /// Keep the form factors of all pairs, for iterative solvers, comparisons and export. Not with
+  /// kLinks, which has none.
+  bool store_form_factors = false;
   /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are
-  /// compressed for iterative solvers; 0: they are not, or, where the operator is made from them
-  /// (kLinks), to a fifth of its tolerance, less where little light reaches the receivers. Less:
-  /// more bytes, fewer errors.
+  /// compressed and kept, for the same. Less: more bytes, fewer errors. 0: they are not kept; where
+  /// the operator is made from them (kLinks), they have a fifth of its tolerance, less where little
+  /// light reaches the receivers.
   double form_factor_tolerance = 0;
   /// Whose indirect light is wanted, and what lamps shine on: entries of PatchSelection, or none
   /// for all patches. Only what the light of sources does to receivers is compressed, checked and

@@ -10,6 +10,7 @@
 #include "runtime/demo/bake/glb_file.h"
 #include "runtime/demo/bake/lit_mesh.h"
 #include "runtime/frame/engine.h"
+#include "runtime/solvers/solve_radiosity.h"
 #include "transfer/file/transfer_file.h"
 
 namespace rebounce::cli {

@@ -41,7 +41,8 @@ void add_patches(const TransferData& data, Export& out) {
 void add_form_factors(const TransferData& data, const std::string& file, Export& out) {
   if (data.exchange.empty()) {
     throw Error(file +
-                " holds its form factors compressed only; make it again with --form-factors pairs");
+                " has no form factors of pairs; make it again with precompute --form-factors pairs "
+                "--store-form-factors");
   }
   const std::size_t n = data.patches.size();
   const std::vector<float>& area = data.patches.area;

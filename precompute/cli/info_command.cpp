@@ -20,7 +20,7 @@ nlohmann::json parse_or_text(const std::string& text) {
 }
 
 const char* form_factors_of(const TransferData& data) {
-  if (data.exchange.empty()) return "compressed";
+  if (data.exchange.empty()) return data.compressed_form_factors ? "compressed" : "none";
   return data.compressed_form_factors ? "pairs, compressed" : "pairs";
 }
 
@@ -39,7 +39,11 @@ nlohmann::json counts_of(const PatchRoles& roles, std::size_t patch_count) {
           {"part_of_pairs", wanted_part(roles, patch_count)}};
 }
 
-void print_summary(const nlohmann::json& info) {
+void print_summary(nlohmann::json info) {
+  if (info["form_factors"] == "none") {
+    info["form_factors"] =
+        "none: precompute --store-form-factors or --compress-form-factors adds them";
+  }
   for (const auto& [key, value] : info.items()) {
     fmt::print("{:<20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
   }

@@ -20,9 +20,9 @@ namespace rebounce::cli {
 namespace {
 
 struct PrecomputeOptions {
-  std::string scene, output, form_factors, operator_kind, precision, quality = "default";
+  std::string scene, output, form_factors, precision, quality = "default";
+  std::string operator_kind = "hierarchical";
   std::vector<std::string> receivers, sources;  ///< each a list
-  bool tolerance_given = false;
   BuildSettings settings;
   double memory_limit_gib = 0;
   std::vector<float> probes;
@@ -129,14 +129,15 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
 }
 
 /// The file is written even if a tolerance is not reached; it holds the measured errors.
-void check_tolerances(const BuildRecord& record, const BuildReport& report) {
+void check_tolerances(const BuildRecord& record, const BuildReport& report,
+                      bool keeps_form_factors) {
   if (record.tolerance > 0 && record.error_mean > record.tolerance) {
     throw Error(fmt::format(
         "the operator misses its tolerance: the mean error is {:.2g}, the tolerance {:.2g}; "
         "raise --tolerance, or use --precision f32 or --operator dense",
         record.error_mean, record.tolerance));
   }
-  if (report.form_factor_error && report.form_factor_error->mean > report.form_factor_tolerance) {
+  if (keeps_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {
     throw Error(fmt::format(
         "the compressed form factors miss their tolerance: the mean error is {:.2g}, the tolerance "
         "{:.2g}; raise --compress-form-factors, or leave it out",
@@ -188,10 +189,6 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   }
   if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
   if (chosen.operator_kind == "low-rank") settings.operator_kind = OperatorKind::kLowRank;
-  if (chosen.operator_kind == "hierarchical" ||
-      (chosen.operator_kind.empty() && chosen.tolerance_given)) {
-    settings.operator_kind = OperatorKind::kHierarchical;
-  }
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
   check_can_write(chosen.output);
@@ -212,7 +209,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   } else if (!options.quiet) {
     print_summary(data, report, file_bytes);
   }
-  check_tolerances(data.record, report);
+  check_tolerances(data.record, report, data.compressed_form_factors != nullptr);
 }
 
 // CLI11 keeps references to these values for as long as `command` lives, and so must `chosen` live.
@@ -239,9 +236,8 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
       .add_option("--form-factors", chosen.form_factors,
                   "What the operator is made from: pairs of patches, with memory in proportion to "
-                  "their number squared, or links between sets of them, with which the file holds "
-                  "form factors compressed only; by default links above 20000 patches or where "
-                  "pairs are over the memory limit")
+                  "their number squared, or links between sets of them; by default links above "
+                  "20000 patches or where pairs are over the memory limit")
       ->check(CLI::IsMember({"pairs", "links"}));
   command
       .add_option(
@@ -257,12 +253,14 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->capture_default_str();
   command.add_flag("--store-links", chosen.settings.store_links,
                    "Store links, for solve --method hierarchical");
+  command.add_flag("--store-form-factors", chosen.settings.store_form_factors,
+                   "Store the form factors of pairs, for iterative methods, refinement, export and "
+                   "comparison with the reference solution");
   command
-      .add_option(
-          "--compress-form-factors", chosen.settings.form_factor_tolerance,
-          "Keep the form factors compressed as well, for iterative methods, with this error of the "
-          "light that is gathered in the mean; always with --form-factors links, by default to a "
-          "fifth of the tolerance")
+      .add_option("--compress-form-factors", chosen.settings.form_factor_tolerance,
+                  "Store the form factors, of pairs or from links, compressed, with this error of "
+                  "the light "
+                  "that is gathered in the mean: for all of that but export")
       ->check(CLI::Range(1e-5, 0.5));
   command.add_option("--seed", chosen.settings.form_factors.seed, "Seed of the sample points")
       ->capture_default_str();
@@ -272,9 +270,10 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
       .add_option(
           "--operator", chosen.operator_kind,
-          "Kind of the operator; by default hierarchical if a tolerance is given or there are "
-          "more than 5000 patches, otherwise dense")
-      ->check(CLI::IsMember({"hierarchical", "low-rank", "dense"}));
+          "Kind of the operator: hierarchical, to a tolerance; low-rank, of one rank; or dense, "
+          "exact to rounding and n² numbers")
+      ->check(CLI::IsMember({"hierarchical", "low-rank", "dense"}))
+      ->capture_default_str();
   command
       .add_option("--rank", chosen.settings.rank,
                   "Rank of a low-rank operator; bytes and time grow with it")
@@ -284,7 +283,6 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
       .add_option("--tolerance", chosen.settings.tolerance,
                   "Error of the indirect light that the hierarchical operator may have in the mean")
       ->check(CLI::Range(1e-5, 0.5))
-      ->each([&chosen](const std::string&) { chosen.tolerance_given = true; })
       ->capture_default_str();
   command
       .add_option(

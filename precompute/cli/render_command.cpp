@@ -14,6 +14,7 @@
 #include "runtime/demo/picture/picture.h"
 #include "runtime/demo/shading/patch_errors.h"
 #include "runtime/frame/engine.h"
+#include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/error.h"
 #include "transfer/file/transfer_file.h"
 

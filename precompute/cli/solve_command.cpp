@@ -23,6 +23,7 @@ namespace {
 
 // The names of the forms of F.
 constexpr const char *kExact = "exact", *kCompressed = "compressed", *kLinks = "links";
+constexpr const char* kNoFormFactors = "none";
 
 struct SolveOptions {
   std::string file, lights, method = kTransferMethod, form_factors, output;
@@ -126,17 +127,18 @@ SolveMethod method_of(const SolveOptions& chosen) {
   return named == kSolveMethods.end() ? SolveMethod::kSymmetricGaussSeidel : named->method;
 }
 
+/// `form_factors` may be null for the product.
 Solution find_solution(const SolveOptions& chosen, Engine& engine,
-                       const FormFactorOperator& form_factors) {
+                       const FormFactorOperator* form_factors) {
   if (chosen.method == kTransferMethod) return solve_by_transfer(engine);
   const TransferData& data = engine.data();
-  const auto solver = make_solver(method_of(chosen), form_factors,
+  const auto solver = make_solver(method_of(chosen), *form_factors,
                                   {data.patches.area, data.patches.reflectance}, data.transfer);
-  return solve_by_iteration(*solver, engine, form_factors, chosen.settings);
+  return solve_by_iteration(*solver, engine, *form_factors, chosen.settings);
 }
 
 /// The form that was asked for, or the best one that the file holds; hierarchical radiosity needs
-/// links.
+/// links, and the product alone needs no form factors.
 std::string form_factors_of(const SolveOptions& chosen, const TransferData& data) {
   const bool hierarchical = chosen.method == kHierarchicalMethod;
   if (hierarchical && !chosen.form_factors.empty() && chosen.form_factors != kLinks) {
@@ -148,19 +150,28 @@ std::string form_factors_of(const SolveOptions& chosen, const TransferData& data
   }
   if (asked == kCompressed && !data.compressed_form_factors) {
     throw Error(chosen.file +
-                " holds no compressed form factors; make it with --compress-form-factors");
+                " has no compressed form factors; make it again with precompute "
+                "--compress-form-factors");
   }
   if (asked == kExact && data.exchange.empty()) {
     throw Error(chosen.file +
-                " holds its form factors compressed only; go without --form-factors exact");
+                " has no exact form factors; make it again with precompute "
+                "--store-form-factors");
   }
-  if (asked.empty()) return data.exchange.empty() ? kCompressed : kExact;
-  return asked;
+  if (!asked.empty()) return asked;
+  if (!data.exchange.empty()) return kExact;
+  if (data.compressed_form_factors) return kCompressed;
+  if (chosen.method == kTransferMethod) return kNoFormFactors;
+  throw Error(chosen.file + " has no form factors, which " + chosen.method +
+              " needs; make it again with precompute --store-form-factors or "
+              "--compress-form-factors");
 }
 
+/// Null for kNoFormFactors.
 std::unique_ptr<const FormFactorOperator> choose_form_factors(const std::string& kind,
                                                               SolveMethod method,
                                                               const TransferData& data) {
+  if (kind == kNoFormFactors) return nullptr;
   if (kind == kLinks) {
     return std::make_unique<LinkedFormFactors>(data.links, data.patches.area,
                                                data.patches.centroid);
@@ -179,24 +190,28 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   engine.compute_initial_exitance();
   const std::string kind = form_factors_of(chosen, *data);
   const auto form_factors = choose_form_factors(kind, method_of(chosen), *data);
-  const Solution solution = find_solution(chosen, engine, *form_factors);
+  const Solution solution = find_solution(chosen, engine, form_factors.get());
   if (solution.diverged) {
     throw Error(chosen.method + " diverges: the operator of " + chosen.file +
                 " does not fit its form factors; use another method, such as "
                 "conjugate-gradient");
   }
-  const double residual = radiosity_residual(engine, *form_factors, solution.radiosity);
+  std::optional<double> residual;
+  if (form_factors) residual = radiosity_residual(engine, *form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);
   if (options.json) {
     const nlohmann::json summary = {{"method", chosen.method},
                                     {"form_factors", kind},
                                     {"sweeps", solution.sweeps},
-                                    {"residual", residual},
+                                    {"residual", residual ? nlohmann::json(*residual) : nullptr},
                                     {"microseconds", solution.microseconds}};
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
-    fmt::print("{}: {:.0f} microseconds, {} sweeps, residual {:.2e}\n", chosen.method,
-               solution.microseconds, solution.sweeps, residual);
+    fmt::print("{}: {:.0f} microseconds, {} sweeps, {}\n", chosen.method, solution.microseconds,
+               solution.sweeps,
+               residual ? fmt::format("residual {:.2e}", *residual)
+                        : "no residual: the file has no form factors (precompute "
+                          "--store-form-factors)");
   }
 }
 

@@ -80,10 +80,12 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
     setup.split = 0.5F;
   }
   setup.panels = chosen.panels;
-  setup.reference = [data, solver = std::make_shared<const ReferenceSolver>(*data)](
-                        std::span<const Float3> exitance) {
-    return solver->indirect_irradiance(exitance);
-  };
+  if (has_form_factors(*data) || !data->links.empty() || setup.show == Show::kError) {
+    setup.reference = [data, solver = std::make_shared<const ReferenceSolver>(*data)](
+                          std::span<const Float3> exitance) {
+      return solver->indirect_irradiance(exitance);
+    };
+  }
   return setup;
 }
 

@@ -4,10 +4,13 @@
 
 namespace rebounce {
 
+/// The tolerance where none is asked for.
+inline constexpr double kDefaultTolerance = 0.005;
+
 struct HierarchicalSettings {
   /// Relative area-weighted L2 error of the indirect irradiance, averaged over lights. Twice the
   /// tolerance takes about 0.6 of the bytes.
-  double tolerance = 0.005;
+  double tolerance = kDefaultTolerance;
   Precision precision = Precision::kQ8;  ///< kF32 takes twice the bytes and is hardly more exact
   /// Whether large blocks may have cluster bases (TransferBlock). Set it for operators that are
   /// applied: from some thousand patches on, cluster bases make the operator smaller, and the cost

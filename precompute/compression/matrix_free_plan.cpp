@@ -24,9 +24,9 @@ constexpr std::size_t kLightBytes =
     sizeof(double) * kMostTrainingLights;
 
 // Upper estimate of the bytes per patch, for each matrix, of the operator of the first stage and
-// the rounds of the second. It holds at kOperatorTolerance and grows with this power of 1 /
+// the rounds of the second. It holds at the default tolerance and grows with this power of 1 /
 // tolerance.
-constexpr double kOperatorBytes = 10.5e3, kOperatorTolerance = 0.005, kOperatorGrowth = 0.4;
+constexpr double kOperatorBytes = 10.5e3, kOperatorGrowth = 0.4;
 
 }  // namespace
 
@@ -46,7 +46,7 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
   const double operators =
       kOperatorBytes * static_cast<double>(matrix_count) *
       wanted_part(settings.roles, patch_count) *
-      std::pow(kOperatorTolerance / settings.compression.tolerance, kOperatorGrowth);
+      std::pow(kDefaultTolerance / settings.compression.tolerance, kOperatorGrowth);
   const std::size_t kept = patch_count * kLightBytes +
                            static_cast<std::size_t>(static_cast<double>(patch_count) * operators);
 

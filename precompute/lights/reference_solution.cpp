@@ -251,6 +251,11 @@ Form best_form(const TransferData& data) {
     return std::make_shared<const LinkedFormFactors>(data.links, data.patches.area,
                                                      data.patches.centroid);
   }
+  if (!data.compressed_form_factors) {
+    throw Error(
+        "there are no form factors to compare with; make the transfer file again with precompute "
+        "--store-form-factors or --compress-form-factors");
+  }
   return CompressedFormFactors(data.compressed_form_factors);
 }
 

@@ -1,5 +1,7 @@
 #include "runtime/solvers/solve_radiosity.h"
 
+#include <algorithm>
+
 #include "runtime/solvers/conjugate_gradient_solver.h"
 #include "runtime/solvers/gathering_solver.h"
 #include "runtime/solvers/gauss_seidel_solver.h"
@@ -33,10 +35,26 @@ std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method
   return std::make_unique<ExchangeBlocks>(exchange, area);
 }
 
+bool has_form_factors(const TransferData& data) {
+  return !data.exchange.empty() || data.compressed_form_factors;
+}
+
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
                                                               const TransferData& data) {
+  if (!has_form_factors(data)) {
+    throw Error(
+        "the transfer file has no form factors; make it again with precompute "
+        "--store-form-factors or --compress-form-factors");
+  }
   if (!data.exchange.empty()) return make_form_factors(method, data.exchange, data.patches.area);
   return std::make_unique<CompressedFormFactors>(data.compressed_form_factors);
+}
+
+std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
+  if (!data.emitted_irradiance.empty()) return data.emitted_irradiance;
+  const std::vector<Float3>& emitted = data.patches.emitted_exitance;
+  if (std::ranges::all_of(emitted, [](const Float3& m) { return m == Float3{}; })) return {};
+  return gather(*make_form_factors(SolveMethod::kGathering, data), emitted);
 }
 
 std::unique_ptr<RadiositySolver> make_solver(SolveMethod method,

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include "runtime/solvers/radiosity_solver.h"
 #include "transfer/exchange/exchange_matrix.h"
@@ -49,10 +50,17 @@ std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method
                                                               const ExchangeMatrix& exchange,
                                                               std::span<const float> area);
 
+/// Whether `data` hold F, by pairs or compressed.
+bool has_form_factors(const TransferData& data);
+
 /// The most accurate F in `data`: pairs, in the form above, or compressed if there are no pairs.
-/// Throws Error if there is neither.
+/// Throws Error, with the options that make a file that has some, if there is neither.
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
                                                               const TransferData& data);
+
+/// F M_e [n] in lx: the irradiance directly from the scene's own emitters, as `data` hold it or as
+/// their F gives it. Empty if nothing emits. Throws Error if something does and there is neither.
+std::vector<Float3> irradiance_from_emitters(const TransferData& data);
 
 /// Makes a solver for `method`. `form_factors` must outlive it. `transfer` may be null for methods
 /// that do not need it. Throws Error if sizes differ, if a needed operator is missing, or if the

@@ -44,6 +44,7 @@ TransferData build_directly() {
   BuildSettings build;
   build.subdivision.patch_count = kPatches;
   build.operator_kind = OperatorKind::kDense;
+  build.store_form_factors = true;
   build.precision = Precision::kF32;
   build.store_links = true;
   BuildReport report;

@@ -86,6 +86,9 @@ struct TransferData {
   LightProbes probes;                  ///< may be empty
   Lightmap lightmap;                   ///< may be empty
   SurfaceHarmonics surface_harmonics;  ///< may be empty
+  /// F M_e [n] in lx: the irradiance directly from emitters. Empty if nothing emits, or if F is
+  /// stored and gives it.
+  std::vector<Float3> emitted_irradiance;
   /// F by pairs of patches. Empty if pairs are not stored: then use compressed_form_factors.
   ExchangeMatrix exchange;
   /// G = A^1/2 F A^-1/2 compressed, one matrix for the three channels (CompressedFormFactors). Null

@@ -109,6 +109,9 @@ class Checker {
     if (n >= kNone) refuse("patch.area", "there are more patches than indices");
     visit_tensors_of_patches(
         data_.patches, [&](const char* name, const auto& values) { rows(name, values.size(), n); });
+    if (const std::size_t count = data_.emitted_irradiance.size(); count > 0) {
+      rows(tensor::kEmittedIrradiance, count, n);
+    }
 
     const DisplayMesh& mesh = data_.mesh;
     const std::size_t vertices = mesh.position.size();
@@ -138,6 +141,7 @@ class Checker {
     numbers("patch.emitted_exitance", patches.emitted_exitance, kNotNegative);
     numbers("patch.sky_visibility", patches.sky_visibility, kFraction);
     numbers("patch.absorbed", patches.absorbed, kFraction);
+    numbers(tensor::kEmittedIrradiance, data_.emitted_irradiance, kFinite);
   }
 
   void check_mesh() const {

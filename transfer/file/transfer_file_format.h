@@ -29,6 +29,7 @@ inline constexpr char kNames[] = "names";
 }  // namespace key
 
 namespace tensor {
+inline constexpr char kEmittedIrradiance[] = "patch.emitted_irradiance";
 inline constexpr char kOpacityMap[] =
     "mesh.opacity_map";  // optional: without it there are no opacity maps
 inline constexpr char kRowBegin[] = "form_factor.row_begin";

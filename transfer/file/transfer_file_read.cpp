@@ -416,15 +416,16 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
   read_probes(file, data);
   data.lightmap = read_lightmap(file);
   data.surface_harmonics = read_surface_harmonics(file);
+  if (file.tensors().contains(tensor::kEmittedIrradiance)) {
+    const TensorReader read(file);
+    read(tensor::kEmittedIrradiance, data.emitted_irradiance);
+  }
   data.exchange = read_exchange(file);
   data.record = read_record(file);
   check_transfer_data(data, file.name());
   data.links = read_links(file, data.patches);
   data.transfer = read_operator(file, data);
   data.compressed_form_factors = read_compressed_form_factors(file, data.patches.area);
-  if (data.exchange.empty() && !data.compressed_form_factors) {
-    refuse(file, "there are no form factors, neither pairs nor compressed ones");
-  }
   return data;
 }
 

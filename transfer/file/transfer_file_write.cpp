@@ -208,11 +208,11 @@ void seal(SafetensorsLayout& layout) {
 }  // namespace
 
 void save_transfer_file(const std::filesystem::path& path, const TransferData& data) {
-  if (data.exchange.empty() && !data.compressed_form_factors) {
-    throw Error("a transfer file needs form factors; give it pairs or compressed ones");
-  }
   TensorCollector collector;
   visit_tensors_of_patches(data.patches, collector);
+  if (!data.emitted_irradiance.empty()) {
+    collector(tensor::kEmittedIrradiance, data.emitted_irradiance);
+  }
   visit_tensors_of_mesh(data.mesh, collector);
   if (!data.mesh.opacity.empty()) visit_tensors_of_opacity(data.mesh.opacity, collector);
   visit_tensors_of_scene(data, collector);

@@ -48,6 +48,7 @@ BuildSettings settings_from_links() {
   settings.subdivision.patch_count = 500;
   settings.exchange_source = ExchangeSource::kLinks;
   settings.tolerance = kTolerance;
+  settings.form_factor_tolerance = kTolerance / 5;
   settings.store_links = true;
   return settings;
 }
@@ -79,6 +80,7 @@ Built exchange_of(const std::string& scene, ExchangeSource kind, std::size_t pat
   BuildSettings settings;
   settings.subdivision.patch_count = patch_count;
   settings.exchange_source = kind;
+  settings.store_form_factors = kind == ExchangeSource::kPairs;
   settings.operator_kind = OperatorKind::kNoOperator;
   Built built;
   built.data = build_transfer_data(kScenes + scene, settings, built.report);

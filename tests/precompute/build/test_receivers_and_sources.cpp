@@ -29,6 +29,7 @@ BuildSettings settings_of_rooms(ExchangeSource kind) {
   BuildSettings settings;
   settings.subdivision.patch_count = 500;
   settings.exchange_source = kind;
+  settings.store_form_factors = kind == ExchangeSource::kPairs;
   settings.tolerance = 0.01;
   settings.sources = {"mesh:first room", "red wall"};
   settings.receivers = {"second room", "material:blue", "table"};

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "precompute/compression/hierarchical_settings.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "tests/support/command_line.h"
 #include "tests/support/npz_reader.h"
@@ -158,7 +159,8 @@ TEST_F(CommandLine, SaysWhatScriptsRelyOn) {
   const Words info_keys = {"format_version", "scene_hash",      "patch_count", "operator",
                            "operator_bytes", "bytes_per_patch", "tolerance",   "error_mean",
                            "error_max",      "error_bound"};
-  const json made = summary_of({"precompute", kScene, "--patches", "300", "-o", file});
+  const json made =
+      summary_of({"precompute", kScene, "--patches", "300", "--store-form-factors", "-o", file});
   const json info = summary_of({"info", file});
   for (const std::string& key : info_keys) {
     EXPECT_TRUE(info.contains(key)) << key;
@@ -168,16 +170,85 @@ TEST_F(CommandLine, SaysWhatScriptsRelyOn) {
     EXPECT_TRUE(made.contains(key)) << key;
   }
   EXPECT_NEAR(info["patch_count"].get<double>(), kPatchCount, 0.2 * kPatchCount);
-  EXPECT_EQ(info["operator"], "dense");
+  EXPECT_EQ(info["operator"], "hierarchical");
+  EXPECT_EQ(info["form_factors"], "pairs");
   EXPECT_EQ(info["file_bytes"], test::read_bytes(file).size());
   EXPECT_GT(made["seconds"]["total"].get<double>(), 0);
-  EXPECT_LT(info["error_max"].get<double>(), 1e-5);
+  EXPECT_EQ(info["tolerance"], kDefaultTolerance);
+  EXPECT_EQ(info["settings"]["tolerance"], kDefaultTolerance);
+  EXPECT_LE(info["error_mean"].get<double>(), kDefaultTolerance);
 
   const json solved = summary_of({"solve", file, "-o", path("x.csv"), "--method", "gauss-seidel"});
   EXPECT_EQ(solved["method"], "gauss-seidel");
   EXPECT_GT(solved["sweeps"].get<int>(), 1);
   EXPECT_LT(solved["residual"].get<double>(), 1e-6);
   EXPECT_GT(solved["microseconds"].get<double>(), 0);
+}
+
+TEST_F(CommandLine, HoldsWhatARunNeedsAndFormFactorsOnRequest) {
+  const std::string file = precompute("box.safetensors");
+  const std::string whole = precompute("whole.safetensors", {"--store-form-factors"});
+  EXPECT_LT(test::read_bytes(file).size(), test::read_bytes(whole).size() * 3 / 4);
+  EXPECT_EQ(summary_of({"info", file})["form_factors"], "none");
+  const Outcome printed = run({"info", file});
+  EXPECT_NE(printed.out.find("--store-form-factors"), std::string::npos) << printed.out;
+
+  const auto solve = [&](const std::string& from, const std::string& method) {
+    return Words{"solve", from, "--lights", kLights, "-o", path("x.csv"), "--method", method};
+  };
+  const json product = summary_of(solve(file, "transfer"));
+  EXPECT_TRUE(product["residual"].is_null());
+  EXPECT_EQ(product["form_factors"], "none");
+  EXPECT_EQ(product["method"], "transfer");
+  EXPECT_EQ(product["sweeps"], 0);
+  EXPECT_GT(product["microseconds"], 0);
+  const std::string without = test::read_bytes(path("x.csv"));
+  EXPECT_LT(summary_of(solve(whole, "transfer"))["residual"], 2 * kDefaultTolerance);
+  EXPECT_EQ(without, test::read_bytes(path("x.csv")));
+  const Outcome said = run(solve(file, "transfer"));
+  EXPECT_NE(said.out.find("--store-form-factors"), std::string::npos) << said.out;
+
+  std::filesystem::remove(folder_ / "x.csv");
+  for (const NamedSolveMethod& method : kSolveMethods) {
+    expect_refused(solve(file, std::string(method.name)), "--store-form-factors");
+  }
+  Words exact = solve(file, "gathering");
+  exact.insert(exact.end(), {"--form-factors", "exact"});
+  expect_refused(exact, "--store-form-factors");
+  expect_refused({"export", file, "--what", "form-factors", "-o", path("f.npz")},
+                 "--store-form-factors");
+  const auto draw = [&](const std::string& from, const char* show, const char* picture) {
+    return Words{"render", from,     "--lights", kLights, "--size",
+                 "32x24",  "--show", show,       "-o",    path(picture)};
+  };
+  expect_refused(draw(file, "error", "x.png"), "--store-form-factors");
+  // The light that comes straight from the scene's own lamp.
+  for (const char* show : {"direct", "indirect"}) {
+    summary_of(draw(file, show, "without.png"));
+    summary_of(draw(whole, show, "with.png"));
+    EXPECT_EQ(test::read_bytes(path("without.png")), test::read_bytes(path("with.png"))) << show;
+  }
+}
+
+TEST_F(CommandLine, LinksHaveNoFormFactorsOfPairs) {
+  expect_refused({"precompute", kScene, "--patches", "100", "--form-factors", "links",
+                  "--store-form-factors", "-o", path("x.safetensors")},
+                 "--compress-form-factors");
+  const std::string file = precompute("box.safetensors", {"--form-factors", "links"});
+  const json info = summary_of({"info", file});
+  EXPECT_EQ(info["form_factors"], "none");
+  EXPECT_EQ(info["compressed_form_factor_bytes"], 0);
+  EXPECT_EQ(info["settings"]["form_factor_tolerance"], kDefaultTolerance / 5);
+  EXPECT_LE(info["error_mean"].get<double>(), kDefaultTolerance);
+}
+
+TEST_F(CommandLine, RecordsTheSettingsThatApply) {
+  const json dense = summary_of({"info", precompute("dense", {"--operator", "dense"})});
+  EXPECT_EQ(dense["operator"], "dense");
+  EXPECT_EQ(dense["tolerance"], 0);
+  EXPECT_FALSE(dense["settings"].contains("tolerance"));
+  EXPECT_FALSE(dense["settings"].contains("rank"));
+  EXPECT_LT(dense["error_max"].get<double>(), 1e-5);
 }
 
 TEST_F(CommandLine, CompressesToATolerance) {
@@ -197,8 +268,9 @@ TEST_F(CommandLine, CompressesToATolerance) {
 
 TEST_F(CommandLine, IteratesOnCompressedFormFactors) {
   const std::string file = path("box.safetensors");
-  const json info = summary_of(
-      {"precompute", kScene, "--patches", "1200", "--compress-form-factors", "0.002", "-o", file});
+  const json info =
+      summary_of({"precompute", kScene, "--patches", "1200", "--compress-form-factors", "0.002",
+                  "--store-form-factors", "-o", file});
   EXPECT_GT(info["compressed_form_factor_bytes"].get<double>(), 0);
   EXPECT_LT(info["report"]["form_factor_error_mean"].get<double>(), 0.002);
   const std::string exact = path("exact.csv"), compressed = path("compressed.csv");
@@ -254,7 +326,7 @@ TEST_F(CommandLine, IntegersAreRefusedBeforeAnythingIsComputed) {
 
 TEST_F(CommandLine, RelightsByOperatorsOfLowRank) {
   const std::string exact = path("exact.csv"), nearly = path("nearly.csv");
-  summary_of({"solve", precompute("dense.safetensors"), "-o", exact});
+  summary_of({"solve", precompute("dense.safetensors", {"--operator", "dense"}), "-o", exact});
   const std::string file = precompute("low-rank", {"--operator", "low-rank", "--rank", "64"});
   const json info = summary_of({"info", file});
   EXPECT_EQ(info["operator"], "low-rank");
@@ -277,7 +349,8 @@ TEST_F(CommandLine, MeetsThePatchSize) {
 }
 
 TEST_F(CommandLine, SolvesTheSameByEitherMethod) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file =
+      precompute("box.safetensors", {"--operator", "dense", "--store-form-factors"});
   const std::string exact = path("transfer.csv"), iterated = path("gauss-seidel.csv");
   for (const std::string& setup : kSetups) {
     const std::string lights = kScenes + setup + ".lights.json";
@@ -298,7 +371,7 @@ TEST_F(CommandLine, SolvesTheSameByEitherMethod) {
 }
 
 TEST_F(CommandLine, EveryMethodReachesTheResidualItWasAsked) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = precompute("box.safetensors", {"--store-form-factors"});
   for (const NamedSolveMethod& method : kSolveMethods) {
     const std::string name(method.name);
     const json solved = summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"),
@@ -316,7 +389,8 @@ TEST_F(CommandLine, EveryMethodReachesTheResidualItWasAsked) {
 TEST_F(CommandLine, WorksWithoutPairs) {
   const std::string file = path("box.safetensors");
   const json built = summary_of({"precompute", kScene, "--patches", "400", "--form-factors",
-                                 "links", "--tolerance", "0.02", "--store-links", "-o", file});
+                                 "links", "--tolerance", "0.02", "--store-links",
+                                 "--compress-form-factors", "0.004", "-o", file});
   EXPECT_EQ(built["form_factors"], "compressed");
   EXPECT_EQ(built["form_factor_count"], 0);
   EXPECT_GT(built["link_count"], 0);
@@ -340,9 +414,9 @@ TEST_F(CommandLine, WorksWithoutPairs) {
   const auto solve = [&](const char* option, const char* value) {
     return Words{"solve", file, "--lights", kLights, "-o", path("y.csv"), option, value};
   };
-  expect_refused(solve("--form-factors", "exact"), "compressed only");
+  expect_refused(solve("--form-factors", "exact"), "--store-form-factors");
   expect_refused({"export", file, "--what", "form-factors", "-o", path("x.npz")},
-                 "--form-factors pairs");
+                 "--form-factors pairs --store-form-factors");
   for (const std::string show : {"radiosity", "error"}) {
     summary_of({"render", file, "--lights", kLights, "--size", "32x24", "--show", show, "-o",
                 path("x.png")});
@@ -372,7 +446,7 @@ TEST_F(CommandLine, QualitySetsTheRaysOfFormFactors) {
 }
 
 TEST_F(CommandLine, SolvesHierarchicallyWhereThereAreLinks) {
-  const std::string file = precompute("box.safetensors", {"--store-links"});
+  const std::string file = precompute("box.safetensors", {"--store-links", "--store-form-factors"});
   const std::string flat = path("flat.csv"), linked = path("linked.csv");
   summary_of({"solve", file, "--lights", kLights, "-o", flat, "--method", "gauss-seidel"});
   const json solved =
@@ -419,8 +493,8 @@ TEST_F(CommandLine, WritesTheSameSolutionAsCsvAndNpz) {
 }
 
 TEST_F(CommandLine, ExportsReciprocalFormFactors) {
-  summary_of(
-      {"export", precompute("box.safetensors"), "--what", "form-factors", "-o", path("f.npz")});
+  summary_of({"export", precompute("box.safetensors", {"--store-form-factors"}), "--what",
+              "form-factors", "-o", path("f.npz")});
   const auto arrays = test::unzip(path("f.npz"));
   const auto form_factor = test::npz_values<double>(arrays, "form_factor", "<f8");
   const auto area = test::npz_values<float>(arrays, "area", "<f4");
@@ -441,7 +515,8 @@ TEST_F(CommandLine, ExportsReciprocalFormFactors) {
 }
 
 TEST_F(CommandLine, ExportsTheTransferOfTheFormFactors) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file =
+      precompute("box.safetensors", {"--operator", "dense", "--store-form-factors"});
   summary_of({"export", file, "--what", "form-factors", "-o", path("f.npz")});
   summary_of({"export", file, "--what", "transfer", "-o", path("y.npz")});
   const auto f = test::npz_values<double>(test::unzip(path("f.npz")), "form_factor", "<f8");
@@ -497,8 +572,11 @@ TEST_F(CommandLine, TheSeedDecides) {
 }
 
 TEST_F(CommandLine, StoresHalfPrecisionInHalfTheBytes) {
-  const json full = summary_of({"info", precompute("f32.safetensors")});
-  const json half = summary_of({"info", precompute("f16.safetensors", {"--precision", "f16"})});
+  const auto info = [&](const std::string& precision) {
+    return summary_of({"info", precompute(precision + ".safetensors",
+                                          {"--operator", "dense", "--precision", precision})});
+  };
+  const json full = info("f32"), half = info("f16");
   EXPECT_EQ(full["operator_bytes"], 2 * half["operator_bytes"].get<std::uint64_t>());
   EXPECT_LT(half["error_max"].get<double>(), 1e-3);
 }
@@ -675,7 +753,7 @@ TEST_F(CommandLine, RefusesToRelightWithoutAnyLight) {
 }
 
 TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = precompute("box.safetensors", {"--store-form-factors"});
   for (const char* show : {"direct", "indirect", "radiosity", "patches", "error"}) {
     const json drawn = summary_of({"render", file, "--lights", kLights, "--size", "64x48", "--show",
                                    show, "-o", path("x.png")});
@@ -691,9 +769,10 @@ TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
 
 TEST_F(CommandLine, StoresReceiversAndSourcesAlone) {
   const std::string file = path("box.safetensors"), solution = path("x.csv");
-  const json made = summary_of({"precompute", kScene, "--patches", "600", "--receivers",
-                                "mesh:floor,tall block", "--receivers", "box:0,0,0,1,0.1,1",
-                                "--sources", "ceiling,material:red", "-o", file});
+  const json made =
+      summary_of({"precompute", kScene, "--patches", "600", "--receivers", "mesh:floor,tall block",
+                  "--receivers", "box:0,0,0,1,0.1,1", "--sources", "ceiling,material:red",
+                  "--store-form-factors", "-o", file});
   EXPECT_EQ(made["operator"], "hierarchical");
   const json info = summary_of({"info", file});
   const auto n = info["patch_count"].get<std::size_t>();

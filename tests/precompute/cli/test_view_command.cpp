@@ -72,7 +72,9 @@ class ViewCommand : public CommandLine {
     }
     file_ = path("box.safetensors");
     // As few patches as show colours bleed: it is the drawing that is looked at.
-    ASSERT_EQ(run({"precompute", kScene, "--patches", "120", "--quiet", "-o", file_}).exit_code,
+    ASSERT_EQ(run({"precompute", kScene, "--patches", "120", "--store-form-factors", "--quiet",
+                   "-o", file_})
+                  .exit_code,
               kDone);
     const Outcome outcome =
         run({"view", file_, "--size", "16x16", "--screenshot", path("try.png")});
@@ -230,7 +232,7 @@ TEST_F(ViewCommand, SplitsTheScreenBetweenMethods) {
   const Words same = {"--lights", kLights, "--exposure", "-4", "--against", "refine"};
   const Words poor = {"--lights", kLights, "--exposure", "-4", "--against", "gathering", "--cold"};
   const Image exact = screenshot({"--lights", kLights, "--exposure", "-4"});
-  // Refinement of a dense operator gives what the product does, apart from the line between.
+  // Refinement gives what the product does to its tolerance, apart from the line between.
   EXPECT_LT(difference(screenshot(same), exact).mean, 1.5);
   const Image split = screenshot(poor);
   double left = 0, right = 0;
@@ -247,6 +249,21 @@ TEST_F(ViewCommand, SplitsTheScreenBetweenMethods) {
 TEST_F(ViewCommand, ShowsTheErrorOfAnIteration) {
   const Image exact = screenshot({"--lights", kLights, "--show", "error", "--method", "gathering"});
   EXPECT_GT(exact.mean(1), 10);
+}
+
+TEST_F(ViewCommand, ComparesOnlyWhereThereAreFormFactors) {
+  const std::string file = path("without.safetensors");
+  ASSERT_EQ(run({"precompute", kScene, "--patches", "120", "--quiet", "-o", file}).exit_code,
+            kDone);
+  const Words words = {"view",   file,    "--lights",     kLights,
+                       "--size", "32x24", "--screenshot", path("without.png")};
+  for (const Words& what : {Words{"--show", "error"}, Words{"--against", "refine"},
+                            Words{"--method", "gauss-seidel"}}) {
+    Words with = words;
+    with.insert(with.end(), what.begin(), what.end());
+    expect_refused(with, "--store-form-factors");
+  }
+  EXPECT_EQ(run(words).exit_code, kDone);
 }
 
 TEST_F(ViewCommand, DrawsPanels) {

@@ -142,6 +142,7 @@ TransferData sample_data(Precision precision = Precision::kF16) {
                   {0, 0},
                   {1, 0, 0},
                   nullptr}};
+  data.emitted_irradiance = {{0.5F, 0.25F, 0}, {1, 2, 3}, {-1e-9F, 0, 7}};
   data.exchange = sample_exchange();
   data.transfer = sample_operator(data.patches.area, precision);
   data.record = {"rebounce 0.1.0",
@@ -273,6 +274,7 @@ void expect_equal(const TransferData& a, const TransferData& b) {
   expect_equal(a.textures, b.textures);
   expect_equal(a.cameras, b.cameras);
   expect_equal(a.lights, b.lights);
+  EXPECT_EQ(a.emitted_irradiance, b.emitted_irradiance);
   expect_equal(a.exchange, b.exchange);
   expect_equal(*a.transfer, *b.transfer);
   expect_equal(a.record, b.record);
@@ -678,6 +680,17 @@ TEST(TransferFile, RefusesImpossibleSurfaceHarmonics) {
       {"surface_harmonics.entry_weight", harmonics([](auto& h) { h.entry_weight.clear(); })},
       {"surface_harmonics.entry_weight",
        harmonics([](auto& h) { h.entry_weight[0][0] = kInfinity; })},
+  });
+}
+
+TEST(TransferFile, RefusesImpossibleLightFromEmitters) {
+  const auto irradiance = [](const std::vector<Float3>& values) {
+    return [values](TransferData& data) { data.emitted_irradiance = values; };
+  };
+  expect_refused({
+      {"patch.emitted_irradiance: 2 rows, not 3", irradiance({{1, 1, 1}, {1, 1, 1}})},
+      {"patch.emitted_irradiance: entry 1 is nan",
+       irradiance({{1, 1, 1}, {1, kNan, 1}, {1, 1, 1}})},
   });
 }
 

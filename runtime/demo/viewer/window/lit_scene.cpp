@@ -11,6 +11,7 @@
 #include "runtime/outputs/probe_irradiance.h"
 #include "runtime/outputs/probe_light.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/area_norm.h"
 
 namespace rebounce {
@@ -75,9 +76,10 @@ LightInAir LitScene::light_in_air(const Float3& position, std::span<const Float3
 }
 
 std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const {
-  std::vector<glm::vec3> value(emitted_.size());
+  std::vector<glm::vec3> value(data_->patches.size());
   for (std::size_t i = 0; i < value.size(); ++i) {
-    value[i] = to_glm(sky_irradiance(*data_, sky, i)) + to_glm(emitted_[i]);
+    value[i] = to_glm(sky_irradiance(*data_, sky, i));
+    if (!emitted_.empty()) value[i] += to_glm(emitted_[i]);
   }
   return reconstruct_at_vertices(data_->mesh, value);
 }

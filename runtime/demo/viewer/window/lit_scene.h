@@ -70,7 +70,7 @@ class LitScene {
 
   std::shared_ptr<const TransferData> data_;
   Engine engine_;
-  std::vector<Float3> emitted_;  // F M_e, lx
+  std::vector<Float3> emitted_;  // F M_e, lx, or none
   std::array<IndirectSolver, kSideCount> solver_;
   std::array<std::vector<Float3>, kSideCount> indirect_;
   std::array<std::vector<Float3>, kSideCount> reflected_;  // B - M_e, lx

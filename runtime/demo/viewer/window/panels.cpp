@@ -54,7 +54,7 @@ void choose_method(const char* label, const TransferData& data, IndirectMethod& 
     choice(kTransferName, std::nullopt, false);
     const bool serves_all = data.transfer->roles().all_are_both();
     for (const NamedSolveMethod& named : kSolveMethods) {
-      if (needs_operator(named.method) && !serves_all) continue;
+      if (!has_form_factors(data) || (needs_operator(named.method) && !serves_all)) continue;
       choice(std::string(named.name), named.method, false);
     }
     if (!data.links.empty()) choice(kHierarchicalName, std::nullopt, true);
@@ -285,7 +285,8 @@ void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
   if (ImGui::Button("Find exposure")) state.wants_exposure = true;
   if (state.show != Show::kError) return;
   if (!frame.scene().has_reference()) {
-    ImGui::TextWrapped("There is no reference solution to compare with.");
+    ImGui::TextWrapped(
+        "The file has no form factors to compare with: precompute --store-form-factors.");
     return;
   }
   ImGui::Text("error, area-weighted  %.2e", frame.scene().error(Side::kFirst));
