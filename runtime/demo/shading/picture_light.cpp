@@ -4,7 +4,6 @@
 
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/error.h"
 
 namespace rebounce {
@@ -49,10 +48,6 @@ glm::vec3 interpolate(const DisplayMesh& mesh, std::span<const glm::vec3> vertex
   const Uint3& corner = mesh.triangle[point.triangle];
   return point.weight.x * vertex_value[corner[0]] + point.weight.y * vertex_value[corner[1]] +
          point.weight.z * vertex_value[corner[2]];
-}
-
-std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
-  return gather(*make_form_factors(SolveMethod::kGathering, data), data.patches.emitted_exitance);
 }
 
 }  // namespace rebounce

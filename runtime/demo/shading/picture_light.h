@@ -38,9 +38,6 @@ std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,
 glm::vec3 interpolate(const DisplayMesh& mesh, std::span<const glm::vec3> vertex_value,
                       const SurfacePoint& point);
 
-/// F M_e [n] in lx: what arrives straight from the scene's own emitters, for PictureLight.
-std::vector<Float3> irradiance_from_emitters(const TransferData& data);
-
 /// Throws Error if `length` is neither 0 nor `patch_count`.
 void check_length(std::size_t length, std::size_t patch_count, const char* name);
 
