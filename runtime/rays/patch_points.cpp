@@ -25,43 +25,43 @@ void PatchSurface::add(const DisplayMesh& mesh, std::uint32_t triangle) {
   const glm::dvec3 ab = b - a, ac = c - a;
   const glm::dvec3 cross = glm::cross(ab, ac);
   const std::span<const std::uint8_t> map = mesh.opacity.of_triangle(triangle);
-  add_places(map, glm::length(cross));
-  grounds_.push_back({a, ab, ac, to_float3(glm::normalize(cross)), opacity_map_level(map.size())});
+  add_pieces(map, glm::length(cross));
+  facets_.push_back({a, ab, ac, to_float3(glm::normalize(cross)), opacity_map_level(map.size())});
 }
 
 /// Adds the micro-triangles of an opacity map, weighted by their opacity.
-void PatchSurface::add_places(std::span<const std::uint8_t> map, double area) {
-  const auto ground = static_cast<std::uint32_t>(grounds_.size());
+void PatchSurface::add_pieces(std::span<const std::uint8_t> map, double area) {
+  const auto facet = static_cast<std::uint32_t>(facets_.size());
   if (map.empty()) {
-    places_.push_back({ground, 0});
+    pieces_.push_back({facet, 0});
     choice_.add(area);
   }
   for (std::uint32_t k = 0; k < map.size(); ++k) {
-    places_.push_back({ground, k});
+    pieces_.push_back({facet, k});
     choice_.add(area * map[k] / (OpacityMaps::kOpaque * static_cast<double>(map.size())));
   }
 }
 
-PatchPoint PatchSurface::at_chosen_place(const glm::dvec2& square) const {
+PatchPoint PatchSurface::at_chosen_piece(const glm::dvec2& square) const {
   if (!(choice_.total() > 0)) return {};
   const auto [index, rest] = choice_.choose(square.x);
-  const auto [number, micro_triangle] = places_[index];
-  const Ground& ground = grounds_[number];
+  const auto [number, micro_triangle] = pieces_[index];
+  const Facet& facet = facets_[number];
   const glm::dvec2 b = square_to_triangle({rest, square.y});
   TrianglePlace place{b.x, b.y};
-  if (ground.map_level > 0) {
-    place = place_in_micro_triangle(ground.map_level, micro_triangle, place);
+  if (facet.map_level > 0) {
+    place = place_in_micro_triangle(facet.map_level, micro_triangle, place);
   }
-  return ground.at({place.u, place.v});
+  return facet.at({place.u, place.v});
 }
 
 void PatchSurface::fill(std::size_t count, const PatchPointBlock::Coordinates& u,
                         const PatchPointBlock::Coordinates& v, float offset,
                         PatchPointBlock& block) const {
-  if (places_.size() == 1 && choice_.total() > 0)
-    return fill(grounds_[0], count, u, v, offset, block);
+  if (pieces_.size() == 1 && choice_.total() > 0)
+    return fill(facets_[0], count, u, v, offset, block);
   for (std::size_t k = 0; k < count; ++k) {
-    const PatchPoint point = at_chosen_place({u[k], v[k]});
+    const PatchPoint point = at_chosen_piece({u[k], v[k]});
     for (int axis = 0; axis < 3; ++axis) {
       block.position[axis][k] = point.position[axis] + offset * point.normal[axis];
       block.normal[axis][k] = point.normal[axis];
@@ -70,15 +70,15 @@ void PatchSurface::fill(std::size_t count, const PatchPointBlock::Coordinates& u
 }
 
 /// Computes points on one triangle.
-void PatchSurface::fill(const Ground& ground, std::size_t count,
+void PatchSurface::fill(const Facet& facet, std::size_t count,
                         const PatchPointBlock::Coordinates& u,
                         const PatchPointBlock::Coordinates& v, float offset,
                         PatchPointBlock& block) {
   for (int axis = 0; axis < 3; ++axis) {
-    const float normal = ground.normal[axis],
-                corner = static_cast<float>(ground.corner[axis] + offset * normal),
-                along = static_cast<float>(ground.first_edge[axis]),
-                aside = static_cast<float>(ground.second_edge[axis]);
+    const float normal = facet.normal[axis],
+                corner = static_cast<float>(facet.corner[axis] + offset * normal),
+                along = static_cast<float>(facet.first_edge[axis]),
+                aside = static_cast<float>(facet.second_edge[axis]);
     PatchPointBlock::Coordinates &position = block.position[axis], &normals = block.normal[axis];
     for (std::size_t k = 0; k < count; ++k) {
       const float fold = 0.5F * std::min(u[k], v[k]);  // square_to_triangle

@@ -55,9 +55,9 @@ class PatchSurface {
   /// neighbours on the surface. Returns a point with a zero normal if nothing stops light.
   PatchPoint at(const glm::dvec2& square) const {
     // Most patches are one triangle, and callers need millions of points.
-    if (places_.size() == 1 && choice_.total() > 0)
-      return grounds_[0].at(square_to_triangle(square));
-    return at_chosen_place(square);
+    if (pieces_.size() == 1 && choice_.total() > 0)
+      return facets_[0].at(square_to_triangle(square));
+    return at_chosen_piece(square);
   }
 
   /// Computes the points of `count` <= PatchPointBlock::kSize squares (`u`[k], `v`[k]), moved by
@@ -66,7 +66,7 @@ class PatchSurface {
             const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block) const;
 
  private:
-  struct Ground {
+  struct Facet {
     glm::dvec3 corner, first_edge, second_edge;
     Float3 normal;
     int map_level;  ///< level of its opacity map
@@ -75,20 +75,20 @@ class PatchSurface {
       return {to_float3(corner + b.x * first_edge + b.y * second_edge), normal};
     }
   };
-  struct Place {  ///< an opaque triangle, or a micro-triangle of one with a map
-    std::uint32_t ground;
+  struct Piece {  ///< an opaque triangle, or a micro-triangle of one with a map
+    std::uint32_t facet;
     std::uint32_t micro_triangle;
   };
 
-  static void fill(const Ground& ground, std::size_t count, const PatchPointBlock::Coordinates& u,
+  static void fill(const Facet& facet, std::size_t count, const PatchPointBlock::Coordinates& u,
                    const PatchPointBlock::Coordinates& v, float offset, PatchPointBlock& block);
-  PatchPoint at_chosen_place(const glm::dvec2& square) const;
+  PatchPoint at_chosen_piece(const glm::dvec2& square) const;
   void add(const DisplayMesh& mesh, std::uint32_t triangle);
-  void add_places(std::span<const std::uint8_t> map, double area);
+  void add_pieces(std::span<const std::uint8_t> map, double area);
 
-  std::vector<Ground> grounds_;  ///< the triangles of the patch
-  std::vector<Place> places_;
-  CumulativeChoice choice_;  ///< chooses among places_
+  std::vector<Facet> facets_;  ///< the triangles of the patch
+  std::vector<Piece> pieces_;
+  CumulativeChoice choice_;  ///< chooses among pieces_
 };
 
 /// Writes points on what of `triangles` of `mesh` stops light (PatchSurface), uniformly by area:
