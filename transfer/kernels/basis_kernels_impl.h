@@ -68,7 +68,7 @@ constexpr std::size_t lane_of(std::size_t v, std::size_t light_stride) {
 /// Loads values of bases and dense blocks, which are read in order.
 template <typename V, typename Value>
 REBOUNCE_INLINE inline V load_ahead(const Value* values) {
-  ask_ahead<V::kWidth * sizeof(float)>(values);
+  prefetch_ahead<V::kWidth * sizeof(float)>(values);
   return load_values<V>(values);
 }
 

@@ -165,7 +165,7 @@ REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CouplingBlo
 // processor's own prefetching. Most fill at most two cache lines.
 constexpr std::size_t kCouplingsAhead = 8;
 
-inline void ask_for_two_lines(const void* p) {
+inline void prefetch_two_lines(const void* p) {
   constexpr std::size_t kLine = 64;
   __builtin_prefetch(p);
   __builtin_prefetch(static_cast<const char*>(p) + kLine);
@@ -183,7 +183,7 @@ void multiply_couplings_with(const Value* values, std::span<const CouplingBlock>
       const CouplingBlock& coupling = couplings[k];
       const Value* const s = values + coupling.values;
       if (k + kCouplingsAhead < couplings.size()) {
-        ask_for_two_lines(values + couplings[k + kCouplingsAhead].values);
+        prefetch_two_lines(values + couplings[k + kCouplingsAhead].values);
       }
       switch (coupling.direction) {
         case Direction::kBoth:

@@ -154,7 +154,7 @@ inline StripBasis<Value> strip_at(const Value* values, const BasisPart& part, st
 /// Loads values of a basis, and prefetches those that follow later.
 template <typename N, typename Value>
 REBOUNCE_INLINE inline N load_basis(const Value* values) {
-  ask_ahead<N::kWidth * sizeof(std::int16_t)>(values);
+  prefetch_ahead<N::kWidth * sizeof(std::int16_t)>(values);
   return N::load(values);
 }
 
