@@ -28,7 +28,8 @@ void add_scaled(const std::array<double, kChannelCount>& factor, std::span<const
 ConjugateGradientSolver::ConjugateGradientSolver(const FormFactorOperator& form_factors,
                                                  const RadiosityProblem& problem)
     : RadiositySolver(form_factors, problem) {
-  for (auto* vector : {&sqrt_reflectance_, &unknown_, &rest_, &direction_, &product_, &scaled_}) {
+  for (auto* vector :
+       {&sqrt_reflectance_, &unknown_, &symmetric_residual_, &direction_, &product_, &scaled_}) {
     vector->resize(patch_count());
   }
 }
@@ -47,35 +48,35 @@ void ConjugateGradientSolver::begin(bool cold) {
     finish();
   }
   form_factors_.gather(radiosity_, scaled_, gather_workspace_, scheduler_);
-  scale(sqrt_reflectance_, scaled_, rest_);
-  add_scaled({-1, -1, -1}, unknown_, rest_);
-  direction_ = rest_;
-  rest_square_ = inner_product(rest_, rest_);
+  scale(sqrt_reflectance_, scaled_, symmetric_residual_);
+  add_scaled({-1, -1, -1}, unknown_, symmetric_residual_);
+  direction_ = symmetric_residual_;
+  residual_square_ = inner_product(symmetric_residual_, symmetric_residual_);
 }
 
 RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
   multiply_direction();
   const Scalars curvature = inner_product(direction_, product_);
-  Scalars step{}, back_step{};
+  Scalars alpha{}, minus_alpha{};
   for (int c = 0; c < kChannelCount; ++c) {
-    if (rest_square_[c] == 0) continue;  // this channel is solved
-    if (!(curvature[c] > 0 && rest_square_[c] > 0 && std::isfinite(rest_square_[c]))) {
+    if (residual_square_[c] == 0) continue;  // this channel is solved
+    if (!(curvature[c] > 0 && residual_square_[c] > 0 && std::isfinite(residual_square_[c]))) {
       return {.residual = radiosity_residual_norm(), .diverged = true};
     }
-    step[c] = rest_square_[c] / curvature[c];
-    back_step[c] = -step[c];
+    alpha[c] = residual_square_[c] / curvature[c];
+    minus_alpha[c] = -alpha[c];
   }
-  add_scaled(step, direction_, unknown_);
-  add_scaled(back_step, product_, rest_);
-  const Scalars next = inner_product(rest_, rest_);
-  Scalars turn{};
+  add_scaled(alpha, direction_, unknown_);
+  add_scaled(minus_alpha, product_, symmetric_residual_);
+  const Scalars next = inner_product(symmetric_residual_, symmetric_residual_);
+  Scalars beta{};
   for (int c = 0; c < kChannelCount; ++c) {
-    if (rest_square_[c] > 0) turn[c] = next[c] / rest_square_[c];
+    if (residual_square_[c] > 0) beta[c] = next[c] / residual_square_[c];
   }
-  rest_square_ = next;
+  residual_square_ = next;
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
-      direction_[i][c] = static_cast<float>(rest_[i][c] + turn[c] * direction_[i][c]);
+      direction_[i][c] = static_cast<float>(symmetric_residual_[i][c] + beta[c] * direction_[i][c]);
     }
   }
   return {.residual = radiosity_residual_norm()};
@@ -104,8 +105,8 @@ double ConjugateGradientSolver::radiosity_residual_norm() const {
   double sum = 0;
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
-      const double rest = rest_[i][c];
-      sum += static_cast<double>(area_[i]) * reflectance_[i][c] * rest * rest;
+      const double residual = symmetric_residual_[i][c];
+      sum += static_cast<double>(area_[i]) * reflectance_[i][c] * residual * residual;
     }
   }
   return std::sqrt(sum);

@@ -31,8 +31,8 @@ class ConjugateGradientSolver final : public RadiositySolver {
   Scalars inner_product(std::span<const Float3> a, std::span<const Float3> b) const;
 
   std::vector<Float3> sqrt_reflectance_;
-  std::vector<Float3> unknown_, rest_, direction_, product_, scaled_;
-  Scalars rest_square_{};  ///< <rest_, rest_>
+  std::vector<Float3> unknown_, symmetric_residual_, direction_, product_, scaled_;
+  Scalars residual_square_{};  ///< <symmetric_residual_, symmetric_residual_>
 };
 
 }  // namespace rebounce
