@@ -7,9 +7,9 @@
 #include <map>
 #include <memory>
 
-#include "bench/read_buffer.h"
-#include "bench/reflected_light.h"
 #include "bench/report/in_parallel.h"
+#include "bench/support/read_buffer.h"
+#include "bench/support/reflected_light.h"
 #include "transfer/base/error.h"
 
 namespace rebounce::bench {

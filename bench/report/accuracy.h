@@ -5,7 +5,7 @@
 
 #include "bench/report/light_cases.h"
 #include "bench/report/method.h"
-#include "bench/timing.h"
+#include "bench/support/timing.h"
 
 namespace rebounce::bench {
 

@@ -6,18 +6,14 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bench/process_cost.h"
-#include "bench/timing.h"
+#include "bench/support/machine.h"
+#include "bench/support/timing.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/compression/low_rank_transfer.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/fitting_lights.h"
 #include "transfer/base/error.h"
-#include "transfer/exchange/compressed_form_factors.h"
-#include "transfer/exchange/exchange_blocks.h"
-#include "transfer/exchange/form_factor_blocks.h"
-#include "transfer/exchange/linked_form_factors.h"
 #include "transfer/file/transfer_file.h"
 #include "transfer/format/hierarchical_storage.h"
 
@@ -26,10 +22,6 @@ namespace {
 
 // As the inverse has it. Sweeps are faster than with halves, and light is rounded by 3e-5 only.
 constexpr Precision kFormFactorPrecision = Precision::kQ8;
-
-std::string percent(double part) {
-  return fmt::format("{:g} %", 100 * part);
-}
 
 /// Builds one thing after the other and notes what each costs.
 class ContenderBuilder {
@@ -42,13 +34,13 @@ class ContenderBuilder {
     lights_ = draw_fitting_lights(*result_.data, *result_.tracer, settings_.seed);
     for (const OperatorChoice& choice : settings_.operators) add_hierarchical(choice);
     add_dense();
-    add_exact_forms();
+    result_.forms = exact_forms(*result_.data);
     const DrawnLights radiosities = radiosities_of(lights_, *result_.data);
     for (const double tolerance : settings_.form_factor_tolerances) {
       add_compressed(tolerance, radiosities);
     }
     for (const std::size_t rank : settings_.ranks) add_low_rank(rank);
-    if (settings_.links) add_links();
+    if (settings_.links) result_.forms.push_back(links_form(*result_.data));
     measure_file();
     return std::move(result_);
   }
@@ -110,14 +102,6 @@ class ContenderBuilder {
     result_.operators.push_back({name, timed(name, work, bytes_of_operator)});
   }
 
-  void add_exact_forms() {
-    const TransferData& data = *result_.data;
-    result_.forms.push_back(
-        {kExactRows, std::make_unique<FormFactorBlocks>(data.exchange, data.patches.area)});
-    result_.forms.push_back(
-        {kExactHalf, std::make_unique<ExchangeBlocks>(data.exchange, data.patches.area)});
-  }
-
   void add_compressed(double tolerance, const DrawnLights& radiosities) {
     const std::string name = compressed_name(tolerance);
     const auto work = [&](const Progress& progress) {
@@ -126,13 +110,7 @@ class ContenderBuilder {
     };
     const auto compressed = timed("form factors " + name, work, bytes_of_operator);
     if (!compressed_) compressed_ = compressed;
-    result_.forms.push_back({name, std::make_unique<CompressedFormFactors>(compressed)});
-  }
-
-  void add_links() {
-    const TransferData& data = *result_.data;
-    result_.forms.push_back({kLinks, std::make_unique<LinkedFormFactors>(
-                                         data.links, data.patches.area, data.patches.centroid)});
+    result_.forms.push_back(compressed_form(name, compressed));
   }
 
   void measure_file() {
@@ -165,10 +143,6 @@ const std::shared_ptr<const FormFactorOperator>& Contenders::form(std::string_vi
   if (found == forms.end())
     throw Error("the report has no form factors named " + std::string(name));
   return found->form_factors;
-}
-
-std::string compressed_name(double tolerance) {
-  return "compressed " + percent(tolerance);
 }
 
 Contenders build_contenders(const std::string& scene, const ReportSettings& settings,

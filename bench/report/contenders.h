@@ -7,20 +7,14 @@
 #include <vector>
 
 #include "bench/report/report_settings.h"
+#include "bench/support/form_factor_forms.h"
 #include "precompute/build/build.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/exchange/form_factor_operator.h"
 
 namespace rebounce::bench {
 
 /// Called when work begins and during it, with its name and the fraction done; false asks to stop.
 using ReportProgress = std::function<bool(std::string_view, double)>;
-
-/// A form of F that methods iterate on.
-struct Form {
-  std::string name;  ///< "exact rows", "exact half", "compressed 0.1 %", "links"
-  std::shared_ptr<const FormFactorOperator> form_factors;
-};
 
 /// Y in one form.
 struct StoredOperator {
@@ -50,12 +44,6 @@ struct Contenders {
   /// Throws Error if there is no such form.
   const std::shared_ptr<const FormFactorOperator>& form(std::string_view name) const;
 };
-
-inline constexpr const char *kExactRows = "exact rows", *kExactHalf = "exact half";
-inline constexpr const char* kLinks = "links";
-
-/// "compressed 0.1 %"
-std::string compressed_name(double tolerance);
 
 /// Builds them. Throws Error if the scene cannot be used, Cancelled if asked to stop.
 Contenders build_contenders(const std::string& scene, const ReportSettings& settings,

@@ -5,8 +5,8 @@
 #include <numeric>
 #include <set>
 
-#include "bench/reflected_light.h"
 #include "bench/report/in_parallel.h"
+#include "bench/support/reflected_light.h"
 #include "runtime/frame/direct_lighting.h"
 #include "transfer/base/error.h"
 #include "transfer/base/reflection.h"

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "bench/light_changes.h"
 #include "bench/report/in_parallel.h"
+#include "bench/support/light_changes.h"
 #include "precompute/lights/reference_solution.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/error.h"

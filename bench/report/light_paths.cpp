@@ -5,7 +5,7 @@
 #include <glm/glm.hpp>
 #include <numbers>
 
-#include "bench/light_changes.h"
+#include "bench/support/light_changes.h"
 #include "runtime/demo/motion/light_motion.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"

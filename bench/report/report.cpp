@@ -6,8 +6,8 @@
 #include "bench/report/accuracy.h"
 #include "bench/report/frames.h"
 #include "bench/report/method.h"
+#include "bench/report/physical_errors.h"
 #include "bench/report/pictures.h"
-#include "bench/report/truth.h"
 
 namespace rebounce::bench {
 namespace {

@@ -47,7 +47,7 @@ def parse_arguments():
     parser.add_argument("--page-only", action="store_true", help="measure nothing, show what there is")
     parser.add_argument("--out", type=pathlib.Path, default=ROOT / "report-out")
     parser.add_argument(
-        "--bench", type=pathlib.Path, default=ROOT / "build/release/bench/report/bench_report"
+        "--bench", type=pathlib.Path, default=ROOT / "build/release/bench/bench_report"
     )
     parser.add_argument(
         "--keep", action="store_true", help="put the summary into notes/ and quote it in README.md"

@@ -4,13 +4,33 @@
 
 #include "precompute/patches/hit_patch.h"
 #include "precompute/sampling/hemisphere_rays.h"
+#include "runtime/frame/direct_lighting.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/solvers/solve_radiosity.h"
-#include "transfer/base/error.h"
+#include "transfer/base/reflection.h"
 
 namespace rebounce::reference {
 namespace {
+
+// Points of a patch and rays from it, of which the noise is far below what is looked for.
+constexpr int kDirectPoints = 256, kBounceRays = 16384;
+
+/// The truth's radiosity [n] in lx.
+std::vector<Float3> true_radiosity(const Solution& solution, const PatchComparison& compared,
+                                   std::span<const Light> lights, const Sky& sky) {
+  const PatchTable& table = solution.data.patches;
+  std::vector<Float3> irradiance(table.size()), radiosity(table.size());
+  DirectLighting(solution.data, solution.tracer, {.points_per_patch = kDirectPoints})
+      .compute(lights, sky, irradiance);
+  for (std::size_t k = 0; k < compared.patch.size(); ++k) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      irradiance[compared.patch[k]][c] += compared.truth[k][c];
+    }
+  }
+  add_reflected(table.emitted_exitance, table.reflectance, irradiance, radiosity);
+  return radiosity;
+}
 
 /// The mean of what rays from the `points` of a patch meet.
 glm::dvec3 trace_bounce(const DisplayMesh& mesh, const RayTracer& tracer,
@@ -27,10 +47,12 @@ glm::dvec3 trace_bounce(const DisplayMesh& mesh, const RayTracer& tracer,
 
 }  // namespace
 
-OneBounce find_one_bounce(const TransferData& data, const RayTracer& tracer,
-                          std::span<const Float3> radiosity, int ray_count, std::uint64_t seed) {
+OneBounce find_one_bounce(const Solution& solution, const PatchComparison& compared,
+                          std::span<const Light> lights, const Sky& sky, std::uint64_t seed) {
+  const TransferData& data = solution.data;
+  const RayTracer& tracer = solution.tracer;
   const std::size_t n = data.patches.size();
-  if (radiosity.size() != n) throw Error("one bounce: the radiosity must have one entry per patch");
+  const std::vector<Float3> radiosity = true_radiosity(solution, compared, lights, sky);
   OneBounce bounce;
   bounce.gathered =
       gather(*make_form_factors(SolveMethod::kConjugateGradient, data.exchange, data.patches.area),
@@ -39,7 +61,7 @@ OneBounce find_one_bounce(const TransferData& data, const RayTracer& tracer,
   const PatchTriangles triangles(data.mesh.triangle_patch, n);
 #pragma omp parallel
   {
-    std::vector<PatchPoint> points(static_cast<std::size_t>(ray_count));
+    std::vector<PatchPoint> points(kBounceRays);
     std::vector<Ray> rays(points.size());
     std::vector<Hit> hits(points.size());
     CoincidenceScratch scratch;

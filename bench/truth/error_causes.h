@@ -6,8 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/rays/ray_tracer.h"
-#include "transfer/file/transfer_data.h"
+#include "bench/truth/pipeline_solution.h"
 
 namespace rebounce::reference {
 
@@ -17,11 +16,10 @@ struct OneBounce {
   std::vector<Float3> traced;    ///< [n] along rays, which know F exactly but for their noise, lx
 };
 
-/// `radiosity` [n] is the truth's, lx; `tracer` holds the first surface_count triangles of
-/// `data.mesh`; `ray_count` cosine-distributed rays leave each patch. `traced` - truth is what
-/// patches of even light cost a patch in its last bounce, `gathered` - `traced` what the form
-/// factors cost it. Throws Error if the sizes do not agree.
-OneBounce find_one_bounce(const TransferData& data, const RayTracer& tracer,
-                          std::span<const Float3> radiosity, int ray_count, std::uint64_t seed);
+/// Finds it for a `solution` of which every patch was `compared` with the truth, under these
+/// lights. `traced` - truth is what patches of even light cost a patch in its last bounce,
+/// `gathered` - `traced` what the form factors cost it.
+OneBounce find_one_bounce(const Solution& solution, const PatchComparison& compared,
+                          std::span<const Light> lights, const Sky& sky, std::uint64_t seed);
 
 }  // namespace rebounce::reference

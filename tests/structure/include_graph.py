@@ -52,7 +52,14 @@ ROOMS = {
     "precompute/cli": "The command line.",
     "tests/scenes": "Scenes that tests, benchmarks and pages share.",
     "tests/support": "Made-up scenes, readers and counters that tests and benchmarks share.",
-    "bench": "Benchmarks, the report and the references that it measures against.",
+    "bench/support": "Tables, timing, scenes and light changes that the benchmarks share.",
+    "bench/reference": "The reference path tracer, and the comparison with it.",
+    "bench/apply": "The product: microseconds, bytes, and the bandwidth that is reached.",
+    "bench/frame": "A whole frame by stages.",
+    "bench/build": "The offline stage by phases, and form factors against closed forms.",
+    "bench/solve": "Iterative methods, and operators under fresh lights against their bounds.",
+    "bench/report": "Everything that ./dev report shows.",
+    "bench/truth": "The offline stage and the runtime against the path tracer.",
     "tests": "A folder for each room of the libraries; files of every format in golden.",
 }
 ROOM_ORDER = {room: place for place, room in enumerate(ROOMS)}

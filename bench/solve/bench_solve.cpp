@@ -1,0 +1,101 @@
+// bench_solve: the iterative methods on every form of the form factors, beside the product with the
+// stored operator; and what a file promises, tried: its operator under many fresh lights.
+
+#include "bench/solve/light_errors.h"
+#include "bench/solve/solve_times.h"
+#include "bench/solve/sweep_times.h"
+#include "bench/support/input.h"
+#include "bench/support/program.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/lights/fitting_lights.h"
+#include "transfer/base/error.h"
+
+namespace rebounce::bench {
+namespace {
+
+const std::string kSolves = "solves", kSweeps = "sweeps", kLightErrors = "light-errors";
+
+struct SolveOptions {
+  InputOptions input{.patch_counts = {4000}};
+  std::string part = kSolves;
+  double form_factor_tolerance = 0.001;
+  LightErrorSettings light_errors;
+  CommonOptions common{.repeats = 7};
+};
+
+/// Those that the data hold or that can be made of all pairs, where the data hold these.
+std::vector<Form> forms_of(const TransferData& data, double tolerance) {
+  std::vector<Form> forms;
+  if (!data.exchange.empty()) forms = exact_forms(data);
+  if (!data.links.empty()) forms.push_back(links_form(data));
+  if (data.compressed_form_factors) {
+    forms.push_back(compressed_form("compressed", data.compressed_form_factors));
+  } else if (!data.exchange.empty()) {
+    const DrawnLights lights = draw_fitting_lights(data, make_surface_tracer(data.mesh), 1);
+    const DrawnLights fitting = radiosities_of(lights, data);
+    forms.push_back(
+        compressed_form(compressed_name(tolerance),
+                        compress_form_factors(data.exchange, data.patches, fitting.view(),
+                                              {tolerance, Precision::kF16})));
+  }
+  if (forms.empty()) throw Error("'" + scene_name(data) + "' holds no form factors");
+  return forms;
+}
+
+Table table_of(const std::string& part) {
+  if (part == kSweeps) return make_sweep_table();
+  return part == kSolves ? make_solve_table() : make_light_error_table();
+}
+
+void measure(const TransferData& data, const SolveOptions& options, Table& table) {
+  if (options.part == kLightErrors) return measure_light_errors(data, options.light_errors, table);
+  const std::vector<Form> forms = forms_of(data, options.form_factor_tolerance);
+  const std::vector<LightChange> changes = light_changes(data);
+  if (options.part == kSweeps) {
+    measure_sweeps(data, forms, changes.front().after, options.common.repeats, table);
+  } else {
+    measure_solves(data, forms, changes, options.common.repeats, table);
+  }
+}
+
+void run(const SolveOptions& options) {
+  Table table = table_of(options.part);
+  for_each_input(options.input, [&](const std::shared_ptr<const TransferData>& data) {
+    measure(*data, options, table);
+    save("bench_solve", table, options.common);
+  });
+  publish("bench_solve", table, options.common);
+}
+
+}  // namespace
+}  // namespace rebounce::bench
+
+int main(int argc, char** argv) {
+  using namespace rebounce::bench;
+  SolveOptions options;
+  CLI::App app("Times iterative methods, and tries operators under fresh lights.", "bench_solve");
+  add_input_options(app, options.input);
+  add_choice_option(app, "--part", options.part, {kSolves, kSweeps, kLightErrors},
+                    "What is measured: solves to errors of 1, 0.1 and 0.01 %; single sweeps beside "
+                    "the bandwidth of memory; or errors of the operator beside its bounds");
+  app.add_option("--form-factor-tolerance", options.form_factor_tolerance,
+                 "Error of compressed form factors, where the input holds none")
+      ->check(CLI::Range(1e-5, 0.5))
+      ->capture_default_str();
+  app.add_option("--lights", options.light_errors.light_count, "Lights of each kind")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str();
+  app.add_option("--seed", options.light_errors.seed, "Seed of these, not that of the build")
+      ->capture_default_str();
+  app.add_flag("--iterate", options.light_errors.iterate,
+               "Their truth by conjugate gradients alone, with neither a dense inverse nor the "
+               "operator to begin with");
+  add_common_options(app, options.common);
+  return run_program(app, argc, argv, options.common, [&] {
+    if (options.part == kLightErrors) {
+      options.input.with_truth = true;
+      options.common.repeats = 1;
+    }
+    run(options);
+  });
+}

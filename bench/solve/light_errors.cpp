@@ -1,0 +1,124 @@
+#include "bench/solve/light_errors.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+
+#include "bench/support/input.h"
+#include "precompute/base/symmetric_matrix.h"
+#include "precompute/inverse/dense_transfer.h"
+#include "precompute/lights/measured_error.h"
+#include "precompute/lights/random_lights.h"
+#include "precompute/lights/reference_lighting.h"
+#include "precompute/lights/reference_solution.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
+
+namespace rebounce::bench {
+namespace {
+
+// The gates are over so many lights, and their largest error may be so many times the tolerance.
+constexpr std::size_t kGateLights = 64;
+constexpr double kLargestOverMean = 3;
+
+// Residual of conjugate gradients, of what a light gives off: of that, hardly less than a millionth
+// arrives.
+constexpr double kResidual = 1e-9;
+
+/// What arrives of lights, as the form factors of a file say.
+class Truth {
+ public:
+  Truth(const TransferData& data, bool iterate)
+      : data_(data),
+        plain_(data),
+        solver_(iterate ? plain_ : plain_.preconditioned(data.transfer)) {
+    if (!iterate && !data.exchange.empty()) {
+      dense_ = build_dense_transfer(data.exchange, data.patches, Precision::kF32);
+    }
+  }
+
+  std::vector<std::vector<Float3>> operator()(std::span<const std::vector<Float3>> lights) const {
+    return dense_ ? products(DenseMatrix(*dense_), lights)
+                  : solver_.indirect_irradiances(lights, kResidual);
+  }
+
+  /// The largest relative difference from plain conjugate gradients over the first lights.
+  double error(std::span<const std::vector<Float3>> lights) const {
+    const auto some =
+        lights.first(std::min<std::size_t>(lights.size(), ReferenceSolver::kBatchLights));
+    const auto truths = (*this)(some);
+    const auto others = plain_.indirect_irradiances(some, kResidual);
+    double largest = 0;
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      if (arrives_nowhere(others[k], some[k], data_.patches.area)) continue;
+      largest = std::max(largest, relative_difference(truths[k], others[k], data_.patches.area));
+    }
+    return largest;
+  }
+
+ private:
+  const TransferData& data_;
+  ReferenceSolver plain_, solver_;
+  std::shared_ptr<const DenseOperator> dense_;  ///< null: solver_ iterates
+};
+
+/// What the file says of lights of one kind; nothing where it was not measured.
+std::optional<double> recorded_bound(const BuildRecord& record, LightKind kind) {
+  const auto report = nlohmann::json::parse(record.report_json, nullptr, false);
+  const nlohmann::json::json_pointer place("/errors/" + std::string(name(kind)) + "/bound");
+  if (!report.contains(place) || !report.at(place).is_number()) return std::nullopt;
+  return report.at(place).get<double>();
+}
+
+std::size_t count_above(std::span<const LightError> errors, double limit) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(errors, [=](const LightError& e) { return e.error > limit; }));
+}
+
+/// The part of whole groups of kGateLights, in the order in which they were drawn, of which one is
+/// above the limit.
+Table::Cell groups_above(std::span<const LightError> errors, double limit) {
+  const std::size_t groups = errors.size() / kGateLights;
+  if (groups == 0) return {};
+  std::size_t above = 0;
+  for (std::size_t k = 0; k < groups; ++k) {
+    above += count_above(errors.subspan(k * kGateLights, kGateLights), limit) > 0 ? 1 : 0;
+  }
+  return static_cast<double>(above) / static_cast<double>(groups);
+}
+
+}  // namespace
+
+Table make_light_error_table() {
+  return Table({"scene", "patches", "tolerance", "bytes_per_patch", "kind", "lights", "error_mean",
+                "error_max", "arriving_of_max", "over_3_tolerances", "groups_of_64_over",
+                "bound_of_kind", "over_bound_of_kind", "bound", "over_bound", "truth_error"});
+}
+
+void measure_light_errors(const TransferData& data, const LightErrorSettings& settings,
+                          Table& table) {
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  const Truth truth(data, settings.iterate);
+  const BuildRecord& record = data.record;
+  const double limit = kLargestOverMean * record.tolerance;
+  for (const LightKind kind : kLightKinds) {
+    const auto lights = random_initial_exitances(data, tracer, kind, settings.light_count,
+                                                 settings.seed, data.transfer->roles());
+    const std::vector<LightError> errors = light_errors(data, lights, std::cref(truth));
+    if (errors.empty()) continue;
+    const auto worst = std::ranges::max_element(errors, {}, &LightError::error);
+    double sum = 0;
+    for (const LightError& light : errors) sum += light.error;
+    const auto bound = recorded_bound(record, kind);
+    table.add(
+        {scene_name(data), data.patches.size(), record.tolerance,
+         static_cast<double>(data.transfer->bytes()) / static_cast<double>(data.patches.size()),
+         name(kind), errors.size(), sum / static_cast<double>(errors.size()), worst->error,
+         worst->arriving, count_above(errors, limit), groups_above(errors, limit),
+         bound ? Table::Cell(*bound) : Table::Cell(),
+         bound ? Table::Cell(count_above(errors, *bound)) : Table::Cell(), record.error_bound,
+         count_above(errors, record.error_bound), truth.error(lights)});
+  }
+}
+
+}  // namespace rebounce::bench

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include "bench/support/table.h"
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce::bench {
+
+struct LightErrorSettings {
+  int light_count = 1000;     ///< of each kind
+  std::uint64_t seed = 4711;  ///< none that operators are built or checked with
+  /// The truth by conjugate gradients alone, with neither a dense inverse nor the operator to begin
+  /// with: many times slower.
+  bool iterate = false;
+};
+
+Table make_light_error_table();
+
+/// Adds a row for each kind of light: the errors of the operator of `data` under fresh lights,
+/// beside the bounds on record. The truth is that of the form factors of `data`, which are to be
+/// those that the operator was made from: by conjugate gradients or, of pairs, a dense inverse of
+/// their own, which is many times faster and is itself held against conjugate gradients.
+void measure_light_errors(const TransferData& data, const LightErrorSettings& settings,
+                          Table& table);
+
+}  // namespace rebounce::bench

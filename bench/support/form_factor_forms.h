@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce::bench {
+
+/// A form of F that methods iterate on.
+struct Form {
+  std::string name;  ///< "exact rows", "exact half", "compressed 0.1 %", "links"
+  std::shared_ptr<const FormFactorOperator> form_factors;
+};
+
+inline constexpr const char *kExactRows = "exact rows", *kExactHalf = "exact half";
+inline constexpr const char* kLinks = "links";
+
+/// "0.1 %"
+std::string percent(double part);
+
+/// "compressed 0.1 %"
+std::string compressed_name(double tolerance);
+
+/// F by all pairs of `data`: rows in blocks, and the half of them that symmetry leaves.
+std::vector<Form> exact_forms(const TransferData& data);
+
+/// F along the links of `data`.
+Form links_form(const TransferData& data);
+
+/// Compressed F under a name of its own.
+Form compressed_form(std::string name, std::shared_ptr<const HierarchicalOperator> compressed);
+
+}  // namespace rebounce::bench

@@ -1,0 +1,102 @@
+#include "bench/support/light_changes.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <glm/glm.hpp>
+
+#include "precompute/lights/random_lights.h"
+#include "runtime/rays/box.h"
+#include "runtime/rays/float3_glm.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/error.h"
+#include "transfer/base/reflection.h"
+
+namespace rebounce::bench {
+namespace {
+
+/// Two places for a lamp, far enough from each other that it can move between them, and free to.
+std::pair<Light, Light> find_places(const TransferData& data, const RayTracer& tracer,
+                                    double distance, std::uint64_t seed) {
+  constexpr int kTries = 64;
+  const std::vector<Light> lamps = lamps_in_the_open(data, tracer, kTries, seed);
+  for (const Light& lamp : lamps) {
+    for (const Light& other : lamps) {
+      if (glm::distance(to_dvec3(lamp.position), to_dvec3(other.position)) > distance &&
+          free_way(tracer, lamp.position, other.position)) {
+        return {lamp, other};
+      }
+    }
+  }
+  throw Error("the scene has no room to move a lamp in; give another");
+}
+
+Light moved(Light lamp, const Light& towards, double distance) {
+  const glm::dvec3 from = to_dvec3(lamp.position);
+  const glm::dvec3 direction = glm::normalize(to_dvec3(towards.position) - from);
+  lamp.position = to_float3(from + distance * direction);
+  return lamp;
+}
+
+/// The part of the surface's area that `irradiance` [n] reaches.
+double lit_part(const TransferData& data, std::span<const Float3> irradiance) {
+  double lit = 0, all = 0;
+  for (std::size_t i = 0; i < irradiance.size(); ++i) {
+    all += data.patches.area[i];
+    if (irradiance[i][0] > 0) lit += data.patches.area[i];
+  }
+  return lit / all;
+}
+
+}  // namespace
+
+std::vector<Float3> light_of(const Light& lamp, const TransferData& data, DirectLighting& direct) {
+  std::vector<Float3> exitance(data.patches.size());
+  direct.compute({&lamp, 1}, {}, exitance);
+  reflect(data.patches.reflectance, exitance);
+  if (area_norm(exitance, data.patches.area) == 0) {
+    throw Error("the test lamp lights nothing; the scene must have lit patches that reflect");
+  }
+  return exitance;
+}
+
+std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
+                                     std::uint64_t seed) {
+  constexpr double kLeastLit = 0.05;
+  DirectLighting direct(data, tracer);
+  std::vector<Float3> irradiance(data.patches.size());
+  std::vector<Light> lamps = random_point_lights(data, tracer, count, seed);
+  std::erase_if(lamps, [&](const Light& lamp) {
+    direct.compute({&lamp, 1}, {}, irradiance);
+    return lit_part(data, irradiance) < kLeastLit;
+  });
+  if (lamps.empty()) throw Error("no lamp at any place lights much of the scene; give another");
+  return lamps;
+}
+
+bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to) {
+  std::array<Ray, 1> ray = {{{.origin = from,
+                              .t_near = 0,
+                              .direction = to_float3(to_glm(to) - to_glm(from)),
+                              .t_far = 1}}};
+  tracer.occluded(ray);
+  return !is_occluded(ray[0]);
+}
+
+std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
+                                       std::uint64_t seed) {
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  DirectLighting direct(data, tracer);
+  const double size = box_around(data.mesh.position).diagonal();
+  const auto [lamp, other] = find_places(data, tracer, 0.2 * size, seed);
+  const std::vector<Float3> before = light_of(lamp, data, direct);
+  std::vector<LightChange> changes = {{"from zero", {}, before}};
+  for (const double part : motions) {
+    changes.push_back({fmt::format("moved {:g} %", 100 * part), before,
+                       light_of(moved(lamp, other, part * size), data, direct)});
+  }
+  changes.push_back({"switched", before, light_of(other, data, direct)});
+  return changes;
+}
+
+}  // namespace rebounce::bench

@@ -1,0 +1,215 @@
+// bench_truth: how far the indirect light of the whole pipeline is from the path tracer's, for a
+// number of patches each.
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "bench/reference/compare.h"
+#include "bench/reference/scene_key_light.h"
+#include "bench/support/input.h"
+#include "bench/support/named_quality.h"
+#include "bench/support/program.h"
+#include "bench/truth/error_causes.h"
+#include "bench/truth/error_tables.h"
+#include "bench/truth/pipeline_solution.h"
+#include "precompute/cli/console.h"
+#include "precompute/cli/light_file.h"
+#include "precompute/patches/lit_sides.h"
+#include "runtime/frame/direct_lighting.h"
+#include "transfer/base/error.h"
+
+namespace rebounce {
+namespace {
+
+struct Options {
+  std::string scene, lights, patch_csv, point_csv, error_picture;
+  bool causes = false;
+  std::string quality = "default";  ///< of the form factors
+  std::vector<std::size_t> patch_counts{1000, 4000};
+  bool key_light = false;
+  std::size_t point_count = 20000;
+  std::uint32_t samples = 512;
+  int direct_points = DirectLightingSettings{}.points_per_patch;
+  reference::PatchComparisonSettings patch_comparison;
+  bench::CommonOptions common;
+};
+
+FormFactorQuality quality_named(const std::string& name) {
+  return std::ranges::find(bench::kQualities, name, &bench::NamedQuality::name)->quality;
+}
+
+/// One row of the result.
+struct Row {
+  std::size_t patch_count = 0;
+  reference::RelativeError patch_means, reconstruction;
+};
+
+/// The scene, its light, and the path tracer's truth at points of it: the same for every number of
+/// patches.
+class TruthBench {
+ public:
+  TruthBench(const Options& options, cli::ProgressBar& bar)
+      : options_(options),
+        bar_(bar),
+        scene_(import_usable(options.scene, 1)),
+        tracer_(reference::make_scene_tracer(scene_)),
+        sides_(find_lit_sides(scene_, tracer_)) {
+    choose_lights();
+    points_ = reference::sample_surface(scene_, sides_, options.point_count,
+                                        options.patch_comparison.seed);
+    truth_ =
+        reference::indirect_irradiance(lit_scene(), points_, options.samples,
+                                       options.patch_comparison.seed, progress("truth at points"));
+  }
+
+  Row run(std::size_t patch_count, bool last) {
+    const reference::Solution solution = solve(patch_count);
+    const bool draws = last && !options_.error_picture.empty();
+    const bool finds_causes = last && options_.causes;
+    reference::PatchComparisonSettings settings = options_.patch_comparison;
+    if (draws || finds_causes) settings.patch_count = 0;  // all of them are needed
+    const reference::PatchComparison patches =
+        reference::compare_patch_means(solution.data, solution.indirect_irradiance, lit_scene(),
+                                       settings, progress("truth on patches"));
+    if (draws) reference::draw_error(solution, patches, options_.error_picture);
+    if (last && !options_.patch_csv.empty()) {
+      const reference::OneBounce bounce =
+          finds_causes ? reference::find_one_bounce(solution, patches, setup_.lights, setup_.sky,
+                                                    settings.seed)
+                       : reference::OneBounce{};
+      reference::write_patch_table(options_.patch_csv, solution.data.patches, patches,
+                                   solution.indirect_irradiance, bounce);
+    }
+    const reference::ReconstructionComparison shown = reference::compare_reconstruction(
+        solution.data, solution.tracer, solution.indirect_irradiance, points_, truth_);
+    if (last && !options_.point_csv.empty()) {
+      reference::write_point_table(options_.point_csv, solution.data, points_, truth_, shown);
+    }
+    return {solution.data.patches.size(), patches.relative, shown.relative};
+  }
+
+ private:
+  reference::LitScene lit_scene() const { return {scene_, tracer_, setup_.lights, setup_.sky}; }
+
+  Progress progress(const char* phase) {
+    return [this, phase](double fraction) { return bar_.update(phase, fraction); };
+  }
+
+  void choose_lights() {
+    if (!options_.lights.empty()) {
+      setup_ = cli::read_lights(options_.lights);
+    } else if (options_.key_light) {
+      setup_.lights = {reference::make_key_light(scene_, tracer_, sides_)};
+      print_as_file(setup_.lights.front());
+    } else {
+      setup_.lights = scene_.lights;
+    }
+    const bool emits = std::ranges::any_of(scene_.materials, [](const Material& m) {
+      return m.emitted_luminance != Float3{0, 0, 0};
+    });
+    if (setup_.lights.empty() && setup_.sky.luminance == 0 && !emits) {
+      throw Error(options_.scene + " has no light of its own; give --lights or --key-light");
+    }
+  }
+
+  /// What --lights takes: the key light moves when other sides count as lit.
+  static void print_as_file(const Light& lamp) {
+    const auto& [x, y, z] = lamp.position;
+    fmt::print(R"({{"lights":[{{"type":"point","position":[{},{},{}],"intensity":{}}}]}})"
+               "\n",
+               x, y, z, lamp.intensity);
+  }
+
+  reference::Solution solve(std::size_t patch_count) {
+    const reference::PipelineSettings settings{.patch_count = patch_count,
+                                               .quality = quality_named(options_.quality),
+                                               .direct_points = options_.direct_points};
+    return reference::solve_scene(
+        options_.scene, settings, setup_.lights, setup_.sky,
+        [this](std::string_view phase, double part) { return bar_.update(phase, part); });
+  }
+
+  const Options& options_;
+  cli::ProgressBar& bar_;
+  Scene scene_;
+  RayTracer tracer_;
+  std::vector<TriangleSides> sides_;
+  cli::LightSetup setup_;
+  std::vector<reference::SurfacePoint> points_;
+  reference::IrradianceEstimate truth_;
+};
+
+void run(const Options& options) {
+  bench::Table table({"scene", "patches", "patch_mean_error", "patch_mean_noise",
+                      "patches_compared", "reconstruction_error", "reconstruction_noise",
+                      "points_compared", "points_left_out"});
+  {
+    cli::ProgressBar bar(true);
+    TruthBench bench(options, bar);
+    for (const std::size_t patch_count : options.patch_counts) {
+      const Row row = bench.run(patch_count, patch_count == options.patch_counts.back());
+      const reference::RelativeError &means = row.patch_means, &shown = row.reconstruction;
+      table.add({bench::scene_name(options.scene), row.patch_count, means.error, means.noise,
+                 means.count, shown.error, shown.noise, shown.count, shown.left_out_count});
+      bench::save("bench_truth", table, options.common);
+    }
+  }
+  bench::publish("bench_truth", table, options.common);
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("scene", options.scene, "Scene: .glb or .gltf")->required();
+  bench::add_patches_option(app, options.patch_counts);
+  auto* lights = app.add_option("--lights", options.lights,
+                                "Lights: .json, or a .glb that has some; by default the scene's");
+  app.add_flag("--key-light", options.key_light, "One point light at a place found for it")
+      ->excludes(lights);
+  app.add_option("--points", options.point_count, "Points at which the reconstruction is compared")
+      ->check(CLI::Range(1, 100000000))
+      ->capture_default_str();
+  app.add_option("--samples", options.samples, "Paths from each of these points")
+      ->check(CLI::Range(1, 100000000))
+      ->capture_default_str();
+  reference::PatchComparisonSettings& patches = options.patch_comparison;
+  app.add_option("--compared-patches", patches.patch_count, "Patches compared; 0: all of them")
+      ->capture_default_str();
+  app.add_option("--patch-points", patches.points_per_patch, "Points on each of these patches")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  app.add_option("--patch-samples", patches.samples_per_point, "Paths from each of these points")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  app.add_option("--direct-points", options.direct_points,
+                 "Points of a patch at which the pipeline looks at lamps")
+      ->check(CLI::Range(1, 4096))
+      ->capture_default_str();
+  std::vector<std::string> qualities;
+  for (const bench::NamedQuality& q : bench::kQualities) qualities.emplace_back(q.name);
+  bench::add_choice_option(app, "--form-factor-quality", options.quality, qualities,
+                           "Quality of the form factors");
+  app.add_option("--seed", patches.seed, "Of all that is random")->capture_default_str();
+  bench::add_csv_option(app, options.common);
+  app.add_option("--patch-csv", options.patch_csv,
+                 "Table to write of the compared patches, for the last number of patches");
+  app.add_flag("--causes", options.causes,
+               "Compare all patches and add to their table what one bounce of the truth's light "
+               "brings them, along rays and by the form factors");
+  app.add_option("--point-csv", options.point_csv,
+                 "Table to write of the compared points, for the last number of patches");
+  app.add_option("--error-picture", options.error_picture,
+                 "Picture (.png) of where the patch means err, for the last number of patches");
+  bench::add_threads_option(app, options.common);
+}
+
+}  // namespace
+}  // namespace rebounce
+
+int main(int argc, char** argv) {
+  rebounce::cli::install_interrupt_handler();
+  rebounce::Options options;
+  CLI::App app("The pipeline's indirect light against a path tracer's.", "bench_truth");
+  rebounce::add_options(app, options);
+  return rebounce::bench::run_program(app, argc, argv, options.common,
+                                      [&] { rebounce::run(options); });
+}
