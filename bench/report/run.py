@@ -8,6 +8,7 @@ import argparse
 import datetime
 import json
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -50,7 +51,7 @@ def parse_arguments():
         "--bench", type=pathlib.Path, default=ROOT / "build/release/bench/bench_report"
     )
     parser.add_argument(
-        "--keep", action="store_true", help="put the summary into notes/ and quote it in README.md"
+        "--keep", action="store_true", help="put the summary into notes/, README.md and bench/results/"
     )
     return parser.parse_args()
 
@@ -243,6 +244,21 @@ def write_notes(notes, headlines, missing, date, pictures, folder):
         shutil.copyfile(folder / "claims.csv", notes / "report_claims.csv")
 
 
+def keep_results(headlines, date, folder):
+    """The claims, with the other tables of this machine."""
+    result = headlines[0].result
+    machine = re.sub(r"[^a-z0-9]+", "-", result["processor"].lower()).strip("-")
+    target = ROOT / "bench" / "results" / machine
+    target.mkdir(parents=True, exist_ok=True)
+    lines = (
+        f"# bench_report, commit {result['commit']}, {date}\n"
+        f"# {result['processor']}, {result['processors']} processors, {result['threads']} threads; "
+        f"{result['compiler']}, {result['build_type']}\n"
+    )
+    claims = (folder / "claims.csv").read_text(encoding="utf-8")
+    (target / "report.csv").write_text(lines + claims, encoding="utf-8")
+
+
 def main():
     options = parse_arguments()
     # However it is asked to stop, what it has begun stops with it.
@@ -276,6 +292,7 @@ def main():
     write_notes(folder, headlines, missing, date, pictures, folder)
     if options.keep:
         write_notes(ROOT / "notes", headlines, missing, date, pictures, folder)
+        keep_results(headlines, date, folder)
         summary.quote_in_readme(ROOT / "README.md", summary.readme_block(headlines))
     print(f"\n{aims.aims(headlines)}\n\n{folder / 'report.html'}")
     return 0
