@@ -16,6 +16,7 @@
 #include "precompute/cli/console.h"
 #include "precompute/cli/light_file.h"
 #include "precompute/patches/lit_sides.h"
+#include "precompute/patches/winding.h"
 #include "runtime/frame/direct_lighting.h"
 #include "transfer/base/error.h"
 
