@@ -8,8 +8,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

@@ -7,8 +7,8 @@
 #include "bench/support/program.h"
 #include "bench/support/timing.h"
 #include "precompute/lights/random_lights.h"
-#include "runtime/frame/engine.h"
-#include "runtime/outputs/octahedral_map.h"
+#include "rebounce/outputs.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/outputs/probe_irradiance.h"
 #include "runtime/outputs/probe_light.h"
 #include "runtime/outputs/surface_light.h"
@@ -33,7 +33,8 @@ class MovingLights {
   MovingLights(const Engine& engine, std::size_t count, std::size_t moving)
       : moving_(std::min(count, moving)) {
     const int twice = static_cast<int>(2 * count);
-    const std::vector<Light> all = random_point_lights(engine.data(), engine.tracer(), twice, 7);
+    const std::vector<Light> all =
+        random_point_lights(engine.data(), *engine.parts().tracer, twice, 7);
     lights_.assign(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
     elsewhere_.assign(all.begin() + static_cast<std::ptrdiff_t>(count), all.end());
   }
@@ -80,9 +81,9 @@ class FrameBenchmark {
     names_.clear();
     cases_.clear();
     for (const std::size_t count : kLightCounts) add_lights(count);
-    add("initial exitance", {}, [this] { engine_.compute_initial_exitance(); });
-    add("product", {}, [this] { engine_.apply_transfer(); });
-    add("radiosity", {}, [this] { engine_.compute_radiosity(); });
+    add("initial exitance", {}, [this] { engine_.parts().compute_initial_exitance(); });
+    add("product", {}, [this] { engine_.parts().apply_transfer(); });
+    add("radiosity", {}, [this] { engine_.parts().compute_radiosity(); });
     add_outputs();
     const std::vector<Timing> timings = time_interleaved(cases_, {.rounds = options_.repeats});
     for (std::size_t k = 0; k < cases_.size(); ++k) {
@@ -99,14 +100,16 @@ class FrameBenchmark {
 
   void add_lights(std::size_t count) {
     const auto all = std::make_shared<MovingLights>(engine_, count, count);
-    add("direct, all moved", count, [this, all] { engine_.compute_direct(all->next(), {}); });
+    add("direct, all moved", count,
+        [this, all] { engine_.parts().compute_direct(all->next(), {}); });
     const auto none = std::make_shared<MovingLights>(engine_, count, 0);
     const auto still = std::make_shared<Engine>(engine_);
-    add("direct, none moved", count, [still, none] { still->compute_direct(none->next(), {}); });
+    add("direct, none moved", count,
+        [still, none] { still->parts().compute_direct(none->next(), {}); });
     const auto spheres = std::make_shared<MovingLights>(engine_, count, count);
     spheres->give_area();
     add("direct, spheres moved", count,
-        [this, spheres] { engine_.compute_direct(spheres->next(), {}); });
+        [this, spheres] { engine_.parts().compute_direct(spheres->next(), {}); });
     // The whole frame keeps its own engine: what does not move is known from its last frame.
     const auto some = std::make_shared<MovingLights>(engine_, count, kMovingCount);
     const auto own = std::make_shared<Engine>(engine_);

@@ -3,11 +3,11 @@
 #include "bench/reference/compare.h"
 #include "bench/reference/error_sum.h"
 #include "bench/reference/scene_surface.h"
+#include "rebounce/error.h"
 #include "runtime/rays/cumulative_choice.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

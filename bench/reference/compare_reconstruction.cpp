@@ -4,8 +4,8 @@
 #include "bench/reference/error_sum.h"
 #include "bench/reference/scene_surface.h"
 #include "precompute/patches/lit_sides.h"
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "bench/reference/compare.h"
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce::reference {
 

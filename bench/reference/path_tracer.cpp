@@ -16,10 +16,10 @@
 #include "bench/reference/scene_surface.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/patches/opacity_sampling.h"
+#include "rebounce/error.h"
 #include "runtime/lights/light_sampling.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

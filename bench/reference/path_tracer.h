@@ -10,6 +10,7 @@
 #include "bench/reference/surface_points.h"
 #include "precompute/base/progress.h"
 #include "precompute/import/scene.h"
+#include "rebounce/sky.h"
 #include "runtime/rays/ray_tracer.h"
 
 namespace rebounce::reference {

@@ -1,10 +1,10 @@
 #include "bench/reference/surface_points.h"
 
 #include "bench/reference/scene_surface.h"
+#include "rebounce/error.h"
 #include "runtime/rays/cumulative_choice.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

@@ -10,7 +10,7 @@
 #include "bench/report/in_parallel.h"
 #include "bench/support/read_buffer.h"
 #include "bench/support/reflected_light.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::bench {
 namespace {

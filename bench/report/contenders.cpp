@@ -13,8 +13,8 @@
 #include "precompute/compression/low_rank_transfer.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/fitting_lights.h"
-#include "transfer/base/error.h"
-#include "transfer/file/transfer_file.h"
+#include "rebounce/error.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce::bench {

@@ -8,7 +8,7 @@
 
 #include "bench/report/report_settings.h"
 #include "bench/support/form_factor_forms.h"
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 #include "runtime/rays/ray_tracer.h"
 
 namespace rebounce::bench {

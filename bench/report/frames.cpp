@@ -7,8 +7,8 @@
 
 #include "bench/report/in_parallel.h"
 #include "bench/support/reflected_light.h"
+#include "rebounce/error.h"
 #include "runtime/frame/direct_lighting.h"
-#include "transfer/base/error.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce::bench {

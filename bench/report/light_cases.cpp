@@ -5,8 +5,8 @@
 #include "bench/report/in_parallel.h"
 #include "bench/support/light_changes.h"
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "runtime/solvers/solve_radiosity.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

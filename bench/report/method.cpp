@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce::bench {
@@ -74,9 +74,8 @@ const StoredOperator& find_operator(const Contenders& contenders, const std::str
 
 /// What the products are called, by their kind.
 std::string product_name(const TransferOperator& transfer) {
-  const std::string kind = transfer.kind();
-  if (kind == "dense") return kDenseInverse;
-  if (kind == "hierarchical") return "inverse";
+  if (transfer.kind() == OperatorKind::kDense) return kDenseInverse;
+  if (transfer.kind() == OperatorKind::kHierarchical) return "inverse";
   return "low rank";
 }
 

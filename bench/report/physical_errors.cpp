@@ -7,13 +7,13 @@
 #include <numeric>
 
 #include "bench/reference/scene_key_light.h"
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 #include "precompute/lights/reference_solution.h"
 #include "precompute/patches/lit_sides.h"
 #include "precompute/patches/winding.h"
-#include "runtime/frame/engine.h"
+#include "rebounce/engine.h"
+#include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {

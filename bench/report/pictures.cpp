@@ -5,13 +5,13 @@
 #include <limits>
 
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/camera.h"
 #include "runtime/demo/picture/key_light.h"
 #include "runtime/demo/picture/picture.h"
-#include "runtime/frame/engine.h"
+#include "runtime/frame/engine_parts.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {
@@ -35,17 +35,17 @@ class Painter {
           std::filesystem::path folder, std::string name)
       : data_(*contenders.data),
         engine_(contenders.data),
-        renderer_(data_, engine_.tracer()),
+        renderer_(data_, *engine_.parts().tracer),
         folder_(std::move(folder)),
         name_(std::move(name)),
-        lights_{make_key_light(data_, engine_.tracer())},
+        lights_{make_key_light(data_, *engine_.parts().tracer)},
         emitted_(irradiance_from_emitters(data_)) {
     engine_.relight(lights_, {});
     picture_settings_.width = settings.picture_width;
     picture_settings_.height = settings.picture_height;
     picture_settings_.samples_per_axis = kSamplesPerAxis;
     picture_settings_.camera = data_.cameras.empty()
-                                   ? fit_camera(data_, engine_.tracer(), engine_.radiosity())
+                                   ? fit_camera(data_, *engine_.parts().tracer, engine_.radiosity())
                                    : data_.cameras.front();
     truth_ = ReferenceSolver(data_.exchange, data_.patches)
                  .indirect_irradiance(engine_.initial_exitance());

@@ -8,7 +8,7 @@
 #include "bench/support/program.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/lights/fitting_lights.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::bench {
 namespace {

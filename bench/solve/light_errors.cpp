@@ -11,8 +11,8 @@
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::bench {
 namespace {
@@ -63,8 +63,8 @@ class Truth {
 };
 
 /// What the file says of lights of one kind; nothing where it was not measured.
-std::optional<double> recorded_bound(const BuildRecord& record, LightKind kind) {
-  const auto report = nlohmann::json::parse(record.report_json, nullptr, false);
+std::optional<double> recorded_bound(const TransferData& data, LightKind kind) {
+  const auto report = nlohmann::json::parse(data.report_json, nullptr, false);
   const nlohmann::json::json_pointer place("/errors/" + std::string(name(kind)) + "/bound");
   if (!report.contains(place) || !report.at(place).is_number()) return std::nullopt;
   return report.at(place).get<double>();
@@ -109,7 +109,7 @@ void measure_light_errors(const TransferData& data, const LightErrorSettings& se
     const auto worst = std::ranges::max_element(errors, {}, &LightError::error);
     double sum = 0;
     for (const LightError& light : errors) sum += light.error;
-    const auto bound = recorded_bound(record, kind);
+    const auto bound = recorded_bound(data, kind);
     table.add(
         {scene_name(data), data.patches.size(), record.tolerance,
          static_cast<double>(data.transfer->bytes()) / static_cast<double>(data.patches.size()),

@@ -3,8 +3,8 @@
 #include <map>
 
 #include "bench/support/program.h"
-#include "transfer/base/error.h"
-#include "transfer/file/transfer_file.h"
+#include "rebounce/error.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::bench {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 
 namespace rebounce::bench {
 

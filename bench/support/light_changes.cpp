@@ -6,10 +6,10 @@
 #include <glm/glm.hpp>
 
 #include "precompute/lights/random_lights.h"
+#include "rebounce/error.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce::bench {

@@ -13,12 +13,13 @@
 #include "bench/truth/error_causes.h"
 #include "bench/truth/error_tables.h"
 #include "bench/truth/pipeline_solution.h"
+#include "precompute/build/transfer_build.h"
 #include "precompute/cli/console.h"
 #include "precompute/cli/light_file.h"
 #include "precompute/patches/lit_sides.h"
 #include "precompute/patches/winding.h"
+#include "rebounce/error.h"
 #include "runtime/frame/direct_lighting.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

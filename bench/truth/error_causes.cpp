@@ -4,6 +4,7 @@
 
 #include "precompute/patches/hit_patch.h"
 #include "precompute/sampling/hemisphere_rays.h"
+#include "rebounce/error.h"
 #include "runtime/frame/direct_lighting.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/patch_points.h"

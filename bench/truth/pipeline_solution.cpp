@@ -2,14 +2,14 @@
 
 #include <cmath>
 
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
+#include "rebounce/error.h"
 #include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/camera.h"
 #include "runtime/demo/picture/picture.h"
 #include "runtime/frame/direct_lighting.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce::reference {

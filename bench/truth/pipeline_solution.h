@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "bench/reference/compare.h"
-#include "precompute/build/build_report.h"
 #include "precompute/exchange/pairs/form_factor_settings.h"
+#include "rebounce/build_report.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <memory>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -4,7 +4,7 @@
 #include <cassert>
 #include <charconv>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/file/atomic_file.h"
 
 namespace rebounce {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

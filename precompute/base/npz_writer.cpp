@@ -7,7 +7,7 @@
 #include <limits>
 #include <memory>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/file/atomic_file.h"
 
 namespace rebounce {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "precompute/base/progress.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "transfer/data/patch_roles.h"
+#include "rebounce/scene_data.h"
 #include "transfer/exchange/exchange_matrix.h"
 #include "transfer/operator/dense_operator.h"
 

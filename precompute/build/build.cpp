@@ -1,4 +1,4 @@
-#include "precompute/build/build.h"
+#include "rebounce/build.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,18 @@
 #include "precompute/build/exchange_stage.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/build/phase_clock.h"
+#include "precompute/build/transfer_build.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "precompute/outputs/light_probes.h"
+#include "precompute/outputs/lightmap.h"
 #include "precompute/outputs/reconstruction_weights.h"
+#include "precompute/outputs/surface_harmonics.h"
 #include "precompute/patches/patch_model.h"
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
+#include "rebounce/error.h"
+#include "rebounce/version.h"
 #include "runtime/solvers/solve_radiosity.h"
-#include "transfer/base/version.h"
 
 namespace rebounce {
 namespace {
@@ -194,6 +199,15 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   build.make_outputs();
   build.make_operator();
   return build.take();
+}
+
+std::shared_ptr<const TransferData> build_transfer(const std::filesystem::path& scene_path,
+                                                   const BuildSettings& settings,
+                                                   BuildReport& report,
+                                                   const BuildProgress& progress,
+                                                   const EstimateListener& on_estimate) {
+  return std::make_shared<const TransferData>(
+      build_transfer_data(scene_path, settings, report, progress, on_estimate));
 }
 
 }  // namespace rebounce

@@ -4,7 +4,7 @@
 #include "precompute/build/operator_stage.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "precompute/build/build_settings.h"
 #include "precompute/patches/patch_model.h"
+#include "rebounce/build_settings.h"
 
 namespace rebounce {
 

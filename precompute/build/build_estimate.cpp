@@ -12,7 +12,7 @@
 #include "precompute/exchange/pairs/closure.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/exchange/linked_form_factors.h"
 
 namespace rebounce {

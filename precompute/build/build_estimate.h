@@ -4,12 +4,12 @@
 #include <cstdint>
 
 #include "precompute/base/progress.h"
-#include "precompute/build/build_report.h"
-#include "precompute/build/build_settings.h"
 #include "precompute/compression/hierarchical_settings.h"
 #include "precompute/patches/patch_model.h"
+#include "rebounce/build_report.h"
+#include "rebounce/build_settings.h"
+#include "rebounce/scene_data.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/data/patch_roles.h"
 
 namespace rebounce {
 

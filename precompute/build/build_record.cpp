@@ -6,20 +6,6 @@
 namespace rebounce {
 namespace {
 
-const char* name(OperatorKind kind) {
-  switch (kind) {
-    case OperatorKind::kHierarchical:
-      return "hierarchical";
-    case OperatorKind::kLowRank:
-      return "low-rank";
-    case OperatorKind::kNoOperator:
-      return "none";
-    case OperatorKind::kDense:
-      break;
-  }
-  return "dense";
-}
-
 const char* name(ExchangeSource kind) {
   return kind == ExchangeSource::kLinks ? "links" : "pairs";
 }
@@ -31,7 +17,7 @@ bool is_hierarchical(const BuildSettings& settings) {
 /// Those that had a part in the build.
 std::string settings_json(const BuildSettings& settings, double form_factor_tolerance) {
   const FormFactorSettings& f = settings.form_factors;
-  nlohmann::json json{{"operator", name(settings.operator_kind)},
+  nlohmann::json json{{"operator", operator_name(settings.operator_kind)},
                       {"form_factors", name(settings.exchange_source)},
                       {"store_form_factors", settings.store_form_factors},
                       {"form_factor_tolerance", form_factor_tolerance},
@@ -101,7 +87,8 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
 }  // namespace
 
 void record_build(const BuildSettings& decided, const BuildReport& report,
-                  const std::vector<KindError>& errors, BuildRecord& record) {
+                  const std::vector<KindError>& errors, TransferData& data) {
+  BuildRecord& record = data.record;
   for (const KindError& e : errors) {
     record.error_bound = std::max(record.error_bound, e.bound);
     if (e.kind != LightKind::kPoint) continue;
@@ -109,8 +96,8 @@ void record_build(const BuildSettings& decided, const BuildReport& report,
     record.error_max = e.max;
   }
   record.tolerance = is_hierarchical(decided) ? decided.tolerance : 0;
-  record.settings_json = settings_json(decided, report.form_factor_tolerance);
-  record.report_json = report_json(report, errors);
+  data.settings_json = settings_json(decided, report.form_factor_tolerance);
+  data.report_json = report_json(report, errors);
 }
 
 }  // namespace rebounce

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "precompute/build/build_report.h"
-#include "precompute/build/build_settings.h"
 #include "precompute/build/phase_clock.h"
 #include "precompute/exchange/pairs/exchange_results.h"
 #include "precompute/patches/patch_model.h"
+#include "rebounce/build_report.h"
+#include "rebounce/build_settings.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 

@@ -13,8 +13,8 @@
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {
@@ -159,7 +159,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
   // The check is the last step that needs all of them.
   data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
   if (decided.store_links) report.link_count = data.links.pair.size();
-  record_build(decided, report, errors, data.record);
+  record_build(decided, report, errors, data);
 }
 
 }  // namespace rebounce

@@ -9,7 +9,7 @@
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {
@@ -72,7 +72,7 @@ void check_operator(TransferData& data, const RayTracer& tracer, const DenseOper
     }
     return measure_error(data, tracer, exact, decided.form_factors.seed, part);
   });
-  record_build(decided, report, errors, data.record);
+  record_build(decided, report, errors, data);
 }
 
 }  // namespace

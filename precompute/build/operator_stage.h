@@ -1,11 +1,11 @@
 #pragma once
 
-#include "precompute/build/build_report.h"
-#include "precompute/build/build_settings.h"
 #include "precompute/build/phase_clock.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "rebounce/build_report.h"
+#include "rebounce/build_settings.h"
+#include "rebounce/scene_data.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/data/patch_roles.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {

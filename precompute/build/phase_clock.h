@@ -2,8 +2,9 @@
 
 #include <chrono>
 
-#include "precompute/build/build_report.h"
-#include "transfer/base/error.h"
+#include "precompute/base/progress.h"
+#include "rebounce/build_report.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 

@@ -9,9 +9,9 @@
 #include "precompute/cli/picture_options.h"
 #include "runtime/demo/bake/glb_file.h"
 #include "runtime/demo/bake/lit_mesh.h"
-#include "runtime/frame/engine.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/solvers/solve_radiosity.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::cli {
 namespace {
@@ -32,7 +32,7 @@ void run(const BakeOptions& chosen, const CommonOptions& options) {
                            .sky = setup.sky,
                            .indirect_irradiance = engine.indirect_irradiance(),
                            .emitted_irradiance = emitted};
-  const LitMesh mesh = light_mesh(*data, engine.tracer(), light,
+  const LitMesh mesh = light_mesh(*data, *engine.parts().tracer, light,
                                   choose_camera(chosen.camera, engine), chosen.settings);
   const std::size_t bytes = write_glb(chosen.output, mesh, *data, setup.lights);
   if (options.json) {

@@ -4,8 +4,8 @@
 
 #include "precompute/base/npz_writer.h"
 #include "precompute/cli/commands.h"
-#include "transfer/base/error.h"
-#include "transfer/file/transfer_file.h"
+#include "rebounce/error.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::cli {
 namespace {

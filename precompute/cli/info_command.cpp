@@ -6,7 +6,7 @@
 #include "precompute/cli/commands.h"
 #include "precompute/cli/info_json.h"
 #include "precompute/patches/patch_selection.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::cli {
@@ -81,7 +81,7 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
       {"compressed_form_factor_bytes",
        data.compressed_form_factors ? data.compressed_form_factors->bytes() : 0},
       {"link_count", data.links.pair.size()},
-      {"operator", data.transfer->kind()},
+      {"operator", operator_name(data.transfer->kind())},
       {"operator_bytes", data.transfer->bytes()},
       {"bytes_per_patch", static_cast<double>(data.transfer->bytes()) / n},
       {"receiver_count", roles.count(PatchRoles::kReceiver, data.patches.size())},
@@ -93,8 +93,8 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
       {"error_mean", record.error_mean},
       {"error_max", record.error_max},
       {"error_bound", record.error_bound},
-      {"settings", parse_or_text(record.settings_json)},
-      {"report", parse_or_text(record.report_json)}};
+      {"settings", parse_or_text(data.settings_json)},
+      {"report", parse_or_text(data.report_json)}};
   for (const char* error : {"form_factor_error_mean", "form_factor_error_max"}) {
     if (info["report"].contains(error)) info[error] = info["report"][error];
   }

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::cli {
 namespace {

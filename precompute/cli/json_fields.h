@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce::cli {
 

@@ -10,12 +10,12 @@
 
 #include "precompute/cli/json_fields.h"
 #include "precompute/import/import_gltf.h"
+#include "rebounce/error.h"
+#include "rebounce/lights.h"
+#include "rebounce/sky.h"
 #include "runtime/lights/emitting_material.h"
-#include "runtime/lights/ies_profile.h"
 #include "runtime/lights/lamp_kind.h"
-#include "runtime/lights/sky_model.h"
-#include "transfer/base/error.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::cli {
 namespace {

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "transfer/data/scene_description.h"
+#include "rebounce/lights.h"
+#include "rebounce/sky.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce::cli {

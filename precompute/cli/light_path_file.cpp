@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "precompute/cli/json_fields.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::cli {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "precompute/cli/commands.h"
 #include "precompute/cli/console.h"
-#include "transfer/base/error.h"
-#include "transfer/base/version.h"
+#include "rebounce/error.h"
+#include "rebounce/version.h"
 
 namespace {
 

@@ -1,4 +1,5 @@
 #include "precompute/cli/picture_options.h"
+#include "runtime/frame/engine_parts.h"
 
 #include <fmt/format.h>
 
@@ -9,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "rebounce/error.h"
 #include "runtime/demo/picture/camera.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::cli {
 namespace {
@@ -46,7 +47,7 @@ std::vector<float> parse_numbers(const std::string& text) {
 Camera choose_camera(const std::string& wanted, const Engine& engine) {
   const TransferData& data = engine.data();
   if (wanted.empty()) {
-    return data.cameras.empty() ? fit_camera(data, engine.tracer(), engine.radiosity())
+    return data.cameras.empty() ? fit_camera(data, *engine.parts().tracer, engine.radiosity())
                                 : data.cameras.front();
   }
   for (const Camera& camera : data.cameras) {

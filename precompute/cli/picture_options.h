@@ -4,9 +4,9 @@
 #include <utility>
 #include <vector>
 
+#include "rebounce/engine.h"
+#include "rebounce/scene_data.h"
 #include "runtime/demo/picture/picture.h"
-#include "runtime/frame/engine.h"
-#include "transfer/data/scene_description.h"
 
 namespace rebounce::cli {
 

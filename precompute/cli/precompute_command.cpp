@@ -6,14 +6,14 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 #include "precompute/cli/commands.h"
 #include "precompute/cli/info_json.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/patches/patch_selection.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/precision.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::cli {
@@ -106,7 +106,7 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   fmt::print(
       "operator: {}, {:.1f} MiB ({:.0f} bytes per patch), residual {:.1e}, error of the indirect "
       "light {:.1e} mean, {:.1e} max\n",
-      data.transfer->kind(), static_cast<double>(data.transfer->bytes()) / (1 << 20),
+      operator_name(data.transfer->kind()), static_cast<double>(data.transfer->bytes()) / (1 << 20),
       static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
       data.record.solve_residual, data.record.error_mean, data.record.error_max);
   if (const PatchRoles& roles = data.transfer->roles(); !roles.all_are_both()) {
@@ -170,9 +170,10 @@ FormFactorQuality quality_named(std::string_view name) {
   return name == "high" ? FormFactorQuality::kHigh : FormFactorQuality::kDefault;
 }
 
-std::vector<std::string> precision_names() {
+/// The names in a table of them.
+std::vector<std::string> names_of(const auto& table) {
   std::vector<std::string> names;
-  for (const OfferedPrecision& offered : kOfferedPrecisions) names.emplace_back(offered.name);
+  for (const auto& entry : table) names.emplace_back(entry.name);
   return names;
 }
 
@@ -184,11 +185,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   if (chosen.form_factors == "pairs") settings.exchange_source = ExchangeSource::kPairs;
   if (chosen.form_factors == "links") settings.exchange_source = ExchangeSource::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
-  for (const OfferedPrecision& offered : kOfferedPrecisions) {
-    if (chosen.precision == offered.name) settings.precision = offered.precision;
-  }
-  if (chosen.operator_kind == "dense") settings.operator_kind = OperatorKind::kDense;
-  if (chosen.operator_kind == "low-rank") settings.operator_kind = OperatorKind::kLowRank;
+  if (!chosen.precision.empty()) settings.precision = precision_named(chosen.precision);
+  settings.operator_kind = operator_kind(chosen.operator_kind);
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
   check_can_write(chosen.output);
@@ -272,7 +270,7 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
           "--operator", chosen.operator_kind,
           "Kind of the operator: hierarchical, to a tolerance; low-rank, of one rank; or dense, "
           "exact to rounding and n² numbers")
-      ->check(CLI::IsMember({"hierarchical", "low-rank", "dense"}))
+      ->check(CLI::IsMember(names_of(kOperatorKinds)))
       ->capture_default_str();
   command
       .add_option("--rank", chosen.settings.rank,
@@ -291,7 +289,7 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
           "q8 for a third of the bytes, q16 for half of them and, where all of them fit a "
           "processor's own cache, a little less time; by default f32 for a dense operator, q8 for "
           "a hierarchical one, f16 for others")
-      ->check(CLI::IsMember(precision_names()));
+      ->check(CLI::IsMember(names_of(kOfferedPrecisions)));
   command
       .add_option("--receivers", chosen.receivers,
                   "Surfaces that get indirect light; for others none is stored. A list of names of "

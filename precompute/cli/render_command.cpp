@@ -9,14 +9,14 @@
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/picture_options.h"
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/key_light.h"
 #include "runtime/demo/picture/picture.h"
 #include "runtime/demo/shading/patch_errors.h"
-#include "runtime/frame/engine.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/solvers/solve_radiosity.h"
-#include "transfer/base/error.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::cli {
 namespace {
@@ -63,7 +63,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
                         : load_lit_scene(chosen.file, chosen.lights, setup);
 
   Engine engine(data);
-  if (chosen.key_light) setup.lights = {make_key_light(*data, engine.tracer())};
+  if (chosen.key_light) setup.lights = {make_key_light(*data, *engine.parts().tracer)};
   engine.relight(setup.lights, setup.sky);
   settings.camera = choose_camera(chosen.camera, engine);
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
@@ -76,7 +76,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   light.indirect_irradiance = engine.indirect_irradiance();
   light.emitted_irradiance = emitted_irradiance;
   light.error = error;
-  const Picture picture = render_picture(*data, engine.tracer(), light, settings);
+  const Picture picture = render_picture(*data, *engine.parts().tracer, light, settings);
   write_png(chosen.output, tone_map(picture));
   print_summary(picture, error, chosen, options);
 }

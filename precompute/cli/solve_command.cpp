@@ -11,10 +11,10 @@
 #include "precompute/cli/commands.h"
 #include "precompute/cli/light_file.h"
 #include "precompute/cli/method_names.h"
-#include "runtime/frame/engine.h"
+#include "rebounce/error.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 #include "transfer/exchange/compressed_form_factors.h"
 #include "transfer/exchange/linked_form_factors.h"
 
@@ -55,11 +55,11 @@ Solution solve_by_transfer(Engine& engine) {
   Solution solution;
   solution.microseconds = median_microseconds([&] {
     const auto begin = std::chrono::steady_clock::now();
-    engine.apply_transfer();
+    engine.parts().apply_transfer();
     const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
     return time.count();
   });
-  engine.compute_radiosity();
+  engine.parts().compute_radiosity();
   solution.indirect_irradiance.assign(engine.indirect_irradiance().begin(),
                                       engine.indirect_irradiance().end());
   solution.radiosity.assign(engine.radiosity().begin(), engine.radiosity().end());
@@ -186,8 +186,8 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   LightSetup setup;
   const auto data = load_lit_scene(chosen.file, chosen.lights, setup);
   Engine engine(data);
-  engine.compute_direct(setup.lights, setup.sky);
-  engine.compute_initial_exitance();
+  engine.parts().compute_direct(setup.lights, setup.sky);
+  engine.parts().compute_initial_exitance();
   const std::string kind = form_factors_of(chosen, *data);
   const auto form_factors = choose_form_factors(kind, method_of(chosen), *data);
   const Solution solution = find_solution(chosen, engine, form_factors.get());

@@ -13,12 +13,12 @@
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/picture_options.h"
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/key_light.h"
 #include "runtime/demo/viewer/window/viewer.h"
-#include "runtime/frame/engine.h"
-#include "transfer/base/error.h"
-#include "transfer/file/transfer_file.h"
+#include "runtime/frame/engine_parts.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::cli {
 namespace {
@@ -54,7 +54,7 @@ LightSetup lights_to_begin_with(const ViewOptions& chosen, const Engine& engine)
     return choose_lights(chosen.lights, data);
   }
   LightSetup setup;
-  setup.lights = {make_key_light(data, engine.tracer())};
+  setup.lights = {make_key_light(data, *engine.parts().tracer)};
   return setup;
 }
 
@@ -69,7 +69,7 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
   setup.sky = lights.sky;
   setup.camera = choose_camera(chosen.camera, engine);
   if (chosen.sphere) {
-    setup.spheres.push_back(sphere_ahead(setup.camera, engine.tracer(), *data));
+    setup.spheres.push_back(sphere_ahead(setup.camera, *engine.parts().tracer, *data));
   }
   setup.make_probes = [data] { return make_probes_for_view(*data); };
   setup.show = parse_show(chosen.show);

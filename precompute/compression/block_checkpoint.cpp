@@ -5,7 +5,7 @@
 #include <span>
 #include <type_traits>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/file/atomic_file.h"
 #include "transfer/file/content_hash.h"
 

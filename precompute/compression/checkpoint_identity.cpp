@@ -4,9 +4,9 @@
 #include <string_view>
 #include <vector>
 
-#include "transfer/base/version.h"
+#include "rebounce/version.h"
 #include "transfer/file/content_hash.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce {

@@ -7,21 +7,13 @@
 #include "precompute/base/progress.h"
 #include "precompute/compression/hierarchical_settings.h"
 #include "precompute/lights/fitting_lights.h"
+#include "rebounce/build_report.h"
 #include "transfer/exchange/exchange_matrix.h"
 #include "transfer/exchange/linked_form_factors.h"
 #include "transfer/file/transfer_data.h"
 #include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce {
-
-/// Relative area-weighted L2 errors of gathered light, F B. Lights from which nothing arrives
-/// (arrives_nowhere) have no error.
-struct FormFactorError {
-  double mean = 0;
-  double max = 0;
-  int light_count = 0;  ///< lights that have an error
-  int dark_count = 0;   ///< lights from which nothing arrives
-};
 
 /// Compresses the form factors as build_hierarchical_transfer compresses Y: G = A^1/2 F A^-1/2, one
 /// matrix for the three channels. The lights are radiosities B, [n] in lx, and `settings.tolerance`

@@ -7,7 +7,7 @@
 
 #include "precompute/base/blas.h"
 #include "precompute/base/symmetric_matrix.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

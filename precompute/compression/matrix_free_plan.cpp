@@ -11,7 +11,7 @@
 #include "precompute/inverse/solved_transfer.h"
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/patches/patch_selection.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce {

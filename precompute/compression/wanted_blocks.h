@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "precompute/patches/cluster_tree.h"
-#include "transfer/data/patch_roles.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
 

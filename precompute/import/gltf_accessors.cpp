@@ -6,7 +6,7 @@
 #include <bit>
 #include <cstring>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -9,7 +9,7 @@
 #include "precompute/import/gltf_meshopt.h"
 #include "precompute/import/gltf_resources.h"
 #include "precompute/import/gltf_validation.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -8,7 +8,7 @@
 #include <array>
 #include <cstring>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

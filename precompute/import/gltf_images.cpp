@@ -11,7 +11,7 @@
 #include <memory>
 #include <new>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "precompute/import/gltf_nodes.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

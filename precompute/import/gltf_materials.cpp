@@ -8,7 +8,7 @@
 #include <tuple>
 
 #include "precompute/import/gltf_images.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

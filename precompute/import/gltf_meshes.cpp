@@ -13,8 +13,8 @@
 
 #include "precompute/import/gltf_instances.h"
 #include "precompute/import/gltf_primitives.h"
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

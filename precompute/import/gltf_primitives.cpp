@@ -9,7 +9,7 @@
 
 #include "precompute/import/gltf_accessors.h"
 #include "precompute/import/gltf_draco.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -6,7 +6,7 @@
 #include <cctype>
 
 #include "precompute/import/gltf_container.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::gltf {
 namespace {

@@ -11,7 +11,7 @@
 #include "precompute/import/gltf_materials.h"
 #include "precompute/import/gltf_meshes.h"
 #include "precompute/import/gltf_nodes.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "transfer/base/types.h"
-#include "transfer/data/scene_description.h"
+#include "rebounce/scene_data.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "precompute/base/blas.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/format/hierarchical_values.h"
 
 namespace rebounce {

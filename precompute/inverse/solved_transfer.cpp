@@ -9,7 +9,7 @@
 
 #include "precompute/base/blas.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

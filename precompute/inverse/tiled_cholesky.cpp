@@ -5,7 +5,7 @@
 
 #include "precompute/base/blas.h"
 #include "precompute/base/flush_to_zero.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/scene_data.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/data/patch_roles.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {

@@ -8,8 +8,8 @@
 #include "precompute/lights/error_reference.h"
 #include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "rebounce/scene_data.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/data/patch_roles.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "precompute/base/arithmetic.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -9,10 +9,11 @@
 #include <vector>
 
 #include "precompute/patches/hit_patch.h"
+#include "rebounce/error.h"
+#include "rebounce/scene_data.h"
+#include "rebounce/sky.h"
 #include "runtime/outputs/spherical_harmonics.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/base/error.h"
-#include "transfer/data/sky_harmonics.h"
 
 namespace rebounce {
 

@@ -9,10 +9,10 @@
 #include "precompute/outputs/emitter_points.h"
 #include "precompute/outputs/harmonic_view.h"
 #include "precompute/patches/hit_patch.h"
+#include "rebounce/error.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -6,18 +6,11 @@
 #include <span>
 
 #include "precompute/base/progress.h"
+#include "rebounce/build_settings.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
-
-struct ProbeSettings {
-  Uint3 grid{0, 0, 0};  ///< probes along x, y and z; zeros: as many as `spacing` gives
-  float spacing = 0;    ///< metres between probes; 0: no probes unless `grid` is set
-  /// Rays of each probe, at least 64. The error falls with the number, at best in proportion. The
-  /// file and the time of a frame grow until all visible patches are hit.
-  int ray_count = 2048;
-};
 
 /// The centres of the cells of a grid over the box around `mesh`. Throws Error if there are more
 /// than 65,536. `settings` must ask for probes.

@@ -9,9 +9,9 @@
 #include <limits>
 
 #include "precompute/outputs/page_packing.h"
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/triangle.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -7,21 +7,10 @@
 #include <vector>
 
 #include "precompute/patches/patch_model.h"
-#include "transfer/data/lightmap.h"
+#include "rebounce/build_settings.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
-
-/// The limits of the side of a lightmap, texels.
-inline constexpr std::uint32_t kSmallestLightmap = 16, kLargestLightmap = 4096;
-
-struct LightmapSettings {
-  /// Texels along each side; 0: no lightmap. More texels give sharper light; the file grows by 12
-  /// bytes per texel.
-  std::uint32_t size = 0;
-  /// Texels by which charts continue beyond their edge. More padding allows more mip levels; charts
-  /// closer to each other share the texels between them.
-  std::uint32_t padding = 4;
-};
 
 struct PlacedLightmap {
   Lightmap lightmap;

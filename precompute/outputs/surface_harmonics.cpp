@@ -7,10 +7,10 @@
 
 #include "precompute/outputs/harmonic_view.h"
 #include "precompute/sampling/hemisphere_rays.h"
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

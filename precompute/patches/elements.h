@@ -5,7 +5,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

@@ -10,7 +10,8 @@
 #include <vector>
 
 #include "precompute/patches/texture_sampling.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
+#include "transfer/data/opacity_maps.h"
 
 namespace rebounce {
 namespace {

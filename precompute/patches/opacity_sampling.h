@@ -3,7 +3,7 @@
 #include <span>
 
 #include "precompute/import/scene.h"
-#include "transfer/data/opacity_maps.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
 

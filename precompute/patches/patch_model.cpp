@@ -15,8 +15,8 @@
 #include "precompute/patches/texture_sampling.h"
 #include "precompute/patches/vertex_split.h"
 #include "precompute/patches/welded_positions.h"
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -11,7 +11,7 @@
 #include <set>
 #include <utility>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

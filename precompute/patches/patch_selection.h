@@ -8,7 +8,7 @@
 
 #include "precompute/import/scene.h"
 #include "precompute/patches/patch_model.h"
-#include "transfer/data/patch_roles.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
 

@@ -5,16 +5,9 @@
 #include <vector>
 
 #include "precompute/import/scene.h"
+#include "rebounce/build_settings.h"
 
 namespace rebounce {
-
-struct SubdivisionSettings {
-  /// Wanted number of patches; 0: patch_size decides. More patches resolve finer light; offline
-  /// time and memory grow with their square.
-  std::size_t patch_count = 4096;
-  /// The largest length of a patch, metres; 0: no limit.
-  float patch_size = 0;
-};
 
 /// After bisection, a mesh of large triangles has no edge longer than this number of mean patch
 /// sizes.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "precompute/import/scene.h"
+#include "transfer/data/opacity_maps.h"
 
 namespace rebounce {
 

@@ -12,20 +12,15 @@
 #include <string>
 #include <vector>
 
-#include "runtime/frame/engine.h"
+#include "rebounce/engine.h"
+#include "rebounce/error.h"
+#include "rebounce/outputs.h"
+#include "rebounce/sky.h"
+#include "rebounce/transfer_file.h"
+#include "rebounce/version.h"
 #include "runtime/lights/lamp_kind.h"
-#include "runtime/lights/light_sampling.h"
 #include "runtime/lights/sky_light.h"
-#include "runtime/lights/sky_model.h"
-#include "runtime/outputs/octahedral_map.h"
-#include "runtime/outputs/probe_irradiance.h"
-#include "runtime/outputs/probe_light.h"
-#include "runtime/outputs/surface_light.h"
-#include "runtime/outputs/texel_light.h"
-#include "runtime/outputs/vertex_light.h"
-#include "transfer/base/error.h"
-#include "transfer/base/version.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_data.h"
 
 using namespace rebounce;
 
@@ -39,16 +34,9 @@ struct rebounce_transfer {
 struct rebounce_engine {
   Engine engine;
   std::vector<Light> lights;                                ///< of the current frame
-  Sky sky;                                                  ///< of the current frame
   std::shared_ptr<const SkyDistribution> sky_distribution;  ///< may be null
-  std::vector<Float3> vertex_irradiance;  ///< [v] only if there is a lightmap, which needs it
-  std::vector<SurfaceLight> patch_light;  ///< [n] only if there are surface harmonics
 
-  explicit rebounce_engine(Engine made) : engine(std::move(made)) {
-    const TransferData& data = engine.data();
-    if (!data.lightmap.empty()) vertex_irradiance.resize(data.mesh.position.size());
-    patch_light.resize(data.surface_harmonics.sky.size());
-  }
+  explicit rebounce_engine(Engine made) : engine(std::move(made)) {}
 };
 
 // NOLINTEND(readability-identifier-naming)
@@ -79,6 +67,8 @@ template <typename Work>
 rebounce_status guarded(rebounce_status status, const Work& work) noexcept {
   try {
     return work();
+  } catch (const Unsupported& error) {
+    return fail(REBOUNCE_UNSUPPORTED, error.what());
   } catch (const Error& error) {
     return fail(status, error.what());
   } catch (const std::bad_alloc&) {
@@ -132,7 +122,6 @@ constexpr std::size_t kInfoSize1 = offsetof(rebounce_transfer_info, operator_byt
                                    sizeof(rebounce_transfer_info::operator_bytes);
 static_assert(kLightSize1 == 84 && kSettingsSize1 == 16 && kInfoSize1 == 48);
 
-#if REBOUNCE_WITH_EMBREE
 /// Reads light k of an array whose entries have the size that the caller states.
 void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   rebounce_light defaults;
@@ -160,15 +149,7 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   light.radius = given.radius;
   light.size = {given.size[0], given.size[1]};
   light.tangent = triple(given.tangent);
-  check_light(light);
 }
-
-/// The engine checks the values.
-Sky take_sky(const rebounce_sky* sky, const std::shared_ptr<const SkyDistribution>& distribution) {
-  if (sky == nullptr) return {};
-  return {triple(sky->color), sky->luminance, distribution};
-}
-#endif
 
 Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_settings& settings) {
   const auto number = [](std::uint32_t given) {
@@ -182,14 +163,13 @@ Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_sett
                  .scheduler = {settings.parallel_for, settings.user}});
 }
 
-/// The light at the probes, with the coefficients of type `Light`.
-template <typename Light>
-rebounce_status write_probe_light(const rebounce_engine& engine, float* harmonics,
-                                  std::size_t probe_count) {
+/// Calls write(engine, values) with `count` entries of an output.
+template <typename Value, typename Handle, typename Write>
+rebounce_status write_output(const char* function, Handle* engine, float* values, std::size_t count,
+                             const Write& write) noexcept {
+  if (engine == nullptr || values == nullptr) return missing(function);
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    apply_probes(engine.engine.data().probes, engine.engine.radiosity(), engine.sky,
-                 std::span(reinterpret_cast<Light*>(harmonics), probe_count),
-                 engine.engine.scheduler());
+    write(engine->engine, std::span(reinterpret_cast<Value*>(values), count));
     return REBOUNCE_OK;
   });
 }
@@ -222,8 +202,7 @@ rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** tra
   return guarded(REBOUNCE_BAD_INPUT, [&] {
     const auto* const utf8 = reinterpret_cast<const char8_t*>(path);
     auto handle = std::make_unique<rebounce_transfer>();
-    handle->data = std::make_shared<const TransferData>(
-        load_transfer_file(std::filesystem::path(std::u8string(utf8))));
+    handle->data = load_transfer(std::filesystem::path(std::u8string(utf8)));
     *transfer = handle.release();
     return REBOUNCE_OK;
   });
@@ -357,21 +336,14 @@ rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_
   if (engine == nullptr || (lights == nullptr && light_count > 0)) {
     return missing("rebounce_engine_relight");
   }
-#if REBOUNCE_WITH_EMBREE
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     engine->lights.resize(light_count);
     for (std::size_t k = 0; k < light_count; ++k) take_light(lights, k, engine->lights[k]);
-    const Sky taken = take_sky(sky, engine->sky_distribution);
+    Sky taken;
+    if (sky != nullptr) taken = {triple(sky->color), sky->luminance, engine->sky_distribution};
     engine->engine.relight(engine->lights, taken);
-    engine->sky = taken;
     return REBOUNCE_OK;
   });
-#else
-  static_cast<void>(sky);
-  return fail(REBOUNCE_UNSUPPORTED,
-              "this library was built without Embree and traces no light; bring the direct "
-              "irradiance with rebounce_engine_relight_direct");
-#endif
 }
 
 rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const float* irradiance,
@@ -382,7 +354,6 @@ rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const fl
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     const auto* const triples = reinterpret_cast<const Float3*>(irradiance);
     engine->engine.relight(std::span(triples, patch_count));
-    engine->sky = {};
     return REBOUNCE_OK;
   });
 }
@@ -434,32 +405,14 @@ const float* rebounce_engine_radiosity(const rebounce_engine* engine) {
 
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count) {
-  if (engine == nullptr || irradiance == nullptr) {
-    return missing("rebounce_engine_vertex_irradiance");
-  }
-  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    reconstruct_at_vertices(engine->engine.data().mesh, engine->engine.indirect_irradiance(),
-                            {reinterpret_cast<Float3*>(irradiance), vertex_count},
-                            engine->engine.scheduler());
-    return REBOUNCE_OK;
-  });
+  return write_output<Float3>("rebounce_engine_vertex_irradiance", engine, irradiance, vertex_count,
+                              vertex_irradiance);
 }
 
 rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* harmonics,
                                              size_t vertex_count) {
-  if (engine == nullptr || harmonics == nullptr) return missing("rebounce_engine_vertex_light");
-  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    const TransferData& data = engine->engine.data();
-    if (data.surface_harmonics.empty()) {
-      throw Error("the transfer file has no surface harmonics; make it with --surface-harmonics");
-    }
-    apply_surface_harmonics(data.surface_harmonics, engine->engine.radiosity(), engine->sky,
-                            engine->patch_light, engine->engine.scheduler());
-    reconstruct_at_vertices(data.mesh, engine->patch_light,
-                            {reinterpret_cast<SurfaceLight*>(harmonics), vertex_count},
-                            engine->engine.scheduler());
-    return REBOUNCE_OK;
-  });
+  return write_output<SurfaceLight>("rebounce_engine_vertex_light", engine, harmonics, vertex_count,
+                                    vertex_light);
 }
 
 void rebounce_bent_irradiance(const float* harmonics, const float* irradiance, const float* normal,
@@ -476,35 +429,22 @@ void rebounce_bent_irradiance(const float* harmonics, const float* irradiance, c
 
 rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,
                                                     size_t texel_count) {
-  if (engine == nullptr || irradiance == nullptr) {
-    return missing("rebounce_engine_lightmap_irradiance");
-  }
-  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    const TransferData& data = engine->engine.data();
-    if (data.lightmap.empty()) {
-      throw Error("the transfer file has no lightmap; make it with --lightmap");
-    }
-    reconstruct_at_vertices(data.mesh, engine->engine.indirect_irradiance(),
-                            engine->vertex_irradiance, engine->engine.scheduler());
-    interpolate_at_texels(data.lightmap, data.mesh, engine->vertex_irradiance,
-                          {reinterpret_cast<Float3*>(irradiance), texel_count},
-                          engine->engine.scheduler());
-    return REBOUNCE_OK;
-  });
+  return write_output<Float3>("rebounce_engine_lightmap_irradiance", engine, irradiance,
+                              texel_count, lightmap_irradiance);
 }
 
 rebounce_status rebounce_engine_probe_light(const rebounce_engine* engine, float* harmonics,
                                             size_t probe_count) {
-  if (engine == nullptr || harmonics == nullptr) return missing("rebounce_engine_probe_light");
-  return write_probe_light<QuadraticProbeLight>(*engine, harmonics, probe_count);
+  return write_output<QuadraticProbeLight>(
+      "rebounce_engine_probe_light", engine, harmonics, probe_count,
+      [](const Engine& of, std::span<QuadraticProbeLight> light) { probe_light(of, light); });
 }
 
 rebounce_status rebounce_engine_probe_light_to_degree_4(const rebounce_engine* engine,
                                                         float* harmonics, size_t probe_count) {
-  if (engine == nullptr || harmonics == nullptr) {
-    return missing("rebounce_engine_probe_light_to_degree_4");
-  }
-  return write_probe_light<ProbeLight>(*engine, harmonics, probe_count);
+  return write_output<ProbeLight>(
+      "rebounce_engine_probe_light_to_degree_4", engine, harmonics, probe_count,
+      [](const Engine& of, std::span<ProbeLight> light) { probe_light(of, light); });
 }
 
 void rebounce_harmonics_irradiance(const float* harmonics, const float* normal, float* irradiance) {
@@ -519,16 +459,12 @@ void rebounce_harmonics_irradiance_to_degree_4(const float* harmonics, const flo
 rebounce_status rebounce_engine_probe_irradiance(const rebounce_engine* engine,
                                                  const float* normals, size_t normal_count,
                                                  float* irradiance, size_t probe_count) {
-  if (engine == nullptr || normals == nullptr || irradiance == nullptr) {
-    return missing("rebounce_engine_probe_irradiance");
-  }
-  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    irradiance_at_probes(engine->engine.data().probes, engine->engine.radiosity(), engine->sky,
-                         {reinterpret_cast<const Float3*>(normals), normal_count},
-                         {reinterpret_cast<Float3*>(irradiance), probe_count * normal_count},
-                         engine->engine.scheduler());
-    return REBOUNCE_OK;
-  });
+  if (normals == nullptr) return missing("rebounce_engine_probe_irradiance");
+  return write_output<Float3>(
+      "rebounce_engine_probe_irradiance", engine, irradiance, probe_count * normal_count,
+      [&](const Engine& of, std::span<Float3> at_probes) {
+        probe_irradiance(of, {reinterpret_cast<const Float3*>(normals), normal_count}, at_probes);
+      });
 }
 
 void rebounce_octahedral_normals(size_t size, float* normals) {

@@ -5,13 +5,13 @@
 #include <cassert>
 #include <cmath>
 
+#include "rebounce/error.h"
 #include "runtime/lights/lamp_shadows.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

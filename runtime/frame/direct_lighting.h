@@ -5,7 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/frame/direct_lighting_settings.h"
+#include "rebounce/engine.h"
+#include "rebounce/sky.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/base/parallel.h"
 #include "transfer/file/transfer_data.h"

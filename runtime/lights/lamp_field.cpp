@@ -5,8 +5,8 @@
 #include <numbers>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

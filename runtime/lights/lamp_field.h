@@ -9,7 +9,7 @@
 #include <span>
 #include <string_view>
 
-#include "transfer/data/scene_description.h"
+#include "rebounce/lights.h"
 
 namespace rebounce {
 

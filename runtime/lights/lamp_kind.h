@@ -8,9 +8,9 @@
 #include <span>
 #include <string_view>
 
+#include "rebounce/scene_data.h"
 #include "runtime/lights/lamp_field.h"
 #include "runtime/lights/lamp_mesh.h"
-#include "transfer/data/scene_description.h"
 
 namespace rebounce {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

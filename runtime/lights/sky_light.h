@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "rebounce/sky.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {

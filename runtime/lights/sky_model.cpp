@@ -1,4 +1,4 @@
-#include "runtime/lights/sky_model.h"
+#include "rebounce/sky.h"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <numbers>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

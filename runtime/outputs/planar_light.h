@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-#include "transfer/data/light_probes.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
 

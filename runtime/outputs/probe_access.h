@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <string>
 
-#include "transfer/base/error.h"
-#include "transfer/data/light_probes.h"
+#include "rebounce/error.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
 

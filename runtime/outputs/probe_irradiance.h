@@ -2,9 +2,9 @@
 
 #include <span>
 
+#include "rebounce/scene_data.h"
+#include "rebounce/sky.h"
 #include "transfer/base/parallel.h"
-#include "transfer/data/light_probes.h"
-#include "transfer/data/scene_description.h"
 
 namespace rebounce {
 

@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <vector>
 
+#include "rebounce/scene_data.h"
+#include "rebounce/sky.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/outputs/spherical_harmonics.h"
-#include "transfer/data/scene_description.h"
-#include "transfer/data/sky_harmonics.h"
 
 namespace rebounce {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "transfer/data/light_probes.h"
+#include "rebounce/outputs.h"
 
 namespace rebounce {
 
@@ -75,10 +75,7 @@ Harmonics degree_4_of_spot(const std::array<float, N>& weight) {
   return degree_4;
 }
 
-/// The harmonics that matter for irradiance up to degree 5: nine of degrees 0 to 2 and nine of
-/// degree 4. Of the odd degrees, the cosine lobe has only degree 1.
-inline constexpr std::size_t kIrradianceHarmonicCount = 2 * kHarmonicCount;
-
+/// Those of degree 0 to 2, then those of degree 4.
 inline std::array<float, kIrradianceHarmonicCount> irradiance_harmonics(const Float3& d) {
   std::array<float, kIrradianceHarmonicCount> all;
   const auto rest = std::ranges::copy(spherical_harmonics(d), all.begin()).out;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/outputs/seen_sky.h"
 #include "runtime/outputs/spherical_harmonics.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

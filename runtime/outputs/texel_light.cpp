@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <span>
 
+#include "rebounce/scene_data.h"
 #include "transfer/base/parallel.h"
-#include "transfer/file/transfer_data.h"
 
 namespace rebounce {
 

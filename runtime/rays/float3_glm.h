@@ -4,7 +4,7 @@
 
 #include <glm/glm.hpp>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

@@ -5,6 +5,7 @@
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
 #include "runtime/rays/triangle.h"
+#include "transfer/data/opacity_maps.h"
 
 namespace rebounce {
 

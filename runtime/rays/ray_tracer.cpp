@@ -12,8 +12,9 @@
 #include <cstddef>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/rays/sampling.h"
-#include "transfer/base/error.h"
+#include "transfer/data/opacity_maps.h"
 
 namespace rebounce {
 namespace {

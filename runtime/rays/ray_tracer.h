@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "transfer/base/types.h"
-#include "transfer/data/opacity_maps.h"
+#include "rebounce/scene_data.h"
+#include "rebounce/types.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
+#include "transfer/base/argument_check.h"
 
 namespace rebounce {
 namespace {
@@ -49,6 +50,11 @@ void RadiositySolver::start_from(std::span<const Float3> radiosity) {
   if (radiosity.size() != radiosity_.size()) {
     throw Error("solver: the radiosity to start from must have one entry per patch");
   }
+  for (const Float3& b : radiosity) {
+    if (!std::ranges::all_of(b, [](float x) { return std::isfinite(x); })) {
+      throw Error("solver: the radiosity to start from is not finite");
+    }
+  }
   std::ranges::copy(radiosity, radiosity_.begin());
   cold_ = false;
 }
@@ -74,6 +80,7 @@ void RadiositySolver::check(std::span<const Float3> initial_exitance,
   if (initial_exitance.size() != area_.size()) {
     throw Error("solver: the initial exitance must have one entry per patch");
   }
+  check_light_of_patches("solver: the initial exitance", initial_exitance);
   if (settings.max_sweeps < 1) throw Error("solver: max_sweeps must be at least 1");
   if (!(settings.residual >= 0)) throw Error("solver: the residual must not be negative");
   if (!(settings.time_budget_microseconds >= 0)) {
@@ -118,7 +125,6 @@ SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_
     result.converged = true;
     return result;
   }
-  if (!std::isfinite(norm)) throw Error("solver: the initial exitance is not finite");
   if (cold_) std::ranges::copy(initial_exitance_, radiosity_.begin());
   begin(std::exchange(cold_, false));
 

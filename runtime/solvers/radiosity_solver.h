@@ -5,33 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "transfer/base/types.h"
+#include "rebounce/solvers.h"
+#include "rebounce/types.h"
 #include "transfer/exchange/form_factor_operator.h"
 
 namespace rebounce {
-
-/// When an iterative method stops (at the first limit that it reaches), and where its loops run.
-/// See notes/solvers.md for the methods.
-struct SolveSettings {
-  int max_sweeps = 100;  ///< at least 1; more: closer to the solution, longer
-  /// Stop when |M0 + rho F B - B| / |M0| (area-weighted L2) is at most this. 0: only sweeps and
-  /// time count. Single precision reaches about 1e-7 |B| / |M0|; a solve that no longer improves
-  /// stops.
-  double residual = 1e-6;
-  double time_budget_microseconds = 0;  ///< no new sweep after this time; 0: no limit
-  /// Measure the residual of the result. `false` saves one gather; the result then has the method's
-  /// own bound.
-  bool measure_residual = true;
-  Scheduler scheduler{};  ///< where the loops of the solve run
-};
-
-struct SolveResult {
-  int sweeps = 0;
-  double residual = 0;      ///< |M0 + rho F B - B| / |M0|, area-weighted L2 over all channels
-  bool converged = false;   ///< the requested residual is reached
-  bool diverged = false;    ///< the residual grew; the result is the best solution found
-  double microseconds = 0;  ///< without the final measurement of the residual
-};
 
 /// The system (I - rho F) B = M0, without M0 and F.
 struct RadiosityProblem {
@@ -51,7 +29,7 @@ class RadiositySolver {
   RadiositySolver& operator=(const RadiositySolver&) = delete;
 
   /// Solves for `initial_exitance` M0 = rho E + Me [n] in lx, starting from the last solution.
-  /// Throws Error if its size or a setting is wrong.
+  /// Throws Error if its size or a setting is wrong, or a number of it is negative or not finite.
   SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings = {});
 
   /// Does the same and copies the solution [n] in lx to `radiosity`.
@@ -65,7 +43,8 @@ class RadiositySolver {
   /// reflectances. Throws Error if the size is wrong or one is not in [0, 1).
   void set_reflectance(std::span<const Float3> reflectance);
 
-  /// The next solve starts from `radiosity` [n] in lx. Throws Error if the size is wrong.
+  /// The next solve starts from `radiosity` [n] in lx. Throws Error if the size is wrong or a
+  /// number is negative or not finite.
   void start_from(std::span<const Float3> radiosity);
 
   /// The next solve starts without a solution.

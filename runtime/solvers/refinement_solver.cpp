@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

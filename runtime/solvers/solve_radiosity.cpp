@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
+#include "rebounce/error.h"
 #include "runtime/solvers/conjugate_gradient_solver.h"
 #include "runtime/solvers/gathering_solver.h"
 #include "runtime/solvers/gauss_seidel_solver.h"
 #include "runtime/solvers/refinement_solver.h"
-#include "transfer/base/error.h"
 #include "transfer/exchange/compressed_form_factors.h"
 #include "transfer/exchange/exchange_blocks.h"
 #include "transfer/exchange/form_factor_blocks.h"

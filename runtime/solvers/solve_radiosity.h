@@ -16,29 +16,6 @@
 
 namespace rebounce {
 
-enum class SolveMethod : std::uint8_t {
-  kGathering,
-  kJacobi,                ///< the same iteration as kGathering (gathering_solver.h)
-  kGaussSeidel,           ///< needs SweepableFormFactors
-  kSymmetricGaussSeidel,  ///< needs SweepableFormFactors
-  kConjugateGradient,
-  kRefine,  ///< needs a stored operator that serves all patches
-};
-
-struct NamedSolveMethod {
-  std::string_view name;  ///< name on the command line
-  SolveMethod method;
-};
-
-inline constexpr std::array<NamedSolveMethod, 6> kSolveMethods = {{
-    {"gathering", SolveMethod::kGathering},
-    {"jacobi", SolveMethod::kJacobi},
-    {"gauss-seidel", SolveMethod::kGaussSeidel},
-    {"symmetric-gauss-seidel", SolveMethod::kSymmetricGaussSeidel},
-    {"conjugate-gradient", SolveMethod::kConjugateGradient},
-    {"refine", SolveMethod::kRefine},
-}};
-
 constexpr bool needs_operator(SolveMethod method) {
   return method == SolveMethod::kRefine;
 }

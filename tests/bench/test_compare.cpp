@@ -5,9 +5,9 @@
 #include "bench/reference/compare.h"
 #include "precompute/outputs/reconstruction_weights.h"
 #include "precompute/patches/lit_sides.h"
+#include "rebounce/error.h"
 #include "tests/support/scene_data.h"
 #include "tests/support/test_scenes.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

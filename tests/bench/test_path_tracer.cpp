@@ -12,10 +12,10 @@
 #include "bench/reference/scene_surface.h"
 #include "precompute/patches/lit_sides.h"
 #include "precompute/patches/texture_sampling.h"
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/error.h"
 
 namespace rebounce::reference {
 namespace {

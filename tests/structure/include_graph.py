@@ -65,7 +65,19 @@ ROOMS = {
 ROOM_ORDER = {room: place for place, room in enumerate(ROOMS)}
 
 # The rooms of public headers without a source of the same name, as "FLOOR/NAME": ROOM.
-PUBLIC_HEADER_ROOMS: dict[str, str] = {}
+PUBLIC_HEADER_ROOMS: dict[str, str] = {
+    "transfer/error": "transfer/base",
+    "transfer/types": "transfer/base",
+    "transfer/scheduler": "transfer/base",
+    "transfer/lights": "transfer/data",
+    "transfer/scene_data": "transfer/data",
+    "runtime/engine": "runtime/frame",
+    "runtime/outputs": "runtime/outputs",
+    "runtime/solvers": "runtime/solvers",
+    "runtime/rebounce": "runtime/lights",
+    "precompute/build_settings": "precompute/base",
+    "precompute/build_report": "precompute/base",
+}
 
 # Rooms whose headers serve their own floor alone, and the tests of that floor.
 PRIVATE_ROOMS = ("transfer/kernels",)

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/frame/engine.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
 
@@ -26,7 +26,7 @@ inline std::vector<glm::dvec3> met_radiosity(const Engine& engine, const Float3&
                     .t_far = std::numeric_limits<float>::infinity()});
   }
   std::vector<Hit> hits(rays.size());
-  engine.tracer().intersect(rays, hits);
+  engine.parts().tracer->intersect(rays, hits);
   std::vector<glm::dvec3> met(hits.size(), glm::dvec3(0));
   for (std::size_t k = 0; k < hits.size(); ++k) {
     if (hits[k].triangle == kNone) continue;

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 
 namespace rebounce::test {
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce::test {
 

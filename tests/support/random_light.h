@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce::test {
 

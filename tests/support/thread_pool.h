@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-#include "transfer/base/parallel.h"
+#include "rebounce/scheduler.h"
 
 namespace rebounce::test {
 

@@ -1,6 +1,9 @@
 #include "transfer/base/precision.h"
 
 #include <algorithm>
+#include <string_view>
+
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {
@@ -25,6 +28,14 @@ bool is_offered(const HierarchicalPrecision& precision) {
 
 std::string precision_name(Precision precision) {
   return offered(precision).name;
+}
+
+Precision precision_named(std::string_view name) {
+  const auto* const named = std::ranges::find(kOfferedPrecisions, name, &OfferedPrecision::name);
+  if (named == kOfferedPrecisions.end()) {
+    throw Error("there is no precision \"" + std::string(name) + "\"");
+  }
+  return named->precision;
 }
 
 std::string precision_name(const HierarchicalPrecision& precision) {

@@ -4,11 +4,9 @@
 #include <cstdint>
 #include <string>
 
-namespace rebounce {
+#include "rebounce/operators.h"
 
-/// How the values of an operator are stored. kQ16 and kQ8 are for hierarchical operators only:
-/// bases as integers of 16 or 8 bits, everything else as kF16.
-enum class Precision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
+namespace rebounce {
 
 /// How the bases of a HierarchicalOperator are stored: IEEE numbers of 16 or 32 bits, or integers.
 enum class BasisPrecision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
@@ -46,9 +44,6 @@ HierarchicalPrecision hierarchical_precision(Precision precision);
 
 /// Whether the command line offers this combination.
 bool is_offered(const HierarchicalPrecision& precision);
-
-/// The name on the command line: "f16", "f32", "q16", "q8".
-std::string precision_name(Precision precision);
 
 /// The name on the command line. `precision` must be one that is offered.
 std::string precision_name(const HierarchicalPrecision& precision);

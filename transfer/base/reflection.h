@@ -2,7 +2,7 @@
 
 #include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

@@ -1,4 +1,4 @@
-#include "transfer/base/version.h"
+#include "rebounce/version.h"
 
 namespace rebounce {
 

@@ -1,4 +1,4 @@
-#include "transfer/data/intensity_profile.h"
+#include "rebounce/lights.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,41 +9,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
-#include "transfer/base/types.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
-
-/// The opacity of some triangles by micro-triangles. A map of level L has 4^L of them: each level
-/// quarters a triangle at the middles of its sides, and the quarters' maps follow one another in
-/// the order first vertex, middle, second vertex, third vertex. The middle one is upside down: its
-/// first vertex is opposite the triangle's.
-struct OpacityMaps {
-  static constexpr int kMaxLevel = 5;
-  static constexpr std::uint8_t kOpaque = 255;  ///< stops everything; 0 stops nothing
-
-  /// [t] the map of each triangle, or kNone for an opaque one. Empty where all are opaque.
-  std::vector<std::uint32_t> triangle_map;
-  std::vector<std::uint32_t> begin;   ///< [m + 1] map k is [begin[k], begin[k + 1]) of `opacity`
-  std::vector<std::uint8_t> opacity;  ///< by micro-triangle, of kOpaque
-
-  bool empty() const { return triangle_map.empty(); }
-  std::size_t map_count() const { return begin.empty() ? 0 : begin.size() - 1; }
-
-  std::span<const std::uint8_t> map(std::uint32_t index) const {
-    return {opacity.data() + begin[index], opacity.data() + begin[index + 1]};
-  }
-
-  /// The map of a triangle, of size 4^level; empty if it is opaque.
-  std::span<const std::uint8_t> of_triangle(std::uint32_t triangle) const {
-    if (empty() || triangle_map[triangle] == kNone) return {};
-    return map(triangle_map[triangle]);
-  }
-
-  /// The part of a triangle that stops light, [0, 1].
-  double stopping_part(std::uint32_t triangle) const;
-};
 
 /// True if a map can have this many micro-triangles: 4^level.
 constexpr bool is_opacity_map_size(std::size_t size) {

@@ -1,6 +1,6 @@
-#include "transfer/exchange/compressed_form_factors.h"
 
-#include "transfer/base/error.h"
+#include "transfer/exchange/compressed_form_factors.h"
+#include "rebounce/error.h"
 #include "transfer/exchange/cluster_relaxation.h"
 
 namespace rebounce {
@@ -17,8 +17,9 @@ CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalO
   }
 }
 
-void CompressedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
-                                   std::span<float> workspace, const Scheduler& scheduler) const {
+void CompressedFormFactors::do_gather(std::span<const Float3> in, std::span<Float3> out,
+                                      std::span<float> workspace,
+                                      const Scheduler& scheduler) const {
   exchange_->apply(in, out, workspace, scheduler);
 }
 

@@ -20,8 +20,6 @@ class CompressedFormFactors final : public SweepableFormFactors {
   std::size_t bytes() const override { return exchange_->bytes(); }
   std::size_t bytes_per_gather() const override { return exchange_->bytes_per_apply(); }
   std::size_t workspace_size() const override { return exchange_->workspace_size(); }
-  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
-              const Scheduler& scheduler = {}) const override;
 
   /// Block Gauss-Seidel in the order of the clusters, on one thread. Dense diagonal blocks are
   /// relaxed patch by patch, as in sequential Gauss-Seidel. Within low-rank diagonal blocks the
@@ -36,6 +34,9 @@ class CompressedFormFactors final : public SweepableFormFactors {
   const HierarchicalOperator& exchange() const { return *exchange_; }
 
  private:
+  void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+                 const Scheduler& scheduler) const override;
+
   std::shared_ptr<const HierarchicalOperator> exchange_;
 };
 

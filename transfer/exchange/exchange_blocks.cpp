@@ -1,7 +1,6 @@
 #include "transfer/exchange/exchange_blocks.h"
 
 #include <algorithm>
-#include <cassert>
 
 #include "transfer/exchange/planes.h"
 #include "transfer/kernels/kernels.h"
@@ -59,10 +58,9 @@ ExchangeBlocks::Row ExchangeBlocks::row(std::size_t row) const {
           row_begin_[row + 1] - inside};
 }
 
-void ExchangeBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
-                            std::span<float> workspace, const Scheduler& scheduler) const {
+void ExchangeBlocks::do_gather(std::span<const Float3> in, std::span<Float3> out,
+                               std::span<float> workspace, const Scheduler& scheduler) const {
   const std::size_t n = patch_count(), stride = plane_size(), planes = kChannelCount * stride;
-  assert(in.size() == n && out.size() == n && workspace.size() >= workspace_size());
   float* const x = workspace.data();
   to_planes(in, stride, x);
   const auto gather_slot = [&](std::size_t s) {

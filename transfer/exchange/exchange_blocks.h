@@ -33,8 +33,6 @@ class ExchangeBlocks final : public SweepableFormFactors {
   std::size_t workspace_size() const override {
     return (1 + kSlotCount) * kChannelCount * plane_size();
   }
-  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
-              const Scheduler& scheduler = {}) const override;
 
   /// Sequential Gauss-Seidel in the order of the patches. Sweeps in one direction read S twice,
   /// sweeps in alternating directions once: see CompressedFormFactors::make_relaxation.
@@ -55,6 +53,9 @@ class ExchangeBlocks final : public SweepableFormFactors {
   float diagonal(std::size_t patch) const { return diagonal_[patch]; }  ///< S(i,i), m²
 
  private:
+  void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+                 const Scheduler& scheduler) const override;
+
   std::vector<float> area_, diagonal_;
   std::vector<std::uint64_t> row_begin_;  ///< [n + 1] index of a row's first block
   /// [n] index of a row's first block within its group; these blocks come last.

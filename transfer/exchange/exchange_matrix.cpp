@@ -1,9 +1,8 @@
 #include "transfer/exchange/exchange_matrix.h"
 
 #include <algorithm>
-#include <cassert>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {
@@ -97,9 +96,8 @@ std::size_t FormFactorRows::bytes() const {
          form_factor_.size() * sizeof(form_factor_[0]);
 }
 
-void FormFactorRows::gather(std::span<const Float3> in, std::span<Float3> out,
-                            std::span<float> /*workspace*/, const Scheduler& scheduler) const {
-  assert(in.size() == patch_count() && out.size() == patch_count());
+void FormFactorRows::do_gather(std::span<const Float3> in, std::span<Float3> out,
+                               std::span<float> /*workspace*/, const Scheduler& scheduler) const {
   parallel_for_pieces(scheduler, patch_count(), kRowsPerTask,
                       [&](std::size_t i) { out[i] = gather_row(i, in); });
 }

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/types.h"
 #include "transfer/base/shared_array.h"
-#include "transfer/base/types.h"
 #include "transfer/exchange/relaxation.h"
 
 namespace rebounce {
@@ -43,9 +43,7 @@ class FormFactorRows final : public SweepableFormFactors {
   std::size_t bytes() const override;
   std::size_t workspace_size() const override { return 0; }
 
-  /// Sums rows in double precision, in parallel. Uses no workspace.
-  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
-              const Scheduler& scheduler = {}) const override;
+  using FormFactorOperator::gather;
   void gather(std::span<const Float3> in, std::span<Float3> out) const { gather(in, out, {}); }
 
   /// Gauss-Seidel in the order of the patches, on one thread.
@@ -55,6 +53,10 @@ class FormFactorRows final : public SweepableFormFactors {
   Float3 gather_row(std::size_t row, std::span<const Float3> in) const;
 
  private:
+  /// Rows are summed in double precision and shared out among threads; no workspace is used.
+  void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+                 const Scheduler& scheduler) const override;
+
   std::vector<std::uint64_t> row_begin_;
   std::vector<std::uint32_t> column_;
   std::vector<float> form_factor_;

@@ -84,9 +84,8 @@ void FormFactorBlocks::from_planes(std::span<const float> planes, std::span<Floa
   rebounce::from_planes(planes.data(), plane_size(), values);
 }
 
-void FormFactorBlocks::gather(std::span<const Float3> in, std::span<Float3> out,
-                              std::span<float> workspace, const Scheduler& scheduler) const {
-  assert(out.size() == patch_count() && workspace.size() >= workspace_size());
+void FormFactorBlocks::do_gather(std::span<const Float3> in, std::span<Float3> out,
+                                 std::span<float> workspace, const Scheduler& scheduler) const {
   const std::span<float> planes = workspace.first(kChannelCount * plane_size());
   to_planes(in, planes);
   parallel_for_pieces(scheduler, patch_count(), kRowsPerTask,

@@ -36,8 +36,6 @@ class FormFactorBlocks final : public SweepableFormFactors {
   std::size_t patch_count() const override { return row_begin_.size() - 1; }
   std::size_t bytes() const override;
   std::size_t workspace_size() const override { return kChannelCount * plane_size(); }
-  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
-              const Scheduler& scheduler = {}) const override;
 
   /// Exact sequential Gauss-Seidel in the order of the patches, on any number of threads. Rows are
   /// relaxed in groups of kGroup. The part of a row outside the group is gathered in parallel, the
@@ -61,6 +59,9 @@ class FormFactorBlocks final : public SweepableFormFactors {
   Float3 gather_inside_group(std::size_t row, std::span<const float> planes) const;
 
  private:
+  void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+                 const Scheduler& scheduler) const override;
+
   Float3 gather_range(std::uint64_t begin, std::uint64_t end, std::span<const float> planes) const;
 
   void fill_row(const FormFactorRows& rows, std::size_t row);

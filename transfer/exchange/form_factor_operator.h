@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/types.h"
 #include "transfer/base/parallel.h"
-#include "transfer/base/types.h"
 
 namespace rebounce {
 
@@ -31,9 +31,14 @@ class FormFactorOperator {
 
   /// Gathers: out(i) = sum over j of F(i,j) in(j), [n] each. `out` must not overlap `in`.
   /// `workspace` has at least workspace_size() floats and is overwritten. Does not allocate or
-  /// lock. Gives the same bits for any `scheduler`.
-  virtual void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
-                      const Scheduler& scheduler = {}) const = 0;
+  /// lock. Gives the same bits for any `scheduler`. Throws Error if a size is wrong.
+  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+              const Scheduler& scheduler = {}) const;
+
+ private:
+  /// What gather does once it has looked at the sizes.
+  virtual void do_gather(std::span<const Float3> in, std::span<Float3> out,
+                         std::span<float> workspace, const Scheduler& scheduler) const = 0;
 };
 
 /// Returns the gathered [n] of `in` [n]. Allocates.

@@ -6,7 +6,7 @@
 #include <string>
 #include <type_traits>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/exchange/links_by_node.h"
 #include "transfer/kernels/kernels.h"
 #include "transfer/kernels/link_gather.h"
@@ -333,9 +333,8 @@ std::size_t LinkedFormFactors::workspace_size() const {
   return 2 * node_count() * sizeof(LinkLight) / sizeof(float);
 }
 
-void LinkedFormFactors::gather(std::span<const Float3> in, std::span<Float3> out,
-                               std::span<float> workspace, const Scheduler& scheduler) const {
-  assert(workspace.size() >= workspace_size());
+void LinkedFormFactors::do_gather(std::span<const Float3> in, std::span<Float3> out,
+                                  std::span<float> workspace, const Scheduler& scheduler) const {
   auto* light = reinterpret_cast<LinkLight*>(workspace.data());
   tree_->gather(in, out, light, light + node_count(), kernels().link.gather, scheduler);
 }

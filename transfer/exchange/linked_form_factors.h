@@ -58,8 +58,7 @@ class LinkedFormFactors final : public FormFactorOperator {
   std::size_t node_count() const;
   std::size_t bytes() const override;
   std::size_t workspace_size() const override;
-  void gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
-              const Scheduler& scheduler = {}) const override;
+  using FormFactorOperator::gather;
 
   /// Gathers several lights at once. `Columns` is an array of 3 or 24 floats or doubles: the
   /// channels of one or of eight lights; sums have the same type. Allocates its workspace.
@@ -67,6 +66,9 @@ class LinkedFormFactors final : public FormFactorOperator {
   void gather(std::span<const Columns> in, std::span<Columns> out) const;
 
  private:
+  void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+                 const Scheduler& scheduler) const override;
+
   class Tree;
   std::shared_ptr<const Tree> tree_;
 };

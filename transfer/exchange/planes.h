@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

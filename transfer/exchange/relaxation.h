@@ -4,7 +4,7 @@
 #include <memory>
 #include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 #include "transfer/exchange/form_factor_operator.h"
 
 namespace rebounce {

@@ -10,7 +10,7 @@
 #include <string>
 #include <system_error>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace fs = std::filesystem;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/file/checked_json.h"
 #include "transfer/file/mapped_file.h"
 #include "transfer/file/safetensors.h"

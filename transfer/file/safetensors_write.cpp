@@ -4,7 +4,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/file/atomic_file.h"
 #include "transfer/file/safetensors.h"
 #include "transfer/file/safetensors_format.h"

@@ -3,8 +3,9 @@
 #include <concepts>
 #include <limits>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/shortest_decimal.h"
+#include "transfer/data/opacity_maps.h"
 #include "transfer/file/transfer_file_format.h"
 
 namespace rebounce {

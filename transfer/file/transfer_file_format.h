@@ -221,14 +221,15 @@ void visit_tensors_of_scene(Data& data, Visit&& visit) {
   visit("light.outer_cone_angle", data.lights, &Light::outer_cone_angle);
 }
 
-// Calls visit(key, value) for each text member of the record, and for each number.
-template <typename Record, typename Visit>
-void visit_texts_of_record(Record& record, Visit&& visit) {
-  visit("generator", record.generator);
-  visit("scene_name", record.scene_name);
-  visit("scene_hash", record.scene_hash);
-  visit("settings", record.settings_json);
-  visit("report", record.report_json);
+// Calls visit(key, value) for each text about how the data were made, and for each number of their
+// record.
+template <typename Data, typename Visit>
+void visit_texts_of_build(Data& data, Visit&& visit) {
+  visit("generator", data.record.generator);
+  visit("scene_name", data.record.scene_name);
+  visit("scene_hash", data.record.scene_hash);
+  visit("settings", data.settings_json);
+  visit("report", data.report_json);
 }
 
 template <typename Record, typename Visit>

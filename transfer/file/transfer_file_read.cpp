@@ -4,12 +4,12 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/exchange/form_factor_blocks.h"
 #include "transfer/file/checked_json.h"
 #include "transfer/file/transfer_data_check.h"
-#include "transfer/file/transfer_file.h"
 #include "transfer/file/transfer_file_format.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/format/hierarchical_storage.h"
 #include "transfer/operator/dense_operator.h"
 #include "transfer/operator/hierarchical_operator.h"
@@ -196,11 +196,10 @@ FormFactorLinks read_links(const SafetensorsFile& file, const PatchTable& patche
   return links;
 }
 
-BuildRecord read_record(const SafetensorsFile& file) {
-  BuildRecord record;
-  visit_texts_of_record(record,
-                        [&](const char* name, std::string& text) { text = metadata(file, name); });
-  visit_numbers_of_record(record, [&](const char* name, double& value) {
+void read_record(const SafetensorsFile& file, TransferData& data) {
+  visit_texts_of_build(data,
+                       [&](const char* name, std::string& text) { text = metadata(file, name); });
+  visit_numbers_of_record(data.record, [&](const char* name, double& value) {
     value = number<double>(file, name);
     if (!std::isfinite(value) || value < 0) {
       refuse(file, std::string("metadata ") + name + " is not finite and >= 0");
@@ -209,7 +208,6 @@ BuildRecord read_record(const SafetensorsFile& file) {
   for (const char* name : {"settings", "report"}) {
     if (!metadata(file, name).empty()) parse_object(file, name);
   }
-  return record;
 }
 
 /// Which of `matrix_count` matrices each channel uses.
@@ -343,10 +341,19 @@ std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsF
 std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& file,
                                                       const TransferData& data) {
   const std::vector<float>& area = data.patches.area;
-  const std::string& kind = metadata(file, key::kOperator);
-  if (kind == "dense") return read_dense_operator(file, area);
-  if (kind == "hierarchical") return read_hierarchical_operator(file, kHierarchicalTransfer, area);
-  if (kind == "low-rank") return read_low_rank_operator(file, area);
+  const auto* const named =
+      std::ranges::find(kOperatorKinds, metadata(file, key::kOperator), &NamedOperatorKind::name);
+  switch (named == kOperatorKinds.end() ? OperatorKind::kNoOperator : named->kind) {
+    case OperatorKind::kDense:
+      return read_dense_operator(file, area);
+    case OperatorKind::kHierarchical:
+      return read_hierarchical_operator(file, kHierarchicalTransfer, area);
+    case OperatorKind::kLowRank:
+      return read_low_rank_operator(file, area);
+    case OperatorKind::kAutomatic:
+    case OperatorKind::kNoOperator:
+      break;
+  }
   refuse(file, "the operator is of a kind that this program does not know");
 }
 
@@ -421,7 +428,7 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
     read(tensor::kEmittedIrradiance, data.emitted_irradiance);
   }
   data.exchange = read_exchange(file);
-  data.record = read_record(file);
+  read_record(file, data);
   check_transfer_data(data, file.name());
   data.links = read_links(file, data.patches);
   data.transfer = read_operator(file, data);

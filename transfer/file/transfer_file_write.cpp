@@ -3,10 +3,10 @@
 #include <deque>
 #include <nlohmann/json.hpp>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/shortest_decimal.h"
-#include "transfer/file/transfer_file.h"
 #include "transfer/file/transfer_file_format.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/format/hierarchical_storage.h"
 #include "transfer/operator/dense_operator.h"
 #include "transfer/operator/hierarchical_operator.h"
@@ -185,10 +185,10 @@ SafetensorsMetadata make_metadata(const TransferData& data) {
   SafetensorsMetadata metadata{{key::kFormat, kFormatName},
                                {key::kFormatVersion, std::to_string(kFileFormatVersion)},
                                {key::kChecksum, zero_checksum()},
-                               {key::kOperator, data.transfer->kind()},
+                               {key::kOperator, operator_name(data.transfer->kind())},
                                {key::kNames, names_text(data)}};
-  visit_texts_of_record(data.record,
-                        [&](const char* name, const std::string& text) { metadata[name] = text; });
+  visit_texts_of_build(data,
+                       [&](const char* name, const std::string& text) { metadata[name] = text; });
   visit_numbers_of_record(data.record, [&](const char* name, double value) {
     metadata[name] = shortest_decimal(value);
   });

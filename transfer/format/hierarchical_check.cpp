@@ -7,7 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
+#include "transfer/data/patch_roles.h"
 #include "transfer/format/hierarchical_layout.h"
 
 namespace rebounce {

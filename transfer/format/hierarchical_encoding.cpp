@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/half_float.h"
 #include "transfer/format/hierarchical_check.h"
 #include "transfer/format/hierarchical_layout.h"

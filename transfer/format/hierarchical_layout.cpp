@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/format/channel_lanes.h"
 
 namespace rebounce {

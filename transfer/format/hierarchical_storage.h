@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "rebounce/scene_data.h"
+#include "rebounce/types.h"
 #include "transfer/base/precision.h"
 #include "transfer/base/shared_array.h"
-#include "transfer/base/types.h"
-#include "transfer/data/patch_roles.h"
 #include "transfer/format/operator_format.h"
 
 namespace rebounce {

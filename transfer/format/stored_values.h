@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/half_float.h"
 #include "transfer/format/operator_format.h"
 

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/vector_load.h"
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 #include "transfer/format/channel_lanes.h"
 
 namespace rebounce {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 #include "transfer/kernels/basis_kernels_impl.h"
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/vector_load.h"

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 #include "transfer/kernels/gather_kernels.h"
 
 namespace rebounce {

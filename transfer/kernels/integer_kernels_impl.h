@@ -33,7 +33,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 #include "transfer/format/operator_format.h"
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/vector_load.h"

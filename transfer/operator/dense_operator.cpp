@@ -1,10 +1,9 @@
 #include "transfer/operator/dense_operator.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/half_float.h"
 #include "transfer/kernels/kernels.h"
 
@@ -149,12 +148,10 @@ std::size_t DenseOperator::workspace_size() const {
   return (1 + kSlotCount) * kChannelCount * padded_size(patch_count());
 }
 
-void DenseOperator::apply(std::span<const Float3> initial_exitance,
-                          std::span<Float3> indirect_irradiance, std::span<float> workspace,
-                          const Scheduler& scheduler) const {
+void DenseOperator::do_apply(std::span<const Float3> initial_exitance,
+                             std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                             const Scheduler& scheduler) const {
   const std::size_t n = patch_count(), stride = padded_size(n);
-  assert(initial_exitance.size() == n && indirect_irradiance.size() == n);
-  assert(workspace.size() >= workspace_size());
 
   float* x = workspace.data();
   float* slots = x + kChannelCount * stride;
@@ -191,9 +188,8 @@ float DenseOperator::symmetric_entry(std::uint32_t matrix, std::size_t row,
                                                : storage_.tiles_f32[k];
 }
 
-void DenseOperator::expand(int channel, std::span<float> transfer) const {
+void DenseOperator::do_expand(int channel, std::span<float> transfer) const {
   const std::size_t n = patch_count();
-  assert(transfer.size() == n * n);
   const std::uint32_t matrix = storage_.channel_matrix[channel];
   parallel_for({}, n, [&](std::size_t i) {
     for (std::size_t j = 0; j < n; ++j) {

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -60,16 +59,17 @@ class DenseOperator final : public TransferOperator {
 
   std::size_t patch_count() const override { return storage_.area.size(); }
   std::size_t bytes() const override;
-  std::string kind() const override { return "dense"; }
+  OperatorKind kind() const override { return OperatorKind::kDense; }
   std::size_t workspace_size() const override;
-  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float> workspace, const Scheduler& scheduler = {}) const override;
-  void expand(int channel, std::span<float> transfer) const override;
 
   /// Yhat(row, column) of one matrix.
   float symmetric_entry(std::uint32_t matrix, std::size_t row, std::size_t column) const;
 
  private:
+  void do_apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+                std::span<float> workspace, const Scheduler& scheduler) const override;
+  void do_expand(int channel, std::span<float> transfer) const override;
+
   Storage storage_;
   std::vector<float> sqrt_area_;
 };

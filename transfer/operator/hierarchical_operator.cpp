@@ -1,11 +1,11 @@
 #include "transfer/operator/hierarchical_operator.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <utility>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
+#include "transfer/base/argument_check.h"
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/format/hierarchical_values.h"
 #include "transfer/kernels/block_kernels.h"
@@ -394,9 +394,6 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
                                std::span<const Float3> initial_exitance,
                                std::span<Float3> indirect_irradiance, std::span<float> workspace,
                                const Scheduler& scheduler) const {
-  assert(initial_exitance.size() == light_count * patch_count());
-  assert(indirect_irradiance.size() == light_count * patch_count());
-  assert(workspace.size() >= batch_workspace_size(light_count));
   // The workspace has room for one cache line more than its vectors, so that they can begin with
   // one.
   const std::size_t misplaced = reinterpret_cast<std::uintptr_t>(workspace.data()) / sizeof(float);
@@ -416,17 +413,17 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance, scheduler);
 }
 
-void HierarchicalOperator::apply(std::span<const Float3> initial_exitance,
-                                 std::span<Float3> indirect_irradiance, std::span<float> workspace,
-                                 const Scheduler& scheduler) const {
+void HierarchicalOperator::do_apply(std::span<const Float3> initial_exitance,
+                                    std::span<Float3> indirect_irradiance,
+                                    std::span<float> workspace, const Scheduler& scheduler) const {
   run(*plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
-void HierarchicalOperator::apply_batch(std::size_t light_count,
-                                       std::span<const Float3> initial_exitance,
-                                       std::span<Float3> indirect_irradiance,
-                                       std::span<float> workspace,
-                                       const Scheduler& scheduler) const {
+void HierarchicalOperator::do_apply_batch(std::size_t light_count,
+                                          std::span<const Float3> initial_exitance,
+                                          std::span<Float3> indirect_irradiance,
+                                          std::span<float> workspace,
+                                          const Scheduler& scheduler) const {
   run(*plan_, light_count, initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
@@ -447,12 +444,14 @@ void HierarchicalOperator::apply_to(const Receivers& receivers,
                                     std::span<const Float3> initial_exitance,
                                     std::span<Float3> indirect_irradiance,
                                     std::span<float> workspace, const Scheduler& scheduler) const {
+  check_size("operator: initial exitance", initial_exitance.size(), patch_count());
+  check_size("operator: indirect irradiance", indirect_irradiance.size(), patch_count());
+  check_workspace("operator: workspace", workspace.size(), workspace_size());
   run(*receivers.plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
-void HierarchicalOperator::expand(int channel, std::span<float> transfer) const {
+void HierarchicalOperator::do_expand(int channel, std::span<float> transfer) const {
   const std::size_t n = patch_count();
-  assert(transfer.size() == n * n);
   std::ranges::fill(transfer, 0.0F);
   const auto put = [&](std::size_t i, std::size_t j, double value) {
     const std::size_t row = storage_->patch[i], column = storage_->patch[j];

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "transfer/operator/transfer_operator.h"
@@ -63,29 +62,30 @@ class HierarchicalOperator final : public TransferOperator {
   std::size_t bytes() const override;
   /// Bases count twice: an apply reads them to project light and to expand it.
   std::size_t bytes_per_apply() const override;
-  std::string kind() const override { return "hierarchical"; }
+  OperatorKind kind() const override { return OperatorKind::kHierarchical; }
   const PatchRoles& roles() const override;
   std::size_t workspace_size() const override { return batch_workspace_size(1); }
-  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float> workspace, const Scheduler& scheduler = {}) const override;
   std::size_t batch_workspace_size(std::size_t light_count) const override;
-  void apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
-                   std::span<Float3> indirect_irradiance, std::span<float> workspace,
-                   const Scheduler& scheduler = {}) const override;
-  void expand(int channel, std::span<float> transfer) const override;
 
   /// Prepares applies to these patches alone. Such an apply reads only the blocks that reach one of
   /// them or a neighbour in the same run of kAlignment positions. Patches that are no receivers of
   /// the operator get 0. Allocates. Throws Error if a patch does not exist.
   Receivers receivers(std::span<const std::uint32_t> patches) const;
 
-  /// Like `apply`, but writes the irradiance [n] only at `receivers`, equal to that of `apply` up
-  /// to rounding. The other entries are left unchanged.
+  /// Like `apply`, but writes the irradiance [n] only at `receivers`, which are of this operator.
+  /// It equals that of `apply` up to rounding. The other entries are left unchanged.
   void apply_to(const Receivers& receivers, std::span<const Float3> initial_exitance,
                 std::span<Float3> indirect_irradiance, std::span<float> workspace,
                 const Scheduler& scheduler = {}) const;
 
  private:
+  void do_apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+                std::span<float> workspace, const Scheduler& scheduler) const override;
+  void do_apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
+                      std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                      const Scheduler& scheduler) const override;
+  void do_expand(int channel, std::span<float> transfer) const override;
+
   std::shared_ptr<const HierarchicalPlan> plan_to(const std::vector<bool>& wanted) const;
   void run(const HierarchicalPlan& plan, std::size_t light_count,
            std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,

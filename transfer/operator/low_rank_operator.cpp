@@ -1,10 +1,9 @@
 #include "transfer/operator/low_rank_operator.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 #include "transfer/base/half_float.h"
 #include "transfer/kernels/kernels.h"
 
@@ -145,12 +144,10 @@ void LowRankOperator::expand_tile(std::size_t tile, const float* coefficient, fl
   }
 }
 
-void LowRankOperator::apply(std::span<const Float3> initial_exitance,
-                            std::span<Float3> indirect_irradiance, std::span<float> workspace,
-                            const Scheduler& scheduler) const {
+void LowRankOperator::do_apply(std::span<const Float3> initial_exitance,
+                               std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                               const Scheduler& scheduler) const {
   const std::size_t n = patch_count();
-  assert(initial_exitance.size() == n && indirect_irradiance.size() == n);
-  assert(workspace.size() >= workspace_size());
   float* const x = workspace.data();
   float* const coefficient = x + kChannelCount * stride();
   float* const multiplied = coefficient + coefficient_size();

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "transfer/base/precision.h"
@@ -48,12 +47,13 @@ class LowRankOperator final : public TransferOperator {
   std::size_t bytes() const override;
   /// The basis counts twice: an apply reads it to project light and to expand it.
   std::size_t bytes_per_apply() const override;
-  std::string kind() const override { return "low-rank"; }
+  OperatorKind kind() const override { return OperatorKind::kLowRank; }
   std::size_t workspace_size() const override;
-  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float> workspace, const Scheduler& scheduler = {}) const override;
 
  private:
+  void do_apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+                std::span<float> workspace, const Scheduler& scheduler) const override;
+
   std::size_t stride() const { return tile_count(patch_count()) * kTile; }
   /// Floats for the coefficients of all channels, each rounded up to whole vectors.
   std::size_t coefficient_size() const { return (kChannelCount + 1) * rank_stride_; }

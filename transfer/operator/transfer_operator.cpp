@@ -1,6 +1,9 @@
 #include "transfer/operator/transfer_operator.h"
 
-#include <cassert>
+#include <string>
+
+#include "rebounce/error.h"
+#include "transfer/base/argument_check.h"
 
 namespace rebounce {
 
@@ -13,25 +16,53 @@ std::size_t TransferOperator::batch_workspace_size(std::size_t) const {
   return workspace_size();
 }
 
+void TransferOperator::apply(std::span<const Float3> initial_exitance,
+                             std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                             const Scheduler& scheduler) const {
+  check_size("operator: initial exitance", initial_exitance.size(), patch_count());
+  check_size("operator: indirect irradiance", indirect_irradiance.size(), patch_count());
+  check_workspace("operator: workspace", workspace.size(), workspace_size());
+  do_apply(initial_exitance, indirect_irradiance, workspace, scheduler);
+}
+
 void TransferOperator::apply_batch(std::size_t light_count,
                                    std::span<const Float3> initial_exitance,
                                    std::span<Float3> indirect_irradiance,
                                    std::span<float> workspace, const Scheduler& scheduler) const {
-  const std::size_t n = patch_count();
-  for (std::size_t light = 0; light < light_count; ++light) {
-    apply(initial_exitance.subspan(light * n, n), indirect_irradiance.subspan(light * n, n),
-          workspace, scheduler);
-  }
+  const std::size_t size = light_count * patch_count();
+  check_size("operator: initial exitance", initial_exitance.size(), size);
+  check_size("operator: indirect irradiance", indirect_irradiance.size(), size);
+  check_workspace("operator: workspace", workspace.size(), batch_workspace_size(light_count));
+  do_apply_batch(light_count, initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
 void TransferOperator::expand(int channel, std::span<float> transfer) const {
+  if (channel < 0 || channel >= kChannelCount) {
+    throw Error("operator: there is no channel " + std::to_string(channel));
+  }
+  check_size("operator: expanded matrix", transfer.size(), patch_count() * patch_count());
+  do_expand(channel, transfer);
+}
+
+void TransferOperator::do_apply_batch(std::size_t light_count,
+                                      std::span<const Float3> initial_exitance,
+                                      std::span<Float3> indirect_irradiance,
+                                      std::span<float> workspace,
+                                      const Scheduler& scheduler) const {
   const std::size_t n = patch_count();
-  assert(transfer.size() == n * n);
+  for (std::size_t light = 0; light < light_count; ++light) {
+    do_apply(initial_exitance.subspan(light * n, n), indirect_irradiance.subspan(light * n, n),
+             workspace, scheduler);
+  }
+}
+
+void TransferOperator::do_expand(int channel, std::span<float> transfer) const {
+  const std::size_t n = patch_count();
   std::vector<Float3> unit(n, {0, 0, 0}), column(n);
   std::vector<float> workspace(workspace_size());
   for (std::size_t j = 0; j < n; ++j) {
     unit[j][channel] = 1;
-    apply(unit, column, workspace);
+    do_apply(unit, column, workspace, {});
     unit[j][channel] = 0;
     for (std::size_t i = 0; i < n; ++i) transfer[i * n + j] = column[i][channel];
   }

@@ -2,12 +2,12 @@
 
 #include <cstddef>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "rebounce/operators.h"
+#include "rebounce/scene_data.h"
+#include "rebounce/types.h"
 #include "transfer/base/parallel.h"
-#include "transfer/base/types.h"
-#include "transfer/data/patch_roles.h"
 
 namespace rebounce {
 
@@ -32,8 +32,8 @@ class TransferOperator {
   /// Bytes that an apply to one light reads; bytes that it reads twice count twice.
   virtual std::size_t bytes_per_apply() const { return bytes(); }
 
-  /// The kind as the command line names it: "dense", "hierarchical", "low-rank".
-  virtual std::string kind() const = 0;
+  /// Of kOperatorKinds.
+  virtual OperatorKind kind() const = 0;
 
   /// Floats of workspace that `apply` needs.
   virtual std::size_t workspace_size() const = 0;
@@ -41,10 +41,10 @@ class TransferOperator {
   /// Writes the indirect irradiance [n] in lx that follows from `initial_exitance` [n] in lx.
   /// Patches that are no receivers get 0; light of patches that are no sources has no effect. The
   /// two arrays must not overlap. `workspace` has at least workspace_size() floats and is
-  /// overwritten. Does not allocate or lock. Gives the same bits for any `scheduler`.
-  virtual void apply(std::span<const Float3> initial_exitance,
-                     std::span<Float3> indirect_irradiance, std::span<float> workspace,
-                     const Scheduler& scheduler = {}) const = 0;
+  /// overwritten. Does not allocate or lock. Gives the same bits for any `scheduler`. Throws Error
+  /// if a size is wrong, as the functions below do.
+  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+             std::span<float> workspace, const Scheduler& scheduler = {}) const;
 
   /// Floats of workspace that `apply_batch` needs for `light_count` lights.
   virtual std::size_t batch_workspace_size(std::size_t light_count) const;
@@ -52,13 +52,23 @@ class TransferOperator {
   /// Applies the operator to several lights, one after the other in both arrays, [light_count][n].
   /// The result equals that of single applies up to rounding. Operators that can read their values
   /// once for several lights are faster here than single applies; the default is single applies.
-  virtual void apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
-                           std::span<Float3> indirect_irradiance, std::span<float> workspace,
-                           const Scheduler& scheduler = {}) const;
+  void apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
+                   std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                   const Scheduler& scheduler = {}) const;
 
   /// Writes Y for one channel, dense, unscaled and row-major [n][n], for export and tests. The
   /// default multiplies with n unit vectors.
-  virtual void expand(int channel, std::span<float> transfer) const;
+  void expand(int channel, std::span<float> transfer) const;
+
+ private:
+  // What the functions above do once they have looked at the sizes.
+  virtual void do_apply(std::span<const Float3> initial_exitance,
+                        std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                        const Scheduler& scheduler) const = 0;
+  virtual void do_apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
+                              std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                              const Scheduler& scheduler) const;
+  virtual void do_expand(int channel, std::span<float> transfer) const;
 };
 
 /// Returns the indirect irradiance [n] in lx that follows from `initial_exitance` [n] in lx.

@@ -10,7 +10,7 @@
 #include "precompute/exchange/links/link_choice.h"
 #include "precompute/exchange/links/pair_sums.h"
 #include "precompute/patches/cluster_tree.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -6,8 +6,8 @@
 #include <atomic>
 #include <cmath>
 
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

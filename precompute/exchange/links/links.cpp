@@ -1,9 +1,9 @@
-#include "precompute/exchange/links/links.h"
 
+#include "precompute/exchange/links/links.h"
 #include "precompute/exchange/links/link_scaling.h"
 #include "precompute/exchange/links/refined_links.h"
+#include "rebounce/error.h"
 #include "transfer/base/bfloat16.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

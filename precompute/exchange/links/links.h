@@ -12,9 +12,6 @@
 
 namespace rebounce {
 
-/// Default of FormFactorSettings::link_epsilon for links. Measured: notes/links.md.
-inline constexpr double kLinkEpsilon = 5e-4;
-
 struct LinkBuild : EscapedLight {
   FormFactorLinks links;
   ClosureReport closure;

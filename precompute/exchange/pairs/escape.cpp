@@ -8,7 +8,7 @@
 
 #include "precompute/sampling/hemisphere_rays.h"
 #include "precompute/sampling/sobol_blocks.h"
-#include "transfer/data/sky_cells.h"
+#include "rebounce/sky.h"
 
 namespace rebounce {
 namespace {

@@ -2,17 +2,10 @@
 
 #include <vector>
 
-#include "transfer/data/sky_cells.h"
+#include "rebounce/build_report.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
-
-/// The size of the correction for closure (closure.h).
-struct ClosureReport {
-  /// Largest |sum over j of F(i,j) - target| before the correction.
-  double row_sum_error_before = 0;
-  double row_sum_error_after = 0;  ///< the same after it, over rows with a certain target
-  double relative_change = 0;      ///< |S' - S| / |S|, Frobenius
-};
 
 /// The light of patches that meets no patch.
 struct EscapedLight {

@@ -7,7 +7,7 @@
 #include <glm/glm.hpp>
 #include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 

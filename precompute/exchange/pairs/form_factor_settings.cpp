@@ -1,7 +1,7 @@
 #include "precompute/exchange/pairs/form_factor_settings.h"
 
 #include "precompute/exchange/pairs/shadow_rays.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 

@@ -4,7 +4,7 @@
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/exchange/pairs/raw_exchange.h"
 #include "precompute/exchange/pairs/shadow_rays.h"
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

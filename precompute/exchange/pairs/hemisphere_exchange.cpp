@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "transfer/base/types.h"
+#include "rebounce/types.h"
 
 namespace rebounce {
 namespace {

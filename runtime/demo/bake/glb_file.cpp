@@ -13,12 +13,12 @@
 #include <optional>
 #include <string>
 
+#include "rebounce/error.h"
+#include "rebounce/version.h"
 #include "runtime/demo/bake/punctual_light.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
-#include "transfer/base/error.h"
-#include "transfer/base/version.h"
 #include "transfer/file/atomic_file.h"
 
 namespace rebounce {

@@ -4,13 +4,13 @@
 #include <cmath>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/demo/bake/lit_surface.h"
 #include "runtime/demo/bake/lit_texture.h"
 #include "runtime/demo/bake/subdivided_mesh.h"
 #include "runtime/demo/image/tone_curve.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sample_sequence.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

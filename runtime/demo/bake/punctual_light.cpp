@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "rebounce/lights.h"
 #include "runtime/lights/lamp_kind.h"
-#include "transfer/data/intensity_profile.h"
 
 namespace rebounce {
 namespace {

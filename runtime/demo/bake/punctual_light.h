@@ -1,6 +1,6 @@
 #pragma once
 
-#include "transfer/data/scene_description.h"
+#include "rebounce/lights.h"
 
 namespace rebounce {
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -4,7 +4,7 @@
 #include <glm/glm.hpp>
 #include <vector>
 
-#include "transfer/data/scene_description.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
 

@@ -7,10 +7,10 @@
 #include <span>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/demo/image/srgb.h"
 #include "runtime/demo/image/tone_curve.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 #include "transfer/file/atomic_file.h"
 
 namespace rebounce {

@@ -2,7 +2,7 @@
 
 #include <glm/glm.hpp>
 
-#include "transfer/data/scene_description.h"
+#include "rebounce/scene_data.h"
 
 namespace rebounce {
 

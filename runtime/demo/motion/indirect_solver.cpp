@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include "rebounce/error.h"
 #include "runtime/solvers/hierarchical_solver.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 

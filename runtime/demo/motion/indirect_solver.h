@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/frame/engine.h"
+#include "rebounce/engine.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "transfer/exchange/form_factor_operator.h"
 

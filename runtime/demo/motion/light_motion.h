@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "transfer/data/scene_description.h"
+#include "rebounce/lights.h"
 
 namespace rebounce {
 

@@ -8,9 +8,9 @@
 #include <numbers>
 #include <vector>
 
+#include "rebounce/error.h"
 #include "runtime/demo/shading/display_surface.h"
 #include "runtime/rays/box.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

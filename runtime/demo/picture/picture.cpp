@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/demo/image/color_map.h"
 #include "runtime/demo/image/exposure.h"
 #include "runtime/demo/image/srgb.h"
@@ -16,7 +17,6 @@
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sample_sequence.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -4,12 +4,14 @@
 #include <memory>
 #include <optional>
 
+#include "rebounce/sky.h"
 #include "runtime/demo/image/images.h"
 #include "runtime/demo/shading/picture_light.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/file/transfer_data.h"
 
 namespace rebounce {
+
+struct TransferData;
 
 /// What a picture shows.
 enum class Show : std::uint8_t {

@@ -2,9 +2,9 @@
 
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 

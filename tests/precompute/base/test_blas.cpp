@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 #include <cstdlib>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <numeric>
 
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_solution.h"
@@ -16,7 +16,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_scenes.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce {
 namespace {

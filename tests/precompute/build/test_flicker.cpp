@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "runtime/frame/engine.h"
+#include "rebounce/engine.h"
 #include "runtime/outputs/vertex_light.h"
 #include "tests/support/built_scene.h"
 

@@ -5,17 +5,17 @@
 
 #include <algorithm>
 
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/random_lights.h"
 #include "rebounce.h"
-#include "runtime/frame/engine.h"
+#include "rebounce/engine.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/exchange/exchange_blocks.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce {
 namespace {

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "precompute/exchange/pairs/form_factors.h"
+#include "rebounce/sky.h"
 #include "runtime/frame/direct_lighting.h"
-#include "runtime/lights/sky_model.h"
 #include "runtime/rays/polygon_form_factor.h"
 #include "runtime/rays/sampling.h"
 #include "tests/support/expect_error.h"

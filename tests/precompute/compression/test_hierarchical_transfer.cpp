@@ -9,11 +9,11 @@
 
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "rebounce/error.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/unshadowed_lights.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 #include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce {

@@ -11,10 +11,10 @@
 
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "rebounce/error.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {
@@ -117,7 +117,7 @@ TEST(LowRankTransfer, MoreRanksAreMoreExactAndMoreBytes) {
   double before = 1;
   for (const std::size_t rank : {4, 16, 64}) {
     const auto transfer = room.low_rank({rank, Precision::kF16});
-    EXPECT_EQ(transfer->kind(), "low-rank");
+    EXPECT_EQ(transfer->kind(), OperatorKind::kLowRank);
     EXPECT_LT(transfer->bytes(), room.low_rank({rank, Precision::kF32})->bytes());
     const double error = relative_difference(product(*transfer, light), truth, room.patches.area);
     EXPECT_LT(error, before);

@@ -10,8 +10,8 @@
 
 #include "precompute/import/import_gltf.h"
 #include "precompute/patches/texture_sampling.h"
+#include "rebounce/error.h"
 #include "tests/support/gltf_builder.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "precompute/import/import_gltf.h"
+#include "rebounce/error.h"
 #include "tests/support/gltf_builder.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

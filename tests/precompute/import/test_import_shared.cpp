@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "precompute/import/import_gltf.h"
+#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/shared_folder.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -8,11 +8,11 @@
 
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/lights/reference_solution.h"
+#include "rebounce/error.h"
 #include "tests/support/random_light.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

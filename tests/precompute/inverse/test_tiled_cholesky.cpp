@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -12,11 +12,11 @@
 #include "precompute/exchange/links/links.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "rebounce/error.h"
 #include "tests/support/exchange_samples.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {
@@ -181,10 +181,10 @@ class Multiple final : public TransferOperator {
 
   std::size_t patch_count() const override { return patch_count_; }
   std::size_t bytes() const override { return sizeof(float); }
-  std::string kind() const override { return "multiple"; }
+  OperatorKind kind() const override { return OperatorKind::kNoOperator; }
   std::size_t workspace_size() const override { return 0; }
-  void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-             std::span<float>, const Scheduler&) const override {
+  void do_apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
+                std::span<float>, const Scheduler&) const override {
     for (std::size_t i = 0; i < patch_count_; ++i) {
       for (int c = 0; c < kChannelCount; ++c) {
         indirect_irradiance[i][c] = factor_ * initial_exitance[i][c];

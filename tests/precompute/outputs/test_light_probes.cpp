@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <numbers>
 
-#include "runtime/frame/engine.h"
-#include "runtime/outputs/octahedral_map.h"
+#include "rebounce/engine.h"
+#include "rebounce/outputs.h"
 #include "runtime/outputs/probe_irradiance.h"
 #include "runtime/outputs/probe_light.h"
 #include "runtime/rays/float3_glm.h"
@@ -15,7 +15,7 @@
 #include "tests/support/built_scene.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce {
 namespace {

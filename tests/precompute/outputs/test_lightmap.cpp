@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/build/build.h"
+#include "precompute/build/transfer_build.h"
 #include "precompute/import/import_gltf.h"
-#include "runtime/frame/engine.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/outputs/texel_light.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/float3_glm.h"
@@ -68,7 +68,7 @@ PatchPoint place_of(const TransferData& data, std::size_t k) {
 
 /// F B at a point, by brute force.
 glm::dvec3 gather(const Engine& engine, const PatchPoint& point) {
-  const Float3 origin = engine.tracer().offset_point(point.position, point.normal);
+  const Float3 origin = engine.parts().tracer->offset_point(point.position, point.normal);
   return test::irradiance_at(engine, origin, point.normal, 1024);
 }
 

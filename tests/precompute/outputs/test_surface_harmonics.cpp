@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/frame/engine.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/outputs/surface_light.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/float3_glm.h"
@@ -17,7 +17,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/with_threads.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce {
 namespace {
@@ -53,7 +53,7 @@ glm::dvec3 gather(const Engine& engine, const PatchPoint& point, const glm::dvec
     const double r = std::sqrt(1 - s.x * s.x), phi = 2 * std::numbers::pi * s.y;
     direction.push_back(frame * glm::dvec3(r * std::cos(phi), r * std::sin(phi), s.x));
   }
-  const Float3 origin = engine.tracer().offset_point(point.position, point.normal);
+  const Float3 origin = engine.parts().tracer->offset_point(point.position, point.normal);
   const std::vector<glm::dvec3> met = test::met_radiosity(engine, origin, direction);
   glm::dvec3 sum(0);
   for (std::size_t k = 0; k < met.size(); ++k) {

@@ -4,6 +4,7 @@
 
 #include "precompute/patches/texture_sampling.h"
 #include "tests/support/test_scenes.h"
+#include "transfer/data/opacity_maps.h"
 
 namespace rebounce {
 namespace {

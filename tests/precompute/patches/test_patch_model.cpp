@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "precompute/patches/lit_sides.h"
+#include "rebounce/error.h"
 #include "tests/support/test_scenes.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -12,13 +12,13 @@
 #include <numbers>
 #include <set>
 
+#include "rebounce/error.h"
 #include "runtime/demo/bake/glb_file.h"
 #include "runtime/demo/bake/subdivided_mesh.h"
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/rectangle_scene.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -8,12 +8,12 @@
 #include <numbers>
 #include <string>
 
+#include "rebounce/error.h"
 #include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/camera.h"
 #include "runtime/demo/picture/picture.h"
 #include "tests/support/rectangle_scene.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

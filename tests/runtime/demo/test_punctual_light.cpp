@@ -5,7 +5,7 @@
 #include <memory>
 #include <numbers>
 
-#include "transfer/data/intensity_profile.h"
+#include "rebounce/lights.h"
 
 namespace rebounce {
 namespace {

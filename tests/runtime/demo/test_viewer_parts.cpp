@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "rebounce/error.h"
 #include "runtime/demo/motion/fly_camera.h"
 #include "runtime/demo/motion/indirect_solver.h"
 #include "runtime/demo/motion/light_motion.h"
@@ -17,7 +18,6 @@
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/test_scene_data.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <numbers>
 
+#include "rebounce/error.h"
 #include "tests/support/test_scene_data.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -1,10 +1,12 @@
-#include "runtime/frame/engine.h"
+#include "runtime/frame/engine_parts.h"
 
 #include <gtest/gtest.h>
 
+#include "rebounce/error.h"
+#include "rebounce/outputs.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/test_scene_data.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {
@@ -81,18 +83,61 @@ TEST(Engine, TakesTheCallersDirectLight) {
   EXPECT_THROW(engine.relight(std::span(direct).first(5)), Error);
 }
 
+TEST(Engine, LightThatIsNoneIsRefusedAndTheLastFrameStays) {
+  Engine engine(two_squares());
+  const Light lamp = lamp_at(0.1F);
+  const Sky sky = {{1, 1, 1}, 3};
+  engine.relight({&lamp, 1}, sky);
+  const std::vector<Float3> good = copy(engine.direct_irradiance()),
+                            indirect = copy(engine.indirect_irradiance()),
+                            radiosity = copy(engine.radiosity());
+  const auto expect_unchanged = [&] {
+    EXPECT_EQ(good, copy(engine.direct_irradiance()));
+    EXPECT_EQ(indirect, copy(engine.indirect_irradiance()));
+    EXPECT_EQ(radiosity, copy(engine.radiosity()));
+    EXPECT_EQ(engine.sky().luminance, 3);
+  };
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e-6F}) {
+    std::vector<Float3> direct = good;
+    direct[7][1] = bad;
+    test::expect_error([&] { engine.relight(direct); }, "patch 7 is negative or not finite");
+    expect_unchanged();
+    Light bad_lamp = lamp;
+    bad_lamp.intensity = bad;
+    const std::array<Light, 2> lamps = {lamp_at(0.7F), bad_lamp};
+    test::expect_error([&] { engine.relight(lamps, {}); }, "intensity");
+    expect_unchanged();
+    test::expect_error([&] { engine.relight({&lamp, 1}, {.luminance = bad}); }, "sky");
+    expect_unchanged();
+  }
+}
+
+TEST(Engine, OutputsOfAnotherSizeAreRefused) {
+  Engine engine(two_squares());
+  engine.relight(std::vector<Float3>(engine.radiosity().size(), {1, 1, 1}));
+  std::vector<Float3> values(engine.data().mesh.position.size() + 1);
+  EXPECT_THROW(vertex_irradiance(engine, values), Error);
+  EXPECT_NO_THROW(vertex_irradiance(engine, std::span(values).first(values.size() - 1)));
+  std::vector<ProbeLight> probes(1);
+  EXPECT_THROW(probe_light(engine, probes), Error);
+  std::vector<SurfaceLight> light(values.size() - 1);
+  test::expect_error([&] { vertex_light(engine, light); }, "--surface-harmonics");
+  test::expect_error([&] { lightmap_irradiance(engine, values); }, "--lightmap");
+}
+
 TEST(Engine, ACopyHasALightStateOfItsOwn) {
   Engine engine(two_squares());
   const Light here = lamp_at(0.1F), there = lamp_at(0.7F);
   engine.relight({&here, 1}, {});
   const std::vector<Float3> before = copy(engine.radiosity());
   Engine second = engine;
-  EXPECT_EQ(&second.tracer(), &engine.tracer());
+  EXPECT_EQ(second.parts().tracer, engine.parts().tracer);
   second.relight({&there, 1}, {});
   EXPECT_EQ(before, copy(engine.radiosity()));
   EXPECT_NE(before, copy(second.radiosity()));
   second.relight({&here, 1}, {});
-  EXPECT_EQ(second.direct_lighting().traced_light_count(), 1);
+  EXPECT_EQ(second.parts().direct_lighting->traced_light_count(), 1);
   EXPECT_EQ(before, copy(second.radiosity()));
 }
 

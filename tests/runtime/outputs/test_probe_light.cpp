@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "runtime/outputs/octahedral_map.h"
+#include "rebounce/outputs.h"
 #include "runtime/outputs/probe_irradiance.h"
 #include "runtime/outputs/spherical_harmonics.h"
 #include "tests/support/allocation_counter.h"

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runtime/rays/ray_tracer.h"
+#include "transfer/data/opacity_maps.h"
 
 namespace rebounce {
 namespace {

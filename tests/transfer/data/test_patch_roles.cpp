@@ -1,6 +1,6 @@
 // Hierarchical operators that serve some receivers and sources alone.
 
-#include "transfer/data/patch_roles.h"
+#include "rebounce/scene_data.h"
 
 #include <gtest/gtest.h>
 

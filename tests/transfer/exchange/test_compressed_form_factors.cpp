@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rebounce/error.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/hierarchical_samples.h"
 #include "tests/support/random_light.h"
-#include "transfer/base/error.h"
 #include "transfer/format/hierarchical_encoding.h"
 
 namespace rebounce {

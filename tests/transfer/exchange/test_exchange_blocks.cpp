@@ -6,8 +6,8 @@
 
 #include <random>
 
+#include "rebounce/error.h"
 #include "tests/support/random_pairs.h"
-#include "transfer/base/error.h"
 #include "transfer/kernels/kernels.h"
 
 namespace rebounce {
@@ -27,6 +27,17 @@ TEST(ExchangeBlocks, GathersWhatTheRowsGather) {
     blocks.gather(pairs.light, gathered, workspace);
     for (std::size_t i = 0; i < n; ++i) expect_near(gathered[i], expected[i], 1e-6);
   }
+}
+
+TEST(ExchangeBlocks, WrongSizesAreRefused) {
+  const Pairs pairs(9);
+  const ExchangeBlocks blocks(pairs.exchange, pairs.area);
+  std::vector<Float3> gathered(9);
+  std::vector<float> workspace(blocks.workspace_size());
+  const std::span<const Float3> light = pairs.light;
+  EXPECT_THROW(blocks.gather(light.first(8), gathered, workspace), Error);
+  EXPECT_THROW(blocks.gather(light, std::span(gathered).first(8), workspace), Error);
+  EXPECT_THROW(blocks.gather(light, gathered, std::span(workspace).subspan(1)), Error);
 }
 
 TEST(ExchangeBlocks, SweepsAreThoseOfTheRowsInEveryOrderOfDirections) {

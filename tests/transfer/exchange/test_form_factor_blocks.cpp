@@ -7,8 +7,8 @@
 #include <cmath>
 #include <random>
 
+#include "rebounce/error.h"
 #include "tests/support/random_pairs.h"
-#include "transfer/base/error.h"
 #include "transfer/kernels/kernels.h"
 
 namespace rebounce {

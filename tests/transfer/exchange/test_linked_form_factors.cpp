@@ -8,13 +8,13 @@
 #include <functional>
 #include <limits>
 
+#include "rebounce/error.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/hierarchical_samples.h"
 #include "tests/support/plain_data.h"
 #include "tests/support/temporary_folder.h"
 #include "transfer/base/bfloat16.h"
-#include "transfer/base/error.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce {
 namespace {

@@ -15,7 +15,7 @@
 #include "tests/support/transfer_file_tampering.h"
 #include "transfer/exchange/compressed_form_factors.h"
 #include "transfer/file/safetensors.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/format/hierarchical_encoding.h"
 
 namespace rebounce {

@@ -6,14 +6,14 @@
 #include <cstring>
 #include <random>
 
+#include "rebounce/error.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/plain_data.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/transfer_file_tampering.h"
-#include "transfer/base/error.h"
 #include "transfer/exchange/form_factor_blocks.h"
 #include "transfer/file/safetensors.h"
-#include "transfer/file/transfer_file.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/operator/low_rank_operator.h"
 
 namespace rebounce {
@@ -67,7 +67,7 @@ TEST(LowRankFile, RoundTrips) {
     const TransferData data = sample_data(precision);
     save_transfer_file(folder / "file", data);
     const TransferData loaded = load_transfer_file(folder / "file");
-    EXPECT_EQ(loaded.transfer->kind(), "low-rank");
+    EXPECT_EQ(loaded.transfer->kind(), OperatorKind::kLowRank);
     EXPECT_EQ(loaded.transfer->bytes(), data.transfer->bytes());
     EXPECT_EQ(relit(loaded), relit(data));
     save_transfer_file(folder / "again", loaded);

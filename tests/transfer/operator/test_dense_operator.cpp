@@ -6,10 +6,11 @@
 #include <cmath>
 #include <random>
 
+#include "rebounce/error.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/random_light.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 #include "transfer/base/half_float.h"
 #include "transfer/kernels/kernels.h"
 
@@ -191,6 +192,30 @@ TEST(HalfFloat, ConvertsThereAndBack) {
   EXPECT_EQ(half_to_float(float_to_half(65504.0F)), 65504.0F);
   EXPECT_TRUE(std::isinf(half_to_float(float_to_half(65520.0F))));
   EXPECT_EQ(half_to_float(float_to_half(1.0F + 0x1p-12F)), 1.0F);  // below half a step
+}
+
+TEST(DenseOperator, WrongSizesAreRefused) {
+  constexpr std::size_t kPatches = 70;
+  const DenseOperator dense(RandomOperator(kPatches, 1, 3).storage);
+  std::vector<Float3> in(2 * kPatches + 1), out(2 * kPatches + 1);
+  std::vector<float> workspace(dense.batch_workspace_size(2)), matrix(kPatches * kPatches);
+  const auto apply = [&](std::size_t from, std::size_t to, std::size_t floats) {
+    dense.apply(std::span(in).first(from), std::span(out).first(to),
+                std::span(workspace).first(floats));
+  };
+  const std::size_t enough = dense.workspace_size();
+  EXPECT_NO_THROW(apply(kPatches, kPatches, enough));
+  EXPECT_THROW(apply(kPatches - 1, kPatches, enough), Error);
+  EXPECT_THROW(apply(kPatches, kPatches + 1, enough), Error);
+  test::expect_error([&] { apply(kPatches, kPatches, enough - 1); }, "workspace");
+  const auto both = [&](std::size_t size) {
+    dense.apply_batch(2, std::span(in).first(size), std::span(out).first(size), workspace);
+  };
+  EXPECT_NO_THROW(both(2 * kPatches));
+  EXPECT_THROW(both(2 * kPatches + 1), Error);
+  EXPECT_NO_THROW(dense.expand(2, matrix));
+  EXPECT_THROW(dense.expand(3, matrix), Error);
+  EXPECT_THROW(dense.expand(0, std::span(matrix).first(kPatches)), Error);
 }
 
 }  // namespace

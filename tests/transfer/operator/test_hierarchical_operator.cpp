@@ -8,13 +8,13 @@
 #include <numeric>
 #include <random>
 
+#include "rebounce/error.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/hierarchical_samples.h"
 #include "tests/support/random_light.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 #include "transfer/base/half_float.h"
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/kernels/kernels.h"
@@ -216,6 +216,8 @@ void check_receivers(const HierarchicalOperator& op, float allowed) {
     const HierarchicalOperator::Receivers receivers = op.receivers(patches);
     std::vector<Float3> h(n, kUnset);
     op.apply_to(receivers, m0, h, workspace);
+    EXPECT_THROW(op.apply_to(receivers, m0, h, std::span(workspace).subspan(1)), Error);
+    EXPECT_THROW(op.apply_to(receivers, m0, std::span(h).subspan(1), workspace), Error);
     std::vector<Float3> expected(n, kUnset);
     for (const std::uint32_t p : patches) expected[p] = whole[p];
     for (std::size_t i = 0; i < n; ++i) {

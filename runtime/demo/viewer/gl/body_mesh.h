@@ -6,8 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "rebounce/lights.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
-#include "transfer/data/scene_description.h"
 
 namespace rebounce {
 

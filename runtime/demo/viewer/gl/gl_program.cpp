@@ -3,7 +3,7 @@
 #include <glm/gtc/type_ptr.hpp>
 #include <string>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <array>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

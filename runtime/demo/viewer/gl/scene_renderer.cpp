@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "rebounce/error.h"
 #include "runtime/demo/image/tone_curve.h"
 #include "runtime/demo/viewer/gl/lamp_shader.h"
 #include "runtime/demo/viewer/gl/shaders.h"

@@ -2,11 +2,11 @@
 
 #include <glm/glm.hpp>
 
+#include "rebounce/lights.h"
 #include "runtime/demo/viewer/gl/gl_objects.h"
 #include "runtime/demo/viewer/gl/gl_program.h"
 #include "runtime/demo/viewer/gl/gpu_bodies.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
-#include "transfer/data/scene_description.h"
 
 namespace rebounce {
 

@@ -1,4 +1,3 @@
-#include "runtime/demo/viewer/window/controls.h"
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
@@ -10,6 +9,8 @@
 #include <limits>
 
 #include "runtime/demo/image/srgb.h"
+#include "runtime/demo/viewer/window/controls.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 
@@ -157,7 +158,7 @@ float Controls::distance_along(const glm::vec3& origin, const glm::vec3& directi
                               .direction = to_float3(direction),
                               .t_far = std::numeric_limits<float>::infinity()}};
   std::array<Hit, 1> hit;
-  scene_.engine().tracer().intersect(ray, hit);
+  scene_.engine().parts().tracer->intersect(ray, hit);
   return hit[0].triangle == kNone ? 0.5F * bounds_.diagonal() : hit[0].t;
 }
 

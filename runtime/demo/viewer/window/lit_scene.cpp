@@ -1,4 +1,3 @@
-#include "runtime/demo/viewer/window/lit_scene.h"
 
 #include <algorithm>
 #include <chrono>
@@ -7,6 +6,8 @@
 
 #include "runtime/demo/shading/patch_errors.h"
 #include "runtime/demo/shading/picture_light.h"
+#include "runtime/demo/viewer/window/lit_scene.h"
+#include "runtime/frame/engine_parts.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/outputs/probe_irradiance.h"
 #include "runtime/outputs/probe_light.h"
@@ -22,7 +23,7 @@ LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference
       engine_(data_),
       emitted_(irradiance_from_emitters(*data_)),
       solver_{IndirectSolver(*data_), IndirectSolver(*data_)},
-      pictures_(*data_, engine_.tracer()),
+      pictures_(*data_, *engine_.parts().tracer),
       reference_(std::move(reference)),
       make_probes_(std::move(make_probes)) {
   for (auto& values : indirect_) values.resize(data_->patches.size());
@@ -33,8 +34,8 @@ void LitScene::relight(std::span<const Light> lights, const Sky& sky,
                        std::span<const IndirectMethod, kSideCount> methods, bool both,
                        StageTimes& times) {
   const auto begin = std::chrono::steady_clock::now();
-  engine_.compute_direct(lights, sky);
-  engine_.compute_initial_exitance();
+  engine_.parts().compute_direct(lights, sky);
+  engine_.parts().compute_initial_exitance();
   const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
   times.direct = time.count();
   for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {

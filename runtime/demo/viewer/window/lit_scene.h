@@ -8,10 +8,11 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/engine.h"
+#include "rebounce/sky.h"
 #include "runtime/demo/motion/indirect_solver.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
 #include "runtime/demo/viewer/window/viewer_setup.h"
-#include "runtime/frame/engine.h"
 
 namespace rebounce {
 

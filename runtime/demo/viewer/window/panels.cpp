@@ -273,7 +273,7 @@ void Panels::draw(ViewerState& state, const FrameDrawer& frame) {
 
 void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
   ImGui::Text("%zu patches, %s operator", frame.scene().data().patches.size(),
-              std::string(frame.scene().data().transfer->kind()).c_str());
+              operator_name(frame.scene().data().transfer->kind()));
   if (!ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) return;
   for (std::size_t k = 0; k < kShows.size(); ++k) {
     if (k % 3 != 0) ImGui::SameLine(100 * static_cast<float>(k % 3));

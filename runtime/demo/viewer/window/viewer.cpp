@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <vector>
 
+#include "rebounce/error.h"
 #include "runtime/demo/viewer/gl/headless_context.h"
 #include "runtime/demo/viewer/gl/render_targets.h"
 #include "runtime/demo/viewer/window/controls.h"
 #include "runtime/demo/viewer/window/frame_drawer.h"
 #include "runtime/demo/viewer/window/panels.h"
 #include "runtime/demo/viewer/window/window.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 
+#include "rebounce/sky.h"
 #include "runtime/demo/image/images.h"
 #include "runtime/demo/viewer/window/viewer_setup.h"
 #include "transfer/file/transfer_data.h"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "rebounce/sky.h"
 #include "runtime/demo/motion/fly_camera.h"
 #include "runtime/demo/viewer/window/viewer_setup.h"
 

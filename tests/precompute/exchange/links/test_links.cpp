@@ -13,12 +13,12 @@
 
 #include "precompute/exchange/links/link_fitting.h"
 #include "precompute/exchange/pairs/form_factors.h"
+#include "rebounce/error.h"
 #include "runtime/solvers/gauss_seidel_solver.h"
 #include "runtime/solvers/hierarchical_solver.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/error.h"
 #include "transfer/exchange/form_factor_blocks.h"
 
 namespace rebounce {

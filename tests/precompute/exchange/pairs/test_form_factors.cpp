@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <numeric>
 
+#include "rebounce/error.h"
 #include "tests/support/form_factor_sums.h"
 #include "tests/support/view_factor_table.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/error.h"
 
 namespace rebounce {
 namespace {

@@ -1,4 +1,4 @@
-#include "transfer/data/sky_cells.h"
+#include "rebounce/sky.h"
 
 #include <algorithm>
 #include <cmath>

@@ -13,6 +13,12 @@ class Error : public std::runtime_error {
   explicit Error(const std::string& message) : std::runtime_error(message) {}
 };
 
+/// Thrown where the library was built without what a call needs.
+class Unsupported : public Error {
+ public:
+  using Error::Error;
+};
+
 /// Thrown out of long work when the caller's progress function asked to stop. Nothing was written.
 class Cancelled : public Error {
  public:

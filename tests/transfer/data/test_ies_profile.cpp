@@ -1,4 +1,4 @@
-#include "runtime/lights/ies_profile.h"
+#include "rebounce/lights.h"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
 // ANSI/IES LM-63-2019, "Approved method: IES standard file format for the electronic transfer of
 // photometric data", and its predecessors, which differ in what comes before TILT.
 
-#include "runtime/lights/ies_profile.h"
+#include "rebounce/lights.h"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numbers>
 
-#include "transfer/base/error.h"
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {

@@ -1,17 +1,17 @@
-#pragma once
+// Normals for irradiance maps.
 
 #include <cmath>
-#include <cstddef>
-#include <span>
 
-#include "transfer/base/types.h"
+#include "rebounce/outputs.h"
+#include "transfer/base/argument_check.h"
 
 namespace rebounce {
+namespace {
 
 /// The direction at (u, v), each in [-1, 1], of an octahedral map of the sphere, with +z at the
 /// centre and -z at the corners (Z. Cigolle et al., "A survey of efficient representations for
 /// independent unit vectors", JCGT 3(2), 2014).
-inline Float3 octahedral_direction(float u, float v) {
+Float3 octahedral_direction(float u, float v) {
   Float3 d = {u, v, 1 - std::abs(u) - std::abs(v)};
   if (d[2] < 0) {
     d[0] = std::copysign(1 - std::abs(v), u);
@@ -22,10 +22,10 @@ inline Float3 octahedral_direction(float u, float v) {
   return d;
 }
 
-/// Writes the directions at the centres of the texels of a map of `size` x `size`, u fastest. They
-/// are the normals of irradiance maps (Z. Majercik et al., "Dynamic diffuse global illumination
-/// with ray-traced irradiance fields", JCGT 8(2), 2019). `normals` has size x size entries.
-inline void write_octahedral_normals(std::size_t size, std::span<Float3> normals) {
+}  // namespace
+
+void write_octahedral_normals(std::size_t size, std::span<Float3> normals) {
+  check_size("octahedral map: the normals", normals.size(), size * size);
   const auto at = [&](std::size_t k) {
     return (2 * static_cast<float>(k) + 1) / static_cast<float>(size) - 1;
   };

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "precompute/build/build_report.h"
-#include "precompute/build/build_settings.h"
+#include "rebounce/build_report.h"
+#include "rebounce/build_settings.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {

@@ -1,5 +1,7 @@
 #pragma once
 
+// What a build takes, and what it has done.
+
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -9,10 +11,24 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/compression/form_factor_compression.h"
-#include "precompute/exchange/pairs/exchange_results.h"
-
 namespace rebounce {
+
+/// The size of the correction for closure (closure.h).
+struct ClosureReport {
+  /// Largest |sum over j of F(i,j) - target| before the correction.
+  double row_sum_error_before = 0;
+  double row_sum_error_after = 0;  ///< the same after it, over rows with a certain target
+  double relative_change = 0;      ///< |S' - S| / |S|, Frobenius
+};
+
+/// Relative area-weighted L2 errors of gathered light, F B. Lights from which nothing arrives
+/// (arrives_nowhere) have no error.
+struct FormFactorError {
+  double mean = 0;
+  double max = 0;
+  int light_count = 0;  ///< lights that have an error
+  int dark_count = 0;   ///< lights from which nothing arrives
+};
 
 /// What the expensive part, or what is left of it, will take.
 struct CostEstimate {

@@ -1,0 +1,16 @@
+# The component precompute of rebounceConfig.cmake: what the offline stage links.
+find_dependency(OpenMP COMPONENTS CXX)
+find_dependency(draco)
+find_dependency(fmt)
+find_dependency(meshoptimizer)
+find_dependency(TinyGLTF)
+foreach(package libzip libwebp stb)
+  pkg_check_modules(${package} QUIET IMPORTED_TARGET ${package})
+  if(NOT ${package}_FOUND)
+    set(rebounce_NOT_FOUND_MESSAGE
+        "rebounce's component precompute needs ${package}, which pkg-config does not find")
+    return()
+  endif()
+endforeach()
+include(${CMAKE_CURRENT_LIST_DIR}/rebouncePrecomputeTargets.cmake)
+set(rebounce_precompute_FOUND TRUE)

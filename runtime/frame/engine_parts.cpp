@@ -1,0 +1,143 @@
+#include "runtime/frame/engine_parts.h"
+
+#include <algorithm>
+#include <string>
+
+#include "rebounce/error.h"
+#include "runtime/lights/emitting_material.h"
+#include "runtime/lights/light_sampling.h"
+#include "runtime/lights/sky_light.h"
+#include "transfer/base/argument_check.h"
+#include "transfer/base/reflection.h"
+
+namespace rebounce {
+namespace {
+
+std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> data) {
+  if (!data || !data->transfer) throw Error("the transfer data have no operator");
+  return data;
+}
+
+}  // namespace
+
+Engine::Parts::Parts(std::shared_ptr<const TransferData> transfer_data,
+                     const EngineSettings& settings)
+    : data(checked(std::move(transfer_data))), scheduler(settings.scheduler) {
+#if REBOUNCE_WITH_EMBREE
+  tracer = std::make_shared<const RayTracer>(make_surface_tracer(data->mesh));
+  direct_lighting = std::make_shared<DirectLighting>(*data, *tracer, settings.direct_lighting);
+#endif
+  const std::size_t n = data->patches.size();
+  emitting_material =
+      std::make_shared<const std::vector<std::uint32_t>>(find_emitting_material(*data));
+  emitted_exitance = data->patches.emitted_exitance;
+  direct_irradiance.resize(n);
+  initial_exitance.resize(n);
+  indirect_irradiance.resize(n);
+  radiosity.resize(n);
+  workspace.resize(data->transfer->workspace_size());
+  if (!data->lightmap.empty()) vertex_irradiance.resize(data->mesh.position.size());
+  patch_light.resize(data->surface_harmonics.sky.size());
+}
+
+Engine::Parts::Parts(const Parts& other) = default;
+
+void Engine::Parts::compute_initial_exitance() {
+  add_reflected(emitted_exitance, data->patches.reflectance, direct_irradiance, initial_exitance);
+}
+
+void Engine::Parts::apply_transfer() {
+  data->transfer->apply(initial_exitance, indirect_irradiance, workspace, scheduler);
+}
+
+void Engine::Parts::compute_radiosity() {
+  add_reflected(initial_exitance, data->patches.reflectance, indirect_irradiance, radiosity);
+}
+
+Engine::Engine(std::shared_ptr<const TransferData> data, const EngineSettings& settings)
+    : parts_(std::make_unique<Parts>(std::move(data), settings)) {}
+
+Engine::Engine(const Engine& other) : parts_(std::make_unique<Parts>(*other.parts_)) {
+#if REBOUNCE_WITH_EMBREE
+  parts_->direct_lighting = std::make_shared<DirectLighting>(*other.parts_->direct_lighting);
+#endif
+}
+
+Engine::~Engine() = default;
+Engine::Engine(Engine&& other) noexcept = default;
+Engine& Engine::operator=(Engine&& other) noexcept = default;
+
+#if REBOUNCE_WITH_EMBREE
+void Engine::Parts::compute_direct(std::span<const Light> lights, const Sky& frame_sky) {
+  direct_lighting->compute(lights, frame_sky, direct_irradiance, scheduler);
+  sky = frame_sky;
+}
+
+void Engine::relight(std::span<const Light> lights, const Sky& sky) {
+  for (const Light& light : lights) check_light(light);
+  parts_->compute_direct(lights, sky);
+  parts_->compute_initial_exitance();
+  parts_->apply_transfer();
+  parts_->compute_radiosity();
+}
+#else
+void Engine::relight(std::span<const Light> /*lights*/, const Sky& /*sky*/) {
+  throw Unsupported(
+      "this library was built without Embree and traces no light; bring the direct irradiance");
+}
+#endif
+
+void Engine::relight(std::span<const Float3> direct_irradiance) {
+  check_size("the direct irradiance", direct_irradiance.size(), parts_->direct_irradiance.size());
+  check_light_of_patches("the direct irradiance", direct_irradiance);
+  std::ranges::copy(direct_irradiance, parts_->direct_irradiance.begin());
+  parts_->sky = {};
+  parts_->compute_initial_exitance();
+  parts_->apply_transfer();
+  parts_->compute_radiosity();
+}
+
+void Engine::set_emission_scale(std::uint32_t material, const Float3& scale) {
+  const SceneData& scene = *parts_->data;
+  if (material >= scene.materials.size()) {
+    throw Error("there is no material " + std::to_string(material) + "; the scene has " +
+                std::to_string(scene.materials.size()));
+  }
+  if (!is_light(scale)) throw Error("a scale of emission must be finite and at least 0");
+  for (std::size_t i = 0; i < parts_->emitted_exitance.size(); ++i) {
+    if ((*parts_->emitting_material)[i] != material) continue;
+    for (int c = 0; c < kChannelCount; ++c) {
+      parts_->emitted_exitance[i][c] = scale[c] * scene.patches.emitted_exitance[i][c];
+    }
+  }
+}
+
+std::span<const Float3> Engine::direct_irradiance() const {
+  return parts_->direct_irradiance;
+}
+std::span<const Float3> Engine::initial_exitance() const {
+  return parts_->initial_exitance;
+}
+std::span<const Float3> Engine::indirect_irradiance() const {
+  return parts_->indirect_irradiance;
+}
+std::span<const Float3> Engine::radiosity() const {
+  return parts_->radiosity;
+}
+std::span<const Float3> Engine::emitted_exitance() const {
+  return parts_->emitted_exitance;
+}
+const Sky& Engine::sky() const {
+  return parts_->sky;
+}
+const Scheduler& Engine::scheduler() const {
+  return parts_->scheduler;
+}
+const TransferData& Engine::data() const {
+  return *parts_->data;
+}
+const std::shared_ptr<const TransferData>& Engine::shared_data() const {
+  return parts_->data;
+}
+
+}  // namespace rebounce

@@ -1,0 +1,44 @@
+#pragma once
+
+// What an engine is made of, for those who time, replace or look into a stage of a frame.
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "rebounce/engine.h"
+#include "runtime/frame/direct_lighting.h"
+#include "runtime/outputs/surface_light.h"
+#include "runtime/rays/ray_tracer.h"
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+struct Engine::Parts {
+  Parts(std::shared_ptr<const TransferData> transfer_data, const EngineSettings& settings);
+  Parts(const Parts& other);
+  Parts& operator=(const Parts&) = delete;
+
+  // The stages of a frame. `lights` are within their ranges; the first stage throws as check_sky
+  // does, and needs Embree.
+  void compute_direct(std::span<const Light> lights, const Sky& frame_sky);
+  void compute_initial_exitance();
+  void apply_transfer();
+  void compute_radiosity();
+
+  std::shared_ptr<const TransferData> data;
+  Scheduler scheduler;
+  std::shared_ptr<const RayTracer> tracer;          ///< null without Embree
+  std::shared_ptr<DirectLighting> direct_lighting;  ///< of this engine alone; null without Embree
+  std::shared_ptr<const std::vector<std::uint32_t>> emitting_material;  ///< [n]
+  Sky sky;                                                              ///< of the last frame
+  std::vector<Float3> emitted_exitance;
+  std::vector<Float3> direct_irradiance, initial_exitance, indirect_irradiance, radiosity;
+  std::vector<float> workspace;
+
+  // What outputs of a frame (outputs.h) need to be made.
+  std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap
+  std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
+};
+
+}  // namespace rebounce

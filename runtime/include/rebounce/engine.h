@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "rebounce/lights.h"
+#include "rebounce/scene_data.h"
+#include "rebounce/scheduler.h"
+#include "rebounce/sky.h"
+#include "rebounce/transfer_file.h"
+#include "rebounce/types.h"
+
+namespace rebounce {
+
+struct DirectLightingSettings {
+  /// Points of a patch at which lamps are looked at. More: softer, truer shadow borders; time grows
+  /// in proportion. At least 1.
+  int points_per_patch = 8;
+  /// Places of a lamp with a surface that each point looks at, from 1 to 64. More: smoother half
+  /// shadows; time of such lamps grows in proportion.
+  int area_light_samples = 4;
+  /// Lights for which room is made at once: 5 bytes per patch and light. A frame that has more
+  /// makes the room it lacks, the only time that one allocates. At least 0.
+  int light_capacity = 16;
+};
+
+struct EngineSettings {
+  DirectLightingSettings direct_lighting{};  ///< of no use where the caller brings the direct light
+  Scheduler scheduler{};                     ///< where frames run; copies of the engine use it too
+};
+
+/// Relights one scene: direct light, then one product with the stored operator.
+///
+/// Where that has receivers and sources (patch_roles), the indirect irradiance of all other patches
+/// than receivers is 0, and their radiosity what they give off the first time; light on patches
+/// that are no sources is shown as direct light and never bounces.
+///
+/// The transfer data are read only and may be shared by any number of engines; an engine is one
+/// light state and belongs to one thread at a time. A copy shares the data, the ray tracer and the
+/// points of the patches and has a light state of its own: that is how many threads relight one
+/// scene. After construction nothing allocates, locks, prints or touches a file, but see
+/// DirectLightingSettings::light_capacity. An engine that was moved from may only be destroyed.
+class Engine {
+ public:
+  /// Makes room for everything a frame needs. Throws Error if `data` is null or has no operator, or
+  /// a setting is out of range.
+  explicit Engine(std::shared_ptr<const TransferData> data, const EngineSettings& settings = {});
+  ~Engine();
+  Engine(const Engine& other);
+  Engine(Engine&& other) noexcept;
+  Engine& operator=(const Engine&) = delete;
+  Engine& operator=(Engine&& other) noexcept;
+
+  /// One frame: finds the direct irradiance of the patches under `lights` and `sky`, and with it
+  /// all that follows. Lights are known by their number: keep their order, so that only those that
+  /// moved or changed shape are traced again. Throws Error if a field of a light that its type uses
+  /// is out of range, a number of the sky is negative or not finite, or the sky has a distribution
+  /// and the data do not say how much of its cells is seen; Unsupported where the library is built
+  /// without Embree. The last frame then stays.
+  void relight(std::span<const Light> lights, const Sky& sky);
+
+  /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for
+  /// instance; its sky is dark. Throws Error if the size is wrong or a number is negative or not
+  /// finite; the last frame then stays.
+  void relight(std::span<const Float3> direct_irradiance);
+
+  /// From the next frame on, what the surfaces of material `material` emit is that of the scene
+  /// times `scale`, each channel >= 0. Throws Error if there is no such material or `scale` is
+  /// negative or not finite. A patch of several materials follows the one that emits from most of
+  /// it.
+  void set_emission_scale(std::uint32_t material, const Float3& scale);
+
+  // Results, [n] in lx; valid until the next frame.
+  std::span<const Float3> direct_irradiance() const;
+  std::span<const Float3> initial_exitance() const;
+  std::span<const Float3> indirect_irradiance() const;
+  std::span<const Float3> radiosity() const;
+  /// What the patches emit at present.
+  std::span<const Float3> emitted_exitance() const;
+
+  /// The sky of the last frame.
+  const Sky& sky() const;
+  /// Where frames run, and the outputs of them (outputs.h).
+  const Scheduler& scheduler() const;
+
+  const TransferData& data() const;
+  const std::shared_ptr<const TransferData>& shared_data() const;
+
+  /// The library's own.
+  struct Parts;
+  Parts& parts() { return *parts_; }
+  const Parts& parts() const { return *parts_; }
+
+ private:
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,124 @@
+#pragma once
+
+// Iterative solutions of the radiosity system (I - rho F) B = M0 with the form factors of a
+// transfer file, for light that is truer than the stored operator, and to compare with.
+// notes/solvers.md tells the methods.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+
+#include "rebounce/scheduler.h"
+#include "rebounce/transfer_file.h"
+#include "rebounce/types.h"
+
+namespace rebounce {
+
+enum class SolveMethod : std::uint8_t {
+  kGathering,
+  kJacobi,                ///< the same iteration as kGathering (gathering_solver.h)
+  kGaussSeidel,           ///< needs SweepableFormFactors
+  kSymmetricGaussSeidel,  ///< needs SweepableFormFactors
+  kConjugateGradient,
+  kRefine,  ///< needs a stored operator that serves all patches
+};
+
+struct NamedSolveMethod {
+  std::string_view name;  ///< name on the command line
+  SolveMethod method;
+};
+
+inline constexpr std::array<NamedSolveMethod, 6> kSolveMethods = {{
+    {"gathering", SolveMethod::kGathering},
+    {"jacobi", SolveMethod::kJacobi},
+    {"gauss-seidel", SolveMethod::kGaussSeidel},
+    {"symmetric-gauss-seidel", SolveMethod::kSymmetricGaussSeidel},
+    {"conjugate-gradient", SolveMethod::kConjugateGradient},
+    {"refine", SolveMethod::kRefine},
+}};
+
+/// The form factors of a file that a method gathers with.
+enum class FormFactorSource : std::uint8_t {
+  kBest,        ///< exact ones where there are any, else compressed ones
+  kExact,       ///< of pairs of patches
+  kCompressed,  ///< as blocks of low rank
+  kLinks,       ///< gathering over links is hierarchical radiosity; not for Gauss-Seidel
+};
+
+/// When an iterative method stops (at the first limit that it reaches), and where its loops run.
+/// See notes/solvers.md for the methods.
+struct SolveSettings {
+  int max_sweeps = 100;  ///< at least 1; more: closer to the solution, longer
+  /// Stop when |M0 + rho F B - B| / |M0| (area-weighted L2) is at most this. 0: only sweeps and
+  /// time count. Single precision reaches about 1e-7 |B| / |M0|; a solve that no longer improves
+  /// stops.
+  double residual = 1e-6;
+  double time_budget_microseconds = 0;  ///< no new sweep after this time; 0: no limit
+  /// Measure the residual of the result. `false` saves one gather; the result then has the method's
+  /// own bound.
+  bool measure_residual = true;
+  Scheduler scheduler{};  ///< where the loops of the solve run
+};
+
+struct SolveResult {
+  int sweeps = 0;
+  double residual = 0;      ///< |M0 + rho F B - B| / |M0|, area-weighted L2 over all channels
+  bool converged = false;   ///< the requested residual is reached
+  bool diverged = false;    ///< the residual grew; the result is the best solution found
+  double microseconds = 0;  ///< without the final measurement of the residual
+};
+
+/// A method with the form factors of one transfer file, made once, that keeps its last solution and
+/// starts the next solve from it.
+///
+/// It belongs to one thread at a time and gives the same bits for any scheduler. After construction
+/// nothing allocates. A solver that was moved from may only be destroyed.
+class Solver {
+ public:
+  /// Throws Error if `data` is null or has not the form factors or the operator that this takes.
+  Solver(std::shared_ptr<const TransferData> data, SolveMethod method,
+         FormFactorSource source = FormFactorSource::kBest);
+  ~Solver();
+  Solver(Solver&&) noexcept;
+  Solver& operator=(Solver&&) noexcept;
+
+  /// Solves for `initial_exitance` M0 = rho E + Me [n] in lx, from the last solution. Throws Error
+  /// if its size or a setting is wrong, or a number of it is negative or not finite; the last
+  /// solution then stays.
+  SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings = {});
+
+  /// The same, and copies the solution [n] in lx to `radiosity`.
+  SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings,
+                    std::span<Float3> radiosity);
+
+  /// The last solution B [n] in lx; valid until the next solve.
+  std::span<const Float3> radiosity() const;
+
+  /// Takes other reflectances [n], which hold from the next solve on, exactly; M0 is to be made
+  /// with them too. Throws Error if the size is wrong or one is not in [0, 1).
+  void set_reflectance(std::span<const Float3> reflectance);
+
+  /// The next solve starts from `radiosity` [n] in lx. Throws Error if the size is wrong or a
+  /// number is negative or not finite.
+  void start_from(std::span<const Float3> radiosity);
+
+  /// The next solve starts from nothing.
+  void reset();
+
+  std::size_t patch_count() const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Solves once, from nothing, and writes the solution [n] in lx to `radiosity`. Makes a Solver:
+/// keep one for more than one solve. Throws Error as that does.
+SolveResult solve_radiosity(const std::shared_ptr<const TransferData>& data, SolveMethod method,
+                            std::span<const Float3> initial_exitance, const SolveSettings& settings,
+                            std::span<Float3> radiosity);
+
+}  // namespace rebounce
