@@ -8,17 +8,12 @@
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
 #include "precompute/build/operator_stage.h"
+#include "precompute/build/output_stage.h"
 #include "precompute/build/phase_clock.h"
 #include "precompute/build/transfer_build.h"
-#include "precompute/inverse/dense_transfer.h"
-#include "precompute/outputs/light_probes.h"
-#include "precompute/outputs/lightmap.h"
-#include "precompute/outputs/reconstruction_weights.h"
-#include "precompute/outputs/surface_harmonics.h"
 #include "precompute/patches/patch_model.h"
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
-#include "rebounce/error.h"
 #include "rebounce/version.h"
 #include "runtime/solvers/solve_radiosity.h"
 
@@ -40,15 +35,6 @@ void describe_patches(const PatchModel& model, BuildReport& report) {
   report.patch_size_median = size[size.size() / 2];
   report.patch_size_max = size.back();
   report.warnings.insert(report.warnings.end(), model.warnings.begin(), model.warnings.end());
-}
-
-Lightmap make_lightmap(const PatchModel& model, const BuildSettings& settings,
-                       BuildReport& report) {
-  PlacedLightmap placed = place_lightmap(model, settings.lightmap);
-  for (const std::string& warning : placed.warnings) {
-    report.warnings.push_back(warning + ": it is left out of the lightmap");
-  }
-  return std::move(placed.lightmap);
 }
 
 /// The offline stage, step by step; each step uses the results of those before it.
@@ -95,52 +81,23 @@ class TransferBuild {
     announce(report_.estimate);
   }
 
-  /// Finds the exchange of the patches; afterwards patches and mesh belong to the data.
+  /// Finds the exchange of the patches, and what brings their light to where it is shown. Patches
+  /// and mesh then belong to the data.
   void find_exchange() {
     if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const auto find = links ? find_links : find_pairs;
     EscapedLight escaped = find(model_, *tracer_, decided_, data_, report_, clock_);
     if (links && decided_.operator_kind != OperatorKind::kNoOperator) {
-      const LinkedBuild known{model_.patches.size(), report_.link_count,
-                              distinct_channels(model_.patches.reflectance), roles_,
-                              decided_.tolerance};
       announce(report_.estimate_after_links.emplace(
-          estimate_after_links(known, decided_.memory_limit_bytes)));
+          estimate_after_links(model_, report_.link_count, roles_, decided_)));
     }
     data_.patches = std::move(model_.patches);
     data_.patches.sky_visibility = std::move(escaped.sky_visibility);
     data_.patches.absorbed = std::move(escaped.absorbed);
     data_.sky_cells = std::move(escaped.sky_cells);
     data_.mesh = std::move(model_.mesh);
-  }
-
-  /// Makes the data that brings the light of patches to where it is shown.
-  void make_outputs() {
-    clock_.run("weights", [&](const Progress& part) {
-      compute_reconstruction_weights(model_.shown_patch, data_.patches.absorbed, *tracer_,
-                                     data_.mesh, part);
-      return true;
-    });
-    const bool probes = settings_.probes.grid[0] > 0 || settings_.probes.spacing > 0;
-    if ((probes || settings_.surface_harmonics.ray_count > 0) && !receivers_.empty()) {
-      report_.warnings.push_back(
-          "light probes and surface harmonics see patches that are no receivers without their "
-          "indirect light");
-    }
-    if (probes) {
-      data_.probes = clock_.run("probes", [&](const Progress& part) {
-        LightProbes placed = place_probes(data_.mesh, settings_.probes);
-        trace_probes(data_, model_.shown_patch, *tracer_, settings_.probes, placed, part);
-        return placed;
-      });
-    }
-    if (settings_.surface_harmonics.ray_count > 0) {
-      data_.surface_harmonics = clock_.run("surface harmonics", [&](const Progress& part) {
-        return trace_surface_harmonics(data_, model_.shown_patch, *tracer_,
-                                       settings_.surface_harmonics, part);
-      });
-    }
+    make_outputs(model_.shown_patch, *tracer_, settings_, data_, report_, clock_);
   }
 
   /// Makes the operator and measures its error.
@@ -196,7 +153,6 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
   TransferBuild build(settings, report, progress, on_estimate);
   build.make_patches(build.import_scene(scene_path));
   build.find_exchange();
-  build.make_outputs();
   build.make_operator();
   return build.take();
 }

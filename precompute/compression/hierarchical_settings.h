@@ -1,11 +1,8 @@
 #pragma once
 
-#include "transfer/base/precision.h"
+#include "rebounce/build_settings.h"
 
 namespace rebounce {
-
-/// The tolerance where none is asked for.
-inline constexpr double kDefaultTolerance = 0.005;
 
 struct HierarchicalSettings {
   /// Relative area-weighted L2 error of the indirect irradiance, averaged over lights. Twice the

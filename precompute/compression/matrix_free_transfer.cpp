@@ -13,9 +13,6 @@
 #include "precompute/inverse/hierarchical_matrix.h"
 #include "precompute/inverse/solved_matrix.h"
 #include "precompute/inverse/solved_transfer.h"
-#include "rebounce/error.h"
-#include "rebounce/version.h"
-#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce {
 namespace {

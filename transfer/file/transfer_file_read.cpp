@@ -350,7 +350,6 @@ std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& fil
       return read_hierarchical_operator(file, kHierarchicalTransfer, area);
     case OperatorKind::kLowRank:
       return read_low_rank_operator(file, area);
-    case OperatorKind::kAutomatic:
     case OperatorKind::kNoOperator:
       break;
   }
