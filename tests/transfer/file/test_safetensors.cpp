@@ -177,7 +177,8 @@ std::vector<Malformed> malformed_headers() {
       {"a key twice", file(R"({"a":{"dtype":"U8","shape":[3],"shape":[3]}})"), "appears twice"},
       {"nesting", file("{\"a\":" + std::string(50'000, '[')), "nested more than 3"},
       {"metadata of another type", file("{\"__metadata__\":3," + good + "}"), "not an object"},
-      {"metadata that is no text", file("{\"__metadata__\":{\"k\":1}," + good + "}"), "strings"},
+      {"metadata that is no text", file("{\"__metadata__\":{\"k\":1}," + good + "}"),
+       "not a string"},
   };
 }
 
