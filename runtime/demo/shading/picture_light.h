@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/sky.h"
 #include "runtime/demo/shading/display_surface.h"
 #include "transfer/file/transfer_data.h"
 
