@@ -69,7 +69,12 @@ TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {
   part.roles.role.assign(build.patch_count, 0);
   std::fill_n(part.roles.role.begin(), 10000, PatchRoles::kBoth);
   EXPECT_LT(bytes(part), bytes(build));
-  const CostEstimate estimate = estimate_after_links(part, kPlenty);
+  PatchModel model;
+  model.patches.area.assign(part.patch_count, 1);
+  model.patches.reflectance.assign(part.patch_count, {0.5F, 0.5F, 0.5F});
+  BuildSettings decided;
+  decided.memory_limit_bytes = kPlenty;
+  const CostEstimate estimate = estimate_after_links(model, part.link_count, part.roles, decided);
   EXPECT_EQ(estimate.receiver_count, 10000U);
   EXPECT_EQ(estimate.source_count, 10000U);
   EXPECT_EQ(estimate.link_count, part.link_count);

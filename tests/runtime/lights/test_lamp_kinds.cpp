@@ -8,6 +8,7 @@
 #include <string>
 
 #include "runtime/lights/lamp_kind.h"
+#include "runtime/lights/light_sampling.h"
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/expect_error.h"
 
