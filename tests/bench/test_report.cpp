@@ -17,6 +17,7 @@
 #include "bench/support/light_changes.h"
 #include "bench/support/reflected_light.h"
 #include "precompute/build/transfer_build.h"
+#include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/reference_solution.h"
