@@ -12,7 +12,7 @@ the libraries: give a machine a work folder of its own.
 
 Instruction sets are chosen at run time, and the product has no way to force one. The program that
 runs is therefore linked from the objects of the commit and one that is compiled anew: the source
-that defines widest_instruction_set(), changed in a copy so that $REBOUNCE_TEST_INSTRUCTION_SET is
+that says how wide the kernels may be, changed in a copy so that $REBOUNCE_TEST_INSTRUCTION_SET is
 the most that it answers. All else is as the release preset builds it.
 
 A row is `equal`; or `tensors equal`, where only the metadata or, of arrays, the container differ;
@@ -43,14 +43,24 @@ HERE = pathlib.Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 SCENES = HERE.parent / "scenes"
 
-SIGNATURE = "InstructionSet widest_instruction_set() {"
-LIMITED = """static InstructionSet widest_of_processor();
+# The function that says how wide the kernels may be, as it was and as it is, and what limits it.
+LIMITS = {
+    "InstructionSet widest_instruction_set() {": """static InstructionSet widest_of_processor();
 InstructionSet widest_instruction_set() {
   const InstructionSet widest = widest_of_processor();
   const char* most = std::getenv("REBOUNCE_TEST_INSTRUCTION_SET");
   return most == nullptr ? widest : std::min(widest, static_cast<InstructionSet>(std::atoi(most)));
 }
-static InstructionSet widest_of_processor() {"""
+static InstructionSet widest_of_processor() {""",
+    "std::size_t runnable_count() {": """std::size_t runnable_on_processor();
+std::size_t runnable_count() {
+  const std::size_t runnable = runnable_on_processor();
+  const char* most = std::getenv("REBOUNCE_TEST_INSTRUCTION_SET");
+  return most == nullptr ? runnable
+                         : std::min(runnable, static_cast<std::size_t>(std::atoi(most)) + 1);
+}
+std::size_t runnable_on_processor() {""",
+}
 # In the order of the enumeration, with what the processor must have.
 INSTRUCTION_SETS = {
     "portable": set(),
@@ -135,16 +145,19 @@ def entry_of_dispatcher(folder):
     """The compile command of the source that chooses the instruction set."""
     for entry in json.loads((folder / "compile_commands.json").read_text()):
         source = pathlib.Path(entry["file"])
-        if source.is_file() and SIGNATURE in source.read_text(errors="replace"):
+        text = source.read_text(errors="replace") if source.is_file() else ""
+        if any(signature in text for signature in LIMITS):
             return entry
-    raise SystemExit(f'no source of {folder} has "{SIGNATURE}"')
+    raise SystemExit(f"no source of {folder} says how wide the kernels may be: {list(LIMITS)}")
 
 
 def compile_limited(entry, work):
     """Compiles the dispatcher with a limit; what it replaces, and the new object."""
     source = pathlib.Path(entry["file"])
     changed, limited = work / "limited.cpp", work / "limited.o"
-    text = source.read_text().replace(SIGNATURE, LIMITED)
+    text = source.read_text()
+    for signature, limit in LIMITS.items():
+        text = text.replace(signature, limit)
     changed.write_text("#include <algorithm>\n#include <cstdlib>\n" + text)
     words = shlex.split(entry["command"])
     at = words.index("-o") + 1
