@@ -44,16 +44,21 @@ class CommandLine : public testing::Test {
     return summary;
   }
 
-  /// Runs what must fail because of its input: status 1, one line that holds `part`, no file.
-  void expect_refused(Words words, const std::string& part) {
-    const Names before = folder_.names();
-    words.emplace_back("--quiet");
+  /// Runs what must fail: with this status, and one line that holds `part`.
+  void expect_failure(const Words& words, const std::string& part, int exit_code = kBadInput) {
     const Outcome outcome = run(words);
-    EXPECT_EQ(outcome.exit_code, kBadInput) << outcome.err;
-    EXPECT_EQ(outcome.out, "");
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    EXPECT_EQ(outcome.out, "") << part;
     EXPECT_TRUE(is_one_line(outcome.err)) << outcome.err;
     EXPECT_TRUE(outcome.err.starts_with("rebounce: ")) << outcome.err;
     EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err << "lacks " << part;
+  }
+
+  /// Runs what must fail because of its input, without a file.
+  void expect_refused(Words words, const std::string& part) {
+    const Names before = folder_.names();
+    words.emplace_back("--quiet");
+    expect_failure(words, part);
     EXPECT_EQ(folder_.names(), before) << part;
   }
 

@@ -6,9 +6,11 @@
 
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "tests/support/temporary_folder.h"
 #include "transfer/file/content_hash.h"
 #include "transfer/file/transfer_data.h"
 
@@ -29,6 +31,18 @@ inline void reseal(std::string& file) {
   ContentHash hash;
   hash.update(std::as_bytes(std::span(file)));
   file.replace(digits + entry.size(), 32, hash.text().substr(5));
+}
+
+/// Replaces a piece of text in a file by another of its length, under a good checksum.
+inline void replace_in_file(const std::filesystem::path& path, const std::string& from,
+                            const std::string& to) {
+  std::string file = read_bytes(path);
+  const std::size_t at = file.find(from);
+  ASSERT_NE(at, std::string::npos) << from;
+  ASSERT_EQ(from.size(), to.size());
+  file.replace(at, from.size(), to);
+  reseal(file);
+  write_bytes(path, file);
 }
 
 /// Uses what was loaded as the runtime does, so that a sanitizer sees an index that got through.

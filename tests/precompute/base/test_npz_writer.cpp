@@ -42,26 +42,22 @@ TEST(NpzWriter, WritesWhatTheNpyFormatSays) {
   const auto files = unzip(folder / "arrays.npz");
   ASSERT_EQ(files.size(), 5U);
 
-  const Npy triples = parse_npy(files.at("direct_irradiance.npy"));
-  EXPECT_EQ(triples.version, 1);
-  EXPECT_EQ(triples.header, "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }");
-  EXPECT_EQ(triples.data, raw(kTriples));
-
-  const Npy doubles = parse_npy(files.at("doubles.npy"));
-  EXPECT_EQ(doubles.header, "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 2, 3), }");
-  EXPECT_EQ(doubles.data, raw(kDoubles));
-
-  const Npy indices = parse_npy(files.at("indices.npy"));
-  EXPECT_EQ(indices.header, "{'descr': '<u4', 'fortran_order': False, 'shape': (3,), }");
-  EXPECT_EQ(indices.data, raw(kIndices));
-
-  const Npy count = parse_npy(files.at("count.npy"));
-  EXPECT_EQ(count.header, "{'descr': '<u8', 'fortran_order': False, 'shape': (), }");
-  EXPECT_EQ(count.data, raw(kCounts));
-
-  const Npy nothing = parse_npy(files.at("nothing.npy"));
-  EXPECT_EQ(nothing.header, "{'descr': '<f4', 'fortran_order': False, 'shape': (0, 3), }");
-  EXPECT_EQ(nothing.data, "");
+  const struct {
+    const char *name, *type, *shape;
+    std::string data;
+  } expected[] = {{"direct_irradiance", "<f4", "(2, 3)", raw(kTriples)},
+                  {"doubles", "<f8", "(1, 2, 3)", raw(kDoubles)},
+                  {"indices", "<u4", "(3,)", raw(kIndices)},
+                  {"count", "<u8", "()", raw(kCounts)},
+                  {"nothing", "<f4", "(0, 3)", ""}};
+  for (const auto& array : expected) {
+    SCOPED_TRACE(array.name);
+    const Npy npy = parse_npy(files.at(std::string(array.name) + ".npy"));
+    EXPECT_EQ(npy.version, 1);
+    EXPECT_EQ(npy.header, std::string("{'descr': '") + array.type +
+                              "', 'fortran_order': False, 'shape': " + array.shape + ", }");
+    EXPECT_EQ(npy.data, array.data);
+  }
 }
 
 TEST(NpzWriter, UsesVersionTwoForALongHeader) {

@@ -5,12 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
-#include "tests/support/allocation_counter.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/hierarchical_samples.h"
-#include "tests/support/with_threads.h"
+#include "tests/support/operator_checks.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/operator/hierarchical_operator.h"
@@ -19,6 +17,7 @@ namespace rebounce {
 namespace {
 
 using test::expect_error;
+using test::unaided_product;
 
 constexpr std::size_t kPatchCount = 777;
 
@@ -41,27 +40,11 @@ HierarchicalStorage with_roles(HierarchicalStorage storage) {
   return storage;
 }
 
-std::vector<Float3> random_light(std::size_t n, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
-  std::uniform_real_distribution<float> uniform(0, 100);
-  std::vector<Float3> light(n);
-  for (Float3& v : light) v = {uniform(engine), uniform(engine), uniform(engine)};
-  return light;
-}
-
-/// Into an array that holds something else.
-std::vector<Float3> product(const TransferOperator& op, const std::vector<Float3>& m0) {
-  std::vector<Float3> h(m0.size(), Float3{-1, -2, -3});
-  std::vector<float> workspace(op.workspace_size(), std::nanf(""));
-  op.apply(m0, h, workspace);
-  return h;
-}
-
 /// What the operator of all patches gives receivers of the light of sources.
 std::vector<Float3> part_of_product(const HierarchicalOperator& whole, const PatchRoles& roles,
                                     std::vector<Float3> m0) {
   roles.keep(PatchRoles::kSource, m0);
-  std::vector<Float3> h = product(whole, m0);
+  std::vector<Float3> h = unaided_product(whole, m0);
   roles.keep(PatchRoles::kReceiver, h);
   return h;
 }
@@ -83,14 +66,14 @@ TEST(PatchRoles, AnApplyIsThatPartOfTheWhole) {
   for (const std::uint32_t matrices : {1U, 3U}) {
     const auto storage = test::random_hierarchical_storage(kPatchCount, matrices, 6);
     const auto some = with_roles(storage);
-    const std::vector<Float3> m0 = random_light(kPatchCount, 1);
+    const std::vector<Float3> m0 = test::random_light(kPatchCount, 1, 100);
     for (const auto& [precision, allowed] :
          {std::pair(Precision::kF32, 2e-6), std::pair(Precision::kF16, 2e-6),
           std::pair(Precision::kQ16, 5e-4), std::pair(Precision::kQ8, 5e-5)}) {
       const HierarchicalOperator whole(encode_values(storage, precision));
       const HierarchicalOperator op(encode_values(some, precision));
       EXPECT_EQ(op.roles(), some.roles);
-      const std::vector<Float3> h = product(op, m0);
+      const std::vector<Float3> h = unaided_product(op, m0);
       EXPECT_LT(relative_difference(h, part_of_product(whole, some.roles, m0), storage.area),
                 allowed);
       for (std::size_t i = 0; i < kPatchCount; ++i) {
@@ -127,7 +110,8 @@ TEST(PatchRoles, WhatIsNotWantedIsNotRead) {
 TEST(PatchRoles, AskedForOthersTheyGetNoLight) {
   const auto some = with_roles(test::random_hierarchical_storage(kPatchCount, 2, 6));
   const HierarchicalOperator op(some);
-  const std::vector<Float3> m0 = random_light(kPatchCount, 1), whole = product(op, m0);
+  const std::vector<Float3> m0 = test::random_light(kPatchCount, 1, 100),
+                            whole = unaided_product(op, m0);
   const std::vector<std::uint32_t> asked(some.patch.begin() + 200, some.patch.begin() + 500);
   constexpr Float3 kUnset = {-1, -2, -3};
   std::vector<Float3> h(kPatchCount, kUnset), expected(h);
@@ -144,34 +128,18 @@ TEST(PatchRoles, AskedForOthersTheyGetNoLight) {
 }
 
 TEST(PatchRoles, ABatchIsAsManyApplies) {
-  const HierarchicalOperator op(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6)));
-  const std::vector<Float3> m0 = random_light(3 * kPatchCount, 2);
-  std::vector<Float3> batch(m0.size(), Float3{-1, -2, -3});
-  std::vector<float> workspace(op.batch_workspace_size(3), std::nanf(""));
-  op.apply_batch(3, m0, batch, workspace);
-  for (std::size_t light = 0; light < 3; ++light) {
-    const auto begin = static_cast<std::ptrdiff_t>(light * kPatchCount);
-    const auto end = begin + static_cast<std::ptrdiff_t>(kPatchCount);
-    const std::vector<Float3> one(m0.begin() + begin, m0.begin() + end);
-    const std::vector<Float3> part(batch.begin() + begin, batch.begin() + end);
-    EXPECT_LT(relative_difference(part, product(op, one), op.storage().area), 1e-6);
-  }
+  test::check_batch(
+      HierarchicalOperator(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6))), 3);
 }
 
 TEST(PatchRoles, SameBitsForAnyNumberOfThreads) {
-  const HierarchicalOperator op(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6)));
-  const std::vector<Float3> m0 = random_light(kPatchCount, 2);
-  const auto multiply = [&] { return product(op, m0); };
-  EXPECT_EQ(test::with_threads(1, multiply), test::with_threads(5, multiply));
+  test::expect_same_bits_for_any_number_of_threads(
+      HierarchicalOperator(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6))));
 }
 
 TEST(PatchRoles, AnApplyAllocatesNothing) {
-  const HierarchicalOperator op(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6)));
-  const std::vector<Float3> m0 = random_light(kPatchCount, 2);
-  std::vector<Float3> h(m0.size());
-  std::vector<float> workspace(op.workspace_size());
-  op.apply(m0, h, workspace);
-  EXPECT_EQ(test::count_allocations([&] { op.apply(m0, h, workspace); }), 0);
+  test::expect_no_allocations(
+      HierarchicalOperator(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6))));
 }
 
 TEST(PatchRoles, ThoseThatDoNotFitAreRefused) {

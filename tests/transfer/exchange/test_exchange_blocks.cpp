@@ -4,11 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include "rebounce/error.h"
 #include "tests/support/random_pairs.h"
-#include "transfer/kernels/kernels.h"
 
 namespace rebounce {
 namespace {
@@ -60,34 +57,6 @@ TEST(ExchangeBlocks, SweepsAreThoseOfTheRowsInEveryOrderOfDirections) {
       by_half->end(relaxed);
       for (std::size_t i = 0; i < n; ++i) expect_near(relaxed[i], expected[i], 2e-6);
     }
-  }
-}
-
-TEST(ExchangeBlocks, InstructionSetsAgree) {
-  constexpr std::size_t kCount = 500, kStride = kCount * kFormFactorBlock;
-  std::mt19937_64 engine(3);
-  std::uniform_real_distribution<float> uniform(0, 1);
-  std::vector<FormFactorBlock> values(kCount);
-  std::vector<std::uint32_t> position(kCount);
-  std::vector<float> x(kChannelCount * kStride);
-  for (std::uint32_t k = 0; k < kCount; ++k) {
-    position[k] = k;
-    for (float& f : values[k].value) f = uniform(engine);
-  }
-  for (float& v : x) v = uniform(engine);
-  const Float3 value{1, 2, 3};
-  Float3 sum_a{}, sum_b{};
-  std::vector<float> a = x, b = x;
-  kKernelsPortable.gather.gather_and_spread(values.data(), position.data(), kCount, value.data(),
-                                            x.data(), a.data(), kStride, sum_a.data());
-  kernels().gather.gather_and_spread(values.data(), position.data(), kCount, value.data(), x.data(),
-                                     b.data(), kStride, sum_b.data());
-  expect_near(sum_a, sum_b, 1e-5);
-  std::vector<float> c = x;
-  kernels().gather.spread(values.data(), position.data(), kCount, value.data(), c.data(), kStride);
-  for (std::size_t k = 0; k < a.size(); ++k) {
-    EXPECT_NEAR(a[k], b[k], 1e-6F * a[k]);
-    EXPECT_EQ(b[k], c[k]);
   }
 }
 

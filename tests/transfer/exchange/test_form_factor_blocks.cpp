@@ -1,15 +1,13 @@
-// F in blocks against F by rows, for every set of kernels that this processor runs.
+// F in blocks against F by rows.
 
 #include "transfer/exchange/form_factor_blocks.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <random>
 
 #include "rebounce/error.h"
 #include "tests/support/random_pairs.h"
-#include "transfer/kernels/kernels.h"
 
 namespace rebounce {
 namespace {
@@ -67,32 +65,6 @@ TEST(FormFactorBlocks, PlanesGoThereAndBack) {
   blocks.from_planes(planes, back);
   EXPECT_EQ(back, pairs.light);
   EXPECT_EQ(planes[77], 0);  // past the last patch
-}
-
-TEST(FormFactorBlocks, InstructionSetsAgree) {
-  constexpr std::size_t kCount = 500, kStride = kCount * kFormFactorBlock;
-  std::mt19937_64 engine(3);
-  std::uniform_real_distribution<float> uniform(0, 1);
-  std::vector<FormFactorBlock> values(kCount);
-  std::vector<std::uint32_t> position(kCount);
-  std::vector<float> x(kChannelCount * kStride);
-  for (std::uint32_t k = 0; k < kCount; ++k) {
-    position[k] = k;
-    for (float& f : values[k].value) f = uniform(engine);
-  }
-  for (float& v : x) v = uniform(engine);
-  const GatherKernels& wide = kernels().gather;
-  Float3 a{}, b{};
-  kKernelsPortable.gather.gather(values.data(), position.data(), kCount, x.data(), kStride,
-                                 a.data());
-  wide.gather(values.data(), position.data(), kCount, x.data(), kStride, b.data());
-  expect_near(a, b, 1e-6);
-  const Float3 weight{1, 2, 3};
-  std::vector<float> y1 = x, y2 = x;
-  kKernelsPortable.gather.spread(values.data(), position.data(), kCount, weight.data(), y1.data(),
-                                 kStride);
-  wide.spread(values.data(), position.data(), kCount, weight.data(), y2.data(), kStride);
-  for (std::size_t k = 0; k < y1.size(); ++k) EXPECT_NEAR(y1[k], y2[k], 1e-6F * y1[k]);
 }
 
 TEST(FormFactorBlocks, CountsItsBytes) {

@@ -247,39 +247,45 @@ class Tampering {
   std::vector<std::byte> changed_;
 };
 
-TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
-  struct Fault {
-    const char* tensor;
-    std::size_t entry;
-    std::uint32_t value;
-    const char* message;
-  };
-  const Fault faults[] = {
-      {"blocks", 0, 16, "nor below"},
-      {"blocks", 0, 0xFFFFFFF0, "reaches outside"},
-      {"blocks", 1, 0, "empty"},
-      {"blocks", 1, 8, "not aligned"},
-      {"blocks", 3, 0xFFFFFFF0, "reaches outside"},
-      {"blocks", 4, 2, "not numbered in the order"},
-      {"blocks", 4, 3, "unknown kind"},
-      {"blocks", 4, 0xFFFFFFFF, "unknown kind"},
-      {"blocks", 5, 1000, "rank"},
-      {"blocks", 5, 0, "rank"},
-      {"blocks", 6, 0xFFFFFFFF, "rank"},
-      {"channel_matrix", 2, 3, "a channel has no matrix"},
-      {"channel_matrix", 2, 2, "number of values"},
-      {"patch", 0, kPatchCount, "not a permutation"},
-      {"patch", 0, 0xFFFFFFFF, "not a permutation"},
-      {"role", 7, 0x03040303, "role of patch 30 is 4"},
-      {"role", 24, 0xFF030303, "role of patch 99 is 255"},
-  };
+/// An entry of a tensor that becomes another, and what is said of it.
+struct Fault {
+  const char* tensor;
+  std::size_t entry;
+  std::uint32_t value;
+  const char* message;
+};
+
+void expect_refused(const TransferData& data, const std::vector<Fault>& faults) {
+  const test::TemporaryFolder folder;
   for (const Fault& fault : faults) {
     SCOPED_TRACE(std::string(fault.tensor) + ": " + fault.message);
-    const test::TemporaryFolder folder;
-    save_transfer_file(folder / "file", sample_data(Precision::kF16, all_roles()));
+    save_transfer_file(folder / "file", data);
     Tampering(folder / "file").set(fault.tensor, fault.entry, fault.value);
     expect_error([&] { load_transfer_file(folder / "file"); }, fault.message);
   }
+}
+
+TEST(HierarchicalFile, RefusesTablesThatDoNotFit) {
+  expect_refused(sample_data(Precision::kF16, all_roles()),
+                 {
+                     {"blocks", 0, 16, "nor below"},
+                     {"blocks", 0, 0xFFFFFFF0, "reaches outside"},
+                     {"blocks", 1, 0, "empty"},
+                     {"blocks", 1, 8, "not aligned"},
+                     {"blocks", 3, 0xFFFFFFF0, "reaches outside"},
+                     {"blocks", 4, 2, "not numbered in the order"},
+                     {"blocks", 4, 3, "unknown kind"},
+                     {"blocks", 4, 0xFFFFFFFF, "unknown kind"},
+                     {"blocks", 5, 1000, "rank"},
+                     {"blocks", 5, 0, "rank"},
+                     {"blocks", 6, 0xFFFFFFFF, "rank"},
+                     {"channel_matrix", 2, 3, "a channel has no matrix"},
+                     {"channel_matrix", 2, 2, "number of values"},
+                     {"patch", 0, kPatchCount, "not a permutation"},
+                     {"patch", 0, 0xFFFFFFFF, "not a permutation"},
+                     {"role", 7, 0x03040303, "role of patch 30 is 4"},
+                     {"role", 24, 0xFF030303, "role of patch 99 is 255"},
+                 });
 }
 
 TEST(HierarchicalFile, RefusesRolesThatAreNotOneForEachPatch) {
@@ -290,28 +296,19 @@ TEST(HierarchicalFile, RefusesRolesThatAreNotOneForEachPatch) {
 }
 
 TEST(HierarchicalFile, RefusesClusterBasesThatDoNotFit) {
-  const auto refuses = [](const char* tensor, std::size_t entry, std::uint32_t value,
-                          const char* message) {
-    SCOPED_TRACE(std::string(tensor) + ": " + message);
-    const test::TemporaryFolder folder;
-    save_transfer_file(folder / "file", nested_data(Precision::kQ8));
-    Tampering(folder / "file").set(tensor, entry, value);
-    expect_error([&] { load_transfer_file(folder / "file"); }, message);
-  };
-  refuses("blocks", 0, 112, "a cluster basis is not over positions");
-  refuses("blocks", 2, 0, "not numbered in the order");
-  refuses("blocks", 3, 0xFFFFFFF0, "not numbered in the order");
-  refuses("blocks", 4, 1, "not numbered in the order");
-  refuses("blocks", 5, 6, "rank of a cluster basis");
-  refuses("moment_scale", 3, 0x7FC00000, "not finite");
-  refuses("moment_scale", 3, 0x7F800000, "not finite");
+  expect_refused(nested_data(Precision::kQ8),
+                 {{"blocks", 0, 112, "a cluster basis is not over positions"},
+                  {"blocks", 2, 0, "not numbered in the order"},
+                  {"blocks", 3, 0xFFFFFFF0, "not numbered in the order"},
+                  {"blocks", 4, 1, "not numbered in the order"},
+                  {"blocks", 5, 6, "rank of a cluster basis"},
+                  {"moment_scale", 3, 0x7FC00000, "not finite"},
+                  {"moment_scale", 3, 0x7F800000, "not finite"}});
 }
 
 TEST(HierarchicalFile, RefusesScalesThatDoNotFit) {
-  const test::TemporaryFolder folder;
-  save_transfer_file(folder / "file", equilibrated_data(Precision::kQ8));
-  Tampering(folder / "file").set("scale_exponent", 3, 0x00001900);
-  expect_error([&] { load_transfer_file(folder / "file"); }, "beyond 2^+-24");
+  expect_refused(equilibrated_data(Precision::kQ8),
+                 {{"scale_exponent", 3, 0x00001900, "beyond 2^+-24"}});
 }
 
 TEST(HierarchicalFile, RefusesFormFactorsWithClusterBases) {

@@ -20,6 +20,7 @@ namespace rebounce {
 namespace {
 
 using test::expect_error;
+using test::replace_in_file;
 
 constexpr std::size_t kPatchCount = 300, kRank = 5;  // two tiles, the second not full
 
@@ -75,22 +76,10 @@ TEST(LowRankFile, RoundTrips) {
   }
 }
 
-/// Changes a piece of text in the header, under a good checksum.
-void tamper(const std::filesystem::path& path, const std::string& before,
-            const std::string& after) {
-  std::string bytes = test::read_bytes(path);
-  const std::size_t at = bytes.find(before);
-  ASSERT_NE(at, std::string::npos);
-  ASSERT_EQ(before.size(), after.size());
-  bytes.replace(at, before.size(), after);
-  test::reseal(bytes);
-  test::write_bytes(path, bytes);
-}
-
 TEST(LowRankFile, RefusesAKindThatIsNotKnown) {
   const test::TemporaryFolder folder;
   save_transfer_file(folder / "file", sample_data(Precision::kF32));
-  tamper(folder / "file", "\"low-rank\"", "\"low-bank\"");
+  replace_in_file(folder / "file", "\"low-rank\"", "\"low-bank\"");
   expect_error([&] { load_transfer_file(folder / "file"); }, "of a kind");
 }
 
@@ -123,7 +112,7 @@ TEST(LowRankFile, RefusesTensorsThatDoNotFit) {
   for (const Fault& fault : faults) {
     SCOPED_TRACE(fault.after);
     save_transfer_file(folder / "file", sample_data(Precision::kF32));
-    tamper(folder / "file", fault.before, fault.after);
+    replace_in_file(folder / "file", fault.before, fault.after);
     EXPECT_THROW(load_transfer_file(folder / "file"), Error);
   }
 }

@@ -1,0 +1,347 @@
+// `rebounce precompute` as scripts see it: what it refuses, stores and says.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "precompute/compression/hierarchical_settings.h"
+#include "runtime/solvers/solve_radiosity.h"
+#include "tests/precompute/cli/solution_table.h"
+#include "tests/support/command_line.h"
+#include "tests/support/npz_reader.h"
+
+namespace rebounce {
+namespace {
+
+using nlohmann::json;
+using test::difference;
+using test::kLights;
+using test::kScene;
+using test::Names;
+using test::Outcome;
+using test::read_csv;
+using test::Table;
+using test::Words;
+using PrecomputeCommand = test::CommandLine;
+
+TEST_F(PrecomputeCommand, HoldsWhatARunNeedsAndFormFactorsOnRequest) {
+  const std::string file = precompute("box.safetensors");
+  const std::string whole = precompute("whole.safetensors", {"--store-form-factors"});
+  EXPECT_LT(test::read_bytes(file).size(), test::read_bytes(whole).size() * 3 / 4);
+  EXPECT_EQ(summary_of({"info", file})["form_factors"], "none");
+  const Outcome printed = run({"info", file});
+  EXPECT_NE(printed.out.find("--store-form-factors"), std::string::npos) << printed.out;
+
+  const auto solve = [&](const std::string& from, const std::string& method) {
+    return Words{"solve", from, "--lights", kLights, "-o", path("x.csv"), "--method", method};
+  };
+  const json product = summary_of(solve(file, "transfer"));
+  EXPECT_TRUE(product["residual"].is_null());
+  EXPECT_EQ(product["form_factors"], "none");
+  EXPECT_EQ(product["method"], "transfer");
+  EXPECT_EQ(product["sweeps"], 0);
+  EXPECT_GT(product["microseconds"], 0);
+  const std::string without = test::read_bytes(path("x.csv"));
+  EXPECT_LT(summary_of(solve(whole, "transfer"))["residual"], 2 * kDefaultTolerance);
+  EXPECT_EQ(without, test::read_bytes(path("x.csv")));
+  const Outcome said = run(solve(file, "transfer"));
+  EXPECT_NE(said.out.find("--store-form-factors"), std::string::npos) << said.out;
+
+  std::filesystem::remove(folder_ / "x.csv");
+  for (const NamedSolveMethod& method : kSolveMethods) {
+    expect_refused(solve(file, std::string(method.name)), "--store-form-factors");
+  }
+  Words exact = solve(file, "gathering");
+  exact.insert(exact.end(), {"--form-factors", "exact"});
+  expect_refused(exact, "--store-form-factors");
+  expect_refused({"export", file, "--what", "form-factors", "-o", path("f.npz")},
+                 "--store-form-factors");
+  const auto draw = [&](const std::string& from, const char* show, const char* picture) {
+    return Words{"render", from,     "--lights", kLights, "--size",
+                 "32x24",  "--show", show,       "-o",    path(picture)};
+  };
+  expect_refused(draw(file, "error", "x.png"), "--store-form-factors");
+  // The light that comes straight from the scene's own lamp.
+  for (const char* show : {"direct", "indirect"}) {
+    summary_of(draw(file, show, "without.png"));
+    summary_of(draw(whole, show, "with.png"));
+    EXPECT_EQ(test::read_bytes(path("without.png")), test::read_bytes(path("with.png"))) << show;
+  }
+}
+
+TEST_F(PrecomputeCommand, LinksHaveNoFormFactorsOfPairs) {
+  expect_refused({"precompute", kScene, "--patches", "100", "--form-factors", "links",
+                  "--store-form-factors", "-o", path("x.safetensors")},
+                 "--compress-form-factors");
+  const std::string file = precompute("box.safetensors", {"--form-factors", "links"});
+  const json info = summary_of({"info", file});
+  EXPECT_EQ(info["form_factors"], "none");
+  EXPECT_EQ(info["compressed_form_factor_bytes"], 0);
+  EXPECT_EQ(info["settings"]["form_factor_tolerance"], kDefaultTolerance / 5);
+  EXPECT_LE(info["error_mean"].get<double>(), kDefaultTolerance);
+}
+
+TEST_F(PrecomputeCommand, RecordsTheSettingsThatApply) {
+  const json dense = summary_of({"info", precompute("dense", {"--operator", "dense"})});
+  EXPECT_EQ(dense["operator"], "dense");
+  EXPECT_EQ(dense["tolerance"], 0);
+  EXPECT_FALSE(dense["settings"].contains("tolerance"));
+  EXPECT_FALSE(dense["settings"].contains("rank"));
+  EXPECT_LT(dense["error_max"].get<double>(), 1e-5);
+}
+
+TEST_F(PrecomputeCommand, CompressesToATolerance) {
+  const Words words = {"precompute",  kScene, "--patches", "1200",
+                       "--tolerance", "0.02", "-o",        path("box.safetensors")};
+  const json info = summary_of(words);
+  EXPECT_EQ(info["operator"], "hierarchical");
+  EXPECT_EQ(info["tolerance"], 0.02);
+  EXPECT_LT(info["error_mean"].get<double>(), 0.02);
+  EXPECT_GT(info["error_mean"].get<double>(), 1e-4);
+  EXPECT_LT(info["bytes_per_patch"].get<double>(), 1000);  // dense: 7,200
+  summary_of({"export", path("box.safetensors"), "--what", "transfer", "-o", path("y.npz")});
+  const auto arrays = test::unzip(path("y.npz"));
+  const auto n = info["patch_count"].get<std::size_t>();
+  EXPECT_EQ(test::npz_values<float>(arrays, "transfer", "<f4").size(), 3 * n * n);
+}
+
+TEST_F(PrecomputeCommand, AMissedToleranceFails) {
+  // Half precision cannot be this exact.
+  expect_failure({"precompute", kScene, "--patches", "300", "--operator", "hierarchical",
+                  "--tolerance", "0.00001", "-o", path("box.safetensors"), "--quiet"},
+                 "misses its tolerance");
+  EXPECT_GT(summary_of({"info", path("box.safetensors")})["error_mean"].get<double>(), 1e-5);
+}
+
+TEST_F(PrecomputeCommand, FormFactorsThatMissTheirToleranceFail) {
+  expect_failure({"precompute", kScene, "--patches", "300", "--compress-form-factors", "0.00001",
+                  "-o", path("box.safetensors"), "--quiet"},
+                 "miss their tolerance");
+  const json report = summary_of({"info", path("box.safetensors")})["report"];
+  EXPECT_GT(report["form_factor_error_mean"].get<double>(), 1e-5);
+}
+
+TEST_F(PrecomputeCommand, IntegersAreRefusedBeforeAnythingIsComputed) {
+  for (const std::string kind : {"dense", "low-rank"}) {
+    for (const std::string precision : {"q16", "q8"}) {
+      // The estimate, which comes before the form factors, would be a line of its own.
+      expect_failure({"precompute", kScene, "--patches", "300", "--operator", kind, "--precision",
+                      precision, "-o", path("box.safetensors")},
+                     "hierarchical");
+    }
+  }
+}
+
+TEST_F(PrecomputeCommand, RelightsByOperatorsOfLowRank) {
+  const std::string exact = path("exact.csv"), nearly = path("nearly.csv");
+  summary_of({"solve", precompute("dense.safetensors", {"--operator", "dense"}), "-o", exact});
+  const std::string file = precompute("low-rank", {"--operator", "low-rank", "--rank", "64"});
+  const json info = summary_of({"info", file});
+  EXPECT_EQ(info["operator"], "low-rank");
+  EXPECT_EQ(info["tolerance"], 0);
+  EXPECT_EQ(info["settings"]["rank"], 64);
+  EXPECT_GT(info["error_mean"].get<double>(), 1e-4);
+  EXPECT_GT(info["error_bound"].get<double>(), info["error_max"].get<double>());
+  summary_of({"solve", file, "-o", nearly});
+  // The largest difference at a patch: that of the corners.
+  EXPECT_LT(difference(read_csv(exact), read_csv(nearly), 3), 0.7);
+}
+
+TEST_F(PrecomputeCommand, MeetsThePatchSize) {
+  const json made = summary_of(
+      {"precompute", kScene, "--patch-size", "0.1", "-o", path("box.safetensors"), "--quiet"});
+  // The surfaces measure 2.1 m2; the largest patch of that length is a square, the smallest a right
+  // triangle half as long.
+  EXPECT_GT(made["patch_count"].get<int>(), 2.1 / 0.005);
+  EXPECT_LT(made["patch_count"].get<int>(), 2.1 / 0.000625);
+}
+
+TEST_F(PrecomputeCommand, WorksWithoutPairs) {
+  const std::string file = path("box.safetensors");
+  const json built = summary_of({"precompute", kScene, "--patches", "400", "--form-factors",
+                                 "links", "--tolerance", "0.02", "--store-links",
+                                 "--compress-form-factors", "0.004", "-o", file});
+  EXPECT_EQ(built["form_factors"], "compressed");
+  EXPECT_EQ(built["form_factor_count"], 0);
+  EXPECT_GT(built["link_count"], 0);
+  EXPECT_EQ(built["settings"]["form_factors"], "links");
+  const json info = summary_of({"info", file});
+  EXPECT_EQ(info["operator"], "hierarchical");
+  EXPECT_GT(info["error_mean"], 0);
+  EXPECT_LT(info["error_mean"], 0.02);
+  EXPECT_GT(info["form_factor_error_mean"], 0);
+  EXPECT_LT(info["form_factor_error_mean"], 0.004);
+
+  const std::string once = path("once.csv");
+  summary_of({"solve", file, "--lights", kLights, "-o", once});
+  for (const std::string method : {"gathering", "jacobi", "gauss-seidel", "symmetric-gauss-seidel",
+                                   "conjugate-gradient", "refine", "hierarchical"}) {
+    const json solved = summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"),
+                                    "--method", method, "--residual", "1e-5"});
+    EXPECT_EQ(solved["form_factors"], method == "hierarchical" ? "links" : "compressed") << method;
+    EXPECT_LT(difference(read_csv(once), read_csv(path("x.csv")), 6), 0.1) << method;
+  }
+  const auto solve = [&](const char* option, const char* value) {
+    return Words{"solve", file, "--lights", kLights, "-o", path("y.csv"), option, value};
+  };
+  expect_refused(solve("--form-factors", "exact"), "--store-form-factors");
+  expect_refused({"export", file, "--what", "form-factors", "-o", path("x.npz")},
+                 "--form-factors pairs --store-form-factors");
+  for (const std::string show : {"radiosity", "error"}) {
+    summary_of({"render", file, "--lights", kLights, "--size", "32x24", "--show", show, "-o",
+                path("x.png")});
+  }
+}
+
+TEST_F(PrecomputeCommand, LinksMakeHierarchicalOperatorsOnly) {
+  for (const std::string kind : {"dense", "low-rank"}) {
+    expect_refused({"precompute", kScene, "--patches", "100", "--form-factors", "links",
+                    "--operator", kind, "-o", path("x.safetensors")},
+                   "only a hierarchical operator");
+  }
+}
+
+TEST_F(PrecomputeCommand, PairsHaveNoErrorOfALink) {
+  expect_refused({"precompute", kScene, "--patches", "100", "--link-epsilon", "0.001", "-o",
+                  path("x.safetensors")},
+                 "from links");
+}
+
+TEST_F(PrecomputeCommand, QualitySetsTheRaysOfFormFactors) {
+  const json low = summary_of({"info", precompute("low.safetensors", {"--quality", "low"})});
+  const json usual = summary_of({"info", precompute("usual.safetensors")});
+  EXPECT_EQ(low["settings"]["hemisphere_rays"], 1024);
+  EXPECT_EQ(low["settings"]["full_rays"], 16);
+  EXPECT_EQ(usual["settings"]["hemisphere_rays"], 4096);
+}
+
+TEST_F(PrecomputeCommand, GivesTheSameBytesForAnyNumberOfThreads) {
+  const std::string one = test::read_bytes(precompute("1.safetensors", {"--threads", "1"}));
+  EXPECT_EQ(one, test::read_bytes(precompute("2.safetensors", {"--threads", "2"})));
+  EXPECT_EQ(one, test::read_bytes(precompute("5.safetensors", {"--threads", "5"})));
+}
+
+TEST_F(PrecomputeCommand, TheSeedDecides) {
+  const std::string seven = test::read_bytes(precompute("7.safetensors", {"--seed", "7"}));
+  EXPECT_EQ(seven, test::read_bytes(precompute("again.safetensors", {"--seed", "7"})));
+  EXPECT_NE(seven, test::read_bytes(precompute("8.safetensors", {"--seed", "8"})));
+}
+
+TEST_F(PrecomputeCommand, StoresHalfPrecisionInHalfTheBytes) {
+  const auto info = [&](const std::string& precision) {
+    return summary_of({"info", precompute(precision + ".safetensors",
+                                          {"--operator", "dense", "--precision", precision})});
+  };
+  const json full = info("f32"), half = info("f16");
+  EXPECT_EQ(full["operator_bytes"], 2 * half["operator_bytes"].get<std::uint64_t>());
+  EXPECT_LT(half["error_max"].get<double>(), 1e-3);
+}
+
+TEST_F(PrecomputeCommand, RefusesWhatNeedsTooMuchMemoryBeforeItBegins) {
+  for (const Words& from : {Words{"--operator", "dense"}, Words{"--operator", "hierarchical"},
+                            Words{"--operator", "low-rank"}, Words{"--form-factors", "links"}}) {
+    SCOPED_TRACE(from[1]);
+    expect_refused({"precompute", kScene, "--patches", "300", from[0], from[1], "--memory-limit",
+                    "0.0001", "-o", path("x.safetensors")},
+                   "the limit is 0.0001 GiB");
+  }
+}
+
+TEST_F(PrecomputeCommand, StopsCleanlyWhenInterrupted) {
+  test::Subprocess program(
+      {REBOUNCE_PROGRAM, "precompute", kScene, "--patches", "4000", "-o", path("x.safetensors")},
+      printed_ / "out", printed_ / "err");
+  ASSERT_TRUE(program.has_said(" patches: about "));
+  program.send(SIGINT);
+  const Outcome outcome = program.finish();
+  EXPECT_GT(outcome.exit_code, 0) << "should end by itself, with an error";
+  EXPECT_NE(outcome.err.find("rebounce: "), std::string::npos) << outcome.err;
+  EXPECT_EQ(folder_.names(), Names{});
+}
+
+TEST_F(PrecomputeCommand, PutsProbesIntoTheFile) {
+  const Words words = {"precompute", kScene, "--patches", "300", "-o", path("p.safetensors")};
+  const auto with = [&](const std::string& probes) {
+    Words more = words;
+    more.insert(more.end(), {"--probes", probes});
+    return more;
+  };
+  const double plain = summary_of(words)["file_bytes"].get<double>();
+  EXPECT_GT(summary_of(with("2,2,2"))["file_bytes"].get<double>(), plain + 10000);
+  EXPECT_GT(summary_of(with("0.25"))["file_bytes"].get<double>(), plain + 10000);
+  for (const char* bad : {"2,2", "0,1,1", "1.5,1,1", "-1", "0.001"}) {
+    const Outcome outcome = run(with(bad));
+    EXPECT_NE(outcome.exit_code, 0) << bad;
+  }
+}
+
+TEST_F(PrecomputeCommand, StoresReceiversAndSourcesAlone) {
+  const std::string file = path("box.safetensors"), solution = path("x.csv");
+  const json made =
+      summary_of({"precompute", kScene, "--patches", "600", "--receivers", "mesh:floor,tall block",
+                  "--receivers", "box:0,0,0,1,0.1,1", "--sources", "ceiling,material:red",
+                  "--store-form-factors", "-o", file});
+  EXPECT_EQ(made["operator"], "hierarchical");
+  const json info = summary_of({"info", file});
+  const auto n = info["patch_count"].get<std::size_t>();
+  const auto receivers = info["receiver_count"].get<std::size_t>();
+  EXPECT_GT(receivers, n / 10);
+  EXPECT_LT(receivers, n * 6 / 10);
+  EXPECT_GT(info["source_count"].get<std::size_t>(), n / 10);
+  EXPECT_LT(info["source_count"].get<std::size_t>(), n / 2);
+  EXPECT_EQ(info["settings"]["sources"], (json{"ceiling", "material:red"}));
+  EXPECT_EQ(info["settings"]["receivers"].size(), 3U);
+  const json& roles = info["roles"];
+  EXPECT_EQ(roles["both"].get<std::size_t>() + roles["receiver_only"].get<std::size_t>(),
+            receivers);
+  EXPECT_EQ(roles["both"].get<std::size_t>() + roles["receiver_only"].get<std::size_t>() +
+                roles["source_only"].get<std::size_t>() + roles["neither"].get<std::size_t>(),
+            n);
+  EXPECT_GT(roles["neither"], 0);
+  EXPECT_GT(roles["part_of_pairs"], 0);
+  EXPECT_LT(roles["part_of_pairs"], 0.5);
+  EXPECT_GT(made["estimate"]["peak_bytes"], 0);
+  EXPECT_GT(made["estimate"]["form_factor_seconds"], 0);
+  EXPECT_GT(made["estimate"]["inverse_seconds"], 0);
+  EXPECT_LT(info["error_mean"].get<double>(), 0.005);
+
+  summary_of({"solve", file, "--lights", kLights, "-o", solution});
+  const Table table = read_csv(solution);
+  const auto lit = static_cast<std::size_t>(std::ranges::count_if(
+      table.rows, [](const std::vector<double>& row) { return row.at(3) != 0; }));
+  // What is under the blocks sees nothing.
+  EXPECT_LE(lit, receivers);
+  EXPECT_GT(lit, receivers * 3 / 4);
+  summary_of({"solve", file, "--lights", kLights, "-o", solution, "--method", "gauss-seidel"});
+  expect_refused({"solve", file, "-o", path("y.csv"), "--method", "refine"},
+                 "receivers or sources");
+  const json whole = summary_of({"info", precompute("whole.safetensors")});
+  EXPECT_EQ(whole["receiver_count"], whole["patch_count"]);
+  EXPECT_EQ(whole["source_count"], whole["patch_count"]);
+  EXPECT_EQ(whole["roles"]["both"], whole["patch_count"]);
+  EXPECT_EQ(whole["roles"]["part_of_pairs"], 1);
+}
+
+TEST_F(PrecomputeCommand, RefusesReceiversAndSourcesThatAreNotThere) {
+  const auto attempt = [&](const Words& options, const std::string& part) {
+    Words words = {"precompute", kScene, "-o", path("x.safetensors")};
+    words.insert(words.end(), options.begin(), options.end());
+    expect_refused(words, part);
+  };
+  attempt({"--receivers", "flor"}, R"(receivers: the scene has no mesh or material "flor"; there)");
+  attempt({"--receivers", "flor"}, R"("floor")");
+  attempt({"--sources", "floor,mesh:red"}, R"(sources: the scene has no mesh "red")");
+  attempt({"--sources", "box:1,2,3"}, "two corners");
+  attempt({"--sources", "box:9,9,9,10,10,10"}, "the named surfaces have no patches");
+  attempt({"--receivers", "floor", "--operator", "dense"}, "hierarchical operators alone");
+  attempt({"--receivers", "floor", "--operator", "low-rank"}, "hierarchical operators alone");
+}
+
+}  // namespace
+}  // namespace rebounce

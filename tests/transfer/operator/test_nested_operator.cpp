@@ -1,0 +1,209 @@
+// Operators with cluster bases, and those that are equilibrated: scaled at every patch.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "tests/support/hierarchical_samples.h"
+#include "tests/support/operator_checks.h"
+#include "transfer/format/hierarchical_encoding.h"
+
+namespace rebounce {
+namespace {
+
+using test::check_batch;
+using test::check_receivers;
+using test::expect_error;
+using test::kPrecisions;
+using test::multiply_expansion;
+using test::random_nested_storage;
+using test::rounding_of;
+using test::unaided_product;
+
+TEST(NestedOperator, TheTestOperatorHasClusterBasesOnAllSides) {
+  int rows = 0, both = 0, diagonal = 0, neither = 0;
+  const std::size_t positions = HierarchicalFormat::position_count(1000);
+  for (const std::uint64_t seed : {1U, 6U, 11U, 12U, 1003U}) {
+    for (const TransferBlock& block : random_nested_storage(1000, 3, seed).blocks) {
+      if (block.kind != TransferBlock::Kind::kLowRank) continue;
+      const bool row = block.row_begin >= positions, column = block.column_begin >= positions;
+      (block.on_diagonal() ? (row ? diagonal : neither) : column ? both : row ? rows : neither)++;
+    }
+  }
+  for (const int count : {rows, both, diagonal, neither}) EXPECT_GE(count, 3);
+}
+
+TEST(NestedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
+  for (const std::size_t n : {64U, 500U, 1000U}) {
+    for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+      const HierarchicalStorage storage = random_nested_storage(n, matrices, n + matrices);
+      ASSERT_FALSE(storage.coefficient_scale.empty());
+      const std::vector<Float3> m0 = test::random_light(n, n, 100);
+      const HierarchicalOperator exact(storage);
+      for (const Precision precision : kPrecisions) {
+        SCOPED_TRACE(std::to_string(n) + " patches, " + std::to_string(matrices) + " matrices");
+        const HierarchicalOperator op(encode_values(storage, precision));
+        EXPECT_LT(
+            relative_difference(unaided_product(op, m0), multiply_expansion(op, m0), storage.area),
+            rounding_of(precision));
+        EXPECT_LT(
+            relative_difference(unaided_product(op, m0), unaided_product(exact, m0), storage.area),
+            5e-3);
+      }
+    }
+  }
+}
+
+TEST(NestedOperator, ClusterBasesAreTheProductsThatTheyStandFor) {
+  // One block of rank one over the cluster coefficients of all positions but its own mirror
+  // image's: Yhat = u v^T + v u^T with u = W D t and v = W D s, written out.
+  HierarchicalStorage storage;
+  storage.area.assign(64, 1.0F);
+  storage.patch.resize(64);
+  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+  storage.matrix_count = 1;
+  std::vector<float> values;
+  const auto take = [&](std::size_t count, auto value) {
+    for (std::size_t k = 0; k < count; ++k) values.push_back(value(static_cast<float>(k)));
+  };
+  for (const std::uint32_t begin : {0U, 32U}) {
+    storage.blocks.push_back({.row_begin = begin,
+                              .row_count = 32,
+                              .column_begin = 64 + begin / 2,
+                              .column_count = 16,
+                              .kind = TransferBlock::Kind::kClusterBasis,
+                              .row_rank = 16});
+    take(16 * 32, [&](float k) { return std::sin(k + static_cast<float>(begin)); });
+  }
+  for (int k = 0; k < 32; ++k)
+    storage.coefficient_scale.push_back(1 + 0.1F * static_cast<float>(k));
+  storage.blocks.push_back({.row_begin = 80,
+                            .row_count = 16,
+                            .column_begin = 64,
+                            .column_count = 16,
+                            .kind = TransferBlock::Kind::kLowRank,
+                            .row_rank = 1,
+                            .column_rank = 1});
+  take(16, [](float k) { return std::cos(k); });
+  take(16, [](float k) { return std::cos(2 * k); });
+  take(1, [](float) { return 0.25F; });
+  values.resize(values.size() + HierarchicalFormat::kPadding);
+  const auto vector_of = [&](std::size_t cell) {
+    std::vector<double> u(32);
+    for (std::size_t m = 0; m < 16; ++m) {
+      const double t =
+          values[2 * 512 + (1 - cell) * 16 + m] * storage.coefficient_scale[16 * cell + m];
+      for (std::size_t k = 0; k < 32; ++k) u[k] += t * values[cell * 512 + m * 32 + k];
+    }
+    return u;
+  };
+  const std::vector<double> rows = vector_of(1), columns = vector_of(0);
+  storage.values_f32 = SharedArray(std::vector<float>(values));
+  const HierarchicalOperator op(storage);
+  std::vector<float> y(64 * 64);
+  op.expand(0, y);
+  for (std::size_t i = 0; i < 32; ++i) {
+    for (std::size_t j = 0; j < 32; ++j) {
+      const double entry = 0.25 * rows[i] * columns[j];
+      EXPECT_NEAR(y[(32 + i) * 64 + j], entry, 1e-4);
+      EXPECT_NEAR(y[j * 64 + 32 + i], entry, 1e-4);
+      EXPECT_EQ(y[i * 64 + j], 0);
+    }
+  }
+}
+
+TEST(NestedOperator, SameBitsForAnyNumberOfThreads) {
+  const HierarchicalStorage storage = random_nested_storage(1000, 3, 6);
+  for (const Precision precision : kPrecisions) {
+    test::expect_same_bits_for_any_number_of_threads(
+        HierarchicalOperator(encode_values(storage, precision)));
+  }
+}
+
+TEST(NestedOperator, ABatchIsAsManyAppliesAndReceiversGetTheirLight) {
+  const HierarchicalStorage storage = random_nested_storage(1000, 3, 11);
+  for (const Precision precision : kPrecisions) {
+    check_batch(HierarchicalOperator(encode_values(storage, precision)), 3);
+  }
+  check_receivers(HierarchicalOperator(random_nested_storage(777, 3, 12)), 1e-6F);
+  check_receivers(HierarchicalOperator(random_nested_storage(1000, 3, 12)), 1e-6F);
+  check_receivers(HierarchicalOperator(encode_values(storage, Precision::kQ8)), 5e-4F);
+}
+
+TEST(NestedOperator, AllocatesNothing) {
+  test::expect_no_allocations(HierarchicalOperator(random_nested_storage(500, 3, 8)));
+}
+
+std::vector<float> expansion(const HierarchicalOperator& op) {
+  std::vector<float> y(op.patch_count() * op.patch_count());
+  op.expand(0, y);
+  return y;
+}
+
+TEST(EquilibratedOperator, IsWhatItHoldsTimesTheScalesOfBothPatches) {
+  const HierarchicalStorage plain = random_nested_storage(500, 3, 21);
+  const HierarchicalStorage scaled = test::equilibrated(plain, 22);
+  std::vector<float> scale(500);
+  for (std::size_t k = 0; k < scale.size(); ++k) {
+    scale[plain.patch[k]] = std::exp2(static_cast<float>(scaled.scale_exponent[k]));
+  }
+  const std::vector<float> before = expansion(HierarchicalOperator(plain));
+  std::vector<float> expected = before;
+  for (std::size_t i = 0; i < 500; ++i) {
+    for (std::size_t j = 0; j < 500; ++j) expected[i * 500 + j] *= scale[i] * scale[j];
+  }
+  EXPECT_EQ(expansion(HierarchicalOperator(scaled)), expected);
+  EXPECT_NE(before, expected);
+}
+
+TEST(EquilibratedOperator, MultipliesLikeItsExpansionInEveryPrecision) {
+  for (const std::size_t n : {777U, 1000U}) {
+    const HierarchicalStorage storage = test::equilibrated(random_nested_storage(n, 3, n), n + 1);
+    const std::vector<Float3> m0 = test::random_light(n, n, 100);
+    for (const Precision precision : kPrecisions) {
+      SCOPED_TRACE(std::to_string(n) + " patches, " + precision_name(precision));
+      const HierarchicalOperator op(encode_values(storage, precision));
+      EXPECT_LT(
+          relative_difference(unaided_product(op, m0), multiply_expansion(op, m0), storage.area),
+          rounding_of(precision));
+      check_batch(op, 3);
+    }
+    check_receivers(HierarchicalOperator(storage), 1e-6F);
+  }
+}
+
+TEST(EquilibratedOperator, FitsHalvesByItsScales) {
+  constexpr std::uint32_t kSize = 32;
+  HierarchicalStorage storage;
+  storage.area.assign(kSize, 1.0F);
+  storage.patch.resize(kSize);
+  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+  storage.matrix_count = 1;
+  storage.blocks.push_back({.row_count = kSize, .column_count = kSize});
+  std::vector<float> values(kSize * kSize + HierarchicalFormat::kPadding);
+  for (std::uint32_t i = 0; i < kSize; ++i) {
+    for (std::uint32_t j = 0; j < kSize; ++j) {
+      values[i * kSize + j] = static_cast<float>(1000 + i * j);  // x 512 is too much
+    }
+  }
+  storage.values_f32 = SharedArray(std::move(values));
+  for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+    expect_error([&] { encode_values(storage, precision); }, "too large for f16");
+  }
+  storage.scale_exponent.assign(kSize, -3);
+  const HierarchicalOperator exact(storage);
+  const std::vector<Float3> m0 = test::random_light(kSize, 24, 100);
+  for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+    const HierarchicalOperator op(encode_values(storage, precision));
+    EXPECT_GT(op.storage().scale_exponent.front(), -3);
+    EXPECT_LT(
+        relative_difference(unaided_product(op, m0), unaided_product(exact, m0), storage.area),
+        1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace rebounce
