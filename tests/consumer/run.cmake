@@ -28,7 +28,7 @@ if(NOT ROOT)
   set(precompute ON)
   run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix} --component precompute)
 endif()
-run(${PROGRAM} precompute ${SCENE} --patches 100 --probes 2,2,2 --probe-rays 256 --quiet -o ${file})
+run(${PROGRAM} precompute ${SCENE} --store-form-factors --patches 100 --probes 2,2,2 --probe-rays 256 --quiet -o ${file})
 
 run(${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/build -G ${GENERATOR} -DCMAKE_PREFIX_PATH=${prefix}
     -DCMAKE_C_COMPILER=${C_COMPILER} -DCMAKE_CXX_COMPILER=${CXX_COMPILER}
