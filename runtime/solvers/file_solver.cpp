@@ -20,10 +20,11 @@ std::unique_ptr<const FormFactorOperator> take_form_factors(const TransferData& 
   const bool exact = !data.exchange.empty(), compressed = data.compressed_form_factors != nullptr;
   switch (source) {
     case FormFactorSource::kBest:
-      if (!exact && !compressed) refuse("form factors", "--compress-form-factors");
+      if (!exact && !compressed)
+        refuse("form factors", "--store-form-factors or --compress-form-factors");
       return make_form_factors(method, data);
     case FormFactorSource::kExact:
-      if (!exact) refuse("exact form factors", "--form-factors pairs");
+      if (!exact) refuse("exact form factors", "--store-form-factors");
       return make_form_factors(method, data);
     case FormFactorSource::kCompressed:
       if (!compressed) refuse("compressed form factors", "--compress-form-factors");

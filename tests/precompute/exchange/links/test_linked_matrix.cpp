@@ -124,7 +124,7 @@ TEST(LinkedMatrix, RefusesLinksOfOtherPatches) {
   PatchTable fewer = room().patches();
   fewer.area.pop_back();
   fewer.centroid.pop_back();
-  test::expect_error([&] { LinkedMatrix(room().links, fewer); }, "differ in number");
+  test::expect_error([&] { LinkedMatrix(room().links, fewer); }, "another number of patches");
 }
 
 }  // namespace
