@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   try {
     rebounce::BuildSettings settings;
     settings.subdivision.patch_count = 100;
-    settings.operator_kind = rebounce::OperatorKind::kHierarchical;
+    settings.store_form_factors = true;  // for the solver of consumer.cpp
     rebounce::BuildReport report;
     const auto data = rebounce::build_transfer(argv[1], settings, report);
     rebounce::save_transfer(argv[2], *data);
