@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "precompute/build/transfer_build.h"
+#include "precompute/compression/form_factor_compression.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/random_lights.h"
 #include "rebounce.h"
