@@ -26,7 +26,7 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
   const bool probes = settings.probes.grid[0] > 0 || settings.probes.spacing > 0;
   const bool harmonics = settings.surface_harmonics.ray_count > 0;
   if ((probes || harmonics) && !settings.receivers.empty()) {
-    report.warnings.push_back(
+    report.warnings.emplace_back(
         "light probes and surface harmonics see patches that are no receivers without their "
         "indirect light");
   }
