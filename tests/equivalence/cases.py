@@ -58,8 +58,9 @@ def low_rank(kind, precision):
 
 def solve(lights, method, form_factors=None):
     words = ["solve", FILE, "--lights", lights, "--method", method, "-o", OUTPUT]
-    words += ["--iterations", "8", "--residual", "1e-6", "--error", "0.01", "--time-budget", "0"]
-    return [words + (["--form-factors", form_factors] if form_factors else [])]
+    words += ["--iterations", "8", "--residual", "1e-6", "--time-budget", "0"]
+    words += ["--form-factors", form_factors] if form_factors else []
+    return [[*words, "--error", "0.01"], words]
 
 
 def iterations(lights, kinds):
