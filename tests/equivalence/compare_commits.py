@@ -240,6 +240,7 @@ class Runner:
         return os.environ | {
             "OPENBLAS_CORETYPE": self.machine.blas_kernels,
             "OMP_WAIT_POLICY": "passive",
+            "OPENBLAS_NUM_THREADS": "1",  # old commits multiply on as many as there are
             "REBOUNCE_TEST_INSTRUCTION_SET": str(list(INSTRUCTION_SETS).index(instruction_set)),
         }
 
