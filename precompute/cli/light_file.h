@@ -23,7 +23,7 @@ struct LightSetup {
   std::vector<EmitterScale> emitters;
 };
 
-/// Reads lights from a .json file (notes/light_file.md), or from a .glb or .gltf with
+/// Reads lights from a .json file (notes/reference/light_file.md), or from a .glb or .gltf with
 /// KHR_lights_punctual. Throws Error naming the file, the light and the field that is wrong.
 LightSetup read_lights(const std::filesystem::path& path);
 

@@ -154,8 +154,9 @@ void add_picture_options(CLI::App& command, ViewOptions& chosen) {
   screenshot->check([](const std::string& path) {
     return std::filesystem::path(path).extension() == ".png" ? "" : "must end in .png";
   });
-  command.add_option("--path", chosen.path,
-                     "How lamps and spheres move: a .json file (notes/viewer.md)");
+  command.add_option(
+      "--path", chosen.path,
+      "How lamps and spheres move: a .json file (notes/reference/light_path_file.md)");
   CLI::Option* out = command.add_option(
       "--out", chosen.out, "Write pictures frame_00000.png ... into this folder, without a window");
   out->excludes(screenshot);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that the files which the pages name are there.
 
-In README.md and notes/*.md, every code span that looks like a path of the source tree (it begins
+In README.md and the pages of notes/ but those of the lab, every code span that looks like a path of the source tree (it begins
 with a folder at the top, or ends like a source) is to be a folder or file, or the end of the path
 of one: `lamp_kind.h` for runtime/lights/lamp_kind.h. A suffix may be left out, and a * stands for
 anything.
@@ -44,7 +44,8 @@ def looks_like_path(text):
 def missing_paths(root):
     root = pathlib.Path(root)
     known = paths_of(root)
-    for page in (root / "README.md", *sorted((root / "notes").glob("*.md"))):
+    pages = [page for page in sorted((root / "notes").rglob("*.md")) if page.parent.name != "lab"]
+    for page in (root / "README.md", *pages):
         text = FENCED.sub(lambda m: "\n" * m.group().count("\n"), page.read_text(encoding="utf-8"))
         for match in PATH.finditer(text):
             name = match.group(1).rstrip("/")

@@ -211,7 +211,7 @@ class IncludeGraphTest(unittest.TestCase):
 
 class RoomsTest(unittest.TestCase):
     def test_the_page_says_of_each_room_what_it_is_for(self):
-        page = (pathlib.Path(__file__).resolve().parents[2] / "notes/design.md").read_text("utf-8")
+        page = (pathlib.Path(__file__).resolve().parents[2] / "notes/contributing/rooms.md").read_text("utf-8")
         for room, purpose in include_graph.ROOMS.items():
             self.assertIn(f"| `{room}` | {purpose} |\n", page)
 

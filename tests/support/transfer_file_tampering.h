@@ -22,7 +22,7 @@ inline std::size_t prefix_size(const std::string& file) {
   return sizeof(length) + length;
 }
 
-/// Gives a file that was tampered with the checksum that notes/file_format.md prescribes.
+/// Gives a file that was tampered with the checksum that notes/reference/file_format.md prescribes.
 inline void reseal(std::string& file) {
   const std::string entry = "\"checksum\":\"xxh3:";
   const std::size_t digits = file.find(entry);

@@ -1,7 +1,7 @@
 #pragma once
 
-// The names in a transfer file, shared by its writer, reader and checks. notes/file_format.md
-// explains them.
+// The names in a transfer file, shared by its writer, reader and checks.
+// notes/reference/file_format.md explains them.
 
 #include <array>
 #include <cstddef>

@@ -1,6 +1,7 @@
 #pragma once
 
-// The transfer file: a safetensors container; notes/file_format.md documents every tensor.
+// The transfer file: a safetensors container; notes/reference/file_format.md documents every
+// tensor.
 
 #include <filesystem>
 #include <memory>

@@ -7,7 +7,7 @@ namespace rebounce {
 
 /// Thrown by every Rebounce library when an input (a file, a light, a setting) cannot be used.
 /// `what()` is one line that says what is wrong, where, and what to do about it. The libraries
-/// neither print nor exit; see notes/conventions.md.
+/// neither print nor exit; see notes/contributing/conventions.md.
 class Error : public std::runtime_error {
  public:
   explicit Error(const std::string& message) : std::runtime_error(message) {}

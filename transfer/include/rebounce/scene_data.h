@@ -246,7 +246,7 @@ struct BuildRecord {
   double tolerance = 0;       ///< asked for; 0 for a dense operator, which is exact to rounding
   double error_mean = 0;      ///< relative area-weighted L2 error of H over test lights
   double error_max = 0;
-  double error_bound = 0;  ///< see notes/file_format.md
+  double error_bound = 0;  ///< see notes/reference/file_format.md
 };
 
 /// What a transfer file says of its scene: all that is in it but form factors and operator.

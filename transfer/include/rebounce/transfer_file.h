@@ -1,6 +1,6 @@
 #pragma once
 
-// Transfer files, and what is in one. notes/file_format.md documents them.
+// Transfer files, and what is in one. notes/reference/file_format.md documents them.
 
 #include <cstddef>
 #include <filesystem>

@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Checks README.md, CHANGELOG.md and the pages in notes/: their length, their words, their links.
+
+See RULES. Entries of the lab are kept as they were written, and only their links are looked at.
+
+Usage: check_pages.py [ROOT]
+"""
+
+import pathlib
+import re
+import sys
+import unicodedata
+
+MOST_WORDS_OF_README = 700
+MOST_LINES = 150
+GENERATED = "<!-- Written by "
+
+# What tells of the program's past instead of what it is.
+PAST = re.compile(r"\b(now|earlier versions?|not run|the version before)\b", re.IGNORECASE)
+
+FENCED = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
+CODE_SPAN = re.compile(r"`[^`\n]*`")
+COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+LINK = re.compile(r"\[[^\]\[]*(?:\[[^\]]*\][^\]\[]*)*\]\(([^()\s]+(?:\([^()]*\))?)\)")
+HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
+
+# Where sources name pages, and the tensors that pages explain.
+CITED = re.compile(r"notes/[\w/-]+\.(?:md|csv)")
+SOURCES = ("transfer", "runtime", "precompute", "bench", "tests")
+SOURCE_SUFFIXES = {".h", ".cpp", ".c", ".py", ".txt", ".cmake"}
+TENSOR_NAMES = "transfer/file/transfer_file_format.h"
+TENSOR = re.compile(r'"((?:\w+\.)+\w+)"')
+
+
+class Pages:
+    """The pages of a source tree by their path from its root."""
+
+    def __init__(self, root):
+        self.root = pathlib.Path(root)
+        paths = [self.root / "README.md", self.root / "CHANGELOG.md"]
+        paths += sorted((self.root / "notes").rglob("*.md"))
+        self.text = {
+            path.relative_to(self.root).as_posix(): path.read_text(encoding="utf-8") for path in paths
+        }
+
+    def outside_lab(self):
+        return {p: t for p, t in self.text.items() if not p.startswith("notes/lab/")}
+
+
+def without_code(text):
+    """With blanks for blocks of code, on as many lines."""
+    return FENCED.sub(lambda match: "\n" * match.group().count("\n"), text)
+
+
+def line_of(text, place):
+    return text.count("\n", 0, place) + 1
+
+
+def readme_is_short(pages):
+    """README has few words, blocks of code apart."""
+    words = len(COMMENT.sub("", without_code(pages.text["README.md"])).split())
+    if words > MOST_WORDS_OF_README:
+        yield f"README.md: {words} words, at most {MOST_WORDS_OF_README}"
+
+
+def pages_are_short(pages):
+    """No page is long, unless it is written by a script."""
+    for path, text in pages.outside_lab().items():
+        lines = text.count("\n")
+        if path.startswith("notes/") and GENERATED not in text and lines > MOST_LINES:
+            yield f"{path}: {lines} lines, at most {MOST_LINES}"
+
+
+def pages_tell_what_is(pages):
+    """No page but those of the lab tells what the program was."""
+    for path, text in pages.outside_lab().items():
+        prose = CODE_SPAN.sub(lambda match: " " * len(match.group()), without_code(text))
+        for match in PAST.finditer(prose):
+            yield f'{path}:{line_of(text, match.start())}: "{match.group()}" is for the lab alone'
+
+
+def anchors_of(text):
+    """What can follow the # of a link to a page."""
+    found = set()
+    for heading in HEADING.findall(without_code(text)):
+        plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "")
+        ascii_only = unicodedata.normalize("NFKD", plain).encode("ascii", "ignore").decode()
+        found.add(re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", ascii_only).strip().lower()))
+    return found
+
+
+def links_lead_somewhere(pages):
+    """Every link to a file of the project leads to one, and to a heading of it."""
+    for path, text in pages.text.items():
+        prose = CODE_SPAN.sub(lambda match: " " * len(match.group()), without_code(text))
+        for match in LINK.finditer(prose):
+            link = match.group(1)
+            if re.match(r"\w+:", link):
+                continue
+            name, _, anchor = link.partition("#")
+            target = (pages.root / path).parent / name if name else pages.root / path
+            where = f"{path}:{line_of(text, match.start())}: {link}"
+            if not target.exists():
+                yield f"{where} leads nowhere"
+            elif anchor and anchor not in anchors_of(target.read_text(encoding="utf-8")):
+                yield f"{where}: there is no such heading"
+
+
+def sources_name_pages(pages):
+    """Every page that a comment, a message or a script names is there."""
+    for top in SOURCES:
+        for path in sorted((pages.root / top).rglob("*")):
+            if path.suffix not in SOURCE_SUFFIXES or not path.is_file():
+                continue
+            text = path.read_text(encoding="utf-8", errors="replace")
+            for match in CITED.finditer(text):
+                if not (pages.root / match.group()).exists():
+                    where = f"{path.relative_to(pages.root)}:{line_of(text, match.start())}"
+                    yield f"{where}: {match.group()} is not there"
+
+
+def tensors_are_explained(pages):
+    """The pages of the file format name every tensor."""
+    explained = "".join(t for p, t in pages.text.items() if p.startswith("notes/reference/file_format"))
+    for name in TENSOR.findall((pages.root / TENSOR_NAMES).read_text(encoding="utf-8")):
+        short = name.replace("form_factor.hierarchical", "")
+        if f"`{name}`" not in explained and f"`{short}`" not in explained:
+            yield f"{TENSOR_NAMES}: no page of the file format explains {name}"
+
+
+RULES = (
+    readme_is_short,
+    pages_are_short,
+    pages_tell_what_is,
+    links_lead_somewhere,
+    sources_name_pages,
+    tensors_are_explained,
+)
+
+
+def main():
+    root = sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).resolve().parents[2]
+    pages = Pages(root)
+    broken = [line for rule in RULES for line in rule(pages)]
+    print("\n".join([*broken, f"{len(pages.text)} pages, {len(broken)} violations"]))
+    return 1 if broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
