@@ -17,7 +17,7 @@ namespace {
 constexpr double kPercent = 0.01, kPermille = 0.001;
 
 // A residual below which sweeps of a frame that are left would change nothing that is seen.
-constexpr double kConverged = 1e-6;
+constexpr double kConvergedResidual = 1e-6;
 
 /// The light of one path: M0 and B [n] in lx of each frame.
 struct LitFrames {
@@ -67,7 +67,7 @@ std::vector<float> follow(const LitFrames& lit, int sweeps, std::span<const floa
   method.start_from(lit.truth.front());
   std::vector<float> errors;
   for (std::size_t frame = 0; frame < lit.truth.size(); ++frame) {
-    method.run(lit.initial_exitance[frame], sweeps, kConverged);
+    method.run(lit.initial_exitance[frame], sweeps, kConvergedResidual);
     errors.push_back(static_cast<float>(
         reflected_error(method.radiosity(), lit.truth[frame], lit.initial_exitance[frame], area)));
   }

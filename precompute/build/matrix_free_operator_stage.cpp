@@ -19,9 +19,8 @@
 namespace rebounce {
 namespace {
 
-// Lights that compressed form factors are measured under, and point lights among the validation
-// lights of the operator that are also validation lights of the form factors.
-constexpr int kTestLightCount = 16;
+// Point lights among the validation lights of the operator that are also validation lights of the
+// form factors.
 constexpr std::size_t kFormFactorValidationCount = 64;
 
 // Residual of the radiosities that form factors are fitted to and measured with. Their third digit
@@ -67,7 +66,7 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
   FittedLights lights;
   lights.exitances = draw_fitting_lights(data, tracer, seed, roles);
   const Lights tests =
-      random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed, roles);
+      random_initial_exitances(data, tracer, LightKind::kPoint, kFormFactorLightCount, seed, roles);
   const Exitances training = lights.exitances.training, validation = lights.exitances.validation;
   const Exitances few =
       validation.first(std::min(validation.size(), 1 + kFormFactorValidationCount));

@@ -14,9 +14,6 @@
 namespace rebounce {
 namespace {
 
-// Lights that compressed form factors are measured under.
-constexpr int kTestLightCount = 16;
-
 // A larger residual is a mistake and no rounding error, for f32 and f16 entries.
 constexpr double kLargestResidualF32 = 1e-4, kLargestResidualF16 = 5e-3;
 
@@ -59,7 +56,7 @@ void compress_form_factors_of(TransferData& data, const TransferOperator& transf
       *data.compressed_form_factors, FormFactorRows(data.exchange, data.patches.area), data.patches,
       radiosities_of(
           transfer, reflectance,
-          random_initial_exitances(data, tracer, LightKind::kPoint, kTestLightCount, seed)));
+          random_initial_exitances(data, tracer, LightKind::kPoint, kFormFactorLightCount, seed)));
 }
 
 /// Measures the error of the operator against `exact` or, if that is null, against an iterative

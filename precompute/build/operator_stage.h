@@ -19,6 +19,9 @@ namespace rebounce {
 /// Their error adds to its own.
 inline constexpr double kToleranceOverFormFactors = 5;
 
+/// Lights that compressed form factors are measured under.
+inline constexpr int kFormFactorLightCount = 16;
+
 /// The precision of the dense inverse that an operator of this kind is made from.
 inline Arithmetic arithmetic_of(OperatorKind kind) {
   return kind == OperatorKind::kDense ? Arithmetic::kDouble : Arithmetic::kSingle;

@@ -19,10 +19,10 @@ using Eigen::MatrixXf;
 // Up to this number of patches all eigenvectors are found. This takes seconds at most.
 constexpr Index kDenseSize = 700;
 
-// The sketch has rank / kOversamplingPart + kOversampling columns beyond the rank. The spectrum
+// The sketch has rank / kSketchPart + kSketchMargin columns beyond the rank. The spectrum
 // falls slowly (corners): with fewer columns or fewer multiplications by sum Yhat² the subspace is
 // some per cent off the best.
-constexpr Index kOversamplingPart = 2, kOversampling = 8;
+constexpr Index kSketchPart = 2, kSketchMargin = 8;
 constexpr int kIterations = 4;
 
 MatrixXf orthonormal(const MatrixXf& a) {
@@ -105,7 +105,7 @@ std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperat
     if (progress && !progress(done)) throw Cancelled();
   };
   report(0);
-  const Index columns = rank + rank / kOversamplingPart + kOversampling;
+  const Index columns = rank + rank / kSketchPart + kSketchMargin;
   MatrixXf basis = MatrixXf::Identity(n, n);
   if (n > kDenseSize && columns < n) {
     basis = orthonormal(random_start(n, columns));

@@ -9,25 +9,25 @@
 namespace rebounce {
 namespace {
 
-constexpr double kGroup = 64, kConfidence = 0.95;
+constexpr double kGroup = 64, kValidationConfidence = 0.95;
 
 // The largest error of a group may be this multiple of the mean.
 constexpr double kLargestOverMean = 3;
 
-// The tail is this fraction of the sample, and at least kLeastTail errors; fewer errors than
-// kLeastSample give no tail.
-constexpr std::size_t kTailPart = 16, kLeastTail = 8, kLeastSample = 32;
+// The tail is this fraction of the sample, and at least kLeastValidationTail errors; fewer errors
+// than kLeastSample give no tail.
+constexpr std::size_t kValidationTailPart = 16, kLeastValidationTail = 8, kLeastSample = 32;
 
-/// The bound that the largest of kGroup errors stays below with kConfidence; `falling` is sorted,
-/// largest first.
+/// The bound that the largest of kGroup errors stays below with kValidationConfidence; `falling` is
+/// sorted, largest first.
 double largest_of_group(std::span<const double> falling) {
   if (falling.size() < kLeastSample) return falling.front();
-  const std::size_t tail = std::max(kLeastTail, falling.size() / kTailPart);
+  const std::size_t tail = std::max(kLeastValidationTail, falling.size() / kValidationTailPart);
   const double threshold = falling[tail];
   const auto count = static_cast<double>(tail), size = static_cast<double>(falling.size());
   const double all = std::accumulate(falling.begin(), falling.begin() + tail, 0.0);
   const double excess = all / count - threshold;
-  const double beyond = 1 - std::pow(kConfidence, 1 / kGroup);
+  const double beyond = 1 - std::pow(kValidationConfidence, 1 / kGroup);
   return threshold + excess * std::log(count / (size * beyond));
 }
 

@@ -18,7 +18,7 @@ namespace rebounce {
 namespace {
 
 constexpr std::size_t kMostProbes = 65536;
-constexpr std::size_t kBatch = 64;  // probes between two reports of progress
+constexpr std::size_t kProbeBatch = 64;  // probes between two reports of progress
 constexpr double kLargestBackPart = 0.25;
 
 // An emitter that this number of rays meets is known well. Others are sampled by points: this
@@ -29,7 +29,7 @@ constexpr int kMostPoints = 16, kPointsPerRay = 2;
 // A ray reaches a point if it ends no farther from it than this fraction of the way.
 constexpr float kAtPoint = 1e-3F;
 
-using View = HarmonicView<kHarmonicCount>;  // the view of one probe
+using ProbeView = HarmonicView<kHarmonicCount>;  // the view of one probe
 
 /// Direction k of `count` that are spread evenly over the sphere and turned about y by `turn`
 /// turns: the spherical Fibonacci lattice (R. Swinbank and R. J. Purser, "Fibonacci grids: a novel
@@ -42,10 +42,10 @@ Float3 fibonacci_direction(int k, int count, double turn) {
           static_cast<float>(r * std::sin(phi))};
 }
 
-class Viewer {
+class ProbeViewer {
  public:
-  Viewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
-         const RayTracer& tracer, std::span<const EmitterPoints> emitters, int ray_count)
+  ProbeViewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+              const RayTracer& tracer, std::span<const EmitterPoints> emitters, int ray_count)
       : mesh_(mesh),
         shown_patch_(shown_patch),
         emitters_(emitters),
@@ -54,7 +54,7 @@ class Viewer {
         hits_(rays_.size()) {}
 
   /// Empty for a probe that sees too many backs: it is inside something.
-  std::optional<View> look_around(const Float3& position, std::uint64_t number) {
+  std::optional<ProbeView> look_around(const Float3& position, std::uint64_t number) {
     const auto count = static_cast<int>(rays_.size());
     const double turn = unit_square(mix_bits(number)).x;
     for (int k = 0; k < count; ++k) {
@@ -71,7 +71,7 @@ class Viewer {
       return std::nullopt;
     }
     const float solid_angle = 4 * std::numbers::pi_v<float> / static_cast<float>(rays_.size());
-    View view = viewer_.sum_up(rays_, hits_, solid_angle);
+    ProbeView view = viewer_.sum_up(rays_, hits_, solid_angle);
     look_at_emitters(position, kEnoughRays * solid_angle, view);
     return view;
   }
@@ -79,7 +79,7 @@ class Viewer {
  private:
   /// Emitters are small and bright, and a few rays more or less that meet one are visible. This
   /// replaces the part of `view` from emitters that it sees by less than the solid angle `enough`.
-  void look_at_emitters(const Float3& position, float enough, View& view) {
+  void look_at_emitters(const Float3& position, float enough, ProbeView& view) {
     for (const EmitterPoints& emitter : emitters_) {
       auto seen = std::ranges::lower_bound(view.patches, emitter.patch, {},
                                            [](const auto& entry) { return entry.first; });
@@ -128,9 +128,9 @@ class Viewer {
   std::vector<Hit> hits_, point_hits_;
 };
 
-void append(const std::optional<View>& seen, LightProbes& probes) {
+void append(const std::optional<ProbeView>& seen, LightProbes& probes) {
   probes.valid.push_back(seen ? 1 : 0);
-  append_view(seen ? *seen : View(),
+  append_view(seen ? *seen : ProbeView(),
               "the probes see too much for one file; ask for fewer of them or for fewer rays",
               probes);
 }
@@ -180,22 +180,22 @@ void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown
   probes.patch_count = data.patches.size();
   const std::vector<EmitterPoints> emitters =
       spread_over_emitters(data, shown_patch, kMostPoints, kPointsPerRay * settings.ray_count);
-  std::vector<std::optional<View>> views;
-  for (std::size_t first = 0; first < probes.size(); first += kBatch) {
+  std::vector<std::optional<ProbeView>> views;
+  for (std::size_t first = 0; first < probes.size(); first += kProbeBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(probes.size()))) {
       throw Cancelled();
     }
-    const std::size_t count = std::min(kBatch, probes.size() - first);
+    const std::size_t count = std::min(kProbeBatch, probes.size() - first);
     views.resize(count);
 #pragma omp parallel
     {
-      Viewer viewer(data.mesh, shown_patch, tracer, emitters, settings.ray_count);
+      ProbeViewer viewer(data.mesh, shown_patch, tracer, emitters, settings.ray_count);
 #pragma omp for schedule(dynamic, 1)
       for (std::size_t k = 0; k < count; ++k) {
         views[k] = viewer.look_around(probes.position[first + k], first + k);
       }
     }
-    for (const std::optional<View>& view : views) append(view, probes);
+    for (const std::optional<ProbeView>& view : views) append(view, probes);
   }
 }
 

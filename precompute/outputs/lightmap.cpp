@@ -31,18 +31,18 @@ constexpr std::uint32_t kLeastTile = 8;
 
 constexpr std::uint32_t kLargestPadding = 64;
 
-using Corners = std::array<glm::dvec2, 3>;
+using TexcoordCorners = std::array<glm::dvec2, 3>;
 
 double cross(const glm::dvec2& a, const glm::dvec2& b) {
   return a.x * b.y - a.y * b.x;
 }
 
-double area_of(const Corners& p) {
+double texcoord_area(const TexcoordCorners& p) {
   return 0.5 * std::abs(cross(p[1] - p[0], p[2] - p[0]));
 }
 
 /// Weights of the second and third corner.
-glm::dvec2 weights_at(const Corners& p, const glm::dvec2& at) {
+glm::dvec2 weights_at(const TexcoordCorners& p, const glm::dvec2& at) {
   const double whole = cross(p[1] - p[0], p[2] - p[0]);
   return {cross(at - p[0], p[2] - p[0]) / whole, cross(p[1] - p[0], at - p[0]) / whole};
 }
@@ -58,7 +58,7 @@ struct Place {
 };
 
 /// The place nearest to `at`.
-Place nearest_place(const Corners& p, const glm::dvec2& at) {
+Place nearest_place(const TexcoordCorners& p, const glm::dvec2& at) {
   const glm::dvec2 inside = weights_at(p, at);
   if (is_inside(inside, 0)) return {inside, 0};
   Place best;
@@ -78,7 +78,7 @@ Place nearest_place(const Corners& p, const glm::dvec2& at) {
 /// Calls visit(x, y, centre) for the texels of a square of `side` whose centres lie within `reach`,
 /// in texels, of the box around a triangle.
 template <typename Visit>
-void for_texels_near(const Corners& p, double reach, int side, const Visit& visit) {
+void for_texels_near(const TexcoordCorners& p, double reach, int side, const Visit& visit) {
   const auto first = [&](double low) {
     return std::clamp(static_cast<int>(std::ceil(low - reach - 0.5)), 0, side);
   };
@@ -128,8 +128,8 @@ class LightmapPlacer {
  private:
   const DisplayMesh& mesh() const { return model_.mesh; }
 
-  Corners texcoords(std::uint32_t t) const {
-    Corners corner;
+  TexcoordCorners texcoords(std::uint32_t t) const {
+    TexcoordCorners corner;
     for (int k = 0; k < 3; ++k) {
       const Float2& at = model_.lightmap_texcoord[mesh().triangle[t][k]].texcoord;
       corner[k] = {at[0], at[1]};
@@ -137,7 +137,7 @@ class LightmapPlacer {
     return corner;
   }
 
-  double area_in_world(std::uint32_t t) const { return rebounce::area_of(corners_of(mesh(), t)); }
+  double area_in_world(std::uint32_t t) const { return area_of(corners_of(mesh(), t)); }
 
   /// The side of surface triangle `t` that gets texels; kNone if neither side sees anything.
   std::uint32_t mapped_side(std::uint32_t t) const {
@@ -148,10 +148,10 @@ class LightmapPlacer {
 
   /// Triangles without area in the texture have no place in it.
   void add_triangle(Page& page, std::uint32_t t) const {
-    const Corners corner = texcoords(t);
-    if (area_of(corner) <= 0) return;
+    const TexcoordCorners corner = texcoords(t);
+    if (texcoord_area(corner) <= 0) return;
     page.triangle.push_back(t);
-    page.in_page += area_of(corner);
+    page.in_page += texcoord_area(corner);
     page.in_world += area_in_world(t);
     for (const glm::dvec2& p : corner) {
       page.low = glm::min(page.low, p);
@@ -198,7 +198,7 @@ class LightmapPlacer {
     std::vector<std::uint8_t> times(std::size_t{kOverlapTexels} * kOverlapTexels, 0);
     std::size_t covered = 0, twice = 0;
     for (const std::uint32_t t : page.triangle) {
-      Corners corner = texcoords(t);
+      TexcoordCorners corner = texcoords(t);
       for (glm::dvec2& p : corner) p *= kOverlapTexels;
       for_texels_near(corner, 0, kOverlapTexels, [&](int x, int y, const glm::dvec2& centre) {
         if (!is_inside(weights_at(corner, centre), kMargin)) return;
@@ -243,7 +243,7 @@ class LightmapPlacer {
   void draw(std::uint32_t t, const Page& page, const Tile& tile) {
     Lightmap& map = placed_.lightmap;
     const auto size = static_cast<int>(settings_.size);
-    Corners corner = texcoords(t);
+    TexcoordCorners corner = texcoords(t);
     for (int k = 0; k < 3; ++k) {
       corner[k] =
           glm::dvec2(tile.corner) + kGutter +

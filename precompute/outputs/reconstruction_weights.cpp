@@ -42,7 +42,7 @@ constexpr double kRidge = 0.1;
 constexpr float kNegligible = 1e-3F;
 
 // Vertices between two reports of progress.
-constexpr std::size_t kBatch = 1 << 14;
+constexpr std::size_t kPointBatch = 1 << 14;
 
 // The largest sum of negative weights of a vertex that the preservation of means may add.
 constexpr double kMostNegative = 0.5;
@@ -131,9 +131,9 @@ class ReconstructionWeights {
     shows_arriving_ = is_covered_;
     const NeighbourSearch search(mesh_, triangles_, area_, absorbed_, tracer_);
     std::vector<VertexWeights> weights(count);
-    for (std::size_t begin = 0; begin < count; begin += kBatch) {
+    for (std::size_t begin = 0; begin < count; begin += kPointBatch) {
       report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
-      compute_batch(search, begin, std::min(begin + kBatch, count), weights);
+      compute_batch(search, begin, std::min(begin + kPointBatch, count), weights);
     }
     preserve_patch_means(mesh_, triangles_, good_patches(), {kMostNegative, kMostSites}, weights);
     write_weights(weights);

@@ -16,9 +16,9 @@ namespace rebounce {
 namespace {
 
 constexpr int kFewestRays = 16;
-constexpr std::size_t kBatch = 256;  // patches between two reports of progress
+constexpr std::size_t kPatchBatch = 256;  // patches between two reports of progress
 
-using View = HarmonicView<kLinearHarmonicCount>;  // the view of one patch
+using PatchView = HarmonicView<kLinearHarmonicCount>;  // the view of one patch
 
 /// A direction around `normal`, uniform over the hemisphere.
 glm::dvec3 hemisphere_direction(const glm::dvec3& normal, const glm::dvec2& s) {
@@ -26,10 +26,10 @@ glm::dvec3 hemisphere_direction(const glm::dvec3& normal, const glm::dvec2& s) {
   return frame_around(normal) * glm::dvec3(r * std::cos(phi), r * std::sin(phi), s.x);
 }
 
-class Viewer {
+class PatchViewer {
  public:
-  Viewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
-         const RayTracer& tracer, const SurfaceHarmonicSettings& settings)
+  PatchViewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+              const RayTracer& tracer, const SurfaceHarmonicSettings& settings)
       : mesh_(mesh),
         viewer_(mesh, shown_patch, tracer),
         tracer_(tracer),
@@ -38,7 +38,7 @@ class Viewer {
         rays_(points_.size()),
         hits_(points_.size()) {}
 
-  View look_up(std::span<const std::uint32_t> triangles, std::uint32_t patch) {
+  PatchView look_up(std::span<const std::uint32_t> triangles, std::uint32_t patch) {
     const std::uint64_t bits = mix_bits(settings_.seed ^ mix_bits(patch));
     spread_points(mesh_, triangles, unit_square(bits), points_);
     const PointSequence directions = direction_sequence(unit_square(mix_bits(bits)));
@@ -78,22 +78,22 @@ SurfaceHarmonics trace_surface_harmonics(const TransferData& data,
   const PatchTriangles triangles(data.mesh.triangle_patch, n);
   SurfaceHarmonics harmonics;
   harmonics.entry_begin = harmonics.sky_cells.entry_begin = {0};
-  std::vector<View> views;
-  for (std::size_t first = 0; first < n; first += kBatch) {
+  std::vector<PatchView> views;
+  for (std::size_t first = 0; first < n; first += kPatchBatch) {
     if (progress && !progress(static_cast<double>(first) / static_cast<double>(n))) {
       throw Cancelled();
     }
-    const std::size_t count = std::min(kBatch, n - first);
+    const std::size_t count = std::min(kPatchBatch, n - first);
     views.resize(count);
 #pragma omp parallel
     {
-      Viewer viewer(data.mesh, shown_patch, tracer, settings);
+      PatchViewer viewer(data.mesh, shown_patch, tracer, settings);
 #pragma omp for schedule(dynamic, 4)
       for (std::size_t k = 0; k < count; ++k) {
         views[k] = viewer.look_up(triangles[first + k], static_cast<std::uint32_t>(first + k));
       }
     }
-    for (const View& view : views) {
+    for (const PatchView& view : views) {
       append_view(view, "the patches see too much for one file; ask for fewer rays of each",
                   harmonics);
     }

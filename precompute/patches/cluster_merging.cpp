@@ -21,8 +21,8 @@ constexpr std::size_t kWatchInterval = 1024;
 
 /// The largest elements of both clusters, by area and then by number; the witnesses of each are in
 /// this order.
-void choose_witnesses(const Elements& elements, const Cluster& a, const Cluster& b,
-                      Cluster& whole) {
+void choose_witnesses(const Elements& elements, const ElementCluster& a, const ElementCluster& b,
+                      ElementCluster& whole) {
   std::array<std::uint32_t, 2 * kWitnessCount> all{};
   const auto end = std::merge(
       a.witness.begin(), a.witness.begin() + a.witness_count, b.witness.begin(),
@@ -35,14 +35,14 @@ void choose_witnesses(const Elements& elements, const Cluster& a, const Cluster&
 }
 
 /// The factor of the squared distance between the mean features of two clusters, m².
-double joint_weight(const Cluster& a, const Cluster& b) {
+double joint_weight(const ElementCluster& a, const ElementCluster& b) {
   return a.area * b.area / (a.area + b.area);
 }
 
 }  // namespace
 
-Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
-  Cluster cluster;
+ElementCluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
+  ElementCluster cluster;
   cluster.surface = elements.area[e];
   cluster.area = cluster.surface * elements.density_weight[e];
   const Float3 centroid = elements.centroid(e);
@@ -61,8 +61,8 @@ Cluster make_cluster(const Elements& elements, std::uint32_t e, double size) {
   return cluster;
 }
 
-Cluster join(const Elements& elements, const Cluster& a, const Cluster& b) {
-  Cluster whole;
+ElementCluster join(const Elements& elements, const ElementCluster& a, const ElementCluster& b) {
+  ElementCluster whole;
   whole.surface = a.surface + b.surface;
   whole.area = a.area + b.area;
   for (std::size_t k = 0; k < whole.sum.size(); ++k) whole.sum[k] = a.sum[k] + b.sum[k];
@@ -73,11 +73,11 @@ Cluster join(const Elements& elements, const Cluster& a, const Cluster& b) {
   return whole;
 }
 
-double joint_length(const Cluster& a, const Cluster& b) {
+double joint_length(const ElementCluster& a, const ElementCluster& b) {
   return glm::distance(glm::min(a.low, b.low), glm::max(a.high, b.high));
 }
 
-double merging_cost(const Cluster& a, const Cluster& b) {
+double merging_cost(const ElementCluster& a, const ElementCluster& b) {
   double distance_squared = 0;
   for (std::size_t k = 0; k < a.sum.size(); ++k) {
     const double d = a.sum[k] / a.area - b.sum[k] / b.area;
@@ -86,7 +86,7 @@ double merging_cost(const Cluster& a, const Cluster& b) {
   return joint_weight(a, b) * distance_squared;
 }
 
-ClusterMerging::ClusterMerging(const MergingScene& scene, std::vector<Cluster> clusters,
+ClusterMerging::ClusterMerging(const MergingScene& scene, std::vector<ElementCluster> clusters,
                                std::span<const std::uint32_t> number_of, std::uint32_t first)
     : scene_(scene),
       clusters_(std::move(clusters)),
@@ -119,7 +119,7 @@ void ClusterMerging::connect_in_sight(const Pairs& pairs) {
   std::vector<std::uint8_t> joins(pairs.size());
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t k = 0; k < pairs.size(); ++k) {
-    const Cluster &a = clusters_[pairs[k].first], &b = clusters_[pairs[k].second];
+    const ElementCluster &a = clusters_[pairs[k].first], &b = clusters_[pairs[k].second];
     if (merging_cost(a, b) > limits_.cost) continue;
     const bool may = joint_length(a, b) <= limits_.detail ||
                      std::min(a.area, b.area) <= limits_.fragment ||
@@ -160,7 +160,7 @@ void ClusterMerging::merge_cheapest(std::size_t count, const Watch& watch) {
 }
 
 /// Clusters of low weight may be longer.
-bool ClusterMerging::is_too_long(const Cluster& a, const Cluster& b) const {
+bool ClusterMerging::is_too_long(const ElementCluster& a, const ElementCluster& b) const {
   const double scale = std::sqrt((a.surface + b.surface) / (a.area + b.area));
   return joint_length(a, b) > limits_.largest * scale;
 }

@@ -21,7 +21,7 @@ namespace rebounce {
 inline constexpr std::size_t kWitnessCount = 4;
 
 /// A set of elements.
-struct Cluster {
+struct ElementCluster {
   static constexpr std::size_t kFeatureCount = 10;
 
   double surface = 0;  ///< m²
@@ -38,17 +38,17 @@ struct Cluster {
 
 /// A cluster of element `e` alone. A difference of one in normal, reflectance or cover counts like
 /// a distance of some patches of `size` metres.
-Cluster make_cluster(const Elements& elements, std::uint32_t e, double size);
+ElementCluster make_cluster(const Elements& elements, std::uint32_t e, double size);
 
 /// The union of two clusters.
-Cluster join(const Elements& elements, const Cluster& a, const Cluster& b);
+ElementCluster join(const Elements& elements, const ElementCluster& a, const ElementCluster& b);
 
 /// Length of the diagonal of the box around both, metres.
-double joint_length(const Cluster& a, const Cluster& b);
+double joint_length(const ElementCluster& a, const ElementCluster& b);
 
 /// The increase of the squared deviation of the elements from their mean if the two are merged: J.
 /// H. Ward's criterion, in m² of area x m² of distance between features.
-double merging_cost(const Cluster& a, const Cluster& b);
+double merging_cost(const ElementCluster& a, const ElementCluster& b);
 
 /// Which clusters may merge, and at what cost: see merge_elements(). Lengths are in metres.
 struct MergingLimits {
@@ -85,7 +85,7 @@ class ClusterMerging {
 
   /// `clusters` contain every element: element `e` is in cluster number_of[e] - first, if that is
   /// below the number of clusters.
-  ClusterMerging(const MergingScene& scene, std::vector<Cluster> clusters,
+  ClusterMerging(const MergingScene& scene, std::vector<ElementCluster> clusters,
                  std::span<const std::uint32_t> number_of, std::uint32_t first);
 
   void set_limits(const MergingLimits& limits) { limits_ = limits; }
@@ -106,7 +106,7 @@ class ClusterMerging {
   std::size_t alive_count() const { return alive_; }
   /// The numbers of the clusters that are left.
   std::vector<std::uint32_t> alive() const;
-  const Cluster& operator[](std::uint32_t c) const { return clusters_[c]; }
+  const ElementCluster& operator[](std::uint32_t c) const { return clusters_[c]; }
   /// The cluster that contains the start cluster `c`.
   std::uint32_t current(std::uint32_t c) const;
   const std::vector<Step>& steps() const { return steps_; }
@@ -131,7 +131,7 @@ class ClusterMerging {
 
   void queue(std::uint32_t a, std::uint32_t b);
   bool is_alive(std::uint32_t c) const { return merged_into_[c] == kNone; }
-  bool is_too_long(const Cluster& a, const Cluster& b) const;
+  bool is_too_long(const ElementCluster& a, const ElementCluster& b) const;
   double cost_of_walls(std::uint32_t a, std::uint32_t b) const;
   double hidden_part(std::uint32_t a, std::uint32_t b) const;
   SightCount look_between(std::uint32_t a, std::uint32_t b) const;
@@ -143,7 +143,7 @@ class ClusterMerging {
   void shorten_chains();
 
   const MergingScene& scene_;
-  std::vector<Cluster> clusters_;
+  std::vector<ElementCluster> clusters_;
   std::span<const std::uint32_t> number_of_;
   std::uint32_t first_, start_count_;
   std::vector<std::uint32_t> merged_into_;              ///< or kNone

@@ -12,7 +12,7 @@ using Feature = Eigen::Matrix<double, 6, 1>;
 
 // Opposite normals count like a distance of this fraction of the size of the scene. Measured:
 // notes/operator.md.
-constexpr double kNormalWeight = 0.25;
+constexpr double kTreeNormalWeight = 0.25;
 
 /// Positions in units of the size of the scene, and weighted normals.
 std::vector<Feature> make_features(const PatchTable& patches) {
@@ -27,7 +27,7 @@ std::vector<Feature> make_features(const PatchTable& patches) {
   for (std::size_t i = 0; i < patches.size(); ++i) {
     for (int k = 0; k < 3; ++k) {
       features[i][k] = (patches.centroid[i][k] - low[k]) / size;
-      features[i][3 + k] = 0.5 * kNormalWeight * patches.normal[i][k];
+      features[i][3 + k] = 0.5 * kTreeNormalWeight * patches.normal[i][k];
     }
   }
   return features;

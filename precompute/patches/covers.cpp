@@ -20,7 +20,7 @@ constexpr std::uint32_t kPoints = kMostCoverPoints;
 // this fraction of the way to the middle.
 constexpr std::uint32_t kPointsOfWhole = 12;
 constexpr double kInset = 0.05;
-const glm::dvec2 kCentroid(1.0 / 3);
+const glm::dvec2 kTriangleCentre(1.0 / 3);
 
 // Triangles whose longest edge is at most this number of patch sizes are fine enough.
 constexpr double kFinest = 0.3;
@@ -135,7 +135,7 @@ double covered_part(const TriangleCorners& corners, const RayTracer& tracer, dou
   std::array<glm::dvec2, kMostCoverPoints> points;
   const auto some = std::span(points).first(std::min(count, kMostCoverPoints));
   for (std::uint32_t k = 0; k < some.size(); ++k) {
-    some[k] = some.size() == 1 ? kCentroid : square_to_triangle(r2_point(k, {0, 0}));
+    some[k] = some.size() == 1 ? kTriangleCentre : square_to_triangle(r2_point(k, {0, 0}));
   }
   return static_cast<double>(count_covered(corners, some, tracer, height)) /
          static_cast<double>(some.size());
@@ -143,7 +143,7 @@ double covered_part(const TriangleCorners& corners, const RayTracer& tracer, dou
 
 bool is_covered(const TriangleCorners& corners, const RayTracer& tracer, double height) {
   std::array<glm::dvec2, 3> tips = {glm::dvec2(0, 0), {1, 0}, {0, 1}};
-  for (glm::dvec2& tip : tips) tip = glm::mix(tip, kCentroid, kInset);
+  for (glm::dvec2& tip : tips) tip = glm::mix(tip, kTriangleCentre, kInset);
   return count_covered(corners, tips, tracer, height) == tips.size() &&
          covered_part(corners, tracer, height, kPointsOfWhole) == 1;
 }

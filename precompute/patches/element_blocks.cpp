@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kBlockSize = 1 << 12;  // elements: their data fits into a cache
 
 // Each element's nearest others that may join it without a shared edge.
-constexpr std::size_t kNearCount = 8;
+constexpr std::size_t kNeighbourBlockCount = 8;
 
 // Merging two flat squares into a patch of the mean area costs size^4 / 8. Mergings up to this
 // fraction of it leave clusters of a sixteenth of that area.
@@ -82,8 +82,8 @@ class BlockMerging {
     split(middle, end);
   }
 
-  std::vector<Cluster> start_clusters(std::size_t b) const {
-    std::vector<Cluster> clusters;
+  std::vector<ElementCluster> start_clusters(std::size_t b) const {
+    std::vector<ElementCluster> clusters;
     for (const std::uint32_t e : block(b)) {
       clusters.push_back(make_cluster(scene_.elements, e, settings_.size));
     }
@@ -100,7 +100,8 @@ class BlockMerging {
     ClusterMerging merging(scene_, start_clusters(b), place_, begin_[b]);
     merging.set_limits(limits_);
     const Pairs edges = find_edge_neighbours(corner);
-    const Pairs near = find_near_pairs(centroid, kNearCount, static_cast<float>(settings_.size));
+    const Pairs near =
+        find_near_pairs(centroid, kNeighbourBlockCount, static_cast<float>(settings_.size));
     Pairs apart;
     std::ranges::set_difference(near, edges, std::back_inserter(apart));
     merging.connect(edges);
@@ -133,7 +134,7 @@ class BlockMerging {
     ElementClusters result;
     result.of_element.resize(order_.size());
     for (std::size_t b = 0; b < steps.size(); ++b) {
-      std::vector<Cluster> cluster = start_clusters(b);
+      std::vector<ElementCluster> cluster = start_clusters(b);
       std::vector<std::uint32_t> number(cluster.size() + steps[b].size(), kNone);
       std::vector<std::uint32_t> into(number.size(), kNone);
       for (const ClusterMerging::Step& s : steps[b]) {

@@ -11,7 +11,7 @@ namespace rebounce {
 
 /// Clusters that elements are merged into.
 struct ElementClusters {
-  std::vector<Cluster> cluster;
+  std::vector<ElementCluster> cluster;
   std::vector<std::uint32_t> of_element;  ///< [e] number of its cluster
 };
 

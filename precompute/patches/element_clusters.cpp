@@ -140,7 +140,8 @@ class ElementMerging {
     edges.erase(std::ranges::unique(edges).begin(), edges.end());
     merging.connect(edges);
     std::vector<Float3> centroid;
-    for (const Cluster& cluster : start.cluster) centroid.push_back(to_float3(cluster.centroid()));
+    for (const ElementCluster& cluster : start.cluster)
+      centroid.push_back(to_float3(cluster.centroid()));
     const Pairs near = find_near_pairs(centroid, kNearCount, static_cast<float>(size_));
     Pairs apart;
     std::ranges::set_difference(near, edges, std::back_inserter(apart));

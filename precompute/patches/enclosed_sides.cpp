@@ -73,7 +73,7 @@ constexpr int kPathBits = 16;
 static_assert(kMostPaths <= 1U << kPathBits);
 
 // Groups between two reports of progress.
-constexpr std::size_t kBatch = 1 << 13;
+constexpr std::size_t kGroupBatch = 1 << 13;
 
 class EnclosedSides {
  public:
@@ -92,9 +92,9 @@ class EnclosedSides {
 
   void run(const Progress& progress) {
     const std::size_t count = group_begin_.size() - 1;
-    for (std::size_t begin = 0; begin < count; begin += kBatch) {
+    for (std::size_t begin = 0; begin < count; begin += kGroupBatch) {
       report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
-      judge_groups(begin, std::min(begin + kBatch, count));
+      judge_groups(begin, std::min(begin + kGroupBatch, count));
     }
   }
 

@@ -20,7 +20,7 @@ constexpr std::uint32_t kRaysPerSide = 256, kFirstRays = 1;
 constexpr double kBuriedReach = 1.0 / 16;
 
 // Triangles between two reports of progress, and the progress when every side was tested alone.
-constexpr std::size_t kBatch = 1 << 15;
+constexpr std::size_t kSideBatch = 1 << 15;
 constexpr double kAfterLooking = 0.4;
 
 // Points at which a side is tested for copies of itself.
@@ -40,9 +40,9 @@ class LitSides {
     const std::size_t count = scene_.triangle.size();
     sides_.resize(count);
     std::vector<Cover> covers;
-    for (std::size_t begin = 0; begin < count; begin += kBatch) {
+    for (std::size_t begin = 0; begin < count; begin += kSideBatch) {
       report_progress(progress, static_cast<double>(begin) / static_cast<double>(count));
-      look_at(begin, std::min(begin + kBatch, count), covers);
+      look_at(begin, std::min(begin + kSideBatch, count), covers);
     }
     // Later triangles yield to earlier ones that have not yielded themselves.
     std::ranges::sort(covers, [](const Cover& a, const Cover& b) {

@@ -7,11 +7,10 @@ namespace rebounce {
 namespace {
 
 constexpr int kLongitudes = 96, kLatitudes = 48;
-constexpr float kPi = std::numbers::pi_v<float>;
 
 Float3 direction_at(int longitude, int latitude) {
-  const float theta = kPi * static_cast<float>(latitude) / kLatitudes;
-  const float phi = 2 * kPi * static_cast<float>(longitude) / kLongitudes;
+  const float theta = std::numbers::pi_v<float> * static_cast<float>(latitude) / kLatitudes;
+  const float phi = 2 * std::numbers::pi_v<float> * static_cast<float>(longitude) / kLongitudes;
   return {std::sin(theta) * std::cos(phi), std::cos(theta), -std::sin(theta) * std::sin(phi)};
 }
 

@@ -7,9 +7,8 @@
 namespace rebounce {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr std::array<std::uint32_t, 8> kRowCells = {30, 30, 24, 24, 18, 12, 6, 1};
-constexpr double kRowHeight = kPi / 15;  // 12 degrees; the last row has half of it
+constexpr double kRowHeight = std::numbers::pi / 15;  // 12 degrees; the last row has half of it
 
 struct RowPlace {
   std::size_t row;
@@ -39,7 +38,8 @@ std::uint32_t sky_cell(const Float3& direction) {
   std::uint32_t first = 1;
   for (std::size_t row = 0; row < wanted; ++row) first += kRowCells[row];
   const double count = kRowCells[wanted];
-  const double turns = std::atan2(x, -z) / (2 * kPi) + 1;  // from north, clockwise; in [0.5, 1.5]
+  const double turns =
+      std::atan2(x, -z) / (2 * std::numbers::pi) + 1;  // from north, clockwise; in [0.5, 1.5]
   return first + static_cast<std::uint32_t>(turns * count + 0.5) % kRowCells[wanted];
 }
 
@@ -47,16 +47,16 @@ Float3 point_of_sky_cell(std::uint32_t cell, const Float2& place) {
   const auto [row, first] = row_of(cell);
   const auto [low, high] = sines_of(row);
   const double y = low + (high - low) * place[0], r = std::sqrt(std::max(0.0, 1 - y * y));
-  const double azimuth = 2 * kPi * (cell - first + place[1] - 0.5) / kRowCells[row];
+  const double azimuth = 2 * std::numbers::pi * (cell - first + place[1] - 0.5) / kRowCells[row];
   return {static_cast<float>(r * std::sin(azimuth)), static_cast<float>(y),
           static_cast<float>(-r * std::cos(azimuth))};
 }
 
 float sky_cell_solid_angle(std::uint32_t cell) {
-  if (cell == 0) return static_cast<float>(2 * kPi);
+  if (cell == 0) return static_cast<float>(2 * std::numbers::pi);
   const std::size_t row = row_of(cell).row;
   const auto [low, high] = sines_of(row);
-  return static_cast<float>(2 * kPi * (high - low) / kRowCells[row]);
+  return static_cast<float>(2 * std::numbers::pi * (high - low) / kRowCells[row]);
 }
 
 }  // namespace rebounce

@@ -13,8 +13,6 @@
 namespace rebounce {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 // Sample points along each side of a cell, for its mean luminance.
 constexpr int kPointsAcross = 8;
 
@@ -57,7 +55,7 @@ class CieSky {
 
   double indicatrix(double cosine) const {
     const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
-    return 1 + type_.c * (std::exp(type_.d * angle) - std::exp(type_.d * kPi / 2)) +
+    return 1 + type_.c * (std::exp(type_.d * angle) - std::exp(type_.d * std::numbers::pi / 2)) +
            type_.e * cosine * cosine;
   }
 
@@ -100,7 +98,7 @@ SkyDistribution cie_sky(int type, const Float3& sun_direction, float ground_refl
     mean[cell] = static_cast<float>(sum / (kPointsAcross * kPointsAcross));
     horizontal += received / (kPointsAcross * kPointsAcross) * sky_cell_solid_angle(cell);
   }
-  mean[0] = static_cast<float>(ground_reflectance * horizontal / kPi);
+  mean[0] = static_cast<float>(ground_reflectance * horizontal / std::numbers::pi);
   return mean;
 }
 

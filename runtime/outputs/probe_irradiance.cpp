@@ -16,7 +16,7 @@ namespace {
 constexpr float kLeastSharpness = 0.85F;
 constexpr float kLeastWidth = 1e-3F;
 constexpr std::size_t kBlock = 64;
-constexpr std::size_t kProbesPerTask = 4;
+constexpr std::size_t kBakedProbesPerTask = 4;
 
 /// A block of normals, stored by coordinates, so that the compiler vectorises loops over them.
 class NormalBlock {
@@ -123,7 +123,7 @@ void irradiance_at_probes(const LightProbes& probes, std::span<const Float3> rad
   check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   for_each_block(normals, [&](const NormalBlock& block, std::size_t first) {
-    parallel_for_pieces(scheduler, probes.size(), kProbesPerTask, [&](std::size_t p) {
+    parallel_for_pieces(scheduler, probes.size(), kBakedProbesPerTask, [&](std::size_t p) {
       IrradianceSum sum(block);
       add_view(probes, p, radiosity, seen_sky, 1, sum);
       sum.write(1, irradiance.subspan(p * normals.size() + first, block.size()));

@@ -10,7 +10,7 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kPatchesPerTask = 64, kVerticesPerTask = 512;
+constexpr std::size_t kPatchesPerTask = 64, kNormalsPerTask = 512;
 
 // A larger gain is not reliable: the series may be too small at the surface's own normal.
 constexpr float kLargestGain = 4;
@@ -49,7 +49,7 @@ void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const 
 void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const SurfaceLight> patch_light,
                              std::span<SurfaceLight> vertex_light, const Scheduler& scheduler) {
   check_size(vertex_light.size(), mesh.position.size(), "the light at vertices");
-  parallel_for_pieces(scheduler, vertex_light.size(), kVerticesPerTask, [&](std::size_t v) {
+  parallel_for_pieces(scheduler, vertex_light.size(), kNormalsPerTask, [&](std::size_t v) {
     SurfaceLight sum{};
     if (!mesh.weight_begin.empty()) {
       for (std::uint32_t w = mesh.weight_begin[v]; w < mesh.weight_begin[v + 1]; ++w) {

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kTexelsPerTask = 1024;
 
-void check_size(std::size_t size, std::size_t wanted, const char* name) {
+void check_texel_count(std::size_t size, std::size_t wanted, const char* name) {
   if (size == wanted) return;
   throw Error(std::string("lightmap: ") + name + " have " + std::to_string(size) +
               " entries; there must be " + std::to_string(wanted));
@@ -21,8 +21,8 @@ void check_size(std::size_t size, std::size_t wanted, const char* name) {
 void interpolate_at_texels(const Lightmap& lightmap, const DisplayMesh& mesh,
                            std::span<const Float3> vertex_value, std::span<Float3> texel_value,
                            const Scheduler& scheduler) {
-  check_size(vertex_value.size(), mesh.position.size(), "the values at vertices");
-  check_size(texel_value.size(), lightmap.triangle.size(), "the values at texels");
+  check_texel_count(vertex_value.size(), mesh.position.size(), "the values at vertices");
+  check_texel_count(texel_value.size(), lightmap.triangle.size(), "the values at texels");
   parallel_for_pieces(scheduler, texel_value.size(), kTexelsPerTask, [&](std::size_t k) {
     const std::uint32_t t = lightmap.triangle[k];
     if (t == kNone) {

@@ -9,7 +9,7 @@
 #include "tests/support/scene_data.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce::reference {
+namespace rebounce::reference::test_compare {
 namespace {
 
 /// A closed room in which every surface emits 1 lx and reflects half: H is 2 lx everywhere.
@@ -159,4 +159,4 @@ TEST(Reconstruction, PointsThatSeeOnlyBackFacesAreLeftOut) {
 }
 
 }  // namespace
-}  // namespace rebounce::reference
+}  // namespace rebounce::reference::test_compare

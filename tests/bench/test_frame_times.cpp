@@ -5,7 +5,7 @@
 #include "bench/report/accuracy.h"
 #include "bench/report/frames.h"
 
-namespace rebounce::bench {
+namespace rebounce::bench::test_frame_times {
 namespace {
 
 TEST(LagAfter, CountsFramesUntilTheErrorIsSmall) {
@@ -36,4 +36,4 @@ TEST(RunTimes, AreALineThroughWhatWasMeasuredThatOutliersDoNotTurn) {
 }
 
 }  // namespace
-}  // namespace rebounce::bench
+}  // namespace rebounce::bench::test_frame_times

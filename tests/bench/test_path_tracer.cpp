@@ -17,7 +17,7 @@
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 
-namespace rebounce::reference {
+namespace rebounce::reference::test_path_tracer {
 namespace {
 
 using test::add_box;
@@ -421,4 +421,4 @@ TEST(SampleSurface, IsUniformByAreaOverLitSides) {
 }
 
 }  // namespace
-}  // namespace rebounce::reference
+}  // namespace rebounce::reference::test_path_tracer

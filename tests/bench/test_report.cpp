@@ -26,7 +26,7 @@
 #include "tests/support/temporary_folder.h"
 #include "transfer/base/reflection.h"
 
-namespace rebounce::bench {
+namespace rebounce::bench::test_report {
 namespace {
 
 constexpr std::size_t kPatches = 100;
@@ -261,4 +261,4 @@ TEST_F(QuickReport, ThePageHasTheSameFigures) {
 }
 
 }  // namespace
-}  // namespace rebounce::bench
+}  // namespace rebounce::bench::test_report

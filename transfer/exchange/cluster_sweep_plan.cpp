@@ -6,7 +6,7 @@
 namespace rebounce {
 namespace {
 
-constexpr auto kAlignment = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment);
+constexpr auto kStepRows = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment);
 
 using Step = ClusterSweepPlan::Step;
 using Direction = CouplingBlock::Direction;
@@ -46,7 +46,7 @@ class Planner {
       : blocks_(storage.blocks),
         layout_(storage),
         plan_(plan),
-        step_at_(HierarchicalFormat::position_count(storage.area.size()) / kAlignment, 0) {}
+        step_at_(HierarchicalFormat::position_count(storage.area.size()) / kStepRows, 0) {}
 
   void run() {
     add_steps();
@@ -71,7 +71,7 @@ class Planner {
     std::ranges::sort(plan_.steps, {}, [](const Step& step) { return step.diagonal.row_begin; });
     for (std::size_t s = 0; s < plan_.steps.size(); ++s) {
       const TransferBlock& block = plan_.steps[s].diagonal;
-      std::fill_n(step_at_.begin() + block.row_begin / kAlignment, block.row_count / kAlignment,
+      std::fill_n(step_at_.begin() + block.row_begin / kStepRows, block.row_count / kStepRows,
                   static_cast<std::uint32_t>(s));
     }
   }
@@ -80,15 +80,15 @@ class Planner {
   void add_missing_steps() {
     std::vector<bool> held(step_at_.size(), false);
     for (const Step& step : plan_.steps) {
-      std::fill_n(held.begin() + step.diagonal.row_begin / kAlignment,
-                  step.diagonal.row_count / kAlignment, true);
+      std::fill_n(held.begin() + step.diagonal.row_begin / kStepRows,
+                  step.diagonal.row_count / kStepRows, true);
     }
     for (std::uint32_t k = 0; k < held.size(); ++k) {
       if (held[k]) continue;
-      plan_.steps.push_back({.diagonal = {.row_begin = k * kAlignment,
-                                          .row_count = kAlignment,
-                                          .column_begin = k * kAlignment,
-                                          .column_count = kAlignment,
+      plan_.steps.push_back({.diagonal = {.row_begin = k * kStepRows,
+                                          .row_count = kStepRows,
+                                          .column_begin = k * kStepRows,
+                                          .column_count = kStepRows,
                                           .kind = TransferBlock::Kind::kLowRank}});
     }
   }
@@ -154,7 +154,7 @@ class Planner {
   };
 
   Steps steps_of(std::uint32_t begin, std::uint32_t count) const {
-    return {step_at_[begin / kAlignment], step_at_[(begin + count) / kAlignment - 1]};
+    return {step_at_[begin / kStepRows], step_at_[(begin + count) / kStepRows - 1]};
   }
 
   Steps rows_of(const TransferBlock& block) const {
@@ -208,7 +208,7 @@ class Planner {
   const std::vector<TransferBlock>& blocks_;
   HierarchicalLayout layout_;
   ClusterSweepPlan& plan_;
-  std::vector<std::uint32_t> step_at_;  ///< [positions / kAlignment]
+  std::vector<std::uint32_t> step_at_;  ///< [positions / kStepRows]
 };
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace rebounce {
 namespace {
 
 constexpr std::size_t kGroup = ExchangeBlocks::kGroup, kSlotCount = ExchangeBlocks::kSlotCount;
-constexpr std::size_t kRowsPerTask = 16;
+constexpr std::size_t kExchangeRowsPerSweepTask = 16;
 
 class ExchangeRelaxation final : public Relaxation {
  public:
@@ -81,10 +81,11 @@ class ExchangeRelaxation final : public Relaxation {
   }
 
   void gather_all(const Scheduler& scheduler) {
-    parallel_for_pieces(scheduler, exchange_.patch_count(), kRowsPerTask, [this](std::size_t i) {
-      gather_outside_row(i);
-      gather_inside(i);
-    });
+    parallel_for_pieces(scheduler, exchange_.patch_count(), kExchangeRowsPerSweepTask,
+                        [this](std::size_t i) {
+                          gather_outside_row(i);
+                          gather_inside(i);
+                        });
   }
 
   void spread_all(const Scheduler& scheduler) {
@@ -98,7 +99,7 @@ class ExchangeRelaxation final : public Relaxation {
   }
 
   void gather_outside(std::size_t begin, std::size_t end, const Scheduler& scheduler) {
-    parallel_for_pieces(scheduler, end - begin, kRowsPerTask,
+    parallel_for_pieces(scheduler, end - begin, kExchangeRowsPerSweepTask,
                         [this, begin](std::size_t k) { gather_outside_row(begin + k); });
   }
 

@@ -7,7 +7,7 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kRowsPerTask = 64;
+constexpr std::size_t kMatrixRowsPerTask = 64;
 
 class RowRelaxation final : public Relaxation {
  public:
@@ -98,7 +98,7 @@ std::size_t FormFactorRows::bytes() const {
 
 void FormFactorRows::do_gather(std::span<const Float3> in, std::span<Float3> out,
                                std::span<float> /*workspace*/, const Scheduler& scheduler) const {
-  parallel_for_pieces(scheduler, patch_count(), kRowsPerTask,
+  parallel_for_pieces(scheduler, patch_count(), kMatrixRowsPerTask,
                       [&](std::size_t i) { out[i] = gather_row(i, in); });
 }
 

@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kRowsPerTask = 64;
+constexpr std::size_t kBlockRowsPerTask = 64;
 
 constexpr std::uint32_t position_of(std::size_t column) {
   return static_cast<std::uint32_t>(column / kFormFactorBlock);
@@ -88,7 +88,7 @@ void FormFactorBlocks::do_gather(std::span<const Float3> in, std::span<Float3> o
                                  std::span<float> workspace, const Scheduler& scheduler) const {
   const std::span<float> planes = workspace.first(kChannelCount * plane_size());
   to_planes(in, planes);
-  parallel_for_pieces(scheduler, patch_count(), kRowsPerTask,
+  parallel_for_pieces(scheduler, patch_count(), kBlockRowsPerTask,
                       [&](std::size_t i) { out[i] = gather_row(i, planes); });
 }
 

@@ -5,13 +5,14 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kGroup = FormFactorBlocks::kGroup;
-constexpr std::size_t kRowsPerTask = 16;
+constexpr std::size_t kBlockRowsPerSweepTask = 16;
 
 class BlockRowRelaxation final : public Relaxation {
  public:
   explicit BlockRowRelaxation(const FormFactorBlocks& blocks)
-      : blocks_(blocks), planes_(kChannelCount * blocks.plane_size()), outside_(kGroup) {}
+      : blocks_(blocks),
+        planes_(kChannelCount * blocks.plane_size()),
+        outside_(FormFactorBlocks::kGroup) {}
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     problem_ = problem;
@@ -19,12 +20,14 @@ class BlockRowRelaxation final : public Relaxation {
   }
 
   double sweep(SweepDirection direction, const Scheduler& scheduler) override {
-    const std::size_t n = blocks_.patch_count(), group_count = (n + kGroup - 1) / kGroup;
+    const std::size_t n = blocks_.patch_count(),
+                      group_count = (n + FormFactorBlocks::kGroup - 1) / FormFactorBlocks::kGroup;
     const bool backward = direction == SweepDirection::kBackward;
     double changed_squared = 0;
     for (std::size_t k = 0; k < group_count; ++k) {
       const std::size_t group = backward ? group_count - 1 - k : k;
-      const std::size_t begin = group * kGroup, end = std::min(begin + kGroup, n);
+      const std::size_t begin = group * FormFactorBlocks::kGroup,
+                        end = std::min(begin + FormFactorBlocks::kGroup, n);
       gather_from_outside(begin, end, scheduler);
       changed_squared += relax_group(begin, end, backward);
     }
@@ -38,9 +41,10 @@ class BlockRowRelaxation final : public Relaxation {
  private:
   void gather_from_outside(std::size_t group_begin, std::size_t group_end,
                            const Scheduler& scheduler) {
-    parallel_for_pieces(scheduler, group_end - group_begin, kRowsPerTask, [&](std::size_t k) {
-      outside_[k] = blocks_.gather_outside_group(group_begin + k, planes_);
-    });
+    parallel_for_pieces(scheduler, group_end - group_begin, kBlockRowsPerSweepTask,
+                        [&](std::size_t k) {
+                          outside_[k] = blocks_.gather_outside_group(group_begin + k, planes_);
+                        });
   }
 
   double relax_group(std::size_t group_begin, std::size_t group_end, bool backward) {
@@ -55,7 +59,7 @@ class BlockRowRelaxation final : public Relaxation {
 
   double relax_row(std::size_t row) {
     const std::size_t stride = blocks_.plane_size();
-    const Float3& outside = outside_[row % kGroup];
+    const Float3& outside = outside_[row % FormFactorBlocks::kGroup];
     const Float3 inside = blocks_.gather_inside_group(row, planes_);
     double changed_squared = 0;
     for (int c = 0; c < kChannelCount; ++c) {
@@ -72,7 +76,7 @@ class BlockRowRelaxation final : public Relaxation {
   const FormFactorBlocks& blocks_;
   RelaxationProblem problem_;
   std::vector<float> planes_;    ///< B, in planes
-  std::vector<Float3> outside_;  ///< [kGroup] gathered from outside the group
+  std::vector<Float3> outside_;  ///< [FormFactorBlocks::kGroup] gathered from outside the group
 };
 
 }  // namespace

@@ -10,8 +10,6 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kTile = LowRankOperator::kTile;
-
 // Ranks are padded to whole vectors of the widest instruction set.
 constexpr std::size_t kVector = 16;
 
@@ -39,7 +37,7 @@ BasisPart basis_of_tile(std::size_t tile, std::size_t rank) {
 }  // namespace
 
 std::size_t LowRankOperator::tile_count(std::size_t patch_count) {
-  return (patch_count + kTile - 1) / kTile;
+  return (patch_count + LowRankOperator::kTile - 1) / LowRankOperator::kTile;
 }
 
 LowRankOperator::Storage LowRankOperator::encode_half(const Storage& storage) {
@@ -65,7 +63,8 @@ LowRankOperator::LowRankOperator(Storage storage) : storage_(std::move(storage))
   }
   const bool half = storage_.precision == Precision::kF16;
   const std::size_t basis = half ? storage_.basis_f16.size() : storage_.basis_f32.size();
-  if (basis != tile_count(n) * rank * kTile) refuse("the basis has the wrong size");
+  if (basis != tile_count(n) * rank * LowRankOperator::kTile)
+    refuse("the basis has the wrong size");
   if (storage_.coupling.size() != storage_.matrix_count * rank * rank) {
     refuse("the coupling matrices have the wrong size");
   }
@@ -134,7 +133,8 @@ void LowRankOperator::multiply_row(std::size_t channel, std::size_t row, const f
 void LowRankOperator::expand_tile(std::size_t tile, const float* coefficient, float* y) const {
   const BlockKernels& blocks = kernels().blocks;
   const Coefficients<const float> in{coefficient, coefficient_size()};
-  for (int c = 0; c < kChannelCount; ++c) std::fill_n(y + c * stride() + tile * kTile, kTile, 0.0F);
+  for (int c = 0; c < kChannelCount; ++c)
+    std::fill_n(y + c * stride() + tile * LowRankOperator::kTile, LowRankOperator::kTile, 0.0F);
   const BasisPart part = basis_of_tile(tile, storage_.rank);
   const PlanarVectors<float> out{y, stride(), kChannelCount};
   if (storage_.precision == Precision::kF16) {

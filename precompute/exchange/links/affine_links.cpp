@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 // Such a gradient would be as large as the direction is thin. Gradients are stored as bfloat16,
 // axis by axis, so rounding errors point anywhere, also along the length of the node: they are at
 // most 2^-9 / 0.03 of what the gradient stands for. With 1e-6 gathering diverges.
-constexpr double kFlat = 0.03;
+constexpr double kFlatSpread = 0.03;
 constexpr int kScalingRounds = 4;
 
 // Factors stay within these limits. A patch that sees almost nothing may have lost most of it;
@@ -24,7 +24,7 @@ constexpr float kLeastScale = 0.5F, kMostScale = 2;
 
 Matrix3d inverse_without_flat(const Matrix3d& covariance) {
   const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(covariance);
-  const double least = kFlat * kFlat * eigen.eigenvalues()[2];
+  const double least = kFlatSpread * kFlatSpread * eigen.eigenvalues()[2];
   Matrix3d inverse = Matrix3d::Zero();
   for (int k = 0; k < 3; ++k) {
     const double value = eigen.eigenvalues()[k];

@@ -16,8 +16,9 @@ namespace rebounce {
 namespace {
 
 constexpr int kMaxDivisions = 64;
-constexpr float kBrightest = 1e6F;     // relative to the screen's white: white with any tone curve
-constexpr std::uint32_t kBlock = 256;  // vertices that a thread lights at a time
+constexpr float kBrightestVertex =
+    1e6F;  // relative to the screen's white: white with any tone curve
+constexpr std::uint32_t kVertexBlock = 256;  // vertices that a thread lights at a time
 
 // The triangles around each vertex, and running sums of their areas.
 class Surroundings {
@@ -106,7 +107,7 @@ class VertexLighter {
                                                           {}, &Surroundings::Corner::area_end),
                                  corners.end() - 1);
     const glm::vec3 inside =
-        near_corner(chosen->index, r2_point(k, {hash_to_unit(v, 0), hash_to_unit(v, 1)}));
+        near_corner(chosen->index, r2_point(k, glm::vec2(hash_to_unit(v, 0), hash_to_unit(v, 1))));
     const std::array<glm::vec3, 3>& corner = mesh_.corner[chosen->triangle];
     CameraSample sample{.pixel = v, .index = k};
     sample.point = lighter_.surface().point_on(
@@ -185,12 +186,12 @@ void light_vertices(const VertexLighter& lighter, LitMesh& lit) {
   for (const LitMesh::Part& part : lit.part) {
     if (part.is_in_texture) continue;
 #pragma omp parallel for schedule(dynamic)
-    for (std::uint32_t begin = part.vertex_begin; begin < part.vertex_end; begin += kBlock) {
-      const std::vector<glm::vec3> shown =
-          lighter.shown(begin, std::min(begin + kBlock, part.vertex_end), std::exp2(lit.exposure));
+    for (std::uint32_t begin = part.vertex_begin; begin < part.vertex_end; begin += kVertexBlock) {
+      const std::vector<glm::vec3> shown = lighter.shown(
+          begin, std::min(begin + kVertexBlock, part.vertex_end), std::exp2(lit.exposure));
       for (std::size_t k = 0; k < shown.size(); ++k) {
         // Unbounded light, as close to a lamp, has no defined value on the tone curve.
-        const glm::vec3 bounded = glm::min(shown[k], glm::vec3(kBrightest));
+        const glm::vec3 bounded = glm::min(shown[k], glm::vec3(kBrightestVertex));
         lit.color[begin + k] = to_float3(glm::clamp(tone_curve(bounded), 0.0F, 1.0F));
       }
     }

@@ -10,8 +10,9 @@
 namespace rebounce {
 namespace {
 
-constexpr float kBrightest = 1e6F;      // relative to the screen's white: white with any tone curve
-constexpr std::uint32_t kBlock = 1024;  // texels that a thread lights at a time
+constexpr float kBrightestTexel =
+    1e6F;  // relative to the screen's white: white with any tone curve
+constexpr std::uint32_t kTexelBlock = 1024;  // texels that a thread lights at a time
 
 /// The position of a display triangle in the texture.
 class TexelFrame {
@@ -63,8 +64,8 @@ ScreenImage light_texture(const TransferData& data, const SurfaceLighter& lighte
   Picture picture{.width = static_cast<int>(map.width), .height = static_cast<int>(map.height)};
   picture.pixel.assign(texel_count, Float3{0, 0, 0});
 #pragma omp parallel for schedule(dynamic)
-  for (std::uint32_t begin = 0; begin < texel_count; begin += kBlock) {
-    const std::uint32_t end = std::min(begin + kBlock, texel_count);
+  for (std::uint32_t begin = 0; begin < texel_count; begin += kTexelBlock) {
+    const std::uint32_t end = std::min(begin + kTexelBlock, texel_count);
     std::vector<std::uint32_t> texels;
     std::vector<LitPiece> pieces;
     std::vector<CameraSample> samples;
@@ -78,7 +79,7 @@ ScreenImage light_texture(const TransferData& data, const SurfaceLighter& lighte
           {lighter.surface().point_on(t, frame.moved(map.weight[k], {0, 0})), frame.width()});
       for (std::uint32_t s = 0; s < count; ++s) {
         const glm::vec2 offset =
-            r2_point(s, {hash_to_unit(piece, 0), hash_to_unit(piece, 1)}) - 0.5F;
+            r2_point(s, glm::vec2(hash_to_unit(piece, 0), hash_to_unit(piece, 1))) - 0.5F;
         CameraSample sample{.pixel = piece, .index = s};
         sample.point = lighter.surface().point_on(t, frame.moved(map.weight[k], offset));
         samples.push_back(sample);
@@ -87,7 +88,7 @@ ScreenImage light_texture(const TransferData& data, const SurfaceLighter& lighte
     const std::vector<glm::vec3> shown =
         lighter.shown(begin, pieces, samples, std::exp2(exposure), true);
     for (std::size_t k = 0; k < texels.size(); ++k) {
-      picture.pixel[texels[k]] = to_float3(glm::min(shown[k], glm::vec3(kBrightest)));
+      picture.pixel[texels[k]] = to_float3(glm::min(shown[k], glm::vec3(kBrightestTexel)));
     }
   }
   return tone_map(picture);

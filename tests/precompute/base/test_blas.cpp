@@ -9,7 +9,7 @@
 
 #include "rebounce/error.h"
 
-namespace rebounce {
+namespace rebounce::test_blas {
 namespace {
 
 constexpr const char* kKernelVariable = "OPENBLAS_CORETYPE";
@@ -87,4 +87,4 @@ TEST_F(Blas, ThatCannotBeLoadedIsAnError) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_blas

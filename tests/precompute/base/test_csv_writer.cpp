@@ -7,7 +7,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
-namespace rebounce {
+namespace rebounce::test_csv_writer {
 namespace {
 
 TEST(CsvWriter, PutsGroupsSideBySide) {
@@ -57,4 +57,4 @@ TEST(CsvWriter, RefusesGroupsOfDifferentHeight) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_csv_writer

@@ -9,7 +9,7 @@
 #include "tests/support/npz_reader.h"
 #include "tests/support/temporary_folder.h"
 
-namespace rebounce {
+namespace rebounce::test_npz_writer {
 namespace {
 
 using test::expect_error;
@@ -134,4 +134,4 @@ TEST(NpzWriter, LeavesTheTargetAloneWhenItFails) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_npz_writer

@@ -9,7 +9,7 @@
 
 #include "tests/support/expect_error.h"
 
-namespace rebounce {
+namespace rebounce::test_build_estimate {
 namespace {
 
 constexpr std::uint64_t kPlenty = 1ULL << 40;
@@ -91,4 +91,4 @@ TEST(BuildEstimate, IsRefusedAboveTheLimit) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_build_estimate

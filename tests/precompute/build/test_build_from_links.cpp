@@ -18,7 +18,7 @@
 #include "transfer/base/area_norm.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_build_from_links {
 namespace {
 
 constexpr std::uint64_t kSeed = 20261120;
@@ -257,4 +257,4 @@ TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_build_from_links

@@ -10,7 +10,7 @@
 #include "runtime/outputs/vertex_light.h"
 #include "tests/support/built_scene.h"
 
-namespace rebounce {
+namespace rebounce::test_flicker {
 namespace {
 
 const std::shared_ptr<const TransferData>& cornell_box() {
@@ -135,4 +135,4 @@ TEST(Flicker, ThereAndBackGivesTheSameBits) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_flicker

@@ -12,7 +12,7 @@
 #include "tests/support/scene_data.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_light_through_surfaces {
 namespace {
 
 constexpr std::uint32_t kWall = 0, kPane = 1, kOther = 2;
@@ -264,4 +264,4 @@ TEST(OpacitySampling, NothingToLetThroughMeansNoMaps) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_light_through_surfaces

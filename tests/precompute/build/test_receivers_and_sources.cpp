@@ -18,7 +18,7 @@
 #include "transfer/exchange/exchange_blocks.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_receivers_and_sources {
 namespace {
 
 using Lights = std::vector<std::vector<Float3>>;
@@ -151,4 +151,4 @@ TEST(ReceiversAndSources, OtherOperatorsRefuseThem) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_receivers_and_sources

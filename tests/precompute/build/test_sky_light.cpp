@@ -14,7 +14,7 @@
 #include "tests/support/scene_data.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_sky_light {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -208,4 +208,4 @@ TEST(CieSky, RefusesWhatThereIsNot) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_sky_light

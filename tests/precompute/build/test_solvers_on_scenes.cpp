@@ -17,7 +17,7 @@
 #include "transfer/exchange/compressed_form_factors.h"
 #include "transfer/exchange/form_factor_blocks.h"
 
-namespace rebounce {
+namespace rebounce::test_solvers_on_scenes {
 namespace {
 
 /// The relative area-weighted error of `radiosity` against the double-precision solution.
@@ -385,4 +385,4 @@ TEST(RelaxationOnScenes, EmissionChangesInTheNextSolve) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_solvers_on_scenes

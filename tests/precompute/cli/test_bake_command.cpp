@@ -6,7 +6,7 @@
 #include "tests/support/command_line.h"
 #include "tests/support/unwrapped_room.h"
 
-namespace rebounce {
+namespace rebounce::test_bake_command {
 namespace {
 
 using nlohmann::json;
@@ -85,4 +85,4 @@ TEST_F(BakeCommand, RefusesWhatItCannotWriteOrRead) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_bake_command

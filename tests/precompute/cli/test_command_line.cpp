@@ -11,7 +11,7 @@
 #include "precompute/compression/hierarchical_settings.h"
 #include "tests/support/command_line.h"
 
-namespace rebounce {
+namespace rebounce::test_command_line {
 namespace {
 
 using nlohmann::json;
@@ -169,4 +169,4 @@ TEST_F(CommandLine, TheShippedScenesAreWhatTheirScriptsMake) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_command_line

@@ -10,7 +10,7 @@
 
 #include "precompute/cli/console.h"
 
-namespace rebounce::cli {
+namespace rebounce::cli::test_console {
 namespace {
 
 using std::chrono::hours;
@@ -63,4 +63,4 @@ TEST(ProgressBar, SaysNothingWhereNoneIsWanted) {
 }
 
 }  // namespace
-}  // namespace rebounce::cli
+}  // namespace rebounce::cli::test_console

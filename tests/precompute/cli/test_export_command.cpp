@@ -10,7 +10,7 @@
 #include "tests/support/command_line.h"
 #include "tests/support/npz_reader.h"
 
-namespace rebounce {
+namespace rebounce::test_export_command {
 namespace {
 
 using nlohmann::json;
@@ -85,4 +85,4 @@ TEST_F(ExportCommand, ExportsPatchesAndMesh) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_export_command

@@ -16,7 +16,7 @@
 #include "tests/support/command_line.h"
 #include "tests/support/npz_reader.h"
 
-namespace rebounce {
+namespace rebounce::test_precompute_command {
 namespace {
 
 using nlohmann::json;
@@ -344,4 +344,4 @@ TEST_F(PrecomputeCommand, RefusesReceiversAndSourcesThatAreNotThere) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_precompute_command

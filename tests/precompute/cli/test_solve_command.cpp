@@ -13,7 +13,7 @@
 #include "tests/support/command_line.h"
 #include "tests/support/npz_reader.h"
 
-namespace rebounce {
+namespace rebounce::test_solve_command {
 namespace {
 
 using nlohmann::json;
@@ -270,4 +270,4 @@ TEST_F(SolveCommand, RefusesToRelightWithoutAnyLight) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_solve_command

@@ -12,7 +12,7 @@
 
 #include "tests/support/command_line.h"
 
-namespace rebounce {
+namespace rebounce::test_view_command {
 namespace {
 
 using nlohmann::json;
@@ -347,4 +347,4 @@ TEST_F(ViewCommand, SaysInOneLineThatThereIsNoDisplay) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_view_command

@@ -12,7 +12,7 @@
 #include "tests/support/temporary_folder.h"
 #include "transfer/format/operator_format.h"
 
-namespace rebounce {
+namespace rebounce::test_block_checkpoint {
 namespace {
 
 const std::string kName = "panel_0000", kOther = "panel_0001";
@@ -121,4 +121,4 @@ TEST(BlockCheckpoint, SaysWhereItCannotKeep) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_block_checkpoint

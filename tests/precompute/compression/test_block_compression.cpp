@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-namespace rebounce {
+namespace rebounce::test_block_compression {
 namespace {
 
 using Eigen::Index;
@@ -118,4 +118,4 @@ TEST(BlockCompression, BlocksThatAreQuicklyTriedSayNothing) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_block_compression

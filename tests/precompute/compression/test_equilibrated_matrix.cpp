@@ -17,7 +17,7 @@
 #include "tests/support/unshadowed_lights.h"
 #include "transfer/operator/hierarchical_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_equilibrated_matrix {
 namespace {
 
 using Eigen::Index;
@@ -107,4 +107,4 @@ TEST(EquilibratedMatrix, PatchesOfWhoseLightLittleArrivesAreRoundedAsWellAsOther
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_equilibrated_matrix

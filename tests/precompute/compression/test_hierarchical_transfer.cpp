@@ -16,7 +16,7 @@
 #include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_storage.h"
 
-namespace rebounce {
+namespace rebounce::test_hierarchical_transfer {
 namespace {
 
 struct Room {
@@ -217,4 +217,4 @@ TEST(HierarchicalTransfer, StopsWhenAsked) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_hierarchical_transfer

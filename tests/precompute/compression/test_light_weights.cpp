@@ -8,7 +8,7 @@
 #include <numeric>
 #include <random>
 
-namespace rebounce {
+namespace rebounce::test_light_weights {
 namespace {
 
 using Eigen::Index;
@@ -117,4 +117,4 @@ TEST(ClusterWeights, ArePutOnEitherSideAndTakenAway) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_light_weights

@@ -16,7 +16,7 @@
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
 
-namespace rebounce {
+namespace rebounce::test_low_rank_transfer {
 namespace {
 
 struct Room {
@@ -147,4 +147,4 @@ TEST(LowRankTransfer, RefusesSizesThatDoNotAgree) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_low_rank_transfer

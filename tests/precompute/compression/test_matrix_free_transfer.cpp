@@ -27,7 +27,7 @@
 #include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_storage.h"
 
-namespace rebounce {
+namespace rebounce::test_matrix_free_transfer {
 namespace {
 
 using Lights = std::vector<std::vector<Float3>>;
@@ -420,4 +420,4 @@ TEST(MatrixFreeTransfer, TakesMemoryInProportionToThePatches) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_matrix_free_transfer

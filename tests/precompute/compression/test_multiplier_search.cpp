@@ -9,7 +9,7 @@
 #include <functional>
 #include <limits>
 
-namespace rebounce {
+namespace rebounce::test_multiplier_search {
 namespace {
 
 constexpr MultiplierSearch::Range kWanted{0.72, 0.8};
@@ -122,4 +122,4 @@ TEST(MultiplierSearch, LeavesAnErrorOfNothing) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_multiplier_search

@@ -18,7 +18,7 @@
 #include "transfer/format/hierarchical_storage.h"
 #include "transfer/operator/hierarchical_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_nested_bases {
 namespace {
 
 using Storage = HierarchicalStorage;
@@ -313,4 +313,4 @@ TEST(NestedBases, AreTakenForATolerance) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_nested_bases

@@ -4,7 +4,7 @@
 
 #include "precompute/compression/residual_ranks.h"
 
-namespace rebounce {
+namespace rebounce::test_residual_ranks {
 namespace {
 
 using Eigen::Index;
@@ -94,4 +94,4 @@ TEST(ClusterWeights, SquaredNormIsThatOfTheMatrix) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_residual_ranks

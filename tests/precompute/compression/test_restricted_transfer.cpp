@@ -20,7 +20,7 @@
 #include "tests/support/unshadowed_lights.h"
 #include "transfer/base/area_norm.h"
 
-namespace rebounce {
+namespace rebounce::test_restricted_transfer {
 namespace {
 
 using Lights = std::vector<std::vector<Float3>>;
@@ -229,4 +229,4 @@ TEST(ReceiversAndSources, OnlyTheirColumnsAreSolvedFor) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_restricted_transfer

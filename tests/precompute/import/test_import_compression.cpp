@@ -11,7 +11,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/gltf_builder.h"
 
-namespace rebounce {
+namespace rebounce::test_import_compression {
 namespace {
 
 using test::GltfBuilder;
@@ -525,4 +525,4 @@ INSTANTIATE_TEST_SUITE_P(BothExtensions, MeshoptCompression,
                          });
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_compression

@@ -13,7 +13,7 @@
 #include "rebounce/error.h"
 #include "tests/precompute/import/imported_triangle.h"
 
-namespace rebounce {
+namespace rebounce::test_import_gltf {
 namespace {
 
 using test::expect_near;
@@ -377,4 +377,4 @@ TEST_F(ImportGltf, VerticesThatNoTriangleUsesAreNotPlaced) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_gltf

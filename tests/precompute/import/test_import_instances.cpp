@@ -8,7 +8,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/gltf_builder.h"
 
-namespace rebounce {
+namespace rebounce::test_import_instances {
 namespace {
 
 using test::GltfBuilder;
@@ -116,4 +116,4 @@ TEST_F(ImportInstances, ThatFillTheMemoryAreRefused) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_instances

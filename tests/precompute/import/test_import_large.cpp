@@ -5,7 +5,7 @@
 #include "precompute/import/import_gltf.h"
 #include "tests/support/large_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_import_large {
 namespace {
 
 double peak_of_import(const test::GltfBuilder& builder, std::size_t triangles) {
@@ -34,4 +34,4 @@ TEST(ImportLarge, SevenMillionInstancedTrianglesWithoutSharedVertices) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_large

@@ -7,7 +7,7 @@
 
 #include "tests/precompute/import/imported_triangle.h"
 
-namespace rebounce {
+namespace rebounce::test_import_lights {
 namespace {
 
 using test::expect_near;
@@ -97,4 +97,4 @@ TEST_F(ImportLights, CamerasLookAlongTheirNodes) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_lights

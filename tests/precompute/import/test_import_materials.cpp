@@ -8,7 +8,7 @@
 #include "precompute/patches/texture_sampling.h"
 #include "tests/precompute/import/imported_triangle.h"
 
-namespace rebounce {
+namespace rebounce::test_import_materials {
 namespace {
 
 using test::expect_near;
@@ -130,4 +130,4 @@ TEST_F(ImportMaterials, AlphaOfVertexColoursIsIgnoredWithAWarningWhereItWouldCou
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_materials

@@ -10,7 +10,7 @@
 #include "rebounce/error.h"
 #include "tests/support/gltf_builder.h"
 
-namespace rebounce {
+namespace rebounce::test_import_refusals {
 namespace {
 
 using test::GltfBuilder;
@@ -373,4 +373,4 @@ TEST_F(ImportRefusals, NoDamagedByteCrashes) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_refusals

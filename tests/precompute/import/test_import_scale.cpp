@@ -9,7 +9,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/gltf_builder.h"
 
-namespace rebounce {
+namespace rebounce::test_import_scale {
 namespace {
 
 using test::GltfBuilder;
@@ -76,4 +76,4 @@ TEST_F(ImportScale, UnlikelySizesAreWarnedOf) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_scale

@@ -19,7 +19,7 @@
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/shared_folder.h"
 
-namespace rebounce {
+namespace rebounce::test_import_shared {
 namespace {
 
 std::vector<std::string> split(const std::string& line, char separator) {
@@ -235,4 +235,4 @@ TEST(ImportShared, MalformedFilesAreImportedOrRefusedInOneLine) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_shared

@@ -12,7 +12,7 @@
 #include "precompute/patches/texture_sampling.h"
 #include "tests/precompute/import/imported_triangle.h"
 
-namespace rebounce {
+namespace rebounce::test_import_textures {
 namespace {
 
 using test::expect_near;
@@ -210,4 +210,4 @@ TEST(TextureSampling, BusyTextureIsAveragedWithoutAliasing) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_textures

@@ -7,7 +7,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/gltf_builder.h"
 
-namespace rebounce {
+namespace rebounce::test_import_webp {
 namespace {
 
 using test::GltfBuilder;
@@ -121,4 +121,4 @@ TEST_F(ImportWebp, NoDamagedByteCrashes) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_import_webp

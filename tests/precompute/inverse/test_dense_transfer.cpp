@@ -14,7 +14,7 @@
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
 
-namespace rebounce {
+namespace rebounce::test_dense_transfer {
 namespace {
 
 struct Solved {
@@ -261,4 +261,4 @@ TEST(DenseTransfer, IntegratingSphere) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_dense_transfer

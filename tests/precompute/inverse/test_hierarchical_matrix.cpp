@@ -13,7 +13,7 @@
 #include "tests/support/with_threads.h"
 #include "transfer/format/hierarchical_encoding.h"
 
-namespace rebounce {
+namespace rebounce::test_hierarchical_matrix {
 namespace {
 
 constexpr std::size_t kPatchCount = 340;
@@ -97,4 +97,4 @@ INSTANTIATE_TEST_SUITE_P(Kinds, HierarchicalMatrixOf,
                          });
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_hierarchical_matrix

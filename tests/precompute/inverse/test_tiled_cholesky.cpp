@@ -4,7 +4,7 @@
 
 #include "rebounce/error.h"
 
-namespace rebounce {
+namespace rebounce::test_tiled_cholesky {
 namespace {
 
 /// Ones, and -`coupling` beside them: of the inverse, coupling^|i - j| and next to nothing more.
@@ -75,4 +75,4 @@ TEST(TiledCholesky, NotPositiveDefinite) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_tiled_cholesky

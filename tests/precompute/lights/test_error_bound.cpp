@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-namespace rebounce {
+namespace rebounce::test_error_bound {
 namespace {
 
 constexpr int kTrialCount = 200, kSampleSize = 256, kOthers = 1000;
@@ -65,4 +65,4 @@ TEST(ErrorBound, TakesFewErrorsAndNone) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_error_bound

@@ -20,7 +20,7 @@
 #include "tests/support/test_scenes.h"
 #include "transfer/base/area_norm.h"
 
-namespace rebounce {
+namespace rebounce::test_measured_error {
 namespace {
 
 constexpr std::uint64_t kSeed = 11, kOtherSeed = 4711;
@@ -292,4 +292,4 @@ TEST(RandomLights, SinglePatchesAreDrawnByArea) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_measured_error

@@ -18,7 +18,7 @@
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
 
-namespace rebounce {
+namespace rebounce::test_reference_solution {
 namespace {
 
 using Double3 = ReferenceSolver::Double3;
@@ -276,4 +276,4 @@ TEST(ReferenceSolution, WhatCannotConvergeIsRefused) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_reference_solution

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-namespace rebounce {
+namespace rebounce::test_validation_error {
 namespace {
 
 /// All but some at the end the same.
@@ -55,4 +55,4 @@ TEST(ValidationError, DoesNotDependOnTheOrder) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_validation_error

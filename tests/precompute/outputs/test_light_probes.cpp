@@ -17,7 +17,7 @@
 #include "tests/support/temporary_folder.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_light_probes {
 namespace {
 
 const TransferData& cornell_box() {
@@ -201,4 +201,4 @@ TEST(LightProbes, SpacingAndLimits) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_light_probes

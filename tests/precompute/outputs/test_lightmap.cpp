@@ -18,7 +18,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/unwrapped_room.h"
 
-namespace rebounce {
+namespace rebounce::test_lightmap {
 namespace {
 
 constexpr std::uint32_t kSize = 256;
@@ -265,4 +265,4 @@ TEST(Lightmap, AFrameDoesNotAllocateAndThreadsDoNotMatter) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_lightmap

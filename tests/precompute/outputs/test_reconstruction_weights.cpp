@@ -10,7 +10,7 @@
 #include "runtime/rays/triangle.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_reconstruction_weights {
 namespace {
 
 /// The patches of a scene with weights, nothing of them covered.
@@ -320,4 +320,4 @@ TEST(ReconstructionWeights, ASlotShowsWhatArrivesInIt) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_reconstruction_weights

@@ -20,7 +20,7 @@
 #include "tests/support/scene_data.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_seen_light {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -338,4 +338,4 @@ TEST(SeenLight, ASunsetBendsNormalsTowardsIt) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_seen_light

@@ -19,7 +19,7 @@
 #include "tests/support/with_threads.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_surface_harmonics {
 namespace {
 
 const std::shared_ptr<const TransferData>& cornell_box() {
@@ -187,4 +187,4 @@ TEST(SurfaceHarmonics, SameBitsForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_surface_harmonics

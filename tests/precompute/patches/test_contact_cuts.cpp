@@ -12,7 +12,7 @@
 #include "precompute/patches/welded_positions.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_contact_cuts {
 namespace {
 
 using Corners = std::array<glm::dvec3, 3>;
@@ -419,4 +419,4 @@ TEST_P(TwoRooms, ExchangeNoLight) {
 INSTANTIATE_TEST_SUITE_P(WallThickness, TwoRooms, ::testing::Values(0.0, 0.02, 0.15));
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_contact_cuts

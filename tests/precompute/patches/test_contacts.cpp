@@ -14,7 +14,7 @@
 #include "runtime/rays/triangle.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_contacts {
 namespace {
 
 using Engine = std::mt19937;
@@ -384,4 +384,4 @@ TEST(Contacts, RowsOfBladesAreOneContactEach) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_contacts

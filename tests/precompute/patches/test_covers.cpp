@@ -10,7 +10,7 @@
 #include "precompute/patches/subdivision.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_covers {
 namespace {
 
 // The board hangs this high above the floor and ends at this x.
@@ -133,4 +133,4 @@ TEST(Covers, PatchesEndWhereCoversDo) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_covers

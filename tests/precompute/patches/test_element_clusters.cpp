@@ -9,7 +9,7 @@
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 
-namespace rebounce {
+namespace rebounce::test_element_clusters {
 namespace {
 
 double triangle_area(const DisplayMesh& mesh, std::uint32_t t) {
@@ -226,4 +226,4 @@ TEST(ElementClusters, DisconnectedLeavesBecomeFewPatches) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_element_clusters

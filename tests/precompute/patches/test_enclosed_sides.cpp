@@ -10,7 +10,7 @@
 #include "precompute/patches/subdivision.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_enclosed_sides {
 namespace {
 
 constexpr std::uint32_t kRoom = 0, kShell = 1, kLamp = 2;
@@ -237,4 +237,4 @@ TEST(EnclosedSides, NoPatchHoldsTheInsideAndTheOutsideOfAShell) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_enclosed_sides

@@ -8,7 +8,7 @@
 #include "precompute/patches/subdivision.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_hemisphere_visibility {
 namespace {
 
 /// A room of 5 x 3 x 4 m in a shell that is 0.5 m larger on every side: what is outside sees
@@ -80,4 +80,4 @@ TEST(HemisphereVisibility, ImportantTrianglesAreSplitMore) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_hemisphere_visibility

@@ -6,7 +6,7 @@
 #include "tests/support/test_scenes.h"
 #include "transfer/data/opacity_maps.h"
 
-namespace rebounce {
+namespace rebounce::test_opacity {
 namespace {
 
 /// A material over a texture of 2 x 1 pixels: alpha 51 (0.2) on the left, 255 on the right.
@@ -84,4 +84,4 @@ TEST_F(Opacity, WithoutATextureTheFactorDecides) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_opacity

@@ -8,7 +8,7 @@
 #include "rebounce/error.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_patch_model {
 namespace {
 
 Scene double_sided(Scene scene) {
@@ -123,4 +123,4 @@ TEST(PatchModel, DropsSliversBelowThePrecisionOfRays) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_patch_model

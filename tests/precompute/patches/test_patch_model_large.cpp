@@ -6,7 +6,7 @@
 #include "precompute/patches/patch_model.h"
 #include "tests/support/large_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_patch_model_large {
 namespace {
 
 TEST(PatchModelLarge, AMillionInstancedTriangles) {
@@ -20,4 +20,4 @@ TEST(PatchModelLarge, AMillionInstancedTriangles) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_patch_model_large

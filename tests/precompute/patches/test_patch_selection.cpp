@@ -9,7 +9,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_patch_selection {
 namespace {
 
 /// Two walls, of which the second is placed twice, and a lamp.
@@ -117,4 +117,4 @@ TEST(WantedPart, CountsPairsThatWantLightBothWaysOnce) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_patch_selection

@@ -9,7 +9,7 @@
 #include "precompute/patches/welded_positions.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_subdivision {
 namespace {
 
 double area_of(const Scene& scene, std::size_t t) {
@@ -136,4 +136,4 @@ TEST(WeldedPositions, JoinsEqualPlacesOnly) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_subdivision

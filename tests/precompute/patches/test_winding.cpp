@@ -9,7 +9,7 @@
 #include "tests/support/shared_folder.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_winding {
 namespace {
 
 constexpr bool kInwards = true, kOutwards = false;
@@ -164,4 +164,4 @@ TEST(Winding, ScenesThatPeopleMadeAreRight) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_winding

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-namespace rebounce {
+namespace rebounce::test_sobol_blocks {
 namespace {
 
 constexpr std::uint64_t kBits = 20261;
@@ -71,4 +71,4 @@ TEST(SobolBlocks, PartOfABlockIsItsBeginning) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_sobol_blocks

@@ -20,7 +20,7 @@
 #include "tests/support/temporary_folder.h"
 #include "tests/support/with_threads.h"
 
-namespace rebounce {
+namespace rebounce::test_lit_mesh {
 namespace {
 
 using nlohmann::json;
@@ -356,4 +356,4 @@ TEST(GlbFile, IsWrittenWholeOrNotAtAll) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_lit_mesh

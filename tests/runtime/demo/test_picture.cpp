@@ -15,7 +15,7 @@
 #include "tests/support/rectangle_scene.h"
 #include "tests/support/with_threads.h"
 
-namespace rebounce {
+namespace rebounce::test_picture {
 namespace {
 
 using test::floor_corners;
@@ -487,4 +487,4 @@ TEST(Camera, FitLooksIntoAnOpenBoxFromItsOpenSide) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_picture

@@ -7,7 +7,7 @@
 
 #include "rebounce/lights.h"
 
-namespace rebounce {
+namespace rebounce::test_punctual_light {
 namespace {
 
 TEST(PunctualLight, ShinesFromAfarAsTheLampDoes) {
@@ -52,4 +52,4 @@ TEST(PunctualLight, LeavesPunctualLightsAlone) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_punctual_light

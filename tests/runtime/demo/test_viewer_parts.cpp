@@ -19,7 +19,7 @@
 #include "tests/support/test_scene_data.h"
 #include "transfer/base/area_norm.h"
 
-namespace rebounce {
+namespace rebounce::test_viewer_parts {
 namespace {
 
 float distance(const Float3& a, const Float3& b) {
@@ -210,4 +210,4 @@ TEST(PatchErrors, ArePartsOfTheRootMeanSquare) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_viewer_parts

@@ -8,7 +8,7 @@
 #include "tests/support/test_scene_data.h"
 #include "tests/support/with_threads.h"
 
-namespace rebounce {
+namespace rebounce::test_direct_lighting {
 namespace {
 
 std::vector<Float3> direct(const TransferData& data, const std::vector<Light>& lights,
@@ -227,4 +227,4 @@ TEST(DirectLighting, NeedsAPoint) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_direct_lighting

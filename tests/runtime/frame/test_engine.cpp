@@ -8,7 +8,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/test_scene_data.h"
 
-namespace rebounce {
+namespace rebounce::test_engine {
 namespace {
 
 std::shared_ptr<const TransferData> two_squares() {
@@ -177,4 +177,4 @@ TEST(Engine, NeedsAnOperator) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_engine

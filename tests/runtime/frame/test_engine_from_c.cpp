@@ -13,7 +13,7 @@
 #include "tests/support/thread_pool.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_engine_from_c {
 namespace {
 
 class FromC : public testing::Test {
@@ -287,4 +287,4 @@ TEST_F(FromC, LightsOutOfRangeAreRefused) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_engine_from_c

@@ -12,7 +12,7 @@
 #include "tests/support/test_scene_data.h"
 #include "tests/support/thread_pool.h"
 
-namespace rebounce {
+namespace rebounce::test_engine_threads {
 namespace {
 
 constexpr int kFrames = 6;
@@ -187,4 +187,4 @@ TEST(EngineThreads, AFrameWithAllOutputsDoesNotAllocate) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_engine_threads

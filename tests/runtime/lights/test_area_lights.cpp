@@ -9,7 +9,7 @@
 #include "runtime/rays/sampling.h"
 #include "tests/support/test_scene_data.h"
 
-namespace rebounce {
+namespace rebounce::test_area_lights {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -224,4 +224,4 @@ TEST(DiscLight, ShinesOnOneSideAndFromAfarLikeASpot) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_area_lights

@@ -12,7 +12,7 @@
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/expect_error.h"
 
-namespace rebounce {
+namespace rebounce::test_lamp_kinds {
 namespace {
 
 /// A lamp of the kind whose fields are as they should be.
@@ -116,4 +116,4 @@ TEST(LampKinds, MeshesAndPlacesLieOnTheSurface) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_lamp_kinds

@@ -4,7 +4,7 @@
 
 #include "runtime/lights/light_sampling.h"
 
-namespace rebounce {
+namespace rebounce::test_light_sampling {
 namespace {
 
 constexpr float kPi = 3.14159265358979F;
@@ -113,4 +113,4 @@ TEST(LightSampling, PointInsideTheLampReceivesNothing) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_light_sampling

@@ -14,7 +14,7 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/expect_error.h"
 
-namespace rebounce {
+namespace rebounce::test_probe_light {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -295,4 +295,4 @@ TEST(ProbeIrradiance, NeedsRightSizesAndNoMemory) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_probe_light

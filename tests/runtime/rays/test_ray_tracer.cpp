@@ -11,7 +11,7 @@
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/data/opacity_maps.h"
 
-namespace rebounce {
+namespace rebounce::test_ray_tracer {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -446,4 +446,4 @@ TEST(RayTracer, ClosedMeshIsWatertight) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_ray_tracer

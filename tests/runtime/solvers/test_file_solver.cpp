@@ -9,7 +9,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/test_scene_data.h"
 
-namespace rebounce {
+namespace rebounce::test_file_solver {
 namespace {
 
 std::shared_ptr<TransferData> two_squares() {
@@ -51,4 +51,4 @@ TEST(FileSolver, SaysWhatAFileHasNot) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_file_solver

@@ -21,7 +21,7 @@
 #include "transfer/exchange/exchange_blocks.h"
 #include "transfer/exchange/form_factor_blocks.h"
 
-namespace rebounce {
+namespace rebounce::test_solvers {
 namespace {
 
 constexpr std::size_t kPatchCount = 300;  // two groups of Gauss-Seidel, the second not full
@@ -457,4 +457,4 @@ TEST(Solvers, EveryMethodHasAFormOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_solvers

@@ -14,7 +14,7 @@
 #include "transfer/operator/dense_operator.h"
 #include "transfer/operator/low_rank_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_parallel {
 namespace {
 
 constexpr std::size_t kPatchCount = 2500;  // several tasks in each loop
@@ -130,4 +130,4 @@ TEST(Parallel, LinksHaveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_parallel

@@ -6,7 +6,7 @@
 
 #include "tests/support/expect_error.h"
 
-namespace rebounce {
+namespace rebounce::test_ies_profile {
 namespace {
 
 constexpr float kDegree = std::numbers::pi_v<float> / 180;
@@ -76,4 +76,4 @@ TEST(IesProfile, AnyPrefixOfAFileIsRefusedOrRead) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_ies_profile

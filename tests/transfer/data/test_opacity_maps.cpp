@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace rebounce {
+namespace rebounce::test_opacity_maps {
 namespace {
 
 constexpr double kThird = 1.0 / 3;
@@ -61,4 +61,4 @@ TEST(OpacityMaps, SizesArePowersOfFour) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_opacity_maps

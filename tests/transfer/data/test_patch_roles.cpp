@@ -13,7 +13,7 @@
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/operator/hierarchical_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_patch_roles {
 namespace {
 
 using test::expect_error;
@@ -157,4 +157,4 @@ TEST(PatchRoles, ThoseThatDoNotFitAreRefused) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_patch_roles

@@ -13,7 +13,7 @@
 #include "tests/support/random_light.h"
 #include "transfer/format/hierarchical_encoding.h"
 
-namespace rebounce {
+namespace rebounce::test_compressed_form_factors {
 namespace {
 
 /// A random matrix of blocks of all kinds, and a system with it that converges: its reflectances
@@ -197,4 +197,4 @@ TEST(CompressedFormFactors, RefusesNothingAndChannelsOfTheirOwn) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_compressed_form_factors

@@ -7,7 +7,7 @@
 #include "rebounce/error.h"
 #include "tests/support/random_pairs.h"
 
-namespace rebounce {
+namespace rebounce::test_exchange_blocks {
 namespace {
 
 using test::expect_near;
@@ -79,4 +79,4 @@ TEST(ExchangeBlocks, AreHalfTheBytesOfTheRows) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_exchange_blocks

@@ -9,7 +9,7 @@
 #include "rebounce/error.h"
 #include "tests/support/random_pairs.h"
 
-namespace rebounce {
+namespace rebounce::test_form_factor_blocks {
 namespace {
 
 using test::expect_near;
@@ -78,4 +78,4 @@ TEST(FormFactorBlocks, CountsItsBytes) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_form_factor_blocks

@@ -16,7 +16,7 @@
 #include "transfer/base/bfloat16.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_linked_form_factors {
 namespace {
 
 constexpr std::size_t kPatchCount = 4;
@@ -172,4 +172,4 @@ TEST(LinkedFormFactors, ThatAreDamagedInAFileAreRefused) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_linked_form_factors

@@ -8,7 +8,7 @@
 #include "tests/support/temporary_folder.h"
 #include "transfer/file/atomic_file.h"
 
-namespace rebounce {
+namespace rebounce::test_atomic_file {
 namespace {
 
 using test::expect_error;
@@ -112,4 +112,4 @@ TEST(AtomicFile, HasTheRightsOfAnOrdinaryFile) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_atomic_file

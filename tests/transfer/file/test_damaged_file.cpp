@@ -17,7 +17,7 @@
 #include "transfer/file/safetensors.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_damaged_file {
 namespace {
 
 using test::expect_error;
@@ -169,4 +169,4 @@ TEST(TransferFile, SurvivesRandomMutationsUnderAGoodChecksum) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_damaged_file

@@ -27,7 +27,7 @@
 #include "transfer/operator/hierarchical_operator.h"
 #include "transfer/operator/transfer_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_golden_file {
 namespace {
 
 constexpr std::size_t kPatchCount = 100;
@@ -170,4 +170,4 @@ TEST(GoldenFile, IsWrittenAgainToTheByte) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_golden_file

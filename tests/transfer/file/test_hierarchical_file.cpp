@@ -18,7 +18,7 @@
 #include "transfer/file/transfer_file_io.h"
 #include "transfer/format/hierarchical_encoding.h"
 
-namespace rebounce {
+namespace rebounce::test_hierarchical_file {
 namespace {
 
 using test::expect_error;
@@ -353,4 +353,4 @@ TEST(HierarchicalFile, SurvivesRandomMutationsUnderAGoodChecksum) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_hierarchical_file

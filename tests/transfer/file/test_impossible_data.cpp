@@ -13,7 +13,7 @@
 #include "tests/transfer/file/transfer_file_samples.h"
 #include "transfer/file/transfer_file_io.h"
 
-namespace rebounce {
+namespace rebounce::test_impossible_data {
 namespace {
 
 using test::expect_error;
@@ -305,4 +305,4 @@ TEST(TransferFile, RefusesAnImpossibleRecord) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_impossible_data

@@ -16,7 +16,7 @@
 #include "transfer/file/transfer_file_io.h"
 #include "transfer/operator/low_rank_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_low_rank_file {
 namespace {
 
 using test::expect_error;
@@ -118,4 +118,4 @@ TEST(LowRankFile, RefusesTensorsThatDoNotFit) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_low_rank_file

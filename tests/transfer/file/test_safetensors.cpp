@@ -9,7 +9,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 
-namespace rebounce {
+namespace rebounce::test_safetensors {
 namespace {
 
 using test::error_of;
@@ -316,4 +316,4 @@ TEST(Safetensors, SurvivesRandomMutations) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_safetensors

@@ -13,7 +13,7 @@
 #include "tests/transfer/file/transfer_file_samples.h"
 #include "transfer/file/safetensors.h"
 
-namespace rebounce {
+namespace rebounce::test_transfer_file {
 namespace {
 
 using test::expect_equal;
@@ -140,4 +140,4 @@ TEST(TransferFile, AFileMayBeReplacedWhileItIsInUse) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_transfer_file

@@ -7,7 +7,7 @@
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/operator/hierarchical_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_integer_encoding {
 namespace {
 
 constexpr std::uint32_t kSide = 64;
@@ -93,4 +93,4 @@ TEST(IntegerEncoding, NothingStaysNothing) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_integer_encoding

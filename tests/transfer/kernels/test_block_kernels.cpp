@@ -12,7 +12,7 @@
 #include "transfer/format/operator_format.h"
 #include "transfer/kernels/kernels.h"
 
-namespace rebounce {
+namespace rebounce::test_block_kernels {
 namespace {
 
 /// Vectors and matrices with random entries that half precision holds exactly.
@@ -521,4 +521,4 @@ TYPED_TEST(IntegerKernels, NoLightStaysNone) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_block_kernels

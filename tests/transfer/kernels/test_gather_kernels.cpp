@@ -9,7 +9,7 @@
 #include "tests/support/random_pairs.h"
 #include "transfer/kernels/kernels.h"
 
-namespace rebounce {
+namespace rebounce::test_gather_kernels {
 namespace {
 
 constexpr std::size_t kCount = 500, kStride = kCount * kFormFactorBlock;
@@ -65,4 +65,4 @@ TEST(GatherKernels, InstructionSetsAgree) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_gather_kernels

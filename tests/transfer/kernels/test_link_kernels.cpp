@@ -9,7 +9,7 @@
 
 #include "transfer/base/bfloat16.h"
 
-namespace rebounce {
+namespace rebounce::test_link_kernels {
 namespace {
 
 TEST(Bfloat16, IsTheNearest) {
@@ -93,4 +93,4 @@ TEST(LinkKernels, GiveTheSameBitsForManyLights) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_link_kernels

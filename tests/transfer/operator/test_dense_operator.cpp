@@ -14,7 +14,7 @@
 #include "transfer/base/half_float.h"
 #include "transfer/kernels/kernels.h"
 
-namespace rebounce {
+namespace rebounce::test_dense_operator {
 namespace {
 
 constexpr std::size_t kTile = DenseOperator::kTile;
@@ -219,4 +219,4 @@ TEST(DenseOperator, WrongSizesAreRefused) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_dense_operator

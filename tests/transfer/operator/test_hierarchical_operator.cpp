@@ -9,7 +9,7 @@
 #include "tests/support/operator_checks.h"
 #include "transfer/format/hierarchical_encoding.h"
 
-namespace rebounce {
+namespace rebounce::test_hierarchical_operator {
 namespace {
 
 using test::check_batch;
@@ -137,4 +137,4 @@ TEST(HierarchicalOperator, AllocatesNothing) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_hierarchical_operator

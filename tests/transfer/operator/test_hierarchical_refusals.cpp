@@ -14,7 +14,7 @@
 #include "transfer/format/hierarchical_encoding.h"
 #include "transfer/operator/hierarchical_operator.h"
 
-namespace rebounce {
+namespace rebounce::test_hierarchical_refusals {
 namespace {
 
 using test::expect_error;
@@ -191,4 +191,4 @@ TEST(HierarchicalOperator, RefusesHalfPrecisionBeyondItsRange) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_hierarchical_refusals

@@ -11,7 +11,7 @@
 #include "tests/support/operator_checks.h"
 #include "transfer/format/hierarchical_encoding.h"
 
-namespace rebounce {
+namespace rebounce::test_nested_operator {
 namespace {
 
 using test::check_batch;
@@ -206,4 +206,4 @@ TEST(EquilibratedOperator, FitsHalvesByItsScales) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_nested_operator

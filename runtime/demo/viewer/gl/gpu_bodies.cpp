@@ -13,11 +13,11 @@ GpuBodies::GpuBodies(const GpuScene& scene) : scene_(scene) {
   for (std::size_t side = 0; side < kSideCount; ++side) {
     glBindVertexArray(vertex_arrays_[side].name());
     glBindBuffer(GL_ARRAY_BUFFER, vertices_.name());
-    point_to(kPosition, 3, kStride, offsetof(BodyVertex, position));
-    point_to(kNormal, 3, kStride, offsetof(BodyVertex, normal));
-    point_to(kColor, 3, kStride, offsetof(BodyVertex, color));
-    point_to(kFirstFlight, 3, kStride, offsetof(BodyVertex, first_flight));
-    point_to(kBounced, 3, kStride, offsetof(BodyVertex, bounced) + side * sizeof(Float3));
+    point_to(kPositionAttribute, 3, kStride, offsetof(BodyVertex, position));
+    point_to(kNormalAttribute, 3, kStride, offsetof(BodyVertex, normal));
+    point_to(kColorAttribute, 3, kStride, offsetof(BodyVertex, color));
+    point_to(kFirstFlightAttribute, 3, kStride, offsetof(BodyVertex, first_flight));
+    point_to(kBouncedAttribute, 3, kStride, offsetof(BodyVertex, bounced) + side * sizeof(Float3));
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, indices_.name());
   }
   glBindVertexArray(0);

@@ -154,21 +154,21 @@ void GpuScene::make_vertex_arrays() {
     glBindVertexArray(vertex_arrays_[side].name());
     glBindBuffer(GL_ARRAY_BUFFER, static_vertices_.name());
     constexpr std::size_t kStride = sizeof(StaticVertex);
-    point_to(kPosition, 3, kStride, offsetof(StaticVertex, position));
-    point_to(kNormal, 3, kStride, offsetof(StaticVertex, normal));
-    point_to(kColor, 3, kStride, offsetof(StaticVertex, color));
-    point_to(kBaseColorTexcoord, 2, kStride, offsetof(StaticVertex, base_color_texcoord));
-    point_to(kEmissiveTexcoord, 2, kStride, offsetof(StaticVertex, emissive_texcoord));
+    point_to(kPositionAttribute, 3, kStride, offsetof(StaticVertex, position));
+    point_to(kNormalAttribute, 3, kStride, offsetof(StaticVertex, normal));
+    point_to(kColorAttribute, 3, kStride, offsetof(StaticVertex, color));
+    point_to(kBaseColorTexcoordAttribute, 2, kStride, offsetof(StaticVertex, base_color_texcoord));
+    point_to(kEmissiveTexcoordAttribute, 2, kStride, offsetof(StaticVertex, emissive_texcoord));
     glBindBuffer(GL_ARRAY_BUFFER, first_flight_.name());
-    point_to(kFirstFlight, 3, sizeof(glm::vec3), 0);
+    point_to(kFirstFlightAttribute, 3, sizeof(glm::vec3), 0);
     glBindBuffer(GL_ARRAY_BUFFER, bounced_[side].name());
-    point_to(kBounced, 3, sizeof(glm::vec3), 0);
+    point_to(kBouncedAttribute, 3, sizeof(glm::vec3), 0);
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, sorted_indices_.name());
   }
   glBindVertexArray(surface_array_.name());
   glBindBuffer(GL_ARRAY_BUFFER, static_vertices_.name());
-  point_to(kPosition, 3, sizeof(StaticVertex), offsetof(StaticVertex, position));
-  point_to(kBaseColorTexcoord, 2, sizeof(StaticVertex),
+  point_to(kPositionAttribute, 3, sizeof(StaticVertex), offsetof(StaticVertex, position));
+  point_to(kBaseColorTexcoordAttribute, 2, sizeof(StaticVertex),
            offsetof(StaticVertex, base_color_texcoord));
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, surface_indices_.name());
   glBindVertexArray(0);

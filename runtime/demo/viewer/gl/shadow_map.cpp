@@ -17,7 +17,7 @@ namespace {
 constexpr int kCubeSide = 1024, kPlaneSide = 4096, kPlaceSide = 512;
 
 // Fraction of the scene's diagonal: nearer objects, such as a lamp's own housing, cast no shadow.
-constexpr float kNearPart = 1e-3F;
+constexpr float kShadowNearPart = 1e-3F;
 // Fraction of the scene's diagonal: receivers are moved off their surface by at least this.
 constexpr float kOffsetPart = 1e-4F;
 
@@ -146,7 +146,7 @@ void ShadowMap::draw_faces(const glm::vec3& eye, int side, const ShadowCasters& 
 
 void ShadowMap::set_reach(const glm::vec3& eye, const SceneBounds& bounds) {
   const glm::vec3 centre = 0.5F * (bounds.low + bounds.high);
-  near_far_ = {kNearPart * bounds.diagonal(), bounds.diagonal() + glm::distance(eye, centre)};
+  near_far_ = {kShadowNearPart * bounds.diagonal(), bounds.diagonal() + glm::distance(eye, centre)};
 }
 
 void ShadowMap::draw_cube(const Light& light, const ShadowCasters& casters,

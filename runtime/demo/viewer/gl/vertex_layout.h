@@ -9,13 +9,13 @@ namespace rebounce {
 
 /// The inputs of shaders::kSceneVertex, by location.
 enum Attribute : GLuint {
-  kPosition,
-  kNormal,
-  kColor,
-  kBaseColorTexcoord,
-  kEmissiveTexcoord,
-  kFirstFlight,
-  kBounced,
+  kPositionAttribute,
+  kNormalAttribute,
+  kColorAttribute,
+  kBaseColorTexcoordAttribute,
+  kEmissiveTexcoordAttribute,
+  kFirstFlightAttribute,
+  kBouncedAttribute,
 };
 
 /// Replaces the contents of `buffer`.

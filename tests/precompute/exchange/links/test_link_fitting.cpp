@@ -22,7 +22,7 @@
 #include "transfer/exchange/exchange_matrix.h"
 #include "transfer/exchange/linked_form_factors.h"
 
-namespace rebounce {
+namespace rebounce::test_link_fitting {
 namespace {
 
 struct Pairs {
@@ -240,4 +240,4 @@ TEST(LinkFitting, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_link_fitting

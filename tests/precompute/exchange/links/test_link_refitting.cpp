@@ -14,7 +14,7 @@
 #include "tests/support/expect_error.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_link_refitting {
 namespace {
 
 constexpr std::uint32_t kSide = 16;  // patches of each of two walls
@@ -200,4 +200,4 @@ TEST(LinkRefitting, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_link_refitting

@@ -15,7 +15,7 @@
 #include "tests/support/test_scenes.h"
 #include "transfer/base/area_norm.h"
 
-namespace rebounce {
+namespace rebounce::test_linked_matrix {
 namespace {
 
 struct LinkedRoom {
@@ -128,4 +128,4 @@ TEST(LinkedMatrix, RefusesLinksOfOtherPatches) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_linked_matrix

@@ -21,7 +21,7 @@
 #include "transfer/base/area_norm.h"
 #include "transfer/exchange/form_factor_blocks.h"
 
-namespace rebounce {
+namespace rebounce::test_links {
 namespace {
 
 Scene empty_room() {
@@ -291,4 +291,4 @@ TEST(Links, RefuseSettingsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_links

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace rebounce {
+namespace rebounce::test_adaptive_row_sampling {
 namespace {
 
 constexpr double kTolerance = 1e-3;
@@ -50,4 +50,4 @@ TEST(AdaptiveRowSampling, LeavesRowsAloneThatAddUp) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_adaptive_row_sampling

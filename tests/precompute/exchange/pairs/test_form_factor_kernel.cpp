@@ -9,7 +9,7 @@
 
 #include "tests/support/view_factor_table.h"
 
-namespace rebounce {
+namespace rebounce::test_form_factor_kernel {
 namespace {
 
 // What the project promises of every analytic configuration.
@@ -137,4 +137,4 @@ TEST(FormFactorKernel, TouchingTrianglesAreExact) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_form_factor_kernel

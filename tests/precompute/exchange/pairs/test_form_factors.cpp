@@ -12,7 +12,7 @@
 #include "tests/support/view_factor_table.h"
 #include "tests/support/with_threads.h"
 
-namespace rebounce {
+namespace rebounce::test_form_factors {
 namespace {
 
 FormFactors form_factors_of(const PatchModel& model, const FormFactorSettings& settings = {}) {
@@ -241,4 +241,4 @@ TEST(FormFactors, RefuseSettingsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_form_factors

@@ -8,7 +8,7 @@
 #include "precompute/exchange/pairs/form_factors.h"
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_hemisphere_exchange {
 namespace {
 
 constexpr int kRays = 4096;
@@ -122,4 +122,4 @@ TEST(Escape, PartsStayWithinOneWhateverRowsAddUpTo) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_hemisphere_exchange

@@ -6,7 +6,7 @@
 
 #include "tests/support/test_scenes.h"
 
-namespace rebounce {
+namespace rebounce::test_patch_geometry {
 namespace {
 
 /// Makes every display triangle's patch the number of its material.
@@ -105,4 +105,4 @@ TEST(PatchGeometry, BoundsNeverDenyAPairThatExchanges) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_patch_geometry
