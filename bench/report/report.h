@@ -1,7 +1,7 @@
 #pragma once
 
-// What the report says of one scene with one number of patches, as JSON: notes/benchmarks.md tells
-// the fields.
+// What the report says of one scene with one number of patches, as JSON:
+// notes/reference/benchmarks.md tells the fields.
 
 #include <filesystem>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures scenes with bench_report, keeps what is finished, and writes the report.
 
-./dev report calls it; notes/benchmarks.md says what is measured.
+./dev report calls it; notes/reference/benchmarks.md says what is measured.
 """
 
 import argparse
@@ -224,8 +224,8 @@ def claim_table(headline):
     return names, lines
 
 
-def write_notes(notes, headlines, missing, date, pictures, folder):
-    """The Markdown summary, its pictures and its claims."""
+def write_notes(notes, headlines, missing, date, pictures):
+    """The Markdown summary and its pictures."""
     target = notes / "pictures"
     target.mkdir(parents=True, exist_ok=True)
 
@@ -239,9 +239,7 @@ def write_notes(notes, headlines, missing, date, pictures, folder):
         for key, value in pictures.items()
     }
     text = summary.markdown(headlines, missing, date, named)
-    (notes / "report.md").write_text(text, encoding="utf-8")
-    if notes != folder:
-        shutil.copyfile(folder / "claims.csv", notes / "report_claims.csv")
+    (notes / summary.PAGE).write_text(text, encoding="utf-8")
 
 
 def keep_results(headlines, date, folder):
@@ -289,9 +287,9 @@ def main():
     drawn.mkdir(exist_ok=True)
     pictures = draw(headlines, drawn)
     write_page(headlines, missing, date, pictures, folder)
-    write_notes(folder, headlines, missing, date, pictures, folder)
+    write_notes(folder, headlines, missing, date, pictures)
     if options.keep:
-        write_notes(ROOT / "notes", headlines, missing, date, pictures, folder)
+        write_notes(ROOT / "notes", headlines, missing, date, pictures)
         keep_results(headlines, date, folder)
         summary.quote_in_readme(ROOT / "README.md", summary.readme_block(headlines))
     print(f"\n{aims.aims(headlines)}\n\n{folder / 'report.html'}")

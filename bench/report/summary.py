@@ -5,6 +5,7 @@ from aims import AIM_ERROR, HEADLINE_NAMES, TIGHTEST_BUDGET, aims, ratio_of
 from formats import markdown_table, span
 from results import REPAINTED, SWITCHED, percent
 
+PAGE = "performance.md"  # of notes/
 README_BEGIN, README_END = "<!-- report -->", "<!-- /report -->"
 SHOWN_LOSSES = 12
 
@@ -41,7 +42,7 @@ sweep within the budget is left out. Lamps are points of 1 cd in free space, alo
 def missing_line(missing):
     if not missing:
         return ""
-    return "\n**Not run:** " + ", ".join(f"{s.replace('_', ' ')} at {n:,}" for s, n in missing) + ".\n"
+    return "\n**Without:** " + ", ".join(f"{s.replace('_', ' ')} at {n:,}" for s, n in missing) + ".\n"
 
 
 def readme_block(headlines):
@@ -50,7 +51,7 @@ def readme_block(headlines):
         f"{markdown_table(HEADLINE_NAMES, headline_rows)}\n\n"
         f"Microseconds to an error of {percent(AIM_ERROR)} after a lamp was switched for another, one "
         f"thread, and how many times faster the inverse is; lag in frames to 1 % at {TIGHTEST_BUDGET} µs "
-        "a frame. [notes/report.md](notes/report.md) has the conditions, and where Gauss-Seidel wins.\n\n"
+        f"a frame. [notes/{PAGE}](notes/{PAGE}) has the conditions, and where Gauss-Seidel wins.\n\n"
         f"{aims(headlines)}"
     )
 
@@ -62,8 +63,8 @@ def markdown(headlines, missing, date, pictures):
     followed = rows.shown_on_paths(all_results)
     parts = [
         "# The stored inverse against Gauss-Seidel",
-        "Written by `./dev report`; the raw figures are in `report-out/` after a run, each claim with its "
-        "rows in `report_claims.csv` beside this file.",
+        "Written by `./dev report`; the raw figures are in `report-out/` after a run, and each claim is in "
+        "`report.csv` of the machine's folder in bench/results.",
         provenance(all_results, date) + missing_line(missing),
         "## Summary",
         markdown_table(HEADLINE_NAMES, [h.row() for h in headlines]),
@@ -140,7 +141,7 @@ def where_gauss_seidel_wins(headlines):
                 f"{span([h.switch_any for h in headlines])}.",
                 f"- With caches that something else has used, after a switch to 0.1 %: {span(cold)}.",
                 "- Before break-even (below), and where memory for F is there and for an operator is not.",
-                "- Which method to take when: [solvers.md](solvers.md#which-one).",
+                "- Which method to take when: [solvers](concepts/solvers.md#when-to-use-which).",
             )
         )
     )

@@ -44,7 +44,7 @@ constexpr std::size_t kLinkBytesKept = 2 * kFlatLinkBytes + LinkedFormFactors::k
 constexpr std::size_t kPatchBytes = 8000;
 
 // Upper estimate of the links of a patch over the cube root of the number of patches:
-// furnished rooms have 10 to 10.5, empty ones a quarter of it.
+// furnished rooms have 10 to 10.5, empty ones a quarter of it (lab/059).
 constexpr double kFurnishedLinks = 11;
 
 std::uint64_t machine_memory_bytes() {

@@ -18,7 +18,7 @@ using Eigen::Index;
 constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
 
 // A block is smooth if its best ranks stay below this fraction of its sides. Splitting it would
-// only store the same few functions several times. Measured: notes/operator.md.
+// only store the same few functions several times (lab/052).
 constexpr Index kSmoothPart = 16;
 
 void append_columns(const Eigen::MatrixXd& matrix, std::vector<float>& values) {

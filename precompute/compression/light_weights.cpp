@@ -14,16 +14,16 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Directions of a cluster that get a strength of their own. Measured: notes/operator.md.
-constexpr Index kDirectionCount = 8;
+// Directions of a cluster that get a strength of their own.
+constexpr Index kDirectionCount = 8;  // lab/034: more take more bytes for the same tail
 
 // The variance of lights in any direction, as a fraction of the mean energy of the sample at one
-// position. Measured: notes/operator.md.
+// position (lab/044).
 constexpr double kBackground = 1;
 
 // The background grows with the square root of how far the energy of a patch is below the usual
 // energy, so that the errors of all single patches count alike. It grows no further below this
-// fraction of the usual energy. Measured: notes/operator.md.
+// fraction of the usual energy (lab/044).
 constexpr double kLeastEnergy = 1e-6;
 
 struct Principal {

@@ -13,7 +13,7 @@ namespace {
 constexpr double kUsualSlope = 0.5, kLeastSlope = 0.2, kMostSlope = 1;
 
 // Minus the slope of the logarithm of the size over that of the multiplier: 0.2 to 0.5 for
-// operators that are applied, 0.05 to 0.2 for form factors. Measured: notes/operator.md.
+// operators that are applied, 0.05 to 0.2 for form factors (lab/037).
 constexpr double kUsualShrinking = 0.3, kLeastShrinking = 0.05, kMostShrinking = 1;
 
 // The longest step outwards, in the logarithm of the multiplier: a factor of a thousand.

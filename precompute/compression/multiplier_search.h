@@ -21,7 +21,7 @@ class MultiplierSearch {
     double aim = 0, most = 0;
   };
 
-  /// The least fraction of the size that a further trial is expected to save.
+  /// The least fraction of the size that a further trial is expected to save (lab/037).
   static constexpr double kLeastSaving = 0.03;
 
   MultiplierSearch(double initial_multiplier, Range wanted)

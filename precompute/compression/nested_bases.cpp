@@ -20,7 +20,7 @@ using Storage = HierarchicalStorage;
 using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // A cell has at most kCell positions. A side of a block can have cluster bases if it consists of
-// whole groups, clusters of at most kGroup positions. Measured: notes/operator.md.
+// whole groups, clusters of at most kGroup positions (lab/035).
 constexpr std::uint32_t kCell = 128, kGroup = 256;
 
 // The largest entry of a coupling matrix between cluster coefficients: half of the range of half
@@ -280,7 +280,7 @@ class Nesting {
   }
 
   /// Scales the vectors to norm 1. The lengths of cluster coefficients lie between equal ones and
-  /// their energies: this is where rounding does least (notes/operator.md).
+  /// their energies: this is where rounding does least (lab/035).
   void make_basis(std::size_t c) {
     CellBasis& own = bases_[c];
     own.directions.conservativeResize(Eigen::NoChange, own.rank);

@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-// The time to compress all panels, in columns that are solved for. Measured: notes/operator.md.
+// The time to compress all panels, in columns that are solved for (lab/059).
 constexpr double kCompression = 5500;
 
 }  // namespace

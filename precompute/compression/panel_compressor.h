@@ -19,7 +19,8 @@ namespace rebounce {
 class PanelCompressor {
  public:
   /// Columns of a panel, and rows of the pieces that it is compressed in. Larger pieces save bytes
-  /// that the second stage saves anyway, and take several times as long at so small a multiplier.
+  /// that the second stage saves anyway, and take several times as long at so small a multiplier
+  /// (lab/060).
   static constexpr std::uint32_t kPanelWidth = 512;
 
   /// Prepares the cluster tree and the weights, and finds the panels that `checkpoint` holds.

@@ -6,8 +6,7 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// The squared error that a value of a residual must remove, in multipliers. Measured:
-// notes/operator.md.
+// The squared error that a value of a residual must remove, in multipliers (lab/042).
 constexpr double kResidualWorth = 1;
 
 constexpr double kLargestByte = 127;

@@ -25,20 +25,19 @@ constexpr double kAim = 0.76, kMost = 0.8;
 constexpr int kUsualRounds = 4;
 
 // The multiplier at which the search begins, in units of the squared tolerance over the number of
-// patches. Measured over scenes and sizes: notes/operator.md.
+// patches (lab/037).
 constexpr double kInitialMultiplier = 2.5;
 
 // Operators with cluster bases mostly end far above that. Above kStartPatches patches, their search
-// begins higher by this power of the ratio of patch counts, up to a limit. Measured:
-// notes/operator.md.
+// begins higher by this power of the ratio of patch counts, up to a limit (lab/037).
 constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
 
-// Operators without cluster bases, form factors, usually end at 2.5 to 22 times it.
+// Operators without cluster bases, form factors, usually end at 2.5 to 22 times it (lab/037).
 constexpr double kPlainStart = 2;
 
 // The time of a vector and of a block in a product, beside their values, in units of a value. It
 // counts in full in operators of kSizedPatches patches and in part in smaller ones: coefficients
-// that the nearest caches do not hold, and the start of loops. Measured: notes/operator.md.
+// that the nearest caches do not hold, and the start of loops (lab/036).
 constexpr double kVectorSize = 9, kBlockSize = 96, kSizedPatches = 16384;
 
 /// The truth of a uniform light stands in for validation lights from which nothing arrives.
@@ -58,8 +57,8 @@ double part_of_search(int rounds) {
 }
 
 /// The sizes of the parts of an operator. A value of a basis in 8 bits, with its share of
-/// residuals, takes about half of a value of a coupling matrix in half precision. The time of a
-/// product counts for operators with cluster bases.
+/// residuals, takes about half of a value of a coupling matrix in half precision (lab/042). The
+/// time of a product counts for operators with cluster bases.
 PartSizes part_sizes(const HierarchicalSettings& settings, std::size_t patch_count) {
   PartSizes sizes;
   sizes.basis_value =

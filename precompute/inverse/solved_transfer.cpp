@@ -24,7 +24,7 @@ using Factors = Eigen::Array<float, 1, Eigen::Dynamic>;
 constexpr int kMostSteps = 500;
 
 // Number of leading eigenvectors, at most 1 / kLeadingPart of all, and of the multiplications that
-// find them. Measured: notes/operator.md.
+// find them (lab/060).
 constexpr Index kLeadingCount = 256, kLeadingPart = 8;
 constexpr int kLeadingSteps = 6;
 

@@ -14,7 +14,7 @@ constexpr double kOtherLights = 1000, kConfidence = 0.95;
 constexpr double kNormalQuantile = 1.645;
 
 // The tail is this fraction of the sample, and at least kLeastTail errors. Larger tails give lower
-// bounds that fail more often in scenes with two kinds of patches. Measured: notes/operator.md.
+// bounds that fail more often in scenes with two kinds of patches (lab/049).
 constexpr std::size_t kTailPart = 8, kLeastTail = 8;
 
 }  // namespace

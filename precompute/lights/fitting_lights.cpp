@@ -10,9 +10,9 @@
 namespace rebounce {
 namespace {
 
-// Numbers of training lights. Measured: notes/operator.md.
+// Numbers of training lights (lab/043).
 constexpr int kTrainingPointCount = 128, kTrainingSpotCount = 32, kTrainingSunCount = 32;
-constexpr int kValidationPointCount = 512;
+constexpr int kValidationPointCount = 512;  // lab/047: fewer let more single lights err
 
 static_assert(kMostTrainingLights ==
               kTrainingPointCount + kTrainingSpotCount + kTrainingSunCount + 1);

@@ -16,12 +16,13 @@ namespace {
 
 using Exitances = std::vector<std::vector<Float3>>;
 
-// Lights of a kind for a compressed operator, and for an operator that has rounding errors alone.
+// Lights of a kind for a compressed operator (lab/049), and for an operator that has rounding
+// errors alone.
 constexpr int kLightCount = 256, kRoundedLightCount = 16;
 
 // Residuals of the reference: relative to the initial exitance, where rounding errors are above it;
 // and relative to the reflected light, in parts of the tolerance, where it changes an error by a
-// thousandth at most (notes/operator.md).
+// thousandth at most (lab/049).
 constexpr double kReferenceResidual = 1e-10, kResidualOfTolerance = 0.02;
 
 KindError summary(LightKind kind, std::size_t light_count, const std::vector<double>& errors) {

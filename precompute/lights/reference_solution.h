@@ -18,9 +18,9 @@ namespace rebounce {
 /// faster methods are measured against.
 ///
 /// B = M0 + R z with R = rho^1/2 and (I - R F R) z = R F M0, positive definite in the area-weighted
-/// inner product as long as no reflectance is 1; black patches have z = 0 (notes/solvers.md). The
-/// residual is that of (I - rho F) B = M0, recomputed from the solution at the end. The bits do not
-/// depend on the number of threads.
+/// inner product as long as no reflectance is 1; black patches have z = 0
+/// (notes/concepts/solvers.md). The residual is that of (I - rho F) B = M0, recomputed from the
+/// solution at the end. The bits do not depend on the number of threads.
 class ReferenceSolver {
  public:
   using Double3 = std::array<double, 3>;

@@ -12,7 +12,7 @@ namespace rebounce {
 /// That quantile lies beyond most samples. It follows from a tail that falls exponentially from the
 /// largest sixteenth of the errors, at least 8, on (excesses over a threshold: A. C. Davison and R.
 /// L. Smith, "Models for exceedances over high thresholds", 1990). For fewer than 32 errors it is
-/// the largest error. Measured: notes/operator.md.
+/// the largest error (lab/047).
 double validation_error(std::span<const double> errors);
 
 }  // namespace rebounce

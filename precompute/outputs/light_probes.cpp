@@ -22,7 +22,7 @@ constexpr std::size_t kProbeBatch = 64;  // probes between two reports of progre
 constexpr double kLargestBackPart = 0.25;
 
 // An emitter that this number of rays meets is known well. Others are sampled by points: this
-// number of points each, and for all of them at most this number per ray.
+// number of points each, and for all of them at most this number per ray (lab/068).
 constexpr float kEnoughRays = 64;
 constexpr int kMostPoints = 16, kPointsPerRay = 2;
 

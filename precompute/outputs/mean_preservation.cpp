@@ -9,7 +9,7 @@
 namespace rebounce {
 namespace {
 
-constexpr int kStepCount = 2;
+constexpr int kStepCount = 2;  // lab/026
 
 // New weights before weights of the same patch are merged: a patch may have a hundred thousand
 // triangles.

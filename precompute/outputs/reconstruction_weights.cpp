@@ -31,11 +31,11 @@ constexpr double kLeastProbeSize = 0.5;
 constexpr double kLittle = 0.1;
 
 // The distance within which a vertex looks for patches, in its own mean patch sizes; the larger one
-// applies where all near patches are mixed. Chosen with bench_truth: notes/patches.md.
+// applies where all near patches are mixed (lab/026).
 constexpr float kReach = 1, kFartherReach = 2;
 
 // How strongly the mean place of the patches is drawn to the vertex: a compromise between edges and
-// the number of patches that are averaged. Measured: notes/patches.md.
+// the number of patches that are averaged (lab/026).
 constexpr double kRidge = 0.1;
 
 // Patches below this fraction of the value of a vertex are left out.

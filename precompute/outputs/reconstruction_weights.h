@@ -11,8 +11,8 @@ namespace rebounce {
 /// Fills mesh.weight_begin, weight_patch and weight. A vertex uses at most 16 patches around it on
 /// the same side of any crease (normals within 40 degrees), about in its plane and visible; near
 /// ones weigh more. The weights are shifted to balance about the vertex, and then sharpened so that
-/// the mean shown on a patch is the value of the patch (notes/patches.md). Some weights are
-/// negative. Vertices of sides without patches get no weights.
+/// the mean shown on a patch is the value of the patch (notes/concepts/outputs.md). Some weights
+/// are negative. Vertices of sides without patches get no weights.
 ///
 /// A patch that is open only in part (the edge of a rug lies on it, a wall cuts through it) has a
 /// mean that belongs to neither part. Short rays above patches find these. Vertices then use

@@ -9,7 +9,7 @@ namespace rebounce {
 namespace {
 
 // A difference of one in normal, reflectance or cover counts like a distance of this number of mean
-// patch sizes.
+// patch sizes (lab/025).
 constexpr double kNormalWeight = 1.5, kReflectanceWeight = 1.0, kCoverWeight = 1.0;
 
 // Pieces of the mesh up to this multiple of the largest length that may merge around itself are

@@ -10,8 +10,7 @@ namespace {
 
 using Feature = Eigen::Matrix<double, 6, 1>;
 
-// Opposite normals count like a distance of this fraction of the size of the scene. Measured:
-// notes/operator.md.
+// Opposite normals count like a distance of this fraction of the size of the scene (lab/050).
 constexpr double kTreeNormalWeight = 0.25;
 
 /// Positions in units of the size of the scene, and weighted normals.

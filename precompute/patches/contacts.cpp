@@ -14,7 +14,7 @@ namespace rebounce {
 namespace {
 
 // Lines within this multiple of the tolerance count as one: two lines would leave a strip of
-// slivers between them.
+// slivers between them (lab/020).
 constexpr double kSameLine = 8;
 
 using Corners = TriangleCorners;

@@ -25,7 +25,7 @@ double covered_part(const TriangleCorners& corners, const RayTracer& tracer, dou
                     std::uint32_t count);
 
 /// A surface no higher above another than this number of mean patch sizes ends the smooth light on
-/// it. Below a higher one the surface is visible.
+/// it. Below a higher one the surface is visible (lab/023).
 inline constexpr double kCloseCover = 1.0 / 32;
 
 /// True if all of the front of a triangle is covered by surfaces no higher than `height` metres,

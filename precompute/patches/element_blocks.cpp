@@ -14,7 +14,7 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kBlockSize = 1 << 12;  // elements: their data fits into a cache
+constexpr std::size_t kBlockSize = 1 << 12;  // elements; lab/028: their data fits into a cache
 
 // Each element's nearest others that may join it without a shared edge.
 constexpr std::size_t kNeighbourBlockCount = 8;

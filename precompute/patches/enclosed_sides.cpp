@@ -51,7 +51,7 @@ constexpr Look kLookAtTiny{32, 1, 2};
 
 // Consecutive sides of triangles no farther apart than this fraction of the reach are first tested
 // together: by a number of paths in all, then by a number for each side, at least kLeastPaths in
-// all, then by four times as many.
+// all, then by four times as many (lab/029).
 constexpr std::size_t kGroup = 16;
 constexpr double kGroupReach = 1.0 / 8;
 constexpr std::size_t kFirstPaths = 16, kPathsOfSide = 4, kLeastPaths = 32;

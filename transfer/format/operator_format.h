@@ -37,7 +37,7 @@ struct HierarchicalFormat {
   /// Bound of the exponents of position scales.
   static constexpr int kLargestExponent = 24;
 
-  /// Ranks and positions that integer bases interleave.
+  /// Ranks and positions that integer bases interleave (lab/038).
   static constexpr std::uint32_t kRankGroup = 4, kStrip = 64;
 
   /// The number of positions: n rounded up to kAlignment.

@@ -162,7 +162,7 @@ REBOUNCE_INLINE inline void multiply_ends(const Value* values, const CouplingBlo
 }
 
 // Coupling matrices are prefetched this many ahead: those that a sweep or an apply skips break the
-// processor's own prefetching. Most fill at most two cache lines.
+// processor's own prefetching (lab/063). Most fill at most two cache lines.
 constexpr std::size_t kCouplingsAhead = 8;
 
 inline void prefetch_two_lines(const void* p) {

@@ -92,7 +92,7 @@ struct IntegerLight {
 
 // Light is uneven if its largest magnitude exceeds this many times the mean. The brightest patches
 // of a chunk may see only the sky; then the others send all that arrives, and rounding to 2^-15 of
-// the largest value leaves few bits of them. See notes/operator.md.
+// the largest value leaves few bits of them (lab/038).
 constexpr float kUneven = 8;
 
 inline bool is_uneven(const Magnitudes& light, std::size_t count) {

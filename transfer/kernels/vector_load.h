@@ -31,7 +31,7 @@ namespace {
 /// only: the first-level cache has too few loads in flight to use the full memory bandwidth.
 template <std::size_t kRegister, typename Value>
 REBOUNCE_INLINE inline void prefetch_ahead(const Value* values) {
-  // The processor's own prefetching stops at the end of a page. See notes/operator.md.
+  // The processor's own prefetching stops at the end of a page (lab/051).
   constexpr std::size_t kLine = 64, kAhead = 16384;
   constexpr int kToRead = 0, kSecondLevel = 2;
   if constexpr (kRegister == kLine) {

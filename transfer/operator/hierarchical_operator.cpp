@@ -25,7 +25,7 @@ constexpr std::size_t kPositionsPerTask = 1024;
 constexpr std::size_t kDenseEndsPerTask = 64, kClusterBasesPerTask = 32;
 
 // The light of a patch is prefetched this many positions ahead, to the second-level cache: it can
-// have more loads in flight than the first-level cache.
+// have more loads in flight than the first-level cache (lab/051).
 constexpr std::size_t kPatchesAhead = 64;
 constexpr int kToRead = 0, kToWrite = 1, kSecondLevel = 2;
 

@@ -18,6 +18,7 @@ namespace rebounce {
 class HierarchicalPlan {
  public:
   /// The largest number of parts of a step: enough to balance the threads of a desktop machine.
+  /// More parts cut more clusters (lab/044).
   static constexpr std::uint64_t kMostParts = 16;
 
   /// A range of positions or of cluster coefficients whose light one task computes alone, from the

@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 // A node has no gradient in directions in which it extends by less than this fraction of its size.
 // Such a gradient would be as large as the direction is thin. Gradients are stored as bfloat16,
 // axis by axis, so rounding errors point anywhere, also along the length of the node: they are at
-// most 2^-9 / 0.03 of what the gradient stands for. With 1e-6 gathering diverges.
+// most 2^-9 / 0.03 of what the gradient stands for. With 1e-6 gathering diverges (lab/016).
 constexpr double kFlatSpread = 0.03;
 constexpr int kScalingRounds = 4;
 

@@ -16,8 +16,8 @@ constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
 // sides of a wall and may be removed.
 constexpr double kLeastFactorUnseeing = 1e-6;
 
-// Relative deviation of the row sum of links, from penumbrae that links average. Measured:
-// notes/links.md.
+// Relative deviation of the row sum of links, from penumbrae that links average
+// (lab/014).
 constexpr double kSumDeviation = 0.01;
 
 /// A sum over a node, and its first moment about the centre of the node.

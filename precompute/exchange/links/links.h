@@ -20,8 +20,8 @@ struct LinkBuild : EscapedLight {
 };
 
 /// Computes the form factors as links between nodes of a tree of patches. The number of links and
-/// the work grow about with n instead of n² (notes/links.md). The links are scaled so that rows add
-/// up to 1 minus what escapes; reciprocity holds.
+/// the work grow about with n instead of n² (notes/concepts/links.md). The links are scaled so that
+/// rows add up to 1 minus what escapes; reciprocity holds.
 ///
 /// `tracer` holds the first surface_count triangles of model.mesh. settings.link_epsilon must be
 /// above 0. `weight` [n] >= 0 is the weight of errors in the light from each patch, for instance

@@ -6,7 +6,7 @@ namespace rebounce {
 namespace {
 
 // Row sums of links are off by about 1 % because links average penumbrae; scaling corrects this. A
-// row that is off by more misses light or has light that is hidden.
+// row that is off by more misses light or has light that is hidden (lab/014).
 constexpr double kLinkRowSumTolerance = 0.02;
 
 std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tracer,

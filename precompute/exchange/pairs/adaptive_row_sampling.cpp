@@ -11,7 +11,7 @@ namespace {
 // Rows of each kind in the trial.
 constexpr std::size_t kTrialRows = 16;
 
-// The fraction of its errors that a kind must lose in the trial.
+// The fraction of its errors that a kind must lose in the trial (lab/005).
 constexpr double kWorthwhile = 0.25;
 
 }  // namespace

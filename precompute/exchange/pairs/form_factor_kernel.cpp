@@ -188,7 +188,7 @@ double quadrature(const FlatTriangle& a, const FlatTriangle& b, const TriangleRu
   return a.area * b.area * sum;
 }
 
-// Measured over random pairs of triangles
+// lab/003, over random pairs of triangles
 // (tests/precompute/exchange/pairs/test_form_factor_kernel.cpp): a rule of degree p has an error
 // below kErrorConstant q^(p+1), where q = (sum of radii) / distance, in all but a few of a thousand
 // pairs.

@@ -11,7 +11,7 @@ namespace {
 
 /// The variance of a count of low-discrepancy rays with this expected value. It is that of random
 /// rays while they are few, then grows with the power 3/4, as for points in four dimensions on
-/// either side of a border. Measured: notes/form_factors.md.
+/// either side of a border (lab/007).
 double variance_of_count(double expected) {
   return expected / std::pow(1 + 0.5 * expected, 0.25);
 }

@@ -231,7 +231,8 @@ double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t 
   return sum;
 }
 
-// The outermost points lie at this fraction of the way from the centroid to a corner of a triangle.
+// The outermost points lie at this fraction of the way from the centroid to a corner of a triangle
+// (lab/004).
 constexpr double kBesideCorner = 0.94;
 
 /// The points near the corners of all `triangles`.

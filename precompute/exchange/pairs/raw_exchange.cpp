@@ -19,16 +19,16 @@ namespace {
 // again, and before the count overrules all rays of the pair.
 constexpr double kDoubt = 2, kContradiction = 4;
 
-// A large pair exchanges more than this fraction of the light of either patch.
+// A large pair exchanges more than this fraction of the light of either patch (lab/011).
 constexpr double kLargePart = 3e-4;
 
 // The variance of points of Sobol's sequence as a fraction of that of random ones; over
-// partly hidden pairs it is 0.14 to 0.19.
+// partly hidden pairs it is 0.14 to 0.19 (lab/004).
 constexpr double kSpreadGain = 0.2;
 
 // A row is traced again with this multiple of the probe rays if its sum is off its target by more
 // than the tolerance (and three deviations), for settings with at least the default number of rays:
-// probe rays miss some partly covered pairs.
+// probe rays miss some partly covered pairs (lab/005).
 constexpr double kRowSumTolerance = 6e-4;
 constexpr int kDefaultRays = 64, kRefinedProbes = 4;
 

@@ -29,7 +29,7 @@ struct RawExchange {
 /// kLargeFactor times the rays of other pairs: what its rays miss shows in row sums, and its noise
 /// in the ranks of blocks.
 bool is_large_pair(const PatchGeometry& geometry, std::uint32_t i, const FacingPatch& pair);
-inline constexpr int kLargeFactor = 6;
+inline constexpr int kLargeFactor = 6;  // lab/011: fewer raise the rank of far blocks
 
 /// Computes the exchange of every pair of patches:
 ///

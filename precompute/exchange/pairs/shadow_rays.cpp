@@ -9,7 +9,7 @@ namespace {
 
 // Pairs of patches whose numbers agree except for this number of low bits, mostly neighbours, share
 // their points. Their errors are then similar, so that blocks of far pairs have lower rank, and
-// rows still average many different points.
+// rows still average many different points (lab/004).
 constexpr int kSharedBits = 4;
 
 /// Evaluates ShadowRays::kernel() between the first `count` points of two blocks.

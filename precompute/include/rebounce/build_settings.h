@@ -42,8 +42,8 @@ struct FormFactorSettings {
   double link_epsilon = 0;
 };
 
-/// Error that a link may have by default: notes/links.md.
-inline constexpr double kLinkEpsilon = 5e-4;
+/// Error that a link may have by default: notes/concepts/links.md.
+inline constexpr double kLinkEpsilon = 5e-4;  // lab/013
 
 /// How exact form factors are, and how long they take.
 enum class FormFactorQuality : std::uint8_t {

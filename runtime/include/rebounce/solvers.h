@@ -2,7 +2,7 @@
 
 // Iterative solutions of the radiosity system (I - rho F) B = M0 with the form factors of a
 // transfer file, for light that is truer than the stored operator, and to compare with.
-// notes/solvers.md tells the methods.
+// notes/concepts/solvers.md tells the methods.
 
 #include <array>
 #include <cstddef>
@@ -49,7 +49,7 @@ enum class FormFactorSource : std::uint8_t {
 };
 
 /// When an iterative method stops (at the first limit that it reaches), and where its loops run.
-/// See notes/solvers.md for the methods.
+/// See notes/concepts/solvers.md for the methods.
 struct SolveSettings {
   int max_sweeps = 100;  ///< at least 1; more: closer to the solution, longer
   /// Stop when |M0 + rho F B - B| / |M0| (area-weighted L2) is at most this. 0: only sweeps and

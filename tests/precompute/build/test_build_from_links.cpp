@@ -24,7 +24,7 @@ namespace {
 constexpr std::uint64_t kSeed = 20261120;
 constexpr double kTolerance = 0.01;
 
-// Of F B, that links of kLinkEpsilon have (notes/links.md: 0.2 to 0.25 %), times the bounces that
+// Of F B, that links of kLinkEpsilon have (lab/013: 0.2 to 0.25 %), times the bounces that
 // carry it on.
 constexpr double kErrorOfLinks = 0.01;
 

@@ -103,7 +103,7 @@ TEST(Lightmap, TexelsAreThatOfABruteForceGatherAtTheirMiddles) {
   const double median = relative[relative.size() / 2], p95 = relative[relative.size() * 95 / 100];
   std::printf("%d texels: relative L2 error %.4f, median %.4f, 95 %% %.4f\n", compared, error,
               median, p95);
-  // The patches' own reconstruction (notes/patches.md): 3 to 5 %; the gather's noise is 1 %.
+  // The patches' own reconstruction (lab/023): 3 to 5 %; the gather's noise is 1 %.
   EXPECT_LE(error, 0.03);
   EXPECT_LE(median, 0.02);
   EXPECT_LE(p95, 0.1);
