@@ -26,6 +26,7 @@ HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
 
 # Where sources name pages, and the tensors that pages explain.
 CITED = re.compile(r"notes/[\w/-]+\.(?:md|csv)")
+CITED_ENTRY = re.compile(r"\blab/(\d{3})\b")
 SOURCES = ("transfer", "runtime", "precompute", "bench", "tests")
 SOURCE_SUFFIXES = {".h", ".cpp", ".c", ".py", ".txt", ".cmake"}
 TENSOR_NAMES = "transfer/file/transfer_file_format.h"
@@ -107,16 +108,21 @@ def links_lead_somewhere(pages):
 
 
 def sources_name_pages(pages):
-    """Every page that a comment, a message or a script names is there."""
+    """Every page, and every entry of the lab, that a comment, a message or a script names is there."""
+    lab = "notes/lab/"
+    entries = {path[len(lab) :][:3] for path in pages.text if path.startswith(lab)}
     for top in SOURCES:
         for path in sorted((pages.root / top).rglob("*")):
             if path.suffix not in SOURCE_SUFFIXES or not path.is_file():
                 continue
             text = path.read_text(encoding="utf-8", errors="replace")
+            where = path.relative_to(pages.root)
             for match in CITED.finditer(text):
                 if not (pages.root / match.group()).exists():
-                    where = f"{path.relative_to(pages.root)}:{line_of(text, match.start())}"
-                    yield f"{where}: {match.group()} is not there"
+                    yield f"{where}:{line_of(text, match.start())}: {match.group()} is not there"
+            for match in CITED_ENTRY.finditer(text):
+                if match.group(1) not in entries:
+                    yield f"{where}:{line_of(text, match.start())}: {match.group()} is no entry"
 
 
 def tensors_are_explained(pages):

@@ -152,6 +152,12 @@ class Rules(unittest.TestCase):
             self.broken(check_pages.sources_name_pages, files), ["transfer/a.h:2: notes/c.md is not there"]
         )
 
+    def test_entries_that_sources_name(self):
+        files = {"transfer/a.h": "// lab/001\n// lab/002: few\n", "notes/lab/001-first.md": ""}
+        self.assertEqual(
+            self.broken(check_pages.sources_name_pages, files), ["transfer/a.h:2: lab/002 is no entry"]
+        )
+
     def test_tensors_without_a_word(self):
         files = {check_pages.TENSOR_NAMES: '"mesh.a" "mesh.b"', "notes/reference/file_format.md": "`mesh.a`"}
         broken = self.broken(check_pages.tensors_are_explained, files)
