@@ -1,7 +1,7 @@
 #pragma once
 
 // The reference integrator: unbiased diffuse path tracing on the scene as it was imported, without
-// patches. notes/reference.md says what is sampled how.
+// patches. notes/reference/path_tracer.md says what is sampled how.
 
 #include <cstdint>
 #include <span>
