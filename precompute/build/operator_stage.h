@@ -17,7 +17,7 @@ namespace rebounce {
 
 /// The tolerance of the operator over that of the compressed form factors that it is made from.
 /// Their error adds to its own.
-inline constexpr double kToleranceOverFormFactors = 5;
+inline constexpr double kToleranceOverFormFactors = 5;  // lab/060
 
 /// Lights that compressed form factors are measured under.
 inline constexpr int kFormFactorLightCount = 16;

@@ -24,7 +24,7 @@ constexpr std::size_t kKeptPieces = 64;
 constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 
 // The uniform light's share of the energy of all training lights. It makes black surfaces, which
-// reflect no light, exact enough as lamps.
+// reflect no light, exact enough as lamps (lab/043).
 constexpr double kUniformShare = 0.1;
 
 using Exitances = std::span<const std::vector<Float3>>;

@@ -17,7 +17,7 @@ namespace rebounce {
 namespace {
 
 // The search for the multiplier aims at kAim of the tolerance and accepts at most kMost of it,
-// because other lights than the validation lights may have slightly larger errors.
+// because other lights than the validation lights may have slightly larger errors (lab/044).
 constexpr int kMostRounds = 8;
 constexpr double kAim = 0.76, kMost = 0.8;
 

@@ -13,7 +13,7 @@ namespace rebounce {
 namespace {
 
 // A path is outside if it meets nothing within this fraction of the diagonal of the scene, or
-// within kRoom metres: where a person can stand, there may be lamps.
+// within kRoom metres: where a person can stand, there may be lamps (lab/032).
 constexpr double kReach = 1.0 / 4, kRoom = 1.5;
 
 // At each bounce the reflected fraction of the paths continues, but at least half of them; no path
