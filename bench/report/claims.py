@@ -1,6 +1,7 @@
 """What the summary says, each figure with the rows that it comes from."""
 
 import dataclasses
+import re
 
 import results
 
@@ -201,6 +202,12 @@ def repainted(result, target=0.001):
         result.fastest(results.REPAINTED, results.INVERSES, target),
         result.fastest(results.REPAINTED, results.ITERATIONS, target),
     )
+
+
+def motions(claims):
+    """The motions that claims are about, as parts of the scene's diagonal, ascending."""
+    found = (re.match(r"moved ([\d.]+) %, error", claim.condition) for claim in claims)
+    return sorted({float(match.group(1)) / 100 for match in found if match})
 
 
 def find(claims, subject, condition):

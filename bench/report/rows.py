@@ -72,7 +72,7 @@ PATH_LOSS_NAMES = ("scene", "patches", "path", "budget", "inverse", "error", "Ga
 def largest_motion(headline, target):
     """The largest motion, a part of the diagonal, at which Gauss-Seidel is as fast; 0: none."""
     largest = 0.0
-    for motion in headline.result["settings"]["motions"]:
+    for motion in claims_module.motions(headline.claims):
         ratio = ratio_of(headline.claims, "equal error", f"{moved(motion)}, error {target:g}")
         if ratio is not None and ratio <= 1:
             largest = max(largest, motion)

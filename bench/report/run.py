@@ -9,7 +9,6 @@ import datetime
 import json
 import pathlib
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -19,6 +18,7 @@ import aims
 import claims as claims_module
 import formats
 import page as page_module
+import performance
 import plots
 import results as results_module
 import rows
@@ -51,7 +51,9 @@ def parse_arguments():
         "--bench", type=pathlib.Path, default=ROOT / "build/release/bench/bench_report"
     )
     parser.add_argument(
-        "--keep", action="store_true", help="put the summary into notes/, README.md and bench/results/"
+        "--keep",
+        action="store_true",
+        help="put the claims into bench/results/, and what they say into notes/ and README.md",
     )
     return parser.parse_args()
 
@@ -224,22 +226,16 @@ def claim_table(headline):
     return names, lines
 
 
-def write_notes(notes, headlines, missing, date, pictures):
-    """The Markdown summary and its pictures."""
-    target = notes / "pictures"
-    target.mkdir(parents=True, exist_ok=True)
-
-    def kept(path):
-        if path.parent != target:
-            shutil.copyfile(path, target / path.name)
-        return f"pictures/{path.name}"
-
+def write_summary(headlines, missing, date, pictures, folder):
+    """The summary in Markdown, beside its pictures."""
     named = {
-        key: {scene: kept(p) for scene, p in value.items()} if key == "scenes" else kept(value)
+        key: {scene: f"pictures/{p.name}" for scene, p in value.items()}
+        if key == "scenes"
+        else f"pictures/{value.name}"
         for key, value in pictures.items()
     }
     text = summary.markdown(headlines, missing, date, named)
-    (notes / summary.PAGE).write_text(text, encoding="utf-8")
+    (folder / "report.md").write_text(text, encoding="utf-8")
 
 
 def keep_results(headlines, date, folder):
@@ -280,18 +276,18 @@ def main():
         return 1
     missing = [(job.name, job.patches) for job in jobs if job not in done]
     date = datetime.date.today().isoformat()
-    headlines = [aims.Headline(r) for r in results_module.load(job.result for job in done)]
+    measured = results_module.load(job.result for job in done)
+    headlines = [aims.Headline(r, claims_module.all_claims(r)) for r in measured]
     claims = [claim for h in headlines for claim in h.claims]
     tables.write_all(folder, [h.result for h in headlines], claims)
     drawn = folder / "pictures"
     drawn.mkdir(exist_ok=True)
     pictures = draw(headlines, drawn)
     write_page(headlines, missing, date, pictures, folder)
-    write_notes(folder, headlines, missing, date, pictures)
+    write_summary(headlines, missing, date, pictures, folder)
     if options.keep:
-        write_notes(ROOT / "notes", headlines, missing, date, pictures)
         keep_results(headlines, date, folder)
-        summary.quote_in_readme(ROOT / "README.md", summary.readme_block(headlines))
+        performance.write()
     print(f"\n{aims.aims(headlines)}\n\n{folder / 'report.html'}")
     return 0
 

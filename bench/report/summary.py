@@ -1,12 +1,10 @@
-"""The report in words: a Markdown file for notes/ and the block that README quotes."""
+"""The report in words: a Markdown file, and the parts of it that claims alone give."""
 
 import rows
 from aims import AIM_ERROR, HEADLINE_NAMES, TIGHTEST_BUDGET, aims, ratio_of
 from formats import markdown_table, span
 from results import REPAINTED, SWITCHED, percent
 
-PAGE = "performance.md"  # of notes/
-README_BEGIN, README_END = "<!-- report -->", "<!-- /report -->"
 SHOWN_LOSSES = 12
 
 
@@ -42,18 +40,28 @@ sweep within the budget is left out. Lamps are points of 1 cd in free space, alo
 def missing_line(missing):
     if not missing:
         return ""
-    return "\n**Without:** " + ", ".join(f"{s.replace('_', ' ')} at {n:,}" for s, n in missing) + ".\n"
+    return "\n**Missing:** " + ", ".join(f"{s.replace('_', ' ')} at {n:,}" for s, n in missing) + ".\n"
 
 
-def readme_block(headlines):
-    headline_rows = [h.row() for h in headlines]
-    return (
-        f"{markdown_table(HEADLINE_NAMES, headline_rows)}\n\n"
-        f"Microseconds to an error of {percent(AIM_ERROR)} after a lamp was switched for another, one "
-        f"thread, and how many times faster the inverse is; lag in frames to 1 % at {TIGHTEST_BUDGET} µs "
-        f"a frame. [notes/{PAGE}](notes/{PAGE}) has the conditions, and where Gauss-Seidel wins.\n\n"
-        f"{aims(headlines)}"
-    )
+def headline_parts(headlines):
+    """What the claims say in short: a table, and the goals beside what was measured."""
+    return [
+        "## Summary",
+        markdown_table(HEADLINE_NAMES, [h.row() for h in headlines]),
+        f"Microseconds to an error of {percent(AIM_ERROR)} after a lamp was switched for another; then how many "
+        f"times faster the inverse is. Lag: frames after a switch until the error is within 1 %, at "
+        f"{TIGHTEST_BUDGET} µs a frame.",
+        aims(headlines),
+    ]
+
+
+def accuracy_parts(headlines):
+    return [
+        "Least errors after a switch at equal time (–: one side has nothing that fits):",
+        markdown_table(rows.EQUAL_TIME_NAMES, rows.equal_time_rows(headlines)),
+        "## Where Gauss-Seidel wins",
+        where_gauss_seidel_wins(headlines),
+    ]
 
 
 def markdown(headlines, missing, date, pictures):
@@ -63,15 +71,9 @@ def markdown(headlines, missing, date, pictures):
     followed = rows.shown_on_paths(all_results)
     parts = [
         "# The stored inverse against Gauss-Seidel",
-        "Written by `./dev report`; the raw figures are in `report-out/` after a run, and each claim is in "
-        "`report.csv` of the machine's folder in bench/results.",
+        "Written by `./dev report`; the raw figures are beside it, each claim with its rows in `claims.csv`.",
         provenance(all_results, date) + missing_line(missing),
-        "## Summary",
-        markdown_table(HEADLINE_NAMES, [h.row() for h in headlines]),
-        f"Microseconds to an error of {percent(AIM_ERROR)} after a lamp was switched for another; then how many "
-        f"times faster the inverse is. Lag: frames after a switch until the error is within 1 %, at "
-        f"{TIGHTEST_BUDGET} µs a frame.",
-        aims(headlines),
+        *headline_parts(headlines),
         "## How it was measured",
         METHOD.format(
             lamps=largest["settings"]["lamps"],
@@ -81,10 +83,7 @@ def markdown(headlines, missing, date, pictures):
         f"![Error against time]({pictures['accuracy']})",
         f"![How many times faster the inverse is]({pictures['winners']})",
         "Ratio of the times to an error, Gauss-Seidel ÷ inverse, by change of the light: red, the inverse is faster.",
-        "Least errors after a switch at equal time (–: one side has nothing that fits):",
-        markdown_table(rows.EQUAL_TIME_NAMES, rows.equal_time_rows(headlines)),
-        "## Where Gauss-Seidel wins",
-        where_gauss_seidel_wins(headlines),
+        *accuracy_parts(headlines),
         "## Light paths",
         f"{followed.title}, {rows.PATH_BUDGET} µs a frame, each method in its best form and warm from its last frame:",
         f"![Error by frame]({pictures['frames']})",
@@ -140,21 +139,8 @@ def where_gauss_seidel_wins(headlines):
                 f"- Against the best iteration of any kind instead of Gauss-Seidel, after a switch to 0.1 %: "
                 f"{span([h.switch_any for h in headlines])}.",
                 f"- With caches that something else has used, after a switch to 0.1 %: {span(cold)}.",
-                "- Before break-even (below), and where memory for F is there and for an operator is not.",
-                "- Which method to take when: [solvers](concepts/solvers.md#when-to-use-which).",
+                "- Before break-even, and where memory for F is there and for an operator is not.",
             )
         )
     )
     return "\n\n".join(parts)
-
-
-def quote_in_readme(path, block):
-    """Replaces what stands between the markers of README."""
-    text = path.read_text(encoding="utf-8")
-    before, _, rest = text.partition(README_BEGIN)
-    _, end, after = rest.partition(README_END)
-    if not end:
-        raise SystemExit(f"{path} has no {README_BEGIN} ... {README_END} to quote the summary in")
-    path.write_text(
-        f"{before}{README_BEGIN}\n{block}\n{README_END}{after}", encoding="utf-8"
-    )

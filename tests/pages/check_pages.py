@@ -6,6 +6,7 @@ See RULES. Entries of the lab are kept as they were written, and only their link
 Usage: check_pages.py [ROOT]
 """
 
+import csv
 import pathlib
 import re
 import sys
@@ -24,11 +25,23 @@ COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 LINK = re.compile(r"\[[^\]\[]*(?:\[[^\]]*\][^\]\[]*)*\]\(([^()\s]+(?:\([^()]*\))?)\)")
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
 
+# Numbers of README, and what has one in its name.
+NUMBER = re.compile(r"(?<![\w.])\d[\d,]*(?:\.\d+)?")
+NAMES_WITH_NUMBERS = re.compile(r"Debian 12|x86-64|OpenGL \d\.\d|glTF 2\.0|Embree \d")
+RESULTS = "bench/results/*/report.csv"
+
 # Where sources name pages, and the tensors that pages explain.
 CITED = re.compile(r"notes/[\w/-]+\.(?:md|csv)")
 CITED_ENTRY = re.compile(r"\blab/(\d{3})\b")
 SOURCES = ("transfer", "runtime", "precompute", "bench", "tests")
+TESTS_OF_THIS = "tests/pages/test_pages.py"  # names pages that it makes up
 SOURCE_SUFFIXES = {".h", ".cpp", ".c", ".py", ".txt", ".cmake"}
+
+# Code spans that name something of the code: with _ or a capital inside.
+NAME = re.compile(r"`(?:\w+(?:::|\.))*(\w*(?:\w_\w|[a-z][A-Z])\w*)(?:\(\))?`")
+PAGES_WITH_NAMES = ("notes/contributing/", "notes/concepts/")
+PAGES_ON_NAMING = ("notes/contributing/conventions.md",)
+
 TENSOR_NAMES = "transfer/file/transfer_file_format.h"
 TENSOR = re.compile(r'"((?:\w+\.)+\w+)"')
 
@@ -62,6 +75,31 @@ def readme_is_short(pages):
     words = len(COMMENT.sub("", without_code(pages.text["README.md"])).split())
     if words > MOST_WORDS_OF_README:
         yield f"README.md: {words} words, at most {MOST_WORDS_OF_README}"
+
+
+def figures_are_measured(pages):
+    """Every number of README is in the results of the report, rounded; milliseconds for microseconds."""
+    prose = CODE_SPAN.sub("", COMMENT.sub("", without_code(pages.text["README.md"])))
+    prose = NAMES_WITH_NUMBERS.sub("", re.sub(r"\]\([^)]*\)", "]", prose))
+    measured = measured_numbers(pages.root)
+    for text in NUMBER.findall(prose):
+        digits = text.rstrip(",").replace(",", "")
+        precision = len(digits.replace(".", "").lstrip("0")) or 1
+        if not any(float(f"{value:.{precision}g}") == float(digits) for value in measured):
+            yield f"README.md: {text} is not in {RESULTS}"
+
+
+def measured_numbers(root):
+    """The values of all rows, the errors of their conditions in per cent, and the number of scenes."""
+    found, scenes = set(), set()
+    for path in root.glob(RESULTS):
+        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line[:1] != "#"]
+        for row in csv.DictReader(lines):
+            scenes.add(row["scene"])
+            values = [float(row[name]) for name in ("inverse_value", "rival_value", "ratio") if row[name]]
+            found.update(values, (value / 1000 for value in values), [float(row["patches"])])
+            found.update(100 * float(error) for error in re.findall(r"error ([\d.]+)", row["condition"]))
+    return found | {float(len(scenes))}
 
 
 def pages_are_short(pages):
@@ -111,18 +149,34 @@ def sources_name_pages(pages):
     """Every page, and every entry of the lab, that a comment, a message or a script names is there."""
     lab = "notes/lab/"
     entries = {path[len(lab) :][:3] for path in pages.text if path.startswith(lab)}
+    for path in source_files(pages.root):
+        where = path.relative_to(pages.root)
+        text = path.read_text(encoding="utf-8", errors="replace")
+        for match in CITED.finditer(text):
+            if not (pages.root / match.group()).exists():
+                yield f"{where}:{line_of(text, match.start())}: {match.group()} is not there"
+        for match in CITED_ENTRY.finditer(text):
+            if match.group(1) not in entries:
+                yield f"{where}:{line_of(text, match.start())}: {match.group()} is no entry"
+
+
+def source_files(root):
     for top in SOURCES:
-        for path in sorted((pages.root / top).rglob("*")):
-            if path.suffix not in SOURCE_SUFFIXES or not path.is_file():
-                continue
-            text = path.read_text(encoding="utf-8", errors="replace")
-            where = path.relative_to(pages.root)
-            for match in CITED.finditer(text):
-                if not (pages.root / match.group()).exists():
-                    yield f"{where}:{line_of(text, match.start())}: {match.group()} is not there"
-            for match in CITED_ENTRY.finditer(text):
-                if match.group(1) not in entries:
-                    yield f"{where}:{line_of(text, match.start())}: {match.group()} is no entry"
+        for path in sorted((root / top).rglob("*")):
+            if path.suffix in SOURCE_SUFFIXES and path.relative_to(root).as_posix() != TESTS_OF_THIS:
+                yield path
+
+
+def names_are_in_the_code(pages):
+    """What pages for contributors name (functions, types, tests) is a word of a source."""
+    named = {p: t for p, t in pages.text.items() if p.startswith(PAGES_WITH_NAMES)}
+    words = set()
+    for path in source_files(pages.root) if named else ():
+        words.update(re.findall(r"\w+", path.read_text(encoding="utf-8", errors="replace")))
+    for path, text in named.items():
+        for match in NAME.finditer(without_code(text)):
+            if match.group(1) not in words and path not in PAGES_ON_NAMING:
+                yield f"{path}:{line_of(without_code(text), match.start())}: no source has {match.group(1)}"
 
 
 def tensors_are_explained(pages):
@@ -136,10 +190,12 @@ def tensors_are_explained(pages):
 
 RULES = (
     readme_is_short,
+    figures_are_measured,
     pages_are_short,
     pages_tell_what_is,
     links_lead_somewhere,
     sources_name_pages,
+    names_are_in_the_code,
     tensors_are_explained,
 )
 

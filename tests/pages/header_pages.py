@@ -15,6 +15,8 @@ SKIPPED = re.compile(
     r'extern "C"|namespace rebounce|}  // namespace|/\* NOLINT|using namespace'
 )
 
+FORWARD = re.compile(r"(?:(?:class|struct) \w+;\n?)*")
+
 # What an entry declares, for its heading: the first group that is not empty.
 DECLARED = re.compile(
     r"^(?:template <.*?>\s*)?(?:typedef )?(?:struct|enum class|enum|class) (?:alignas\(\w+\) )?(\w+)\b(?!\s*\*)"
@@ -23,7 +25,7 @@ DECLARED = re.compile(
     re.MULTILINE,
 )
 IDENTIFIER = re.compile(
-    r"(?<![\w`/.-])((?:\w+::)+\w+|[A-Za-z]\w*_\w+(?:\(\))?|k[A-Z]\w+|[a-z]\w+\(\))(?![\w`/-]|\.\w)"
+    r"(?<![\w`/.-])(--[a-z][\w-]*\w|(?:\w+::)+\w+|[A-Za-z]\w*_\w+(?:\(\))?|k[A-Z]\w+|[a-z]\w+\(\))(?![\w`/-]|\.\w)"
 )
 NOTES_PAGE = re.compile(r"notes/([\w/]+)\.md")
 
@@ -60,7 +62,7 @@ def entries_of(text):
             continue
         comment, code = split_comment(block)
         code = without_private(code)
-        if comment or code:
+        if comment or not FORWARD.fullmatch("\n".join(code)):
             yield Entry(comment, code)
 
 

@@ -17,24 +17,24 @@ import help_page
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 REFERENCE = pathlib.Path("notes/reference")
 
-# The public headers of C++, in the order in which one meets them.
-CPP_HEADERS = (
-    "runtime/engine",
-    "transfer/transfer_file",
-    "transfer/lights",
-    "runtime/sky",
-    "runtime/outputs",
-    "runtime/solvers",
-    "transfer/scene_data",
-    "transfer/operators",
-    "transfer/scheduler",
-    "transfer/error",
-    "transfer/types",
-    "transfer/version",
-    "precompute/build",
-    "precompute/build_settings",
-    "precompute/build_report",
-)
+# The public headers of C++, in the order in which one meets them, with what each holds.
+CPP_HEADERS = {
+    "runtime/engine": "`Engine`: frames by lights and sky, or by a direct irradiance of the caller's",
+    "transfer/transfer_file": "loading and saving; what is known of the operator",
+    "transfer/lights": "lamps, and luminaires by their photometric data",
+    "runtime/sky": "the sky, its cells, CIE skies",
+    "runtime/outputs": "the light of the last frame at vertices, lightmap texels, probes and in air",
+    "runtime/solvers": "`Solver`: the same light by iteration on the form factors of the file",
+    "transfer/scene_data": "patches, display mesh, materials, cameras, maps",
+    "transfer/operators": "kinds and precisions of operators, by name",
+    "transfer/scheduler": "`Scheduler`: where loops run",
+    "transfer/error": "`Error`, `Unsupported`, `Cancelled`",
+    "transfer/types": "small types",
+    "transfer/version": "the version of the library",
+    "precompute/build": "`build_transfer`: the offline stage",
+    "precompute/build_settings": "all settings of the offline stage",
+    "precompute/build_report": "what a build has done",
+}
 
 COMMAND_LINE = """# Command line
 
@@ -48,6 +48,13 @@ C_INTERFACE = """# C interface
 [versions](versions.md) says what stays."""
 
 
+CPP_INTERFACE = """# C++ interface
+
+The public headers, a page each; nothing else is installed, and each compiles alone. [In an
+engine](../../guide/in_an_engine.md) has a program from end to end, and [versions](../versions.md) says what
+stays. Those of `precompute` are in the component of that name, all others in `runtime`."""
+
+
 def generated_from(source):
     return f"<!-- Written by tests/pages/reference.py from {source}. Change that, not this. -->"
 
@@ -57,8 +64,8 @@ def public_headers():
     found = {
         f"{floor}/{path.stem}" for floor in floors for path in (ROOT / floor / "include/rebounce").glob("*.h")
     }
-    if found != set(CPP_HEADERS):
-        raise SystemExit(f"CPP_HEADERS of {__file__} and the folders differ: {found ^ set(CPP_HEADERS)}")
+    if found != CPP_HEADERS.keys():
+        raise SystemExit(f"CPP_HEADERS of {__file__} and the folders differ: {found ^ CPP_HEADERS.keys()}")
     return [pathlib.Path(floor) / "include/rebounce" / f"{name}.h"
             for floor, name in (header.split("/") for header in CPP_HEADERS)]
 
@@ -70,13 +77,22 @@ def cpp_page(header):
     return "\n\n".join([title, generated_from(header), f"`#include <rebounce/{header.name}>`", body])
 
 
+def cpp_index():
+    rows = ["| header | holds | component |", "|---|---|---|"]
+    for header, holds in CPP_HEADERS.items():
+        floor, name = header.split("/")
+        component = "precompute" if floor == "precompute" else "runtime"
+        rows.append(f"| [rebounce/{name}.h]({name}.md) | {holds} | `{component}` |")
+    return "\n\n".join([CPP_INTERFACE, generated_from("the list in it"), "\n".join(rows)])
+
+
 def relative_link(page, up):
     """The link to notes/`page`.md from a page of notes that lies `up` below it."""
     return f"{up}{page}.md"
 
 
 def header_files():
-    pages = {}
+    pages = {REFERENCE / "cpp" / "README.md": cpp_index()}
     for header in public_headers():
         pages[REFERENCE / "cpp" / f"{header.stem}.md"] = cpp_page(header)
     c_header = "runtime/include/rebounce.h"

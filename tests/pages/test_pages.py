@@ -123,6 +123,18 @@ class Rules(unittest.TestCase):
         self.assertEqual(self.broken(check_pages.readme_is_short, {"README.md": text}), [])
         self.assertEqual(len(self.broken(check_pages.readme_is_short, {"README.md": text + "word"})), 1)
 
+    def test_figures_that_were_not_measured(self):
+        results = (
+            "# of a machine\nscene,patches,condition,inverse_value,rival_value,ratio\n"
+            'room,4000,"switched, error 0.001",67.5255,795.4,11.78\n'
+        )
+        text = "Debian 12 `13` [14](15.md): 4,000 patches, 0.0675 ms, to 0.1 %, 12 times, 68 µs"
+        files = {"README.md": text, "bench/results/m/report.csv": results}
+        self.assertEqual(
+            self.broken(check_pages.figures_are_measured, files),
+            ["README.md: 14 is not in bench/results/*/report.csv"],
+        )
+
     def test_lines_of_pages_that_people_write(self):
         long = "line\n" * 151
         files = {"notes/guide/a.md": long, "notes/lab/b.md": long, "notes/c.md": check_pages.GENERATED + long}
@@ -156,6 +168,16 @@ class Rules(unittest.TestCase):
         files = {"transfer/a.h": "// lab/001\n// lab/002: few\n", "notes/lab/001-first.md": ""}
         self.assertEqual(
             self.broken(check_pages.sources_name_pages, files), ["transfer/a.h:2: lab/002 is no entry"]
+        )
+
+    def test_names_that_are_gone(self):
+        files = {
+            "runtime/a.h": "void kept_name(); TEST(Suite, ItHolds)",
+            "notes/contributing/a.md": "`kept_name` `Type::kept_name()` `Suite.ItHolds` `word`\n`gone_name`",
+        }
+        self.assertEqual(
+            self.broken(check_pages.names_are_in_the_code, files),
+            ["notes/contributing/a.md:2: no source has gone_name"],
         )
 
     def test_tensors_without_a_word(self):
