@@ -7,7 +7,7 @@
 #include "precompute/lights/reference_solution.h"
 #include "rebounce/error.h"
 #include "runtime/demo/image/image_file.h"
-#include "runtime/demo/picture/camera.h"
+#include "runtime/demo/picture/default_view.h"
 #include "runtime/demo/picture/key_light.h"
 #include "runtime/demo/picture/picture.h"
 #include "runtime/frame/engine_parts.h"
@@ -44,9 +44,7 @@ class Painter {
     picture_settings_.width = settings.picture_width;
     picture_settings_.height = settings.picture_height;
     picture_settings_.samples_per_axis = kSamplesPerAxis;
-    picture_settings_.camera = data_.cameras.empty()
-                                   ? fit_camera(data_, *engine_.parts().tracer, engine_.radiosity())
-                                   : data_.cameras.front();
+    picture_settings_.camera = default_camera(data_, *engine_.parts().tracer);
     truth_ = ReferenceSolver(data_.exchange, data_.patches)
                  .indirect_irradiance(engine_.initial_exitance());
     reference_ = draw(truth_);

@@ -5,7 +5,7 @@
 #include "precompute/build/transfer_build.h"
 #include "rebounce/error.h"
 #include "runtime/demo/image/image_file.h"
-#include "runtime/demo/picture/camera.h"
+#include "runtime/demo/picture/default_view.h"
 #include "runtime/demo/picture/picture.h"
 #include "runtime/frame/direct_lighting.h"
 #include "runtime/solvers/solve_radiosity.h"
@@ -67,7 +67,7 @@ void draw_error(const Solution& solution, const PatchComparison& patches, const 
   const std::vector<float> error = patch_errors(solution, patches);
   PictureSettings settings;
   settings.show = Show::kError;
-  settings.camera = data.cameras.empty() ? fit_camera(data, solution.tracer) : data.cameras.front();
+  settings.camera = default_camera(data, solution.tracer);
   PictureLight light;
   light.error = error;
   write_png(path, tone_map(render_picture(data, solution.tracer, light, settings)));

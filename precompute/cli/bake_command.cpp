@@ -32,14 +32,16 @@ void run(const BakeOptions& chosen, const CommonOptions& options) {
                            .sky = setup.sky,
                            .indirect_irradiance = engine.indirect_irradiance(),
                            .emitted_irradiance = emitted};
-  const LitMesh mesh = light_mesh(*data, *engine.parts().tracer, light,
-                                  choose_camera(chosen.camera, engine), chosen.settings);
+  const RayTracer& tracer = *engine.parts().tracer;
+  const ChosenCamera camera = choose_camera(chosen.camera, *data, tracer);
+  const LitMesh mesh = light_mesh(*data, tracer, light, camera.camera, chosen.settings);
   const std::size_t bytes = write_glb(chosen.output, mesh, *data, setup.lights);
   if (options.json) {
     const nlohmann::json summary = {{"vertices", mesh.position.size()},
                                     {"triangles", mesh.index.size() / 3},
                                     {"texture", {mesh.texture.width, mesh.texture.height}},
                                     {"exposure", mesh.exposure},
+                                    {"camera", as_json(camera)},
                                     {"bytes", bytes}};
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
@@ -49,6 +51,7 @@ void run(const BakeOptions& chosen, const CommonOptions& options) {
             : fmt::format("lightmap {} x {}, ", mesh.texture.width, mesh.texture.height);
     fmt::print("{}: {} triangles, {} vertices, {}exposure {:+.2f} EV, {} bytes\n", chosen.output,
                mesh.index.size() / 3, mesh.position.size(), texture, mesh.exposure, bytes);
+    if (!chosen.settings.exposure) fmt::print("exposure for {}\n", described(camera));
   }
 }
 
@@ -62,9 +65,9 @@ void add_bake_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene");
   command->add_option("--exposure", chosen->settings.exposure,
-                      "Stops; by default that of a picture from the camera");
+                      "Stops; by default found from what the camera sees, as render does");
   command->add_option("--camera", chosen->camera,
-                      "Camera that the exposure is computed for: as for render");
+                      fmt::format("Camera that the exposure is found for. {}", kCameraHelp));
   command
       ->add_option("--triangles", chosen->settings.triangle_target,
                    "Subdivide triangles without lightmap texels evenly, as finely as keeps their "

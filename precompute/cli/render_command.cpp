@@ -35,18 +35,19 @@ std::vector<float> errors_of(const Engine& engine) {
                       solver.indirect_irradiance(engine.initial_exitance()), data.patches.area);
 }
 
-void print_summary(const Picture& picture, std::span<const float> error,
+void print_summary(const Picture& picture, const ChosenCamera& camera, std::span<const float> error,
                    const RenderOptions& chosen, const CommonOptions& options) {
   if (options.json) {
     nlohmann::json summary = {{"width", picture.width},
                               {"height", picture.height},
                               {"show", chosen.show},
-                              {"exposure", picture.exposure}};
+                              {"exposure", picture.exposure},
+                              {"camera", as_json(camera)}};
     if (!error.empty()) summary["error_max"] = *std::ranges::max_element(error);
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
-    fmt::print("{}: {}x{}, exposure {:+.2f} EV\n", chosen.output, picture.width, picture.height,
-               picture.exposure);
+    fmt::print("{}: {}x{}, exposure {:+.2f} EV\n{}\n", chosen.output, picture.width, picture.height,
+               picture.exposure, described(camera));
   }
 }
 
@@ -65,7 +66,8 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   if (chosen.key_light) setup.lights = {make_key_light(*data, *engine.parts().tracer)};
   engine.relight(setup.lights, setup.sky);
-  settings.camera = choose_camera(chosen.camera, engine);
+  const ChosenCamera camera = choose_camera(chosen.camera, *data, *engine.parts().tracer);
+  settings.camera = camera.camera;
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
   std::vector<float> error;
   if (settings.show == Show::kError) error = errors_of(engine);
@@ -76,9 +78,13 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   light.indirect_irradiance = engine.indirect_irradiance();
   light.emitted_irradiance = emitted_irradiance;
   light.error = error;
-  const Picture picture = render_picture(*data, *engine.parts().tracer, light, settings);
+  const PictureRenderer renderer(*data, *engine.parts().tracer);
+  if (!settings.exposure && is_light(settings.show)) {
+    settings.exposure = exposure_for(renderer, light, settings.camera, settings.show);
+  }
+  const Picture picture = renderer.render(light, settings);
   write_png(chosen.output, tone_map(picture));
-  print_summary(picture, error, chosen, options);
+  print_summary(picture, camera, error, chosen, options);
 }
 
 }  // namespace
@@ -93,9 +99,7 @@ void add_render_command(CLI::App& app, const CommonOptions& options) {
                           "Lights: .json, or a .glb that has some; by default those of the scene");
   command->add_flag("--key-light", chosen->key_light, "One lamp at a place that suits the scene")
       ->excludes(lights);
-  command->add_option(
-      "--camera", chosen->camera,
-      "Name or number of a camera of the scene, or px,py,pz,tx,ty,tz[,degrees] in metres");
+  command->add_option("--camera", chosen->camera, kCameraHelp);
   command->add_option("--size", chosen->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
   command
       ->add_option("--show", chosen->show,
@@ -103,7 +107,8 @@ void add_render_command(CLI::App& app, const CommonOptions& options) {
                    "(of the indirect irradiance against the reference solution)")
       ->check(CLI::IsMember(show_names()))
       ->capture_default_str();
-  command->add_option("--exposure", chosen->exposure, "Stops; by default found from the picture");
+  command->add_option("--exposure", chosen->exposure,
+                      "Stops; by default found from what the camera sees");
   command->add_option("-o,--output", chosen->output, "Image to write (.png)")
       ->required()
       ->check([](const std::string& path) {

@@ -58,7 +58,8 @@ LightSetup lights_to_begin_with(const ViewOptions& chosen, const Engine& engine)
   return setup;
 }
 
-ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data) {
+ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data,
+                       ChosenCamera& camera) {
   Engine engine(data);
   const LightSetup lights = lights_to_begin_with(chosen, engine);
   engine.relight(lights.lights, lights.sky);
@@ -67,7 +68,8 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
   std::tie(setup.width, setup.height) = parse_size(chosen.size);
   for (const Light& light : lights.lights) setup.lights.push_back({.light = light});
   setup.sky = lights.sky;
-  setup.camera = choose_camera(chosen.camera, engine);
+  camera = choose_camera(chosen.camera, *data, *engine.parts().tracer);
+  setup.camera = camera.camera;
   if (chosen.sphere) {
     setup.spheres.push_back(sphere_ahead(setup.camera, *engine.parts().tracer, *data));
   }
@@ -89,8 +91,10 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
   return setup;
 }
 
-void report(const StageTimes& times, int frames, const CommonOptions& options) {
+void report(const StageTimes& times, int frames, const ChosenCamera& camera,
+            const CommonOptions& options) {
   const nlohmann::json summary = {{"frames", frames},
+                                  {"camera", as_json(camera)},
                                   {"microseconds",
                                    {{"direct", times.direct},
                                     {"solve", times.solve[0]},
@@ -103,14 +107,14 @@ void report(const StageTimes& times, int frames, const CommonOptions& options) {
   } else if (!options.quiet) {
     fmt::print(
         "{} frames; median milliseconds: direct {:.2f}, solve {:.2f}, upload {:.2f}, "
-        "shadows {:.2f}, draw {:.2f}\n",
+        "shadows {:.2f}, draw {:.2f}\n{}\n",
         frames, times.direct / 1e3, (times.solve[0] + times.solve[1]) / 1e3, times.upload / 1e3,
-        times.shadows / 1e3, times.draw / 1e3);
+        times.shadows / 1e3, times.draw / 1e3, described(camera));
   }
 }
 
 void write_pictures(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data,
-                    const ViewerSetup& setup, float frames_per_second,
+                    const ViewerSetup& setup, const ChosenCamera& camera, float frames_per_second,
                     const CommonOptions& options) {
   if (!chosen.out.empty()) std::filesystem::create_directories(chosen.out);
   ProgressBar progress(!options.quiet && !options.json);
@@ -126,7 +130,7 @@ void write_pictures(const ViewOptions& chosen, const std::shared_ptr<const Trans
     }
   };
   const StageTimes times = draw_viewer_frames(data, setup, chosen.frames, frames_per_second, write);
-  report(times, chosen.frames, options);
+  report(times, chosen.frames, camera, options);
 }
 
 void run(const ViewOptions& chosen, const CommonOptions& options) {
@@ -135,7 +139,8 @@ void run(const ViewOptions& chosen, const CommonOptions& options) {
   const auto data = chosen.lights.empty()
                         ? std::make_shared<const TransferData>(load_transfer_file(chosen.file))
                         : load_lit_scene(chosen.file, chosen.lights, lights);
-  ViewerSetup setup = make_setup(chosen, data);
+  ChosenCamera camera;
+  ViewerSetup setup = make_setup(chosen, data, camera);
   float frames_per_second = 30;
   if (!chosen.path.empty()) {
     frames_per_second = read_light_path(chosen.path, setup.lights, setup.spheres);
@@ -143,7 +148,7 @@ void run(const ViewOptions& chosen, const CommonOptions& options) {
   if (chosen.screenshot.empty() && chosen.out.empty()) {
     run_viewer(data, setup, [] { return !interrupted(); });
   } else {
-    write_pictures(chosen, data, setup, frames_per_second, options);
+    write_pictures(chosen, data, setup, camera, frames_per_second, options);
   }
 }
 
@@ -176,13 +181,13 @@ void add_view_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene, or "
                       "one lamp if it has none");
-  command->add_option("--camera", chosen->camera, "First camera: as for render");
+  command->add_option("--camera", chosen->camera, fmt::format("First camera. {}", kCameraHelp));
   command->add_option("--size", chosen->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
   command->add_option("--show", chosen->show, "First view: as for render")
       ->check(CLI::IsMember(show_names()))
       ->capture_default_str();
   command->add_option("--exposure", chosen->exposure,
-                      "Stops; by default found from the first picture");
+                      "Stops; by default found from what the first picture shows, as render does");
   command->add_option("--method", chosen->method, "How to find the indirect light")
       ->check(CLI::IsMember(method_names()))
       ->capture_default_str();

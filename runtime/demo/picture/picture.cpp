@@ -346,7 +346,7 @@ Picture PictureRenderer::render(const PictureLight& light, const PictureSettings
   check(settings);
   const auto& [data, tracer, surface] = *impl_;
   Picture picture{.width = settings.width, .height = settings.height};
-  if (settings.show == Show::kPatches || settings.show == Show::kError) {
+  if (!is_light(settings.show)) {
     PatchPainter painter(surface, light, settings, data.patches.size());
     picture.pixel = to_float3s(paint_tiles(tracer, surface, settings, painter));
     picture.display_referred = true;
@@ -365,12 +365,13 @@ Picture render_picture(const TransferData& data, const RayTracer& tracer, const 
   return PictureRenderer(data, tracer).render(light, settings);
 }
 
-float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
-                   const Camera& camera) {
+float exposure_for(const PictureRenderer& renderer, const PictureLight& light, const Camera& camera,
+                   Show show) {
   PictureSettings small;
   small.width = 160;
-  small.height = 120;
+  small.height = 90;
   small.camera = camera;
+  small.show = show;
   small.samples_per_axis = 2;
   return renderer.render(light, small).exposure;
 }

@@ -22,6 +22,10 @@ enum class Show : std::uint8_t {
   kError,      ///< a number per patch in a colour map (viridis)
 };
 
+inline bool is_light(Show show) {
+  return show != Show::kPatches && show != Show::kError;
+}
+
 struct PictureSettings {
   int width = 1280;  ///< pixels
   int height = 720;  ///< pixels
@@ -58,8 +62,9 @@ class PictureRenderer {
 Picture render_picture(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                        const PictureSettings& settings);
 
-/// The exposure in stops for a picture of the scene from `camera`, computed from a small picture.
-float exposure_for(const PictureRenderer& renderer, const PictureLight& light,
-                   const Camera& camera);
+/// The exposure in stops for what `camera` sees of the scene, found from a small picture of 16:9:
+/// the same for pictures of any size, baked scenes and the viewer. `show` is a kind of light.
+float exposure_for(const PictureRenderer& renderer, const PictureLight& light, const Camera& camera,
+                   Show show = Show::kRadiosity);
 
 }  // namespace rebounce

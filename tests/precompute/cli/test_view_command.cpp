@@ -115,6 +115,14 @@ TEST_F(ViewCommand, LooksAsThePictureOfRender) {
   EXPECT_LT(difference(image, read_image(path("render.png"))).mean, 2.0);
 }
 
+TEST_F(ViewCommand, FindsTheExposureOfRender) {
+  const Outcome outcome = run({"render", file_, "--lights", kLights, "--size", "240x160", "--quiet",
+                               "-o", path("render.png")});
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  EXPECT_LT(difference(screenshot({"--lights", kLights}), read_image(path("render.png"))).mean,
+            2.5);
+}
+
 TEST_F(ViewCommand, LampsWithASurfaceLookAsRenderDrawsThem) {
   // The camera looks in from the front; the lamps hang above its view.
   const std::string place = R"("position": [0.278, 0.53, 0.28], )";

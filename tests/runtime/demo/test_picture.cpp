@@ -463,28 +463,5 @@ TEST(Camera, LookAtIsOrthonormalAndAims) {
   EXPECT_NEAR(std::abs(down.right[0]), 1, 1e-6F);
 }
 
-TEST(Camera, FitStandsInsideAClosedRoom) {
-  for (const bool double_sided : {false, true}) {
-    SceneBuilder scene = lamp_room();
-    if (double_sided) scene.make_double_sided();
-    const RayTracer tracer = make_surface_tracer(scene.data().mesh);
-    const Camera camera = fit_camera(scene.data(), tracer);
-    EXPECT_LT(std::abs(camera.position[0]), 1);
-    EXPECT_LT(std::abs(camera.position[2]), 1);
-    EXPECT_EQ(camera.up, (Float3{0, 1, 0})) << "level";
-  }
-}
-
-TEST(Camera, FitLooksIntoAnOpenBoxFromItsOpenSide) {
-  SceneBuilder scene = lamp_room();
-  // Rectangle 5 is the wall at z = 1: shrunk to nothing, it leaves the box open.
-  DisplayMesh& mesh = scene.data().mesh;
-  for (int k = 20; k < 24; ++k) mesh.position[k] = {0, 0, 0.99F};
-  const RayTracer tracer = make_surface_tracer(mesh);
-  const Camera camera = fit_camera(scene.data(), tracer);
-  EXPECT_GT(camera.backward[2], 0.7F);
-  EXPECT_GT(camera.position[2], 0.5F);
-}
-
 }  // namespace
 }  // namespace rebounce::test_picture

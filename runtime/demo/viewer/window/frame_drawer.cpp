@@ -40,7 +40,7 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
   const std::vector<Light> lights = state.lights_now();
   lit_.relight(lights, state.sky, state.methods, state.is_split, times_);
   if (state.wants_exposure) {
-    state.exposure = lit_.find_exposure(lights, state.sky, state.camera.camera());
+    state.exposure = lit_.find_exposure(lights, state.sky, state.camera.camera(), state.show);
     state.wants_exposure = false;
   }
   if (state.show == Show::kError) compare(state);

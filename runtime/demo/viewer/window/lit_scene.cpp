@@ -102,14 +102,14 @@ std::vector<float> LitScene::patch_errors(Side side) {
   return rebounce::patch_errors(indirect(side), reference_indirect_, patches.area);
 }
 
-float LitScene::find_exposure(std::span<const Light> lights, const Sky& sky,
-                              const Camera& camera) const {
+float LitScene::find_exposure(std::span<const Light> lights, const Sky& sky, const Camera& camera,
+                              Show show) const {
   return exposure_for(pictures_,
                       {.lights = lights,
                        .sky = sky,
                        .indirect_irradiance = indirect(Side::kFirst),
                        .emitted_irradiance = emitted_},
-                      camera);
+                      camera, is_light(show) ? show : Show::kRadiosity);
 }
 
 }  // namespace rebounce

@@ -59,8 +59,9 @@ class LitScene {
   double error(Side side) const { return error_[index(side)]; }
   bool has_reference() const { return static_cast<bool>(reference_); }
 
-  /// The exposure in stops of a small picture of the scene from `camera`.
-  float find_exposure(std::span<const Light> lights, const Sky& sky, const Camera& camera) const;
+  /// exposure_for() of what `camera` sees; of all light where `show` is not a kind of light.
+  float find_exposure(std::span<const Light> lights, const Sky& sky, const Camera& camera,
+                      Show show) const;
 
   const Engine& engine() const { return engine_; }
   const TransferData& data() const { return *data_; }
