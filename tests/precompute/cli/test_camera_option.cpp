@@ -6,7 +6,7 @@
 
 #include "tests/support/command_line.h"
 
-namespace rebounce {
+namespace rebounce::test_camera_option {
 namespace {
 
 using nlohmann::json;
@@ -105,4 +105,4 @@ TEST_F(CameraOption, ExposesForWhatIsShown) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_camera_option

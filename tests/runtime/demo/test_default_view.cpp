@@ -15,7 +15,7 @@
 #include "tests/support/rectangle_scene.h"
 #include "tests/support/with_threads.h"
 
-namespace rebounce {
+namespace rebounce::test_default_view {
 namespace {
 
 using test::SceneBuilder;
@@ -194,4 +194,4 @@ TEST(ViewScore, IsHigherTheMoreIsSeen) {
 }
 
 }  // namespace
-}  // namespace rebounce
+}  // namespace rebounce::test_default_view
