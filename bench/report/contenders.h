@@ -18,7 +18,7 @@ using ReportProgress = std::function<bool(std::string_view, double)>;
 
 /// Y in one form.
 struct StoredOperator {
-  std::string name;  ///< "dense f32", "hierarchical 0.5 % q16", "low rank 64", ...
+  std::string name;  ///< "dense f32", "hierarchical 0.5 % f16", "low rank 64", ...
   std::shared_ptr<const TransferOperator> transfer;
 };
 

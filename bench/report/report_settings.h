@@ -23,9 +23,8 @@ struct ReportSettings {
 
   /// Hierarchical operators; the first is the one that pictures, truth and refinement use.
   std::vector<OperatorChoice> operators = {
-      {0.005, Precision::kQ8},  {0.02, Precision::kQ8},   {0.002, Precision::kQ8},
-      {0.001, Precision::kQ8},  {0.0003, Precision::kQ8}, {0.005, Precision::kF16},
-      {0.005, Precision::kQ16},
+      {0.005, Precision::kQ8}, {0.02, Precision::kQ8},   {0.002, Precision::kQ8},
+      {0.001, Precision::kQ8}, {0.0003, Precision::kQ8}, {0.005, Precision::kF16},
   };
   /// At which form factors are compressed; the first is what refinement has beside exact ones.
   std::vector<double> form_factor_tolerances = {0.0003, 0.001, 0.003, 0.01};

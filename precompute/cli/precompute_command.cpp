@@ -285,10 +285,9 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
       .add_option(
           "--precision", chosen.precision,
-          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, integers: "
-          "q8 for a third of the bytes, q16 for half of them and, where all of them fit a "
-          "processor's own cache, a little less time; by default f32 for a dense operator, q8 for "
-          "a hierarchical one, f16 for others")
+          "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, "
+          "integers: q8 for a third of the bytes; by default f32 for a dense operator, q8 for a "
+          "hierarchical one, f16 for others")
       ->check(CLI::IsMember(names_of(kOfferedPrecisions)));
   command
       .add_option("--receivers", chosen.receivers,

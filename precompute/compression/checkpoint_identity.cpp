@@ -32,7 +32,6 @@ std::string identity_of_panels(const HierarchicalOperator& form_factors, const P
   update(hash, std::span(f.blocks));
   update(hash, f.values_f32.span());
   update(hash, f.values_f16.span());
-  update(hash, f.bases_q16.span());
   update(hash, f.bases_q8.span());
   update<std::uint32_t>(hash, f.patch);
   update<float>(hash, patches.area);

@@ -3,11 +3,13 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
+#include <numeric>
 #include <random>
 
 #include "precompute/base/blas.h"
 #include "precompute/base/symmetric_matrix.h"
 #include "rebounce/error.h"
+#include "transfer/format/hierarchical_encoding.h"
 
 namespace rebounce {
 namespace {
@@ -69,34 +71,41 @@ RitzVectors ritz_vectors(const DenseMatrix& dense, const MatrixXf& basis, Index 
   return result;
 }
 
-SharedArray<float> tile_basis(const MatrixXf& basis) {
-  constexpr std::size_t kTile = LowRankOperator::kTile;
-  const auto n = static_cast<std::size_t>(basis.rows()),
-             rank = static_cast<std::size_t>(basis.cols());
-  std::vector<float> values(LowRankOperator::tile_count(n) * rank * kTile, 0.0F);
-  for (std::size_t r = 0; r < rank; ++r) {
-    for (std::size_t i = 0; i < n; ++i) {
-      values[(i / kTile * rank + r) * kTile + i % kTile] = basis(i, r);
-    }
-  }
-  return SharedArray(std::move(values));
-}
-
-SharedArray<float> make_couplings(const RitzVectors& vectors) {
-  std::vector<float> values;
+/// One block on the diagonal: its basis [rank][positions] and its coupling matrices, one after the
+/// other.
+HierarchicalStorage one_block(const DenseOperator::Storage& dense, const RitzVectors& vectors) {
+  const std::size_t n = dense.area.size(), positions = HierarchicalFormat::position_count(n);
+  const auto size = static_cast<std::uint32_t>(positions);
+  const auto rank = static_cast<std::uint32_t>(vectors.basis.cols());
+  MatrixXf basis = MatrixXf::Zero(static_cast<Index>(positions), vectors.basis.cols());
+  basis.topRows(vectors.basis.rows()) = vectors.basis;
+  std::vector<float> values(basis.data(), basis.data() + basis.size());
   for (const MatrixXf& image : vectors.images) {
     const MatrixXf coupling = vectors.basis.transpose() * image;
     const MatrixXf symmetric = 0.5F * (coupling + coupling.transpose());
     values.insert(values.end(), symmetric.data(), symmetric.data() + symmetric.size());
   }
-  return SharedArray(std::move(values));
+  values.resize(values.size() + HierarchicalFormat::kPadding);
+  HierarchicalStorage storage;
+  storage.area = dense.area;
+  storage.patch.resize(n);
+  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+  storage.channel_matrix = dense.channel_matrix;
+  storage.matrix_count = dense.matrix_count;
+  storage.blocks = {{.row_count = size,
+                     .column_count = size,
+                     .kind = TransferBlock::Kind::kLowRank,
+                     .row_rank = rank,
+                     .column_rank = rank}};
+  storage.values_f32 = SharedArray(std::move(values));
+  return storage;
 }
 
 }  // namespace
 
-std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperator& dense,
-                                                               const LowRankSettings& settings,
-                                                               const Progress& progress) {
+std::shared_ptr<const HierarchicalOperator> build_low_rank_transfer(const DenseOperator& dense,
+                                                                    const LowRankSettings& settings,
+                                                                    const Progress& progress) {
   load_blas();
   const DenseMatrix matrix(dense);
   const auto n = static_cast<Index>(matrix.area().size());
@@ -117,15 +126,8 @@ std::shared_ptr<const LowRankOperator> build_low_rank_transfer(const DenseOperat
   const RitzVectors vectors = ritz_vectors(matrix, basis, rank);
   report(1);
 
-  LowRankOperator::Storage storage;
-  storage.area = dense.storage().area;
-  storage.channel_matrix = dense.storage().channel_matrix;
-  storage.matrix_count = dense.storage().matrix_count;
-  storage.rank = static_cast<std::size_t>(rank);
-  storage.basis_f32 = tile_basis(vectors.basis);
-  storage.coupling = make_couplings(vectors);
-  if (settings.precision == Precision::kF16) storage = LowRankOperator::encode_half(storage);
-  return std::make_shared<const LowRankOperator>(std::move(storage));
+  return std::make_shared<const HierarchicalOperator>(
+      encode_values(one_block(dense.storage(), vectors), settings.precision));
 }
 
 }  // namespace rebounce

@@ -124,7 +124,7 @@ def cornell_box():
 
     yield case("dense_f32", dense("f32") + STORED, everything(bulb, METHODS))
     yield case("dense_f16", dense("f16"), looks(spot) | export("transfer"))
-    for precision in ("q8", "q16", "f16", "f32"):
+    for precision in ("q8", "f16", "f32"):
         for tolerance in (0.005, 0.05):
             options = hierarchical(precision, tolerance)
             uses = looks(pair) | export("transfer")
@@ -161,8 +161,8 @@ def rooms():
     yield case("furnished_room", "links_roles", links, form_factors="links")
     yield case("white_room", "dense", dense("f16"), export("transfer"))
     yield case("white_room", "first-bounce", low_rank("first-bounce", "f16"))
-    links = hierarchical("q16", 0.02) + COMPRESSED
-    yield case("white_room", "links_q16", links, form_factors="links")
+    links = hierarchical("q8", 0.02) + COMPRESSED
+    yield case("white_room", "links_q8", links, form_factors="links")
 
 
 def pavilion():
@@ -174,7 +174,7 @@ def pavilion():
 
     yield case("dense", dense("f32") + EXTRAS, looks(sky) | iterations(sky, ["exact"]) | bake(sky))
     yield case("hierarchical_q8", hierarchical("q8", 0.005))
-    yield case("hierarchical_q16", hierarchical("q16", 0.05) + STORED)
+    yield case("hierarchical_q8_stored", hierarchical("q8", 0.05) + STORED)
     links = hierarchical("f32", 0.02) + COMPRESSED + EXTRAS
     yield case("links_f32", links, form_factors="links")
 

@@ -178,4 +178,18 @@ inline HierarchicalStorage equilibrated(HierarchicalStorage storage, std::uint64
   return storage;
 }
 
+/// The same with roles by position: the first third both, then receivers, sources, and patches with
+/// no role.
+inline HierarchicalStorage with_roles(HierarchicalStorage storage) {
+  storage.roles.role.resize(storage.patch.size());
+  for (std::size_t k = 0; k < storage.patch.size(); ++k) {
+    const std::size_t sixth = 6 * k / storage.patch.size();
+    storage.roles.role[storage.patch[k]] = sixth < 2    ? PatchRoles::kBoth
+                                           : sixth == 2 ? PatchRoles::kReceiver
+                                           : sixth < 5  ? PatchRoles::kSource
+                                                        : std::uint8_t{0};
+  }
+  return storage;
+}
+
 }  // namespace rebounce::test

@@ -19,8 +19,7 @@
 
 namespace rebounce::test {
 
-inline constexpr Precision kPrecisions[] = {Precision::kF32, Precision::kF16, Precision::kQ16,
-                                            Precision::kQ8};
+inline constexpr Precision kPrecisions[] = {Precision::kF32, Precision::kF16, Precision::kQ8};
 
 /// Y M0, into an array that holds something else and with a workspace that holds no numbers.
 inline std::vector<Float3> unaided_product(const TransferOperator& op,
@@ -115,12 +114,6 @@ inline void expect_no_allocations(const HierarchicalOperator& op) {
   EXPECT_EQ(count_allocations([&] { op.apply(m0, h, workspace); }), 0);
   EXPECT_EQ(count_allocations([&] { op.apply_to(receivers, m0, h, workspace); }), 0);
   EXPECT_GT(count_allocations([&] { h.reserve(2 * h.size()); }), 0) << "allocations are counted";
-}
-
-/// What an apply may differ from plain sums over the same stored values: by the rounding of light,
-/// to 11 or 12 bits for 16-bit values and to 15 for bytes, twice on its way, else by that of sums.
-inline double rounding_of(Precision precision) {
-  return precision == Precision::kQ16 ? 5e-4 : precision == Precision::kQ8 ? 1e-4 : 5e-6;
 }
 
 }  // namespace rebounce::test

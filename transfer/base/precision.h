@@ -8,8 +8,9 @@
 
 namespace rebounce {
 
-/// How the bases of a HierarchicalOperator are stored: IEEE numbers of 16 or 32 bits, or integers.
-enum class BasisPrecision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
+/// How the bases of a HierarchicalOperator are stored: IEEE numbers of 16 or 32 bits, or integers
+/// of 8 bits.
+enum class BasisPrecision : std::uint8_t { kF16, kF32, kQ8 };
 
 /// How the coupling matrices and dense entries of a HierarchicalOperator are stored.
 enum class CouplingPrecision : std::uint8_t { kF16, kF32 };
@@ -27,16 +28,15 @@ struct OfferedPrecision {
   const char* name;
   HierarchicalPrecision hierarchical;  ///< what it means for a HierarchicalOperator
 };
-inline constexpr std::array<OfferedPrecision, 4> kOfferedPrecisions{{
+inline constexpr std::array<OfferedPrecision, 3> kOfferedPrecisions{{
     {Precision::kF16, "f16", {BasisPrecision::kF16, CouplingPrecision::kF16}},
     {Precision::kF32, "f32", {BasisPrecision::kF32, CouplingPrecision::kF32}},
-    {Precision::kQ16, "q16", {BasisPrecision::kQ16, CouplingPrecision::kF16}},
     {Precision::kQ8, "q8", {BasisPrecision::kQ8, CouplingPrecision::kF16}},
 }};
 
 /// Whether bases of this precision are integers. Integers have an order of their own.
 constexpr bool are_integers(BasisPrecision precision) {
-  return precision == BasisPrecision::kQ16 || precision == BasisPrecision::kQ8;
+  return precision == BasisPrecision::kQ8;
 }
 
 /// What `precision` means for a HierarchicalOperator.

@@ -45,9 +45,6 @@ inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
 inline constexpr char kSurfaceSkyBegin[] = "surface_harmonics.sky_begin";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
-inline constexpr char kLowRankBasis[] = "transfer.low_rank.basis";
-inline constexpr char kLowRankCore[] = "transfer.low_rank.core";
-inline constexpr char kLowRankChannelMatrix[] = "transfer.low_rank.channel_matrix";
 }  // namespace tensor
 
 /// The tensors of a hierarchical operator. Without `role` every patch has both roles.

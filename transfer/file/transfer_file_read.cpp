@@ -13,7 +13,6 @@
 #include "transfer/format/hierarchical_storage.h"
 #include "transfer/operator/dense_operator.h"
 #include "transfer/operator/hierarchical_operator.h"
-#include "transfer/operator/low_rank_operator.h"
 
 namespace rebounce {
 namespace {
@@ -260,17 +259,6 @@ std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* 
   return blocks;
 }
 
-void read_integer_bases(const SafetensorsFile& file, const char* name,
-                        HierarchicalStorage& storage) {
-  if (file.info(name).type == TensorType::kI16) {
-    storage.precision.bases = BasisPrecision::kQ16;
-    storage.bases_q16 = file.tensor<std::int16_t>(name, {kAnySize}, TensorType::kI16);
-  } else {
-    storage.precision.bases = BasisPrecision::kQ8;
-    storage.bases_q8 = file.tensor<std::int8_t>(name, {kAnySize}, TensorType::kI8);
-  }
-}
-
 /// Without the tensor, the operator serves all patches.
 PatchRoles read_roles(const SafetensorsFile& file, const char* name, std::size_t patch_count) {
   if (name == nullptr || !file.tensors().contains(name)) return {};
@@ -304,35 +292,12 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
   } else {
     storage.values_f32 = file.tensor<float>(names.values, {kAnySize});
   }
-  if (file.tensors().contains(names.bases)) read_integer_bases(file, names.bases, storage);
+  if (file.tensors().contains(names.bases)) {
+    storage.precision.bases = BasisPrecision::kQ8;
+    storage.bases_q8 = file.tensor<std::int8_t>(names.bases, {kAnySize}, TensorType::kI8);
+  }
   try {
     return std::make_shared<const HierarchicalOperator>(std::move(storage));
-  } catch (const Error& error) {
-    refuse(file, error.what());
-  }
-}
-
-std::shared_ptr<const LowRankOperator> read_low_rank_operator(const SafetensorsFile& file,
-                                                              const std::vector<float>& area) {
-  LowRankOperator::Storage storage;
-  storage.area = area;
-  const TensorInfo& basis = file.info(tensor::kLowRankBasis);
-  const TensorShape shape{LowRankOperator::tile_count(storage.area.size()), kAnySize,
-                          LowRankOperator::kTile};
-  if (basis.type == TensorType::kF16) {
-    storage.precision = Precision::kF16;
-    storage.basis_f16 = file.tensor<std::uint16_t>(tensor::kLowRankBasis, shape, TensorType::kF16);
-  } else {
-    storage.basis_f32 = file.tensor<float>(tensor::kLowRankBasis, shape);
-  }
-  storage.rank = basis.shape[1];
-  storage.coupling =
-      file.tensor<float>(tensor::kLowRankCore, {kAnySize, storage.rank, storage.rank});
-  storage.matrix_count = static_cast<std::uint32_t>(file.info(tensor::kLowRankCore).shape[0]);
-  storage.channel_matrix =
-      read_channel_matrix(file, tensor::kLowRankChannelMatrix, storage.matrix_count);
-  try {
-    return std::make_shared<const LowRankOperator>(std::move(storage));
   } catch (const Error& error) {
     refuse(file, error.what());
   }
@@ -347,9 +312,8 @@ std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& fil
     case OperatorKind::kDense:
       return read_dense_operator(file, area);
     case OperatorKind::kHierarchical:
-      return read_hierarchical_operator(file, kHierarchicalTransfer, area);
     case OperatorKind::kLowRank:
-      return read_low_rank_operator(file, area);
+      return read_hierarchical_operator(file, kHierarchicalTransfer, area);
     case OperatorKind::kNoOperator:
       break;
   }

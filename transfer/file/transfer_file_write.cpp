@@ -10,7 +10,6 @@
 #include "transfer/format/hierarchical_storage.h"
 #include "transfer/operator/dense_operator.h"
 #include "transfer/operator/hierarchical_operator.h"
-#include "transfer/operator/low_rank_operator.h"
 
 namespace rebounce {
 namespace {
@@ -88,7 +87,6 @@ void collect_dense_operator(const DenseOperator::Storage& storage, TensorCollect
 template <typename Value>
 constexpr TensorType value_type() {
   if constexpr (std::same_as<Value, std::uint16_t>) return TensorType::kF16;
-  if constexpr (std::same_as<Value, std::int16_t>) return TensorType::kI16;
   if constexpr (std::same_as<Value, std::int8_t>) return TensorType::kI8;
   if constexpr (std::same_as<Value, float>) return TensorType::kF32;
 }
@@ -121,28 +119,11 @@ void collect_hierarchical_operator(const HierarchicalStorage& storage,
   with_couplings(storage, add(names.values));
 }
 
-void collect_low_rank_operator(const LowRankOperator::Storage& storage,
-                               TensorCollector& collector) {
-  const TensorShape shape{LowRankOperator::tile_count(storage.area.size()), storage.rank,
-                          LowRankOperator::kTile};
-  if (storage.precision == Precision::kF16) {
-    collector.add(tensor::kLowRankBasis, shape, storage.basis_f16.span(), TensorType::kF16);
-  } else {
-    collector.add(tensor::kLowRankBasis, shape, storage.basis_f32.span());
-  }
-  collector.add(tensor::kLowRankCore, {storage.matrix_count, storage.rank, storage.rank},
-                storage.coupling.span());
-  collector.add<std::uint32_t>(tensor::kLowRankChannelMatrix, {storage.channel_matrix.size()},
-                               storage.channel_matrix);
-}
-
 void collect_operator(const TransferOperator* transfer, TensorCollector& collector) {
   if (const auto* dense = dynamic_cast<const DenseOperator*>(transfer)) {
     collect_dense_operator(dense->storage(), collector);
   } else if (const auto* blocks = dynamic_cast<const HierarchicalOperator*>(transfer)) {
     collect_hierarchical_operator(blocks->storage(), kHierarchicalTransfer, collector);
-  } else if (const auto* low_rank = dynamic_cast<const LowRankOperator*>(transfer)) {
-    collect_low_rank_operator(low_rank->storage(), collector);
   } else {
     throw Error(
         "a transfer file cannot hold this kind of operator; give it one that the library has");

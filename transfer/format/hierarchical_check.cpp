@@ -152,9 +152,8 @@ void check_tables(const Storage& storage) {
     if (one_rank && storage.order == HierarchicalStorage::Order::kStreamed) {
       refuse("a block has only one rank");
     }
-    const bool rounded = storage.precision.bases == BasisPrecision::kF16 ||
-                         storage.precision.bases == BasisPrecision::kQ16;
-    if (rounded && (block.row_residual_rank | block.column_residual_rank) != 0) {
+    if (storage.precision.bases == BasisPrecision::kF16 &&
+        (block.row_residual_rank | block.column_residual_rank) != 0) {
       refuse("a block has residual ranks, but its bases are not in 8 bits");
     }
   }
@@ -197,12 +196,6 @@ void check_hierarchical_storage(const Storage& storage) {
     refuse("bases in integers are not in the streamed order");
   }
   if (!sizes_fit(storage)) refuse("the number of values does not fit the blocks");
-  // Otherwise sums of products could overflow 32 bits.
-  constexpr std::int16_t kLargest = HierarchicalFormat::kLargestShort;
-  const auto too_large = [](std::int16_t value) { return value > kLargest || value < -kLargest; };
-  if (std::ranges::any_of(storage.bases_q16.span(), too_large)) {
-    refuse("a value of the bases is beyond +-" + std::to_string(kLargest));
-  }
 }
 
 }  // namespace rebounce

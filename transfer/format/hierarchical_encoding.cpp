@@ -95,17 +95,8 @@ Storage stream_exact(const Storage& storage) {
   return streamed;
 }
 
-/// The largest magnitude of the integers that bases are rounded to.
-template <typename Basis>
-struct IntegerRange;
-template <>
-struct IntegerRange<std::int8_t> {
-  static constexpr float kLargest = 127;
-};
-template <>
-struct IntegerRange<std::int16_t> {
-  static constexpr float kLargest = HierarchicalFormat::kLargestShort;
-};
+// The largest magnitude of the integers that bases are rounded to.
+constexpr float kLargestByte = 127;
 
 /// Writes an operator in f32 in another precision. Where bases become integers, the scales of their
 /// vectors are multiplied into the coupling matrices.
@@ -127,7 +118,7 @@ class Encoder {
   std::vector<float> release_coefficient_scale() { return std::move(coefficient_scale_); }
 
  private:
-  static constexpr bool kIntegers = std::is_integral_v<Basis> && std::is_signed_v<Basis>;
+  static constexpr bool kIntegers = std::is_same_v<Basis, std::int8_t>;
 
   void encode(const TransferBlock& block, std::size_t index) {
     const Layout::BlockLayout &from = from_.block_layouts[index], &to = to_.block_layouts[index];
@@ -179,7 +170,7 @@ class Encoder {
                      std::size_t r) {
     float largest = 0;
     for (const float v : rest) largest = std::max(largest, std::abs(v));
-    const float step = largest / IntegerRange<Basis>::kLargest;
+    const float step = largest / kLargestByte;
     put_multiples(rest, step, to, r);
     if (r < to.residual_rank) {
       put_multiples(rest, step / HierarchicalFormat::kResidualScale, to, rank + r);
@@ -189,10 +180,9 @@ class Encoder {
 
   /// Stores a vector as integer multiples of `step` and replaces it by the rounding error.
   void put_multiples(std::span<float> vector, float step, const Layout::End& to, std::size_t rank) {
-    constexpr float kLargest = IntegerRange<Basis>::kLargest;
     if (step == 0) return;
     for (std::size_t k = 0; k < vector.size(); ++k) {
-      const float steps = std::clamp(std::round(vector[k] / step), -kLargest, kLargest);
+      const float steps = std::clamp(std::round(vector[k] / step), -kLargestByte, kLargestByte);
       bases_[to_.basis_index(to, rank, k)] = static_cast<Basis>(steps);
       vector[k] -= steps * step;
     }

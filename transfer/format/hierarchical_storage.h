@@ -53,7 +53,6 @@ struct HierarchicalStorage {
   /// have the same type, the bases come first in one array. The other arrays are empty.
   SharedArray<float> values_f32;
   SharedArray<std::uint16_t> values_f16;  ///< bits of IEEE half-precision numbers
-  SharedArray<std::int16_t> bases_q16;
   SharedArray<std::int8_t> bases_q8;
 
   /// Whether bases and coupling matrices share one array.
@@ -77,8 +76,6 @@ decltype(auto) with_bases(Storage& storage, const Work& work) {
   switch (storage.precision.bases) {
     case BasisPrecision::kF16:
       return work(storage.values_f16);
-    case BasisPrecision::kQ16:
-      return work(storage.bases_q16);
     case BasisPrecision::kQ8:
       return work(storage.bases_q8);
     case BasisPrecision::kF32:
@@ -104,7 +101,6 @@ template <typename Storage, typename Work>
 void for_each_array(Storage& storage, const Work& work) {
   work(storage.values_f32);
   work(storage.values_f16);
-  work(storage.bases_q16);
   work(storage.bases_q8);
 }
 

@@ -29,11 +29,6 @@ struct HierarchicalFormat {
   /// again in 8 bits. The residuals of a basis follow its vectors, in their order.
   static constexpr float kResidualScale = 254;
 
-  /// The largest 16-bit integer; kShortScale stands for 1. Sums of 128 products with such integers
-  /// fit 32 bits.
-  static constexpr std::int16_t kLargestShort = 4095;
-  static constexpr float kShortScale = 4096;
-
   /// Bound of the exponents of position scales.
   static constexpr int kLargestExponent = 24;
 
@@ -65,7 +60,7 @@ struct TransferBlock {
   /// Ranks of a low-rank block. A dense block has 0 and 0, a cluster basis column_count and 0.
   std::uint32_t row_rank = 0, column_rank = 0;
   /// The number of leading basis vectors that have a residual in 8 bits (kResidualScale). In f32
-  /// the numbers are kept but not used; in f16 and 16 bits they are 0.
+  /// the numbers are kept but not used; in f16 they are 0.
   std::uint32_t row_residual_rank = 0, column_residual_rank = 0;
 
   bool on_diagonal() const { return row_begin == column_begin; }

@@ -14,8 +14,6 @@ namespace rebounce {
 template <typename Basis>
 inline constexpr float kBasisScale = 1;
 template <>
-inline constexpr float kBasisScale<std::int16_t> = HierarchicalFormat::kShortScale;
-template <>
 inline constexpr float kBasisScale<std::int8_t> = HierarchicalFormat::kByteScale;
 
 /// The stored number that stands for 1 in coupling matrices and dense blocks.
@@ -29,9 +27,6 @@ inline double as_number(float stored) {
 }
 inline double as_number(std::uint16_t half) {
   return half_to_float(half);
-}
-inline double as_number(std::int16_t stored) {
-  return stored;
 }
 inline double as_number(std::int8_t stored) {
   return stored;

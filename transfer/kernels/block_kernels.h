@@ -137,7 +137,6 @@ struct CouplingKernels {
 struct BlockKernels {
   BasisKernels<float> bases_f32;
   BasisKernels<std::uint16_t> bases_f16;
-  BasisKernels<std::int16_t> bases_q16;
   BasisKernels<std::int8_t> bases_q8;
   CouplingKernels<float> couplings_f32;
   CouplingKernels<std::uint16_t> couplings_f16;

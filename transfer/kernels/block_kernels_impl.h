@@ -19,17 +19,11 @@ constexpr BasisKernels<Value> make_basis_kernels() {
   return {project<V, Value>, expand<V, Value>};
 }
 
-template <typename N, typename Value>
-constexpr BasisKernels<Value> make_integer_kernels() {
-  return {project_integers<N, Value>, expand_integers<N, Value>};
-}
-
 template <typename V, typename N>
 constexpr BlockKernels make_block_kernels() {
   return {make_basis_kernels<V, float>(),
           make_basis_kernels<V, std::uint16_t>(),
-          make_integer_kernels<N, std::int16_t>(),
-          make_integer_kernels<N, std::int8_t>(),
+          {project_integers<N>, expand_integers<N>},
           {multiply_couplings<V, float>, multiply_dense<V, float>, add_products<V>,
            add_dense<V, float>},
           {multiply_couplings<V, std::uint16_t>, multiply_dense<V, std::uint16_t>, add_products<V>,

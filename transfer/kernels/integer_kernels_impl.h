@@ -1,15 +1,14 @@
 #pragma once
 
-// Products with bases in 16-bit or 8-bit integers, written once over a vector type `N` of integers.
+// Products with bases in 8-bit integers, written once over a vector type `N` of integers.
 // One file per instruction set includes this. Everything is in an unnamed namespace, so that no two
 // sets share an instantiation.
 //
 // One instruction multiplies neighbouring pairs of 16-bit integers and adds the two products to a
-// 32-bit sum: twice the products of a float multiply-add. 8-bit values are widened as they are
+// 32-bit sum: twice the products of a float multiply-add. Values are widened as they are
 // loaded. Light is rounded to integers, with one scale per channel and chunk of positions;
 // coefficients are rounded in the same way on the way back. The scale is the largest for which no
-// sum of products can overflow. With 8-bit values this leaves 15 bits; with 16-bit values 11 bits
-// where the light is even over a chunk of 128, up to 15 where it is not.
+// sum of products can overflow. This leaves 15 bits.
 //
 // A basis is [strip of 64 positions][rank / 4][position / 2][4 ranks][2 positions]; projection and
 // expansion both read it from the first value to the last. Coefficients are sums over positions:
@@ -57,17 +56,14 @@ struct Magnitudes {
 
 /// Base-2 logarithm of the largest sum of magnitudes for which no sum of products with basis values
 /// can overflow 32 bits.
-template <typename Value>
-constexpr std::uint32_t kLargestSum = 19;  // values up to 2^12
-template <>
-constexpr std::uint32_t kLargestSum<std::int8_t> = 24;
+constexpr std::uint32_t kLargestSum = 24;
 
 /// Powers of two that scale light to integers and back. The largest integer stays below 2^15 and
 /// the sum of all below 2^kLargestSum, so sums of products stay below 2^31.
 struct IntegerScales {
   ChannelFloats to, back;
 
-  IntegerScales(const Magnitudes& light, std::uint32_t largest_sum) {
+  explicit IntegerScales(const Magnitudes& light) {
     constexpr std::uint32_t kExponent = 0x7F800000, kOne = 127U << 23;
     constexpr std::uint32_t kLargest = 14U << 23;
     constexpr std::uint32_t kDark = kOne - (100U << 23);  // anything below 2^-100 is as dark
@@ -76,7 +72,7 @@ struct IntegerScales {
     };
     for (std::size_t c = 0; c < kChannelLanes; ++c) {
       const std::uint32_t one = std::max(power(light.largest[c]) - kLargest,
-                                         power(light.sum[c]) - ((largest_sum - 1) << 23));
+                                         power(light.sum[c]) - ((kLargestSum - 1) << 23));
       to[c] = std::bit_cast<float>(2 * kOne - one);
       back[c] = std::bit_cast<float>(one);
     }
@@ -103,11 +99,11 @@ inline bool is_uneven(const Magnitudes& light, std::size_t count) {
   return uneven;
 }
 
-template <typename N, typename Value>
+template <typename N>
 REBOUNCE_INLINE inline void round_light(const float* x, std::size_t stride, std::size_t count,
                                         IntegerLight& light) {
   const Magnitudes magnitudes = N::magnitudes_of_planes(x, stride, count);
-  const IntegerScales scales(magnitudes, kLargestSum<Value>);
+  const IntegerScales scales(magnitudes);
   light.to = scales.to;
   light.back = scales.back;
   light.uneven = is_uneven(magnitudes, count);
@@ -134,16 +130,14 @@ struct LightRest {
 
 /// Part of a basis within a strip: the values of one group of ranks. The next group is `group_step`
 /// values later.
-template <typename Value>
 struct StripBasis {
-  const Value* values;
+  const std::int8_t* values;
   std::size_t group_step;
 };
 
 /// The part of a basis from a position of the cluster on, beginning with rank group `group`.
-template <typename Value>
-inline StripBasis<Value> strip_at(const Value* values, const BasisPart& part, std::size_t position,
-                                  std::size_t group) {
+inline StripBasis strip_at(const std::int8_t* values, const BasisPart& part, std::size_t position,
+                           std::size_t group) {
   const std::size_t groups = (part.rank + kRankGroup - 1) / kRankGroup;
   const std::size_t begin = position / kBasisStrip * kBasisStrip;
   const std::size_t width = std::min(kBasisStrip, part.size - begin);
@@ -152,8 +146,8 @@ inline StripBasis<Value> strip_at(const Value* values, const BasisPart& part, st
 }
 
 /// Loads values of a basis, and prefetches those that follow later.
-template <typename N, typename Value>
-REBOUNCE_INLINE inline N load_basis(const Value* values) {
+template <typename N>
+REBOUNCE_INLINE inline N load_basis(const std::int8_t* values) {
   prefetch_ahead<N::kWidth * sizeof(std::int16_t)>(values);
   return N::load(values);
 }
@@ -163,16 +157,14 @@ REBOUNCE_INLINE inline N load_basis(const Value* values) {
 
 /// Projects kGroups groups of ranks over `count` positions, at most a chunk; `first` and `second`
 /// are its two strips.
-template <typename N, std::size_t kGroups, typename Value>
-[[gnu::noinline]] void project_groups(StripBasis<Value> first, StripBasis<Value> second,
-                                      std::size_t count, const IntegerLight& light, bool add_to,
-                                      float* coefficient) {
+template <typename N, std::size_t kGroups>
+[[gnu::noinline]] void project_groups(StripBasis first, StripBasis second, std::size_t count,
+                                      const IntegerLight& light, bool add_to, float* coefficient) {
   N sum[kChannelCount][kGroups];
   unroll<kChannelCount>([&](auto c) REBOUNCE_INLINE {
     unroll<kGroups>([&](auto g) REBOUNCE_INLINE { sum[c][g] = N::zero(); });
   });
-  const auto add_strip = [&](StripBasis<Value> strip, std::size_t begin,
-                             std::size_t end) REBOUNCE_INLINE {
+  const auto add_strip = [&](StripBasis strip, std::size_t begin, std::size_t end) REBOUNCE_INLINE {
     for (std::size_t k = begin; k < end; k += N::kWidth, strip.values += N::kWidth) {
       N b[kGroups];
       unroll<kGroups>([&](auto g) REBOUNCE_INLINE {
@@ -195,13 +187,13 @@ struct LightChunk {
   std::size_t begin, count;
 };
 
-template <typename N, typename Value>
-REBOUNCE_INLINE inline void project_chunk(const Value* values, const BasisPart& part,
+template <typename N>
+REBOUNCE_INLINE inline void project_chunk(const std::int8_t* values, const BasisPart& part,
                                           const LightChunk& chunk, const IntegerLight& light,
                                           bool add_to, float* coefficient) {
   const std::size_t first_group = part.first_rank / kRankGroup;
   const std::size_t groups = (part.last_rank + kRankGroup - 1) / kRankGroup - first_group;
-  StripBasis<Value> first = strip_at(values, part, chunk.begin, first_group), second{};
+  StripBasis first = strip_at(values, part, chunk.begin, first_group), second{};
   if (chunk.count > kBasisStrip) {
     second = strip_at(values, part, chunk.begin + kBasisStrip, first_group);
   }
@@ -214,8 +206,8 @@ REBOUNCE_INLINE inline void project_chunk(const Value* values, const BasisPart& 
   });
 }
 
-template <typename N, typename Value>
-void project_integers(const Value* values, std::span<const BasisPart> parts,
+template <typename N>
+void project_integers(const std::int8_t* values, std::span<const BasisPart> parts,
                       PlanarVectors<const float> x, Coefficients<float> coefficient) {
   IntegerLight light;
   for (const BasisPart& part : parts) {
@@ -224,11 +216,11 @@ void project_integers(const Value* values, std::span<const BasisPart> parts,
       float* const to = coefficient.data + v / kChannelCount * coefficient.stride;
       for (std::size_t k = 0; k < part.size; k += kChunk) {
         const LightChunk chunk{k, std::min(part.size - k, kChunk)};
-        round_light<N, Value>(from + k, x.stride, chunk.count, light);
+        round_light<N>(from + k, x.stride, chunk.count, light);
         project_chunk<N>(values, part, chunk, light, k > 0, to);
         if (light.uneven && !part.over_cluster_coefficients) {
           const LightRest rest(from + k, x.stride, chunk.count, light);
-          round_light<N, Value>(rest.value, kChunk, chunk.count, light);
+          round_light<N>(rest.value, kChunk, chunk.count, light);
           project_chunk<N>(values, part, chunk, light, true, to);
         }
       }
@@ -250,13 +242,12 @@ struct IntegerCoefficients {
 };
 
 /// Rounds the coefficients of `ranks`; the other ranks of their groups become zero.
-template <typename N, typename Value>
+template <typename N>
 REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange ranks,
                                                IntegerCoefficients& to) {
   constexpr std::size_t kGroupSize = IntegerCoefficients::kGroupSize;
   const IntegerScales scales(N::magnitudes_of_lanes(from + ranks.begin * kChannelLanes,
-                                                    (ranks.end - ranks.begin) * kChannelLanes),
-                             kLargestSum<Value>);
+                                                    (ranks.end - ranks.begin) * kChannelLanes));
   to.back = scales.back;
   to.group_count = (ranks.end + kRankGroup - 1) / kRankGroup;
   const typename N::CoefficientRounding round(scales.to);
@@ -276,8 +267,8 @@ REBOUNCE_INLINE inline void round_coefficients(const float* from, RankRange rank
 
 /// Computes y at kWide vectors of positions. Groups of ranks are divided among kSplit partial sums,
 /// so that at least N::kLeastSums sums are independent.
-template <typename N, std::size_t kWide, typename Value>
-[[gnu::noinline]] void expand_integer_strip(StripBasis<Value> strip,
+template <typename N, std::size_t kWide>
+[[gnu::noinline]] void expand_integer_strip(StripBasis strip,
                                             const IntegerCoefficients& coefficient, float* y,
                                             std::size_t y_stride) {
   constexpr std::size_t kSums = kChannelCount * kWide;
@@ -317,8 +308,8 @@ template <typename N, std::size_t kWide, typename Value>
 }
 
 /// Expands the chunk of ranks from `first_rank` on.
-template <typename N, typename Value>
-REBOUNCE_INLINE inline void expand_chunk(const Value* values, const BasisPart& part,
+template <typename N>
+REBOUNCE_INLINE inline void expand_chunk(const std::int8_t* values, const BasisPart& part,
                                          std::size_t first_rank,
                                          const IntegerCoefficients& coefficient, float* y,
                                          std::size_t y_stride) {
@@ -339,8 +330,8 @@ REBOUNCE_INLINE inline void expand_chunk(const Value* values, const BasisPart& p
   }
 }
 
-template <typename N, typename Value>
-void expand_integers(const Value* values, std::span<const BasisPart> parts,
+template <typename N>
+void expand_integers(const std::int8_t* values, std::span<const BasisPart> parts,
                      Coefficients<const float> coefficient, PlanarVectors<float> y) {
   IntegerCoefficients rounded;
   for (const BasisPart& part : parts) {
@@ -351,7 +342,7 @@ void expand_integers(const Value* values, std::span<const BasisPart> parts,
       for (std::size_t r = first_group * kRankGroup; r < part.last_rank; r += kChunk) {
         const RankRange ranks{std::max<std::size_t>(part.first_rank, r) - r,
                               std::min(part.last_rank - r, kChunk)};
-        round_coefficients<N, Value>(from + r * kChannelLanes, ranks, rounded);
+        round_coefficients<N>(from + r * kChannelLanes, ranks, rounded);
         expand_chunk<N>(values, part, r, rounded, y.data + v * y.stride, y.stride);
       }
     }

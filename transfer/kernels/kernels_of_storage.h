@@ -16,7 +16,6 @@ template <typename Value>
 const BasisKernels<Value>& basis_kernels(const BlockKernels& kernels) {
   if constexpr (std::is_same_v<Value, float>) return kernels.bases_f32;
   if constexpr (std::is_same_v<Value, std::uint16_t>) return kernels.bases_f16;
-  if constexpr (std::is_same_v<Value, std::int16_t>) return kernels.bases_q16;
   if constexpr (std::is_same_v<Value, std::int8_t>) return kernels.bases_q8;
 }
 
@@ -60,7 +59,7 @@ class BasisProducts {
  private:
   template <typename Value>
   using On = KernelsOn<BasisKernels<Value>, Value>;
-  std::variant<On<float>, On<std::uint16_t>, On<std::int16_t>, On<std::int8_t>> on_;
+  std::variant<On<float>, On<std::uint16_t>, On<std::int8_t>> on_;
   float scale_ = 1;
 };
 

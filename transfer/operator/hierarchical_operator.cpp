@@ -366,6 +366,12 @@ std::shared_ptr<const HierarchicalPlan> HierarchicalOperator::plan_to(
                                             std::move(dark));
 }
 
+OperatorKind HierarchicalOperator::kind() const {
+  const std::vector<TransferBlock>& blocks = storage_->blocks;
+  const bool one = blocks.size() == 1 && blocks.front().kind == TransferBlock::Kind::kLowRank;
+  return one ? OperatorKind::kLowRank : OperatorKind::kHierarchical;
+}
+
 const PatchRoles& HierarchicalOperator::roles() const {
   return storage_->roles;
 }

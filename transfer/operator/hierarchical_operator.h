@@ -62,7 +62,8 @@ class HierarchicalOperator final : public TransferOperator {
   std::size_t bytes() const override;
   /// Bases count twice: an apply reads them to project light and to expand it.
   std::size_t bytes_per_apply() const override;
-  OperatorKind kind() const override { return OperatorKind::kHierarchical; }
+  /// kLowRank if one block of low rank is all.
+  OperatorKind kind() const override;
   const PatchRoles& roles() const override;
   std::size_t workspace_size() const override { return batch_workspace_size(1); }
   std::size_t batch_workspace_size(std::size_t light_count) const override;

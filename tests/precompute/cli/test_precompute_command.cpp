@@ -129,12 +129,10 @@ TEST_F(PrecomputeCommand, FormFactorsThatMissTheirToleranceFail) {
 
 TEST_F(PrecomputeCommand, IntegersAreRefusedBeforeAnythingIsComputed) {
   for (const std::string kind : {"dense", "low-rank"}) {
-    for (const std::string precision : {"q16", "q8"}) {
-      // The estimate, which comes before the form factors, would be a line of its own.
-      expect_failure({"precompute", kScene, "--patches", "300", "--operator", kind, "--precision",
-                      precision, "-o", path("box.safetensors")},
-                     "hierarchical");
-    }
+    // The estimate, which comes before the form factors, would be a line of its own.
+    expect_failure({"precompute", kScene, "--patches", "300", "--operator", kind, "--precision",
+                    "q8", "-o", path("box.safetensors")},
+                   "hierarchical");
   }
 }
 

@@ -7,33 +7,21 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/solved_room.h"
 #include "tests/support/unshadowed_lights.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce::test_hierarchical_transfer {
 namespace {
 
-struct Room {
-  PatchTable patches;
-  std::shared_ptr<const DenseOperator> dense;
-};
-
-Room make_room(const Scene& scene, std::size_t patch_count) {
-  PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-  const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  return {model.patches, build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
-}
+using Room = test::SolvedRoom;
 
 /// Coloured walls, a black block, another colour.
 const Room& furnished_room() {
-  static const Room room =
-      make_room(test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.1F, 0.3F, 0.9F}), 1500);
+  static const Room room(test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.1F, 0.3F, 0.9F}),
+                         1500);
   return room;
 }
 
@@ -41,16 +29,6 @@ const Room& furnished_room() {
 std::vector<std::vector<Float3>> lights_in(const PatchTable& patches, int count,
                                            std::uint64_t seed) {
   return test::unshadowed_lights(patches, count, seed, 2.2, 0.7);
-}
-
-double mean_error(const Room& room, const TransferOperator& transfer,
-                  const std::vector<std::vector<Float3>>& lights) {
-  double sum = 0;
-  for (const std::vector<Float3>& light : lights) {
-    sum += relative_difference(product(transfer, light), product(*room.dense, light),
-                               room.patches.area);
-  }
-  return sum / static_cast<double>(lights.size());
 }
 
 double entry_error(const DenseOperator& dense, const TransferOperator& transfer) {
@@ -77,7 +55,7 @@ TEST(HierarchicalTransfer, KeepsEveryTolerance) {
   for (const double tolerance : {0.04, 0.01, 0.002}) {
     const auto transfer = build_hierarchical_transfer(*room.dense, room.patches, {probes, judges},
                                                       {.tolerance = tolerance});
-    const double error = mean_error(room, *transfer, others);
+    const double error = room.mean_error(*transfer, others);
     // Under lights that the build has not seen.
     EXPECT_LT(error, tolerance);
     EXPECT_GT(error, 0.2 * tolerance) << "bytes are wasted";
@@ -95,7 +73,7 @@ TEST(HierarchicalTransfer, SaysWhatItMissesByItsError) {
   const auto probes = lights_in(room.patches, 4, 1);
   const auto transfer =
       build_hierarchical_transfer(*room.dense, room.patches, {probes, probes}, {.tolerance = 1e-6});
-  const double error = mean_error(room, *transfer, probes);
+  const double error = room.mean_error(*transfer, probes);
   EXPECT_GT(error, 1e-6);
   EXPECT_LT(error, 1e-3);
 }
@@ -155,12 +133,12 @@ TEST(HierarchicalTransfer, BlackLampsAreCarriedWhereTheyAreNamed) {
   constexpr double kTolerance = 0.01;
   const auto transfer = build_hierarchical_transfer(*room.dense, room.patches, {lights, lights},
                                                     {.tolerance = kTolerance});
-  EXPECT_LT(mean_error(room, *transfer, {light}), 3 * kTolerance);
+  EXPECT_LT(room.mean_error(*transfer, {&light, 1}), 3 * kTolerance);
 }
 
 TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   constexpr Float3 kGrey = {0.6F, 0.6F, 0.6F};
-  const Room room = make_room(test::furnished_room(kGrey, {0, 0, 0}, kGrey), 800);
+  const Room room(test::furnished_room(kGrey, {0, 0, 0}, kGrey), 800);
   const HierarchicalOperator grey(
       compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7));
   EXPECT_EQ(grey.storage().matrix_count, 1U);
@@ -186,12 +164,12 @@ TEST(HierarchicalTransfer, TheBrightestRoomFitsHalfPrecision) {
   for (const float reflectance : {0.9F, 0.99F}) {
     Scene scene = test::empty_scene({reflectance, reflectance, reflectance});
     test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
-    const Room room = make_room(scene, 300);
+    const Room room(scene, 300);
     const auto lights = lights_in(room.patches, 12, 1);
-    for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+    for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
       const auto transfer = build_hierarchical_transfer(
           *room.dense, room.patches, {lights, lights}, {.tolerance = 0.03, .precision = precision});
-      EXPECT_LT(mean_error(room, *transfer, lights), 0.03);
+      EXPECT_LT(room.mean_error(*transfer, lights), 0.03);
       EXPECT_LT(transfer->bytes(), room.dense->bytes() / 4);
     }
   }

@@ -9,21 +9,17 @@
 #include <cmath>
 #include <functional>
 
-#include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/solved_room.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/area_norm.h"
+#include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce::test_low_rank_transfer {
 namespace {
 
-struct Room {
-  PatchTable patches;
-  std::shared_ptr<const DenseOperator> dense;
-
-  std::shared_ptr<const LowRankOperator> low_rank(const LowRankSettings& settings) const {
+struct Room : test::SolvedRoom {
+  using SolvedRoom::SolvedRoom;
+  std::shared_ptr<const HierarchicalOperator> low_rank(const LowRankSettings& settings) const {
     return build_low_rank_transfer(*dense, settings);
   }
 };
@@ -32,9 +28,7 @@ Room make_room(std::size_t patch_count, const Float3& reflectance) {
   Scene scene = test::empty_scene(reflectance);
   test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
   test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 0);
-  PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-  const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  return {model.patches, build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
+  return {scene, patch_count};
 }
 
 const Room& small_room() {
@@ -82,7 +76,7 @@ std::vector<Float3> smooth_light(const PatchTable& patches) {
 TEST(LowRankTransfer, AFullRankIsExact) {
   const Room& room = small_room();
   const auto transfer = room.low_rank({100000, Precision::kF32});
-  EXPECT_EQ(transfer->storage().rank, room.patches.size());
+  EXPECT_EQ(transfer->storage().blocks.front().row_rank, room.patches.size());
   const std::vector<Float3> light = smooth_light(room.patches);
   EXPECT_LT(relative_difference(product(*transfer, light), product(*room.dense, light),
                                 room.patches.area),
@@ -135,15 +129,6 @@ TEST(LowRankTransfer, SameBitsForAnyNumberOfThreads) {
 TEST(LowRankTransfer, StopsWhenAsked) {
   const Room& room = grey_room();
   EXPECT_THROW(build_low_rank_transfer(*room.dense, {}, [](double) { return false; }), Cancelled);
-}
-
-TEST(LowRankTransfer, RefusesSizesThatDoNotAgree) {
-  LowRankOperator::Storage storage = small_room().low_rank({8})->storage();
-  storage.rank = 9;
-  EXPECT_THROW(LowRankOperator{storage}, Error);
-  storage.rank = 8;
-  storage.matrix_count = 2;
-  EXPECT_THROW(LowRankOperator{storage}, Error);
 }
 
 }  // namespace

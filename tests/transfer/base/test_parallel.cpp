@@ -12,7 +12,6 @@
 #include "transfer/exchange/exchange_blocks.h"
 #include "transfer/exchange/linked_form_factors.h"
 #include "transfer/operator/dense_operator.h"
-#include "transfer/operator/low_rank_operator.h"
 
 namespace rebounce::test_parallel {
 namespace {
@@ -82,22 +81,13 @@ std::vector<float> random_values(std::size_t count) {
   return values;
 }
 
-TEST(Parallel, DenseAndLowRankOperatorsHaveTheSameBits) {
+TEST(Parallel, DenseOperatorsHaveTheSameBits) {
   DenseOperator::Storage dense;
   dense.area.assign(kPatchCount, 0.5F);
   dense.matrix_count = 1;
   constexpr std::size_t kTileSize = DenseOperator::kTile * DenseOperator::kTile;
   dense.tiles_f32 = SharedArray(random_values(DenseOperator::tile_count(kPatchCount) * kTileSize));
   expect_same_bits(DenseOperator(std::move(dense)));
-
-  LowRankOperator::Storage low_rank;
-  low_rank.area.assign(kPatchCount, 0.5F);
-  low_rank.matrix_count = 1;
-  low_rank.rank = 40;
-  low_rank.basis_f32 = SharedArray(random_values(LowRankOperator::tile_count(kPatchCount) *
-                                                 low_rank.rank * LowRankOperator::kTile));
-  low_rank.coupling = SharedArray(random_values(low_rank.rank * low_rank.rank));
-  expect_same_bits(LowRankOperator(std::move(low_rank)));
 }
 
 TEST(Parallel, FormFactorsByPairsHaveTheSameBits) {

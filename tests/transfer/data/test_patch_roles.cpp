@@ -18,27 +18,9 @@ namespace {
 
 using test::expect_error;
 using test::unaided_product;
+using test::with_roles;
 
 constexpr std::size_t kPatchCount = 777;
-
-/// By position: the first third both, then receivers, sources, and patches with no role.
-PatchRoles roles_by_position(const HierarchicalStorage& storage) {
-  PatchRoles roles;
-  roles.role.resize(storage.patch.size());
-  for (std::size_t k = 0; k < storage.patch.size(); ++k) {
-    const std::size_t sixth = 6 * k / storage.patch.size();
-    roles.role[storage.patch[k]] = sixth < 2    ? PatchRoles::kBoth
-                                   : sixth == 2 ? PatchRoles::kReceiver
-                                   : sixth < 5  ? PatchRoles::kSource
-                                                : std::uint8_t{0};
-  }
-  return roles;
-}
-
-HierarchicalStorage with_roles(HierarchicalStorage storage) {
-  storage.roles = roles_by_position(storage);
-  return storage;
-}
 
 /// What the operator of all patches gives receivers of the light of sources.
 std::vector<Float3> part_of_product(const HierarchicalOperator& whole, const PatchRoles& roles,
@@ -69,7 +51,7 @@ TEST(PatchRoles, AnApplyIsThatPartOfTheWhole) {
     const std::vector<Float3> m0 = test::random_light(kPatchCount, 1, 100);
     for (const auto& [precision, allowed] :
          {std::pair(Precision::kF32, 2e-6), std::pair(Precision::kF16, 2e-6),
-          std::pair(Precision::kQ16, 5e-4), std::pair(Precision::kQ8, 5e-5)}) {
+          std::pair(Precision::kQ8, 5e-5)}) {
       const HierarchicalOperator whole(encode_values(storage, precision));
       const HierarchicalOperator op(encode_values(some, precision));
       EXPECT_EQ(op.roles(), some.roles);
@@ -125,21 +107,6 @@ TEST(PatchRoles, AskedForOthersTheyGetNoLight) {
       EXPECT_EQ(h[i], expected[i]);
     }
   }
-}
-
-TEST(PatchRoles, ABatchIsAsManyApplies) {
-  test::check_batch(
-      HierarchicalOperator(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6))), 3);
-}
-
-TEST(PatchRoles, SameBitsForAnyNumberOfThreads) {
-  test::expect_same_bits_for_any_number_of_threads(
-      HierarchicalOperator(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6))));
-}
-
-TEST(PatchRoles, AnApplyAllocatesNothing) {
-  test::expect_no_allocations(
-      HierarchicalOperator(with_roles(test::random_hierarchical_storage(kPatchCount, 3, 6))));
 }
 
 TEST(PatchRoles, ThoseThatDoNotFitAreRefused) {

@@ -68,7 +68,6 @@ void check_round_trip(const TransferData& data) {
   EXPECT_EQ(a.scale_exponent, b.scale_exponent);
   EXPECT_TRUE(std::ranges::equal(a.values_f32, b.values_f32));
   EXPECT_TRUE(std::ranges::equal(a.values_f16, b.values_f16));
-  EXPECT_TRUE(std::ranges::equal(a.bases_q16, b.bases_q16));
   EXPECT_TRUE(std::ranges::equal(a.bases_q8, b.bases_q8));
   std::vector<float> expanded_a(kPatchCount * kPatchCount), expanded_b(expanded_a);
   data.transfer->expand(1, expanded_a);
@@ -79,8 +78,7 @@ void check_round_trip(const TransferData& data) {
 }
 
 TEST(HierarchicalFile, RoundTripsWithAndWithoutClusterBasesAndScales) {
-  for (const Precision precision :
-       {Precision::kF16, Precision::kF32, Precision::kQ16, Precision::kQ8}) {
+  for (const Precision precision : {Precision::kF16, Precision::kF32, Precision::kQ8}) {
     check_round_trip(sample_data(precision));
     const TransferData nested = nested_data(precision);
     EXPECT_EQ(storage_of(nested).coefficient_scale.size(), 16U);
@@ -108,7 +106,7 @@ PatchRoles all_roles() {
 
 TEST(HierarchicalFile, HoldsReceiversAndSources) {
   const test::TemporaryFolder folder;
-  save_transfer_file(folder / "file", sample_data(Precision::kQ16, all_roles()));
+  save_transfer_file(folder / "file", sample_data(Precision::kQ8, all_roles()));
   const TransferData loaded = load_transfer_file(folder / "file");
   EXPECT_EQ(loaded.transfer->roles(), all_roles());
   save_transfer_file(folder / "again", loaded);
@@ -117,21 +115,18 @@ TEST(HierarchicalFile, HoldsReceiversAndSources) {
 
 TEST(HierarchicalFile, SaysNothingOfRolesWhereEveryPatchHasBoth) {
   const test::TemporaryFolder folder;
-  save_transfer_file(folder / "file", sample_data(Precision::kQ16));
+  save_transfer_file(folder / "file", sample_data(Precision::kQ8));
   EXPECT_FALSE(SafetensorsFile(folder / "file").tensors().contains("transfer.hierarchical.role"));
   EXPECT_TRUE(load_transfer_file(folder / "file").transfer->roles().all_are_both());
 }
 
 TEST(HierarchicalFile, MapsTheValuesInsteadOfCopyingThem) {
-  for (const Precision precision : {Precision::kF16, Precision::kQ16, Precision::kQ8}) {
+  for (const Precision precision : {Precision::kF16, Precision::kQ8}) {
     const test::TemporaryFolder folder;
     save_transfer_file(folder / "file", sample_data(precision));
     const TransferData data = load_transfer_file(folder / "file");
     const auto& owner = data.exchange.row_begin.owner();
     EXPECT_EQ(storage_of(data).values_f16.owner(), owner);
-    if (precision == Precision::kQ16) {
-      EXPECT_EQ(storage_of(data).bases_q16.owner(), owner);
-    }
     if (precision == Precision::kQ8) {
       EXPECT_EQ(storage_of(data).bases_q8.owner(), owner);
     }

@@ -80,11 +80,9 @@ TEST(IntegerEncoding, ResidualsAtOneEndLeaveTheOther) {
 
 TEST(IntegerEncoding, OthersHaveNoResiduals) {
   const auto exact = block_with({1, 0.03F, 0.002F, 0.001F}, 2, 2);
-  for (const Precision precision : {Precision::kF16, Precision::kQ16}) {
-    const auto encoded = encode_values(exact, precision);
-    EXPECT_EQ(encoded.blocks.front().row_residual_rank, 0U);
-    EXPECT_LT(change(exact, encoded), 1e-3);
-  }
+  const auto encoded = encode_values(exact, Precision::kF16);
+  EXPECT_EQ(encoded.blocks.front().row_residual_rank, 0U);
+  EXPECT_LT(change(exact, encoded), 1e-3);
 }
 
 TEST(IntegerEncoding, NothingStaysNothing) {

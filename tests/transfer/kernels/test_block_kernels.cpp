@@ -135,16 +135,15 @@ void check_bases(const BasisKernels<Value>& kernels, const std::vector<Value>& b
 
 /// A basis in the order of the file: strips of 64 positions, groups of four ranks, pairs of
 /// positions.
-template <typename Value>
-std::vector<Value> in_strips(const PlainBasis& plain) {
-  std::vector<Value> values;
+std::vector<std::int8_t> in_strips(const PlainBasis& plain) {
+  std::vector<std::int8_t> values;
   for (std::size_t strip = 0; strip < plain.size; strip += 64) {
     for (std::size_t group = 0; group < plain.rank; group += 4) {
       for (std::size_t k = strip; k < std::min(strip + 64, plain.size); k += 2) {
         for (std::size_t r = group; r < group + 4; ++r) {
           for (std::size_t i = k; i < k + 2; ++i) {
             const float value = r < plain.rank ? plain.value[r * plain.size + i] : 0;
-            values.push_back(static_cast<Value>(value));
+            values.push_back(static_cast<std::int8_t>(value));
           }
         }
       }
@@ -153,30 +152,24 @@ std::vector<Value> in_strips(const PlainBasis& plain) {
   return values;
 }
 
-template <typename Value>
 constexpr float kLargestInteger = 127;
-template <>
-constexpr float kLargestInteger<std::int16_t> = HierarchicalFormat::kLargestShort;
 
 /// Integers up to the largest.
-template <typename Value>
 PlainBasis integer_basis(std::size_t rank, std::size_t size) {
-  constexpr float kLargest = kLargestInteger<Value>;
   // Light up to 1 is a multiple of this at most.
-  constexpr double kLightStep = std::is_same_v<Value, std::int16_t> ? 0x1p-11 : 0x1p-14;
+  constexpr double kLightStep = 0x1p-14;
   Random random;
   PlainBasis plain{random.floats(rank * size), rank, size, 0};
-  for (float& value : plain.value) value = std::round(kLargest * value);
-  plain.value.front() = -kLargest;
-  plain.allowed = kLightStep / 2 * kLargest * static_cast<double>(std::max(rank, size));
+  for (float& value : plain.value) value = std::round(kLargestInteger * value);
+  plain.value.front() = -kLargestInteger;
+  plain.allowed = kLightStep / 2 * kLargestInteger * static_cast<double>(std::max(rank, size));
   return plain;
 }
 
-template <typename Value>
-void check_integer_bases(const BasisKernels<Value>& kernels, std::size_t rank, std::size_t size,
-                         std::size_t lights) {
-  const PlainBasis plain = integer_basis<Value>(rank, size);
-  const std::vector<Value> basis = in_strips<Value>(plain);
+void check_integer_bases(const BasisKernels<std::int8_t>& kernels, std::size_t rank,
+                         std::size_t size, std::size_t lights) {
+  const PlainBasis plain = integer_basis(rank, size);
+  const std::vector<std::int8_t> basis = in_strips(plain);
   check_project(kernels, basis, plain, (rank + 3) / 4 * 4, lights);
   for (std::size_t places = 16; places <= size; places += 16) {
     for (std::size_t first = 0; first < std::min<std::size_t>(6, rank); ++first) {
@@ -343,7 +336,6 @@ void check_kernels(const BlockKernels& kernels) {
         check_bases(kernels.bases_f32, values, {values, rank, size, kAllowed}, lights);
         check_bases(kernels.bases_f16, half, {values, rank, size, kAllowed}, lights);
         check_integer_bases(kernels.bases_q8, rank, size, lights);
-        check_integer_bases(kernels.bases_q16, rank, size, lights);
       }
       const auto rows = static_cast<std::uint32_t>(rank);
       for (const std::uint32_t columns : {1U, 4U, 8U, 11U, 16U, 19U, 33U}) {
@@ -358,8 +350,7 @@ void check_kernels(const BlockKernels& kernels) {
     check_coupling(kernels.couplings_f32.multiply, values, values, 48, 96, lights);
     check_coupling(kernels.couplings_f16.multiply, half, values, 96, 32, lights);
   }
-  check_integer_bases(kernels.bases_q16, 134, 304, 1);  // more than a chunk either way
-  check_integer_bases(kernels.bases_q8, 134, 304, 1);
+  check_integer_bases(kernels.bases_q8, 134, 304, 1);  // more than a chunk either way
 }
 
 TEST(BlockKernels, ResidualsBelongToTheFirstCoefficients) {
@@ -417,23 +408,11 @@ TEST(BlockKernels, EveryInstructionSetAgrees) {
   }
 }
 
-template <typename Value>
-const BasisKernels<Value>& integer_kernels(const BlockKernels& set);
-template <>
-const BasisKernels<std::int16_t>& integer_kernels(const BlockKernels& set) {
-  return set.bases_q16;
-}
-template <>
-const BasisKernels<std::int8_t>& integer_kernels(const BlockKernels& set) {
-  return set.bases_q8;
-}
-
 /// What comes of x by way of coefficients and back: those, and the light.
-template <typename Value>
 std::vector<float> there_and_back(const BlockKernels& set, const PlainBasis& plain,
                                   const std::vector<float>& x) {
-  const BasisKernels<Value>& kernels = integer_kernels<Value>(set);
-  const std::vector<Value> basis = in_strips<Value>(plain);
+  const BasisKernels<std::int8_t>& kernels = set.bases_q8;
+  const std::vector<std::int8_t> basis = in_strips(plain);
   const BasisPart part = part_of(plain, 0, plain.size);
   std::vector<float> sent(kRankStride * kChannelLanes, 0.0F), y(3 * kStride, 0.0F);
   kernels.project(basis.data(), {&part, 1}, planar(x, 3), side_by_side<float>(sent, 1));
@@ -443,29 +422,23 @@ std::vector<float> there_and_back(const BlockKernels& set, const PlainBasis& pla
   return sent;
 }
 
-template <typename Value>
-class IntegerKernels : public testing::Test {};
-using IntegerTypes = testing::Types<std::int16_t, std::int8_t>;
-TYPED_TEST_SUITE(IntegerKernels, IntegerTypes);
-
-TYPED_TEST(IntegerKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
-  const PlainBasis plain = integer_basis<TypeParam>(134, 304);
+TEST(IntegerKernels, SumsOfIntegersHaveTheSameBitsInEveryInstructionSet) {
+  const PlainBasis plain = integer_basis(134, 304);
   Random random;
   std::vector<float> x = random.floats(3 * kStride);
   for (const float brightest : {x[kFirstPosition + 37], 1e5F}) {  // even light, and uneven
     x[kFirstPosition + 37] = brightest;
-    const std::vector<float> expected =
-        there_and_back<TypeParam>(kKernelsPortable.blocks, plain, x);
+    const std::vector<float> expected = there_and_back(kKernelsPortable.blocks, plain, x);
     for (const KernelSet* set : kernel_sets()) {
-      EXPECT_EQ(there_and_back<TypeParam>(set->blocks, plain, x), expected) << set->instruction_set;
+      EXPECT_EQ(there_and_back(set->blocks, plain, x), expected) << set->instruction_set;
     }
   }
 }
 
-TYPED_TEST(IntegerKernels, BrightPatchesThatDoNotCountLeaveTheOthersTheirLight) {
+TEST(IntegerKernels, BrightPatchesThatDoNotCountLeaveTheOthersTheirLight) {
   constexpr std::size_t kRank = 7, kSize = 304;
   constexpr float kBright = 1e5F;
-  PlainBasis plain = integer_basis<TypeParam>(kRank, kSize);
+  PlainBasis plain = integer_basis(kRank, kSize);
   Random random;
   std::vector<float> x = random.floats(3 * kStride);
   for (const std::size_t bright : {37U, 38U, 140U}) {
@@ -478,8 +451,8 @@ TYPED_TEST(IntegerKernels, BrightPatchesThatDoNotCountLeaveTheOthersTheirLight) 
   }
   for (const KernelSet* set : kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
-    const std::vector<float> expected = there_and_back<TypeParam>(set->blocks, plain, x);
-    const std::vector<float> result = there_and_back<TypeParam>(set->blocks, plain, uneven);
+    const std::vector<float> expected = there_and_back(set->blocks, plain, x);
+    const std::vector<float> result = there_and_back(set->blocks, plain, uneven);
     float largest = 0;
     for (std::size_t r = 0; r < kRank * kChannelLanes; ++r) {
       largest = std::max(largest, std::abs(expected[coefficient_at(0, 0) + r]));
@@ -493,28 +466,27 @@ TYPED_TEST(IntegerKernels, BrightPatchesThatDoNotCountLeaveTheOthersTheirLight) 
   }
 }
 
-TYPED_TEST(IntegerKernels, SumsOfIntegersHaveRoomForTheLargest) {
+TEST(IntegerKernels, SumsOfIntegersHaveRoomForTheLargest) {
   constexpr std::size_t kRank = 128, kSize = 128;
-  constexpr float kLargest = kLargestInteger<TypeParam>;
-  const PlainBasis plain{std::vector<float>(kRank * kSize, kLargest), kRank, kSize, 0};
+  const PlainBasis plain{std::vector<float>(kRank * kSize, kLargestInteger), kRank, kSize, 0};
   // Just below a power of two: it becomes the largest integer that there is.
   const float light = std::nextafter(1.0F, 0.0F);
   for (const KernelSet* set : kernel_sets()) {
     SCOPED_TRACE(set->instruction_set);
     const std::vector<float> result =
-        there_and_back<TypeParam>(set->blocks, plain, std::vector<float>(3 * kStride, light));
-    const double sent = kSize * kLargest * light, y = kRank * kLargest * sent;
+        there_and_back(set->blocks, plain, std::vector<float>(3 * kStride, light));
+    const double sent = kSize * kLargestInteger * light, y = kRank * kLargestInteger * sent;
     EXPECT_NEAR(result[coefficient_at(0, 0)] / sent, 1, 3e-4);
     EXPECT_NEAR(result[kRankStride * kChannelLanes + kFirstPosition] / y, 1, 6e-4);
   }
 }
 
-TYPED_TEST(IntegerKernels, NoLightStaysNone) {
-  const PlainBasis plain = integer_basis<TypeParam>(7, 48);
+TEST(IntegerKernels, NoLightStaysNone) {
+  const PlainBasis plain = integer_basis(7, 48);
   for (const float light : {0.0F, 1e-42F}) {
     for (const KernelSet* set : kernel_sets()) {
       const std::vector<float> result =
-          there_and_back<TypeParam>(set->blocks, plain, std::vector<float>(3 * kStride, light));
+          there_and_back(set->blocks, plain, std::vector<float>(3 * kStride, light));
       for (const float value : result) EXPECT_LE(std::abs(value), 1e-20F);
     }
   }

@@ -18,16 +18,83 @@ using test::multiply_expansion;
 using test::random_hierarchical_storage;
 using test::unaided_product;
 
-TEST(HierarchicalOperator, MultipliesLikeItsExpansion) {
+/// A kind of operator with random values of so many patches, with so many matrices.
+struct Kind {
+  const char* name;
+  HierarchicalStorage (*make)(std::size_t patches, std::uint32_t matrices, std::uint64_t seed);
+  /// What an apply may differ from plain sums over the same stored values: by the rounding of sums
+  /// or, of bytes, of light.
+  double of_sums, of_bytes;
+};
+
+HierarchicalStorage scaled_storage(std::size_t patches, std::uint32_t matrices,
+                                   std::uint64_t seed) {
+  return test::equilibrated(test::random_nested_storage(patches, matrices, seed), seed + 1);
+}
+
+HierarchicalStorage storage_with_roles(std::size_t patches, std::uint32_t matrices,
+                                       std::uint64_t seed) {
+  return test::with_roles(random_hierarchical_storage(patches, matrices, seed));
+}
+
+constexpr Kind kKinds[] = {{"Plain", random_hierarchical_storage, 2e-6, 5e-5},
+                           {"Nested", test::random_nested_storage, 5e-6, 1e-4},
+                           {"Equilibrated", scaled_storage, 5e-6, 1e-4},
+                           {"WithRoles", storage_with_roles, 2e-6, 5e-5}};
+
+class EveryOperator : public testing::TestWithParam<Kind> {
+ protected:
+  static HierarchicalOperator make(std::size_t patches, std::uint32_t matrices, std::uint64_t seed,
+                                   Precision precision = Precision::kF32) {
+    return HierarchicalOperator(encode_values(GetParam().make(patches, matrices, seed), precision));
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(HierarchicalOperator, EveryOperator, testing::ValuesIn(kKinds),
+                         [](const auto& instance) { return instance.param.name; });
+
+TEST_P(EveryOperator, MultipliesLikeItsExpansionInEveryPrecision) {
   for (const std::size_t n : {1U, 15U, 16U, 17U, 100U, 333U, 1000U}) {
     for (const std::uint32_t matrices : {1U, 2U, 3U}) {
-      const HierarchicalOperator op(random_hierarchical_storage(n, matrices, 7 * n + matrices));
       const std::vector<Float3> m0 = test::random_light(n, n, 100);
-      EXPECT_LT(relative_difference(unaided_product(op, m0), multiply_expansion(op, m0),
-                                    op.storage().area),
-                2e-6)
-          << n << " patches, " << matrices << " matrices";
+      for (const Precision precision : test::kPrecisions) {
+        const HierarchicalOperator op = make(n, matrices, 7 * n + matrices, precision);
+        EXPECT_LT(relative_difference(unaided_product(op, m0), multiply_expansion(op, m0),
+                                      op.storage().area),
+                  precision == Precision::kQ8 ? GetParam().of_bytes : GetParam().of_sums)
+            << n << " patches, " << matrices << " matrices, " << precision_name(precision);
+      }
     }
+  }
+}
+
+TEST_P(EveryOperator, SameBitsForAnyNumberOfThreads) {
+  for (const Precision precision : test::kPrecisions) {
+    test::expect_same_bits_for_any_number_of_threads(make(1000, 3, 6, precision));
+  }
+}
+
+TEST_P(EveryOperator, ABatchIsAsManyApplies) {
+  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+    for (const Precision precision : test::kPrecisions) {
+      const HierarchicalOperator op = make(333, matrices, 40 + matrices, precision);
+      for (const std::size_t lights : {1U, 2U, 3U, 5U}) check_batch(op, lights);
+    }
+  }
+}
+
+TEST_P(EveryOperator, AllocatesNothing) {
+  test::expect_no_allocations(make(500, 3, 8));
+}
+
+TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
+  for (const Kind& kind : std::span(kKinds).first(3)) {
+    SCOPED_TRACE(kind.name);
+    check_receivers(HierarchicalOperator(kind.make(777, 3, 12)), 1e-6F);
+    check_receivers(HierarchicalOperator(kind.make(1000, 3, 7003)), 1e-6F);
+    // Coefficients are rounded by the largest of those that are wanted.
+    check_receivers(HierarchicalOperator(encode_values(kind.make(1000, 3, 7003), Precision::kQ8)),
+                    5e-4F);
   }
 }
 
@@ -65,11 +132,9 @@ struct Exactness {
   double least, most;  ///< error by the rounding of values
 };
 
-// Values of 8 bits have 7 and a sign, those of 16 bits 12, halves 11; an entry of a block of low
-// rank is a product of three. Light is rounded twice on its way, to 11 or 12 bits for 16-bit values
-// and to 15 for bytes; for halves only sums round.
+// Values of 8 bits have 7 and a sign, halves 11; an entry of a block of low rank is a product of
+// three. Light is rounded twice on its way, to 15 bits for bytes; for halves only sums round.
 constexpr Exactness kExactness[] = {{Precision::kF16, 0.6, 2e-6, 1e-6, 1e-3},
-                                    {Precision::kQ16, 1, 5e-4, 1e-6, 1e-3},
                                     {Precision::kQ8, 0.5, 5e-5, 1e-5, 5e-3}};
 
 TEST(HierarchicalOperator, EveryPrecisionIsAsGoodAsItsBits) {
@@ -95,33 +160,6 @@ TEST(HierarchicalOperator, EveryPrecisionIsAsGoodAsItsBits) {
   }
 }
 
-TEST(HierarchicalOperator, SameBitsForAnyNumberOfThreads) {
-  const HierarchicalStorage storage = random_hierarchical_storage(777, 3, 6);
-  for (const Precision precision : {Precision::kF32, Precision::kQ16, Precision::kQ8}) {
-    test::expect_same_bits_for_any_number_of_threads(
-        HierarchicalOperator(encode_values(storage, precision)));
-  }
-}
-
-TEST(HierarchicalOperator, ABatchIsAsManyApplies) {
-  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
-    const HierarchicalStorage storage = random_hierarchical_storage(333, matrices, 40 + matrices);
-    for (const HierarchicalOperator& op :
-         {HierarchicalOperator(storage),
-          HierarchicalOperator(encode_values(storage, Precision::kF16)),
-          HierarchicalOperator(encode_values(storage, Precision::kQ16))}) {
-      for (const std::size_t lights : {1U, 2U, 3U, 5U}) check_batch(op, lights);
-    }
-  }
-}
-
-TEST(HierarchicalOperator, ReceiversGetWhatAnApplyGivesThemAndNothingElseIsTouched) {
-  const HierarchicalStorage storage = random_hierarchical_storage(777, 3, 12);
-  check_receivers(HierarchicalOperator(storage), 1e-6F);
-  // Coefficients are rounded by the largest of those that are wanted.
-  check_receivers(HierarchicalOperator(encode_values(storage, Precision::kQ16)), 5e-4F);
-}
-
 TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
   const HierarchicalStorage by_block = random_hierarchical_storage(500, 2, 9);
   const HierarchicalStorage streamed = stream_values(by_block);
@@ -130,10 +168,6 @@ TEST(HierarchicalOperator, TheOrderOfTheValuesMakesNoDifference) {
   EXPECT_EQ(streamed.values_f32.size() % 64, 0U);
   EXPECT_EQ(unaided_product(HierarchicalOperator(by_block), m0),
             unaided_product(HierarchicalOperator(streamed), m0));
-}
-
-TEST(HierarchicalOperator, AllocatesNothing) {
-  test::expect_no_allocations(HierarchicalOperator(random_hierarchical_storage(500, 3, 8)));
 }
 
 }  // namespace

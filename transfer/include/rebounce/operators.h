@@ -33,11 +33,11 @@ const char* operator_name(OperatorKind kind);
 /// The kind of that name. Throws Error if there is none.
 OperatorKind operator_kind(std::string_view name);
 
-/// How the values of an operator are stored. kQ16 and kQ8 are for hierarchical ones alone: bases as
-/// integers of 16 or 8 bits, and the rest as kF16.
-enum class Precision : std::uint8_t { kF16, kF32, kQ16, kQ8 };
+/// How the values of an operator are stored. kQ8 is for hierarchical ones alone: bases as integers
+/// of 8 bits, and the rest as kF16.
+enum class Precision : std::uint8_t { kF16, kF32, kQ8 };
 
-/// As the command line names it: "f16", "f32", "q16", "q8".
+/// As the command line names it: "f16", "f32", "q8".
 std::string precision_name(Precision precision);
 
 /// The precision of that name. Throws Error if there is none.
