@@ -9,50 +9,6 @@ namespace {
 
 constexpr std::size_t kMatrixRowsPerTask = 64;
 
-class RowRelaxation final : public Relaxation {
- public:
-  explicit RowRelaxation(const FormFactorRows& rows)
-      : rows_(rows), radiosity_(rows.patch_count()) {}
-
-  void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
-    problem_ = problem;
-    std::ranges::copy(radiosity, radiosity_.begin());
-  }
-
-  double sweep(SweepDirection direction, const Scheduler& /*scheduler*/) override {
-    const std::size_t n = radiosity_.size();
-    double changed_squared = 0;
-    for (std::size_t k = 0; k < n; ++k) {
-      changed_squared += relax_row(direction == SweepDirection::kForward ? k : n - 1 - k);
-    }
-    return changed_squared;
-  }
-
-  void end(std::span<Float3> radiosity) const override {
-    std::ranges::copy(radiosity_, radiosity.begin());
-  }
-
-  int reads_per_sweep(SweepOrder /*order*/) const override { return 1; }
-
- private:
-  double relax_row(std::size_t row) {
-    const Float3 gathered = rows_.gather_row(row, radiosity_);
-    double changed_squared = 0;
-    for (int c = 0; c < kChannelCount; ++c) {
-      const float next =
-          problem_.initial_exitance[row][c] + problem_.reflectance[row][c] * gathered[c];
-      const double change = static_cast<double>(next) - radiosity_[row][c];
-      changed_squared += problem_.area[row] * change * change;
-      radiosity_[row][c] = next;
-    }
-    return changed_squared;
-  }
-
-  const FormFactorRows& rows_;
-  RelaxationProblem problem_;
-  std::vector<Float3> radiosity_;
-};
-
 }  // namespace
 
 FormFactorRows::FormFactorRows(const ExchangeMatrix& exchange, std::span<const float> area) {
@@ -98,24 +54,18 @@ std::size_t FormFactorRows::bytes() const {
 
 void FormFactorRows::do_gather(std::span<const Float3> in, std::span<Float3> out,
                                std::span<float> /*workspace*/, const Scheduler& scheduler) const {
-  parallel_for_pieces(scheduler, patch_count(), kMatrixRowsPerTask,
-                      [&](std::size_t i) { out[i] = gather_row(i, in); });
-}
-
-std::unique_ptr<Relaxation> FormFactorRows::make_relaxation() const {
-  return std::make_unique<RowRelaxation>(*this);
-}
-
-Float3 FormFactorRows::gather_row(std::size_t row, std::span<const Float3> in) const {
-  double red = 0, green = 0, blue = 0;
-  for (std::uint64_t k = row_begin_[row]; k < row_begin_[row + 1]; ++k) {
-    const Float3& value = in[column_[k]];
-    const double f = form_factor_[k];
-    red += f * value[0];
-    green += f * value[1];
-    blue += f * value[2];
-  }
-  return {static_cast<float>(red), static_cast<float>(green), static_cast<float>(blue)};
+  const auto gather_row = [&](std::size_t row) {
+    double red = 0, green = 0, blue = 0;
+    for (std::uint64_t k = row_begin_[row]; k < row_begin_[row + 1]; ++k) {
+      const Float3& value = in[column_[k]];
+      const double f = form_factor_[k];
+      red += f * value[0];
+      green += f * value[1];
+      blue += f * value[2];
+    }
+    out[row] = {static_cast<float>(red), static_cast<float>(green), static_cast<float>(blue)};
+  };
+  parallel_for_pieces(scheduler, patch_count(), kMatrixRowsPerTask, gather_row);
 }
 
 }  // namespace rebounce

@@ -7,7 +7,7 @@
 
 #include "rebounce/types.h"
 #include "transfer/base/shared_array.h"
-#include "transfer/exchange/relaxation.h"
+#include "transfer/exchange/form_factor_operator.h"
 
 namespace rebounce {
 
@@ -27,7 +27,7 @@ struct ExchangeMatrix {
 
 /// Form factors by full rows, for gathering: row i lists every j with F(i,j) > 0. Has twice the
 /// entries of the ExchangeMatrix it is made from.
-class FormFactorRows final : public SweepableFormFactors {
+class FormFactorRows final : public FormFactorOperator {
  public:
   /// Expands `exchange`. `area` has n entries in m². Throws Error if the sizes do not agree or
   /// `exchange` is empty.
@@ -45,12 +45,6 @@ class FormFactorRows final : public SweepableFormFactors {
 
   using FormFactorOperator::gather;
   void gather(std::span<const Float3> in, std::span<Float3> out) const { gather(in, out, {}); }
-
-  /// Gauss-Seidel in the order of the patches, on one thread.
-  std::unique_ptr<Relaxation> make_relaxation() const override;
-
-  /// One row of gather, summed in double precision in the order of the columns.
-  Float3 gather_row(std::size_t row, std::span<const Float3> in) const;
 
  private:
   /// Rows are summed in double precision and shared out among threads; no workspace is used.

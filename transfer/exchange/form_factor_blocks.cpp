@@ -1,7 +1,6 @@
 #include "transfer/exchange/form_factor_blocks.h"
 
 #include <array>
-#include <cassert>
 
 #include "transfer/exchange/planes.h"
 #include "transfer/kernels/kernels.h"
@@ -45,7 +44,6 @@ FormFactorBlocks::FormFactorBlocks(const FormFactorRows& rows) {
     const auto [outside, inside] = count_blocks(rows.columns(i), i);
     inside_begin_[i] = row_begin_[i] + outside;
     row_begin_[i + 1] = inside_begin_[i] + inside;
-    entry_count_ += rows.columns(i).size();
   }
   position_.resize(row_begin_[n]);
   block_.resize(row_begin_[n]);
@@ -68,26 +66,10 @@ std::size_t FormFactorBlocks::bytes() const {
          position_.size() * sizeof(position_[0]) + block_.size() * sizeof(block_[0]);
 }
 
-double FormFactorBlocks::fill() const {
-  return block_.empty() ? 1
-                        : static_cast<double>(entry_count_) /
-                              static_cast<double>(block_.size() * kFormFactorBlock);
-}
-
-void FormFactorBlocks::to_planes(std::span<const Float3> values, std::span<float> planes) const {
-  assert(values.size() == patch_count() && planes.size() >= kChannelCount * plane_size());
-  rebounce::to_planes(values, plane_size(), planes.data());
-}
-
-void FormFactorBlocks::from_planes(std::span<const float> planes, std::span<Float3> values) const {
-  assert(values.size() == patch_count() && planes.size() >= kChannelCount * plane_size());
-  rebounce::from_planes(planes.data(), plane_size(), values);
-}
-
 void FormFactorBlocks::do_gather(std::span<const Float3> in, std::span<Float3> out,
                                  std::span<float> workspace, const Scheduler& scheduler) const {
   const std::span<float> planes = workspace.first(kChannelCount * plane_size());
-  to_planes(in, planes);
+  to_planes(in, plane_size(), planes.data());
   parallel_for_pieces(scheduler, patch_count(), kBlockRowsPerTask,
                       [&](std::size_t i) { out[i] = gather_row(i, planes); });
 }

@@ -43,15 +43,8 @@ class FormFactorBlocks final : public SweepableFormFactors {
   /// form factors; convergence is unchanged.
   std::unique_ptr<Relaxation> make_relaxation() const override;
 
-  /// The fraction of the values that are not zero: 1 when every block is full.
-  double fill() const;
-
   /// n, rounded up to whole blocks.
   std::size_t plane_size() const { return in_whole_blocks(patch_count()); }
-
-  /// Copies values [n] into planes, and back.
-  void to_planes(std::span<const Float3> values, std::span<float> planes) const;
-  void from_planes(std::span<const float> planes, std::span<Float3> values) const;
 
   /// Gathers one row from planes: all columns, those outside the row's group, those within it.
   Float3 gather_row(std::size_t row, std::span<const float> planes) const;
@@ -71,7 +64,6 @@ class FormFactorBlocks final : public SweepableFormFactors {
   std::vector<std::uint64_t> inside_begin_;
   std::vector<std::uint32_t> position_;  ///< [blocks] first column / kFormFactorBlock
   std::vector<FormFactorBlock> block_;   ///< [blocks]
-  std::uint64_t entry_count_ = 0;
 };
 
 }  // namespace rebounce

@@ -1,6 +1,7 @@
 #include <algorithm>
 
 #include "transfer/exchange/form_factor_blocks.h"
+#include "transfer/exchange/planes.h"
 
 namespace rebounce {
 namespace {
@@ -16,7 +17,7 @@ class BlockRowRelaxation final : public Relaxation {
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     problem_ = problem;
-    blocks_.to_planes(radiosity, planes_);
+    to_planes(radiosity, blocks_.plane_size(), planes_.data());
   }
 
   double sweep(SweepDirection direction, const Scheduler& scheduler) override {
@@ -34,7 +35,9 @@ class BlockRowRelaxation final : public Relaxation {
     return changed_squared;
   }
 
-  void end(std::span<Float3> radiosity) const override { blocks_.from_planes(planes_, radiosity); }
+  void end(std::span<Float3> radiosity) const override {
+    from_planes(planes_.data(), blocks_.plane_size(), radiosity);
+  }
 
   int reads_per_sweep(SweepOrder /*order*/) const override { return 1; }
 

@@ -6,14 +6,11 @@
 
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
-#include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/import/import_gltf.h"
-#include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/reference_solution.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "tests/support/shared_folder.h"
-#include "tests/support/test_scenes.h"
-#include "transfer/base/area_norm.h"
+#include "tests/support/solved_room.h"
 #include "transfer/exchange/compressed_form_factors.h"
 #include "transfer/exchange/form_factor_blocks.h"
 
@@ -36,22 +33,14 @@ double radiosity_error(const ExchangeMatrix& exchange, const PatchTable& patches
   return std::sqrt(difference / norm);
 }
 
-struct Room {
-  PatchTable patches;
-  ExchangeMatrix exchange;
-  std::unique_ptr<FormFactorBlocks> blocks;
-  std::shared_ptr<const TransferOperator> transfer;
+struct Room : test::SolvedRoom {
+  FormFactorBlocks blocks;
 
-  explicit Room(const Scene& scene, std::size_t patch_count = 600) {
-    PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-    exchange = compute_form_factors(model, test::make_tracer(model)).exchange;
-    patches = std::move(model.patches);
-    blocks = std::make_unique<FormFactorBlocks>(exchange, patches.area);
-    transfer = build_dense_transfer(exchange, patches, Precision::kF32);
-  }
+  explicit Room(const Scene& scene, std::size_t patch_count = 600)
+      : SolvedRoom(scene, patch_count), blocks(exchange, patches.area) {}
 
   std::unique_ptr<RadiositySolver> solver(SolveMethod method) const {
-    return make_solver(method, *blocks, {patches.area, patches.reflectance}, transfer);
+    return make_solver(method, blocks, {patches.area, patches.reflectance}, dense);
   }
   double error(std::span<const Float3> radiosity, std::span<const Float3> m0) const {
     return radiosity_error(exchange, patches, radiosity, m0);
@@ -127,54 +116,6 @@ TEST_P(SolversOnScenes, FurnaceIsUniform) {
   for (const Float3& b : solver->radiosity()) EXPECT_NEAR(b[1], 10, 10 * 1e-4);
 }
 
-TEST(RelaxationOnScenes, ContractsByTheReflectanceOrBetter) {
-  const std::vector<Float3> m0 = lamp_light(bright().patches.size(), 6);
-  for (const SolveMethod method : {SolveMethod::kGathering, SolveMethod::kJacobi,
-                                   SolveMethod::kGaussSeidel, SolveMethod::kSymmetricGaussSeidel}) {
-    const auto solver = bright().solver(method);
-    double before = solver->solve(m0, {.max_sweeps = 1, .residual = 0}).residual;
-    for (int sweep = 0; sweep < 8; ++sweep) {
-      const double after = solver->solve(m0, {.max_sweeps = 1, .residual = 0}).residual;
-      EXPECT_LE(after, 0.9001 * before) << static_cast<int>(method) << " " << sweep;
-      before = after;
-    }
-  }
-}
-
-TEST_P(SolversOnScenes, RepaintedWallsAreExact) {
-  // The operator is of the old colours; only the methods that use it can notice.
-  const Room& room = furnished();
-  std::vector<Float3> repainted = room.patches.reflectance;
-  for (Float3& rho : repainted) rho = {0.9F * rho[0], 0.6F, rho[2]};
-  const std::vector<Float3> m0 = lamp_light(repainted.size(), 7);
-  const auto solver = room.solver(GetParam().method);
-  solver->solve(m0);
-  solver->set_reflectance(repainted);
-  const SolveResult result = solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
-  EXPECT_FALSE(result.diverged);
-  PatchTable patches = room.patches;
-  patches.reflectance = repainted;
-  EXPECT_LE(radiosity_error(room.exchange, patches, solver->radiosity(), m0), 1e-6);
-}
-
-TEST(RefinementOnScenes, AnOperatorOfOtherColoursNeedsAHandfulOfSteps) {
-  // Y of walls that are 3 % darker.
-  const Room& room = furnished();
-  PatchTable darker = room.patches;
-  for (Float3& rho : darker.reflectance) {
-    for (float& x : rho) x *= 0.97F;
-  }
-  const auto transfer = build_dense_transfer(room.exchange, darker, Precision::kF32);
-  const auto solver = make_solver(SolveMethod::kRefine, *room.blocks,
-                                  {room.patches.area, room.patches.reflectance}, transfer);
-  const std::vector<Float3> m0 = lamp_light(room.patches.size(), 8);
-  const SolveResult result = solver->solve(m0, {.residual = 1e-6});
-  EXPECT_TRUE(result.converged);
-  EXPECT_GT(result.sweeps, 1);
-  EXPECT_LE(result.sweeps, 6);
-  EXPECT_LE(room.error(solver->radiosity(), m0), 1e-6);
-}
-
 TEST(RefinementOnScenes, TheExactOperatorIsOneStep) {
   const std::vector<Float3> m0 = lamp_light(furnished().patches.size(), 9);
   const SolveResult result =
@@ -196,7 +137,7 @@ struct OtherReflectances {
   }
 
   std::unique_ptr<RadiositySolver> solver(const Room& room, SolveMethod method) const {
-    return make_solver(method, *room.blocks, {room.patches.area, reflectance}, transfer);
+    return make_solver(method, room.blocks, {room.patches.area, reflectance}, transfer);
   }
   double error(const Room& room, std::span<const Float3> radiosity,
                std::span<const Float3> m0) const {
@@ -234,14 +175,14 @@ TEST(RefinementOnScenes, AnOperatorOfBrightWallsIsReportedInADarkRoom) {
 TEST(RefinementOnScenes, AThreePerCentOperatorNeedsAHandfulOfSteps) {
   for (const Room* room : {&cornell(), &furnished(), &bright()}) {
     const std::size_t n = room->patches.size();
-    const auto dense = build_dense_transfer(room->exchange, room->patches, Precision::kF32);
     std::vector<std::vector<Float3>> lights;
     for (std::uint64_t seed = 20; seed < 28; ++seed) lights.push_back(lamp_light(n, seed));
-    const auto transfer = build_hierarchical_transfer(
-        *dense, room->patches, {lights, lights}, {.tolerance = 0.03, .precision = Precision::kF32});
+    const auto transfer =
+        build_hierarchical_transfer(*room->dense, room->patches, {lights, lights},
+                                    {.tolerance = 0.03, .precision = Precision::kF32});
     for (std::uint64_t seed = 30; seed < 34; ++seed) {
       const std::vector<Float3> m0 = lamp_light(n, seed);
-      const auto solver = make_solver(SolveMethod::kRefine, *room->blocks,
+      const auto solver = make_solver(SolveMethod::kRefine, room->blocks,
                                       {room->patches.area, room->patches.reflectance}, transfer);
       const SolveResult result = solver->solve(m0, {.residual = 1e-6});
       EXPECT_TRUE(result.converged) << result.residual;
@@ -270,12 +211,12 @@ struct CompressedRoom {
     for (std::uint64_t seed = begin; seed < end; ++seed) {
       lights.push_back(lamp_light(room.patches.size(), seed));
     }
-    return radiosities_of(*room.transfer, room.patches.reflectance, lights);
+    return radiosities_of(*room.dense, room.patches.reflectance, lights);
   }
 
   std::unique_ptr<RadiositySolver> solver(SolveMethod method) const {
     return make_solver(method, *form_factors, {room.patches.area, room.patches.reflectance},
-                       room.transfer);
+                       room.dense);
   }
 
   /// Jacobi in double precision on the expanded matrix.
@@ -315,11 +256,11 @@ TEST(CompressedFormFactorsOnScenes, KeepTheTolerance) {
         lights.push_back(lamp_light(room->patches.size(), seed));
       }
       double mean = 0;
-      for (const auto& b : radiosities_of(*room->transfer, room->patches.reflectance, lights)) {
+      for (const auto& b : radiosities_of(*room->dense, room->patches.reflectance, lights)) {
         std::vector<Float3> exact(b.size()), gathered(b.size());
         std::vector<float> workspace(
-            std::max(compressed.form_factors->workspace_size(), room->blocks->workspace_size()));
-        room->blocks->gather(b, exact, workspace);
+            std::max(compressed.form_factors->workspace_size(), room->blocks.workspace_size()));
+        room->blocks.gather(b, exact, workspace);
         compressed.form_factors->gather(b, gathered, workspace);
         mean += relative_difference(gathered, exact, room->patches.area) / 8;
       }
@@ -367,20 +308,6 @@ TEST(CompressedFormFactorsOnScenes, RelaxInAboutAsManySweepsAsRows) {
     const int by_rows = bright().solver(method)->solve(m0, settings).sweeps;
     const int by_clusters = compressed.solver(method)->solve(m0, settings).sweeps;
     EXPECT_LE(by_clusters, 1.3 * by_rows + 1);
-  }
-}
-
-TEST(RelaxationOnScenes, EmissionChangesInTheNextSolve) {
-  const Room& room = furnished();
-  for (const NamedSolveMethod& named : kSolveMethods) {
-    std::vector<Float3> m0 = lamp_light(room.patches.size(), 15);
-    const auto solver = room.solver(named.method);
-    solver->solve(m0);
-    for (const Float3& panel : {Float3{7, 300, 0}, Float3{0, 0, 0}}) {  // on, and off
-      for (std::size_t i = 0; i < m0.size(); i += 100) m0[i] = panel;
-      solver->solve(m0, {.max_sweeps = 400, .residual = 2e-7});
-      EXPECT_LE(room.error(solver->radiosity(), m0), 1e-6) << named.name;
-    }
   }
 }
 

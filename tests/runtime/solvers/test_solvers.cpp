@@ -131,12 +131,10 @@ class SeriesOperator final : public TransferOperator {
   float scale_;
 };
 
-enum class Form : std::uint8_t { kRows, kBlocks, kExchange, kCompressed };
+enum class Form : std::uint8_t { kBlocks, kExchange, kCompressed };
 
 std::unique_ptr<const FormFactorOperator> make_form(Form form, const System& system) {
   switch (form) {
-    case Form::kRows:
-      return std::make_unique<FormFactorRows>(system.exchange, system.area);
     case Form::kBlocks:
       return std::make_unique<FormFactorBlocks>(system.exchange, system.area);
     case Form::kExchange:
@@ -183,7 +181,7 @@ struct MethodAndForm {
 std::vector<MethodAndForm> methods_and_forms() {
   std::vector<MethodAndForm> all;
   for (const NamedSolveMethod& named : kSolveMethods) {
-    for (const Form form : {Form::kRows, Form::kBlocks, Form::kExchange, Form::kCompressed}) {
+    for (const Form form : {Form::kBlocks, Form::kExchange, Form::kCompressed}) {
       all.push_back({named, form});
     }
   }
@@ -199,7 +197,7 @@ class EveryMethod : public testing::TestWithParam<MethodAndForm> {
 };
 
 std::string name_of(const testing::TestParamInfo<MethodAndForm>& instance) {
-  constexpr std::array<const char*, 4> kForms = {"Rows", "Blocks", "Exchange", "Compressed"};
+  constexpr std::array<const char*, 3> kForms = {"Blocks", "Exchange", "Compressed"};
   std::string name(instance.param.named.name);
   std::erase(name, '-');
   return name + kForms[static_cast<std::size_t>(instance.param.form)];
@@ -422,25 +420,9 @@ TEST(Solvers, MissingOrOtherOperatorsAreRefused) {
                Error);
 }
 
-/// F that can only gather.
-class Gatherer final : public FormFactorOperator {
- public:
-  explicit Gatherer(const FormFactorBlocks& blocks) : blocks_(blocks) {}
-  std::size_t patch_count() const override { return blocks_.patch_count(); }
-  std::size_t bytes() const override { return blocks_.bytes(); }
-  std::size_t workspace_size() const override { return blocks_.workspace_size(); }
-  void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
-                 const Scheduler& scheduler) const override {
-    blocks_.gather(in, out, workspace, scheduler);
-  }
-
- private:
-  const FormFactorBlocks& blocks_;
-};
-
 TEST(Solvers, FormsThatAMethodCannotUseAreRefused) {
   const Case c(0.5F, Form::kExchange);
-  const Gatherer gatherer(c.blocks);
+  const FormFactorRows gatherer(c.system.exchange, c.system.area);
   for (const SolveMethod method : {SolveMethod::kGaussSeidel, SolveMethod::kSymmetricGaussSeidel}) {
     EXPECT_THROW(make_solver(method, gatherer, c.system.problem()), Error);
   }

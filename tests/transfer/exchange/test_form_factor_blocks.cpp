@@ -1,13 +1,15 @@
-// F in blocks against F by rows.
+// F in blocks, by rows and by its symmetric half, against plain rows.
 
 #include "transfer/exchange/form_factor_blocks.h"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "rebounce/error.h"
 #include "tests/support/random_pairs.h"
+#include "transfer/exchange/exchange_blocks.h"
 
 namespace rebounce::test_form_factor_blocks {
 namespace {
@@ -15,66 +17,94 @@ namespace {
 using test::expect_near;
 using test::Pairs;
 
-TEST(FormFactorBlocks, GathersWhatTheRowsGather) {
+template <typename Blocks>
+class EveryBlocks : public testing::Test {};
+
+using Forms = testing::Types<FormFactorBlocks, ExchangeBlocks>;
+TYPED_TEST_SUITE(EveryBlocks, Forms);
+
+TYPED_TEST(EveryBlocks, GatherWhatTheRowsGather) {
   for (const std::size_t n : {1, 2, 7, 8, 9, 255, 256, 257, 1000}) {
     const Pairs pairs(n);
-    const FormFactorRows rows(pairs.exchange, pairs.area);
-    const FormFactorBlocks blocks(rows);
+    const TypeParam blocks(pairs.exchange, pairs.area);
     ASSERT_EQ(blocks.patch_count(), n);
-    std::vector<Float3> expected(n), gathered(n);
-    std::vector<float> workspace(blocks.workspace_size());
-    rows.gather(pairs.light, expected);
-    blocks.gather(pairs.light, gathered, workspace);
-    std::vector<float> planes(kChannelCount * blocks.plane_size());
-    blocks.to_planes(pairs.light, planes);
-    for (std::size_t i = 0; i < n; ++i) {
-      expect_near(gathered[i], expected[i], 3e-7);
-      const Float3 inside = blocks.gather_inside_group(i, planes),
-                   outside = blocks.gather_outside_group(i, planes);
-      expect_near({inside[0] + outside[0], inside[1] + outside[1], inside[2] + outside[2]},
-                  expected[i], 3e-7);
+    const std::vector<Float3> gathered = gather(blocks, pairs.light),
+                              expected =
+                                  gather(FormFactorRows(pairs.exchange, pairs.area), pairs.light);
+    // Halves add up in partial sums.
+    const double allowed = std::is_same_v<TypeParam, FormFactorBlocks> ? 3e-7 : 1e-6;
+    for (std::size_t i = 0; i < n; ++i) expect_near(gathered[i], expected[i], allowed);
+  }
+}
+
+TYPED_TEST(EveryBlocks, WrongSizesAreRefused) {
+  const Pairs pairs(9);
+  const TypeParam blocks(pairs.exchange, pairs.area);
+  std::vector<Float3> gathered(9);
+  std::vector<float> workspace(blocks.workspace_size());
+  const std::span<const Float3> light = pairs.light;
+  EXPECT_THROW(blocks.gather(light.first(8), gathered, workspace), Error);
+  EXPECT_THROW(blocks.gather(light, std::span(gathered).first(8), workspace), Error);
+  EXPECT_THROW(blocks.gather(light, gathered, std::span(workspace).subspan(1)), Error);
+  EXPECT_THROW(TypeParam(pairs.exchange, std::span(pairs.area).first(5)), Error);
+}
+
+/// Gauss-Seidel over plain rows. Returns the area-weighted square of the changes.
+double relax(const FormFactorRows& rows, const RelaxationProblem& problem, SweepDirection direction,
+             std::vector<Float3>& radiosity) {
+  double changed_squared = 0;
+  for (std::size_t k = 0; k < radiosity.size(); ++k) {
+    const std::size_t i = direction == SweepDirection::kForward ? k : radiosity.size() - 1 - k;
+    for (int c = 0; c < kChannelCount; ++c) {
+      double arrived = 0;
+      for (std::size_t e = 0; e < rows.columns(i).size(); ++e) {
+        arrived += double{rows.form_factors(i)[e]} * radiosity[rows.columns(i)[e]][c];
+      }
+      const double next = problem.initial_exitance[i][c] + problem.reflectance[i][c] * arrived;
+      changed_squared += problem.area[i] * std::pow(next - radiosity[i][c], 2);
+      radiosity[i][c] = static_cast<float>(next);
+    }
+  }
+  return changed_squared;
+}
+
+TYPED_TEST(EveryBlocks, SweepsAreThoseOfTheRowsInEveryOrderOfDirections) {
+  constexpr auto kForward = SweepDirection::kForward, kBackward = SweepDirection::kBackward;
+  for (const std::size_t n : {5, 256, 777}) {
+    const Pairs pairs(n);
+    const FormFactorRows rows(pairs.exchange, pairs.area);
+    const TypeParam blocks(pairs.exchange, pairs.area);
+    const std::vector<Float3> reflectance(n, {0.7F, 0.2F, 0.0F});
+    const RelaxationProblem problem{pairs.area, reflectance, pairs.light};
+    std::vector<Float3> expected(n, {1, 2, 3}), relaxed(n);
+    const auto relaxation = blocks.make_relaxation();
+    relaxation->begin(problem, expected);
+    for (const SweepDirection direction :
+         {kForward, kForward, kBackward, kForward, kBackward, kBackward}) {
+      const double changed = relax(rows, problem, direction, expected);
+      EXPECT_NEAR(relaxation->sweep(direction), changed, 1e-4 * changed + 1e-6);
+      relaxation->end(relaxed);
+      for (std::size_t i = 0; i < n; ++i) expect_near(relaxed[i], expected[i], 2e-6);
     }
   }
 }
 
-TEST(FormFactorBlocks, AGroupGathersFromItselfOnly) {
-  const Pairs pairs(1000);
-  const FormFactorBlocks blocks(pairs.exchange, pairs.area);
-  std::vector<Float3> light(1000, {0, 0, 0});
-  constexpr std::size_t kGroup = FormFactorBlocks::kGroup;
-  std::fill_n(light.begin() + kGroup, kGroup, Float3{1, 1, 1});
-  std::vector<float> planes(kChannelCount * blocks.plane_size());
-  blocks.to_planes(light, planes);
-  double inside = 0;
-  for (std::size_t i = 0; i < 1000; ++i) {
-    const bool member = i / kGroup == 1;
-    const Float3 nothing =
-        member ? blocks.gather_outside_group(i, planes) : blocks.gather_inside_group(i, planes);
-    EXPECT_EQ(nothing[0], 0);
-    inside += blocks.gather_inside_group(i, planes)[0];
+TEST(FormFactorBlocks, TakeTheBytesOfFullBlocksAndTheirHalfHalfOfThem) {
+  constexpr std::size_t kCount = 512;  // each sees each
+  std::vector<std::uint64_t> begin = {0};
+  std::vector<std::uint32_t> column;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    for (std::uint32_t j = i + 1; j < kCount; ++j) column.push_back(j);
+    begin.push_back(column.size());
   }
-  EXPECT_GT(inside, 0);
-}
-
-TEST(FormFactorBlocks, PlanesGoThereAndBack) {
-  const Pairs pairs(77);
-  const FormFactorBlocks blocks(pairs.exchange, pairs.area);
-  std::vector<float> planes(kChannelCount * blocks.plane_size(), -1.0F);
-  std::vector<Float3> back(77);
-  blocks.to_planes(pairs.light, planes);
-  blocks.from_planes(planes, back);
-  EXPECT_EQ(back, pairs.light);
-  EXPECT_EQ(planes[77], 0);  // past the last patch
-}
-
-TEST(FormFactorBlocks, CountsItsBytes) {
-  const Pairs pairs(512);
-  const FormFactorBlocks blocks(pairs.exchange, pairs.area);
-  EXPECT_GT(blocks.fill(), 0.3);
-  EXPECT_LE(blocks.fill(), 1);
-  const double slots = 2 * static_cast<double>(pairs.exchange.column.size()) / blocks.fill();
-  EXPECT_NEAR(static_cast<double>(blocks.bytes()), slots * 4.5 + (512 + 513) * 8, 1);
-  EXPECT_THROW(FormFactorBlocks(pairs.exchange, std::span(pairs.area).first(5)), Error);
+  std::vector<float> value(column.size(), 1.0F / kCount);
+  const ExchangeMatrix exchange{SharedArray(std::move(begin)), SharedArray(std::move(column)),
+                                SharedArray(std::move(value))};
+  const std::vector<float> area(kCount, 1.0F);
+  const FormFactorBlocks rows(exchange, area);
+  EXPECT_EQ(rows.bytes(), kCount * kCount * 9 / 2 + (2 * kCount + 1) * 8);
+  EXPECT_LT(static_cast<double>(ExchangeBlocks(exchange, area).bytes()),
+            0.53 * static_cast<double>(rows.bytes()));
 }
 
 }  // namespace
