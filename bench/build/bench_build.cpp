@@ -1,10 +1,9 @@
 // bench_build: what the offline stage takes, phase by phase, and how that grows with the number of
-// patches; and form factors against closed forms.
+// patches.
 
 #include <cmath>
 #include <map>
 
-#include "bench/build/closed_forms.h"
 #include "bench/support/input.h"
 #include "bench/support/machine.h"
 #include "bench/support/program.h"
@@ -13,12 +12,8 @@
 namespace rebounce::bench {
 namespace {
 
-const std::string kPhases = "phases", kClosedForms = "closed-forms";
-
 struct BuildOptions {
   InputOptions input{.patch_counts = {1000, 4000}};
-  std::string part = kPhases;
-  std::string view_factors = REBOUNCE_SOURCE_DIR "/tests/reference/view_factors.tsv";
   CommonOptions common{.repeats = 1};
 };
 
@@ -84,7 +79,7 @@ class SceneBuilds {
   std::map<std::string, std::pair<double, double>> before_;  ///< patches and value
 };
 
-Table measure_phases(const BuildOptions& options) {
+void run(const BuildOptions& options) {
   Table table({"scene", "patches", "measure", "value", "unit", "growth"});
   for (const std::string& scene : options.input.inputs) {
     SceneBuilds builds(scene, options.input.settings, options.common.repeats);
@@ -93,12 +88,6 @@ Table measure_phases(const BuildOptions& options) {
       save("bench_build", table, options.common);
     }
   }
-  return table;
-}
-
-void run(const BuildOptions& options) {
-  const Table table = options.part == kPhases ? measure_phases(options)
-                                              : measure_closed_forms(options.view_factors);
   publish("bench_build", table, options.common);
 }
 
@@ -108,14 +97,8 @@ void run(const BuildOptions& options) {
 int main(int argc, char** argv) {
   using namespace rebounce::bench;
   BuildOptions options;
-  CLI::App app("Times the offline stage by phase, or holds form factors against closed forms.",
-               "bench_build");
-  add_input_options(app, options.input)->required(false);
-  add_choice_option(app, "--part", options.part, {kPhases, kClosedForms},
-                    "What is measured: phases of building each scene, with rays and memory; or "
-                    "form factors whose values are known");
-  app.add_option("--view-factors", options.view_factors, "Table of known form factors")
-      ->capture_default_str();
+  CLI::App app("Times the offline stage by phase, with rays and memory.", "bench_build");
+  add_input_options(app, options.input);
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] { run(options); });
 }

@@ -1,10 +1,10 @@
-// bench_solve: the iterative methods on every form of the form factors, beside the product with the
-// stored operator; and what a file promises, tried: its operator under many fresh lights.
+// bench_solve: sweeps over every form of the form factors; and what a file promises, tried: its
+// operator under many fresh lights.
 
 #include "bench/solve/light_errors.h"
-#include "bench/solve/solve_times.h"
 #include "bench/solve/sweep_times.h"
 #include "bench/support/input.h"
+#include "bench/support/light_changes.h"
 #include "bench/support/program.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/lights/fitting_lights.h"
@@ -13,11 +13,11 @@
 namespace rebounce::bench {
 namespace {
 
-const std::string kSolves = "solves", kSweeps = "sweeps", kLightErrors = "light-errors";
+const std::string kSweeps = "sweeps", kLightErrors = "light-errors";
 
 struct SolveOptions {
   InputOptions input{.patch_counts = {4000}};
-  std::string part = kSolves;
+  std::string part = kSweeps;
   double form_factor_tolerance = 0.001;
   LightErrorSettings light_errors;
   CommonOptions common{.repeats = 7};
@@ -43,19 +43,13 @@ std::vector<Form> forms_of(const TransferData& data, double tolerance) {
 }
 
 Table table_of(const std::string& part) {
-  if (part == kSweeps) return make_sweep_table();
-  return part == kSolves ? make_solve_table() : make_light_error_table();
+  return part == kSweeps ? make_sweep_table() : make_light_error_table();
 }
 
 void measure(const TransferData& data, const SolveOptions& options, Table& table) {
   if (options.part == kLightErrors) return measure_light_errors(data, options.light_errors, table);
   const std::vector<Form> forms = forms_of(data, options.form_factor_tolerance);
-  const std::vector<LightChange> changes = light_changes(data);
-  if (options.part == kSweeps) {
-    measure_sweeps(data, forms, changes.front().after, options.common.repeats, table);
-  } else {
-    measure_solves(data, forms, changes, options.common.repeats, table);
-  }
+  measure_sweeps(data, forms, light_changes(data).front().after, options.common.repeats, table);
 }
 
 void run(const SolveOptions& options) {
@@ -73,11 +67,12 @@ void run(const SolveOptions& options) {
 int main(int argc, char** argv) {
   using namespace rebounce::bench;
   SolveOptions options;
-  CLI::App app("Times iterative methods, and tries operators under fresh lights.", "bench_solve");
+  CLI::App app("Times sweeps, and tries operators under fresh lights.", "bench_solve");
   add_input_options(app, options.input);
-  add_choice_option(app, "--part", options.part, {kSolves, kSweeps, kLightErrors},
-                    "What is measured: solves to errors of 1, 0.1 and 0.01 %; single sweeps beside "
-                    "the bandwidth of memory; or errors of the operator beside its bounds");
+  add_choice_option(
+      app, "--part", options.part, {kSweeps, kLightErrors},
+      "What is measured: single sweeps beside the bandwidth of memory, or errors of the "
+      "operator beside its bounds");
   app.add_option("--form-factor-tolerance", options.form_factor_tolerance,
                  "Error of compressed form factors, where the input holds none")
       ->check(CLI::Range(1e-5, 0.5))

@@ -116,14 +116,6 @@ TEST(LinkRefitting, WorthNextToNothingTheLightIsTheSame) {
   EXPECT_LE(difference(walls, fit_links(walls.links, walls.patches, 1e-9)), 5e-4 * norm(walls));
 }
 
-TEST(LinkRefitting, KeepsRowSums) {
-  const Walls walls = two_walls(near_kernel);
-  const FormFactorLinks fewer = fit_links(walls.links, walls.patches, 0.02);
-  const std::vector<Float3> ones(walls.patches.size(), {1, 1, 1});
-  const auto a = gathered(walls, walls.links, ones), b = gathered(walls, fewer, ones);
-  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(b[i][0] / a[i][0], 1, 1e-3);
-}
-
 TEST(LinkRefitting, KeepsWhatPatchesExchangeWithThemselves) {
   Walls walls = two_walls(near_kernel);
   const std::uint32_t leaf = 2 * kSide - 1 + 3;  // of the fourth patch
