@@ -10,10 +10,8 @@
 #include <random>
 
 #include "precompute/compression/tolerance_search.h"
-#include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/reference_lighting.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/solved_room.h"
 #include "tests/support/unshadowed_lights.h"
 #include "transfer/operator/hierarchical_operator.h"
 
@@ -23,19 +21,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXf;
 
-struct Room {
-  PatchTable patches;
-  std::shared_ptr<const DenseOperator> dense;
-};
-
-const Room& room() {
-  static const Room made = [] {
-    const PatchModel model = make_patch_model(
-        test::furnished_room({0.7F, 0.5F, 0.2F}, {0.3F, 0.3F, 0.3F}, {0.1F, 0.3F, 0.9F}),
-        {.patch_count = 1200});
-    const FormFactors f = compute_form_factors(model, test::make_tracer(model));
-    return Room{model.patches, build_dense_transfer(f.exchange, model.patches, Precision::kF32)};
-  }();
+const test::SolvedRoom& room() {
+  static const test::SolvedRoom made(
+      test::furnished_room({0.7F, 0.5F, 0.2F}, {0.3F, 0.3F, 0.3F}, {0.1F, 0.3F, 0.9F}), 1200);
   return made;
 }
 

@@ -15,14 +15,12 @@
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/compression/matrix_compression.h"
 #include "precompute/compression/tolerance_search.h"
-#include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/inverse/dense_transfer.h"
 #include "precompute/inverse/hierarchical_matrix.h"
 #include "precompute/inverse/solved_transfer.h"
 #include "tests/support/exchange_samples.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/solved_room.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test_scenes.h"
 #include "tests/support/unshadowed_lights.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_storage.h"
@@ -36,8 +34,8 @@ Lights lights_in(const PatchTable& patches, int count, std::uint64_t seed) {
   return test::unshadowed_lights(patches, count, seed, 1.6, 1.2);
 }
 
-/// A room of 4 x 3 x 5 m with a black box. How near its form factors are to the truth is of no
-/// density_weight here.
+/// A room of 4 x 3 x 5 m with a black box. How near its form factors are to the truth does
+/// not matter here.
 struct Room {
   Room(const Float3& reflectance, std::size_t patch_count) {
     Scene scene = test::room_with_block(reflectance);
@@ -154,19 +152,6 @@ void flip_a_byte(const std::filesystem::path& path) {
   test::write_bytes(path, bytes);
 }
 
-double mean_error(const ColouredRoom& room, const TransferOperator& transfer,
-                  const Lights& lights) {
-  std::vector<float> workspace(std::max(transfer.workspace_size(), room.dense->workspace_size()));
-  std::vector<Float3> result(room.patches.size()), truth(room.patches.size());
-  double sum = 0;
-  for (const auto& light : lights) {
-    transfer.apply(light, result, workspace);
-    room.dense->apply(light, truth, workspace);
-    sum += relative_difference(result, truth, room.patches.area);
-  }
-  return sum / static_cast<double>(lights.size());
-}
-
 /// Of three runs of columns, relative to the dense inverse.
 std::vector<double> column_errors(const SolvedTransfer& solved, const ColouredRoom& room) {
   SolvedTransfer::Workspace workspace;
@@ -258,7 +243,7 @@ TEST(MatrixFreeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
   const auto by_dense =
       build_hierarchical_transfer(*room.dense, room.patches, room.lights(), settings);
   const Lights others = lights_in(room.patches, 24, 3);
-  EXPECT_LT(mean_error(room, *large, others), settings.tolerance);
+  EXPECT_LT(test::mean_error(*large, *room.dense, room.patches.area, others), settings.tolerance);
   EXPECT_LT(static_cast<double>(large->bytes()), 1.1 * static_cast<double>(by_dense->bytes()));
 }
 

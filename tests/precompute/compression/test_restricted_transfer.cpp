@@ -13,12 +13,9 @@
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/compression/matrix_free_transfer.h"
-#include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/inverse/dense_transfer.h"
+#include "tests/support/solved_room.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/support/test_scenes.h"
 #include "tests/support/unshadowed_lights.h"
-#include "transfer/base/area_norm.h"
 
 namespace rebounce::test_restricted_transfer {
 namespace {
@@ -26,33 +23,23 @@ namespace {
 using Lights = std::vector<std::vector<Float3>>;
 
 /// A room of 4 x 3 x 5 m with two blocks.
-struct Room {
-  PatchTable patches;
-  ExchangeMatrix exchange;
-  std::shared_ptr<const DenseOperator> dense;
-  Lights training, validation, others;
+struct Room : test::SolvedRoom {
+  Room(const Scene& scene, std::size_t patch_count) : SolvedRoom(scene, patch_count) {}
+
+  Lights lights(int count, std::uint64_t seed) const {
+    return test::unshadowed_lights(patches, count, seed, 1.6, 1.2);
+  }
+  Lights training = lights(16, 1), validation = lights(12, 2), others = lights(24, 3);
 };
 
-Room make_room(std::size_t patch_count) {
+Scene room_with_two_blocks() {
   Scene scene = test::room_with_block({0.7F, 0.5F, 0.2F});
   test::add_box(scene, {2.5, 0, 3}, {3, 1, 4}, false);
-  const PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-  FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  Room room;
-  room.patches = model.patches;
-  room.exchange = std::move(f.exchange);
-  room.dense = build_dense_transfer(room.exchange, room.patches, Precision::kF32);
-  const auto lights = [&](int count, std::uint64_t seed) {
-    return test::unshadowed_lights(room.patches, count, seed, 1.6, 1.2);
-  };
-  room.training = lights(16, 1);
-  room.validation = lights(12, 2);
-  room.others = lights(24, 3);
-  return room;
+  return scene;
 }
 
 const Room& room() {
-  static const Room made = make_room(1200);
+  static const Room made(room_with_two_blocks(), 1200);
   return made;
 }
 
@@ -114,18 +101,6 @@ double entry_error(const Room& room, const TransferOperator& transfer) {
   return std::sqrt(error / norm);
 }
 
-/// Of the light of sources at receivers.
-double mean_error(const Room& room, const TransferOperator& transfer, const Lights& lights) {
-  double sum = 0;
-  for (std::vector<Float3> light : lights) {
-    transfer.roles().keep(PatchRoles::kSource, light);
-    std::vector<Float3> truth = product(*room.dense, light);
-    transfer.roles().keep(PatchRoles::kReceiver, truth);
-    sum += relative_difference(product(transfer, light), truth, room.patches.area);
-  }
-  return sum / static_cast<double>(lights.size());
-}
-
 TEST(ReceiversAndSources, EntriesAreThoseOfTheWholeAtALowMultiplier) {
   for (const Choice& choice : {kChoices[1], kChoices[2]}) {
     SCOPED_TRACE(choice.name);
@@ -172,7 +147,7 @@ TEST(ReceiversAndSources, BytesFallInProportionAtTheSameTolerance) {
     const auto some =
         build_hierarchical_transfer(*room().dense, room().patches, lights, settings, {}, roles);
     // Sixteen lights shape it, of which sources are half, and others judge.
-    EXPECT_LT(mean_error(room(), *some, room().others), 1.2 * settings.tolerance);
+    EXPECT_LT(room().mean_error(*some, room().others), 1.2 * settings.tolerance);
     const double bytes = static_cast<double>(some->bytes()) / static_cast<double>(whole->bytes());
     RecordProperty(choice.name, std::to_string(bytes));
     EXPECT_LT(bytes, part);
@@ -224,7 +199,7 @@ TEST(ReceiversAndSources, OnlyTheirColumnsAreSolvedFor) {
     const auto panels = folder / choice.name;
     const auto some = build(roles_at(room().patches, choice.receivers, choice.sources), panels);
     EXPECT_LT(panel_count(panels), panel_count(folder / "all"));
-    EXPECT_LT(mean_error(room(), *some, room().others), 0.015);
+    EXPECT_LT(room().mean_error(*some, room().others), 0.015);
   }
 }
 

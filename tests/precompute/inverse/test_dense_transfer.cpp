@@ -6,47 +6,23 @@
 
 #include <numbers>
 
-#include "precompute/exchange/pairs/form_factors.h"
 #include "precompute/lights/reference_solution.h"
 #include "rebounce/error.h"
 #include "tests/support/random_light.h"
-#include "tests/support/test_scenes.h"
+#include "tests/support/solved_room.h"
 #include "tests/support/with_threads.h"
-#include "transfer/base/area_norm.h"
 
 namespace rebounce::test_dense_transfer {
 namespace {
 
-struct Solved {
-  PatchTable patches;
-  ExchangeMatrix exchange;
-  std::shared_ptr<const DenseOperator> transfer;
-
-  std::vector<Float3> indirect(const std::vector<Float3>& m0) const {
-    return product(*transfer, m0);
-  }
+struct Solved : test::SolvedRoom {
+  using SolvedRoom::SolvedRoom;
+  std::vector<Float3> indirect(const std::vector<Float3>& m0) const { return product(*dense, m0); }
 };
-
-Solved solve(const Scene& scene, std::size_t patch_count, Precision precision = Precision::kF32) {
-  PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-  FormFactors f = compute_form_factors(model, test::make_tracer(model));
-  Solved solved;
-  solved.exchange = f.exchange;
-  solved.patches = model.patches;
-  solved.transfer = build_dense_transfer(f.exchange, model.patches, precision);
-  return solved;
-}
 
 /// A room of coloured walls with a black and a nearly white block.
 Scene colourful_room() {
-  Scene scene = test::empty_scene({0.7F, 0.5F, 0.2F});
-  scene.materials.resize(3, scene.materials[0]);
-  scene.materials[1].base_color = {0, 0, 0};
-  scene.materials[2].base_color = {0.9F, 0.95F, 0.0F};
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true, 0);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false, 1);
-  test::add_box(scene, {2.5, 1.5, 3}, {3, 2, 4}, false, 2);
-  return scene;
+  return test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.9F, 0.95F, 0.0F});
 }
 
 TEST(DenseTransfer, FurnaceIsUniform) {
@@ -55,7 +31,7 @@ TEST(DenseTransfer, FurnaceIsUniform) {
     Scene scene = test::empty_scene({rho, rho, rho});
     test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
     test::add_box(scene, {1, 0.5, 1}, {2, 1.2, 2.5}, false);
-    const Solved solved = solve(scene, 500);
+    const Solved solved(scene, 500);
     const std::vector<Float3> h =
         solved.indirect(std::vector<Float3>(solved.patches.size(), {1, 1, 1}));
     // Row sums are 1 to 1e-6, and a closed room multiplies what they lack by 1 / (1 - rho).
@@ -110,7 +86,7 @@ TEST(DenseTransfer, CubeOfManyPatchesKeepsTheMeansOfItsFaces) {
   // Many patches resolve what one per face smears: the total must still be conserved.
   Scene scene = test::empty_scene({0.5F, 0.5F, 0.5F});
   test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);
-  const Solved solved = solve(scene, 600);
+  const Solved solved(scene, 600);
   std::vector<Float3> m0(solved.patches.size());
   double emitted = 0, absorbed = 0;
   for (std::size_t i = 0; i < m0.size(); ++i) {
@@ -125,7 +101,7 @@ TEST(DenseTransfer, CubeOfManyPatchesKeepsTheMeansOfItsFaces) {
 }
 
 TEST(DenseTransfer, AgreesWithGaussSeidelInDoublePrecision) {
-  const Solved solved = solve(colourful_room(), 900);
+  const Solved solved(colourful_room(), 900);
   const ReferenceSolver reference(solved.exchange, solved.patches);
   for (int light = 0; light < 8; ++light) {
     std::vector<Float3> m0 = test::random_light(solved.patches.size(), light);
@@ -140,25 +116,10 @@ TEST(DenseTransfer, AgreesWithGaussSeidelInDoublePrecision) {
 }
 
 TEST(DenseTransfer, SatisfiesItsEquation) {
-  const Solved solved = solve(colourful_room(), 500);
-  EXPECT_LT(transfer_residual(*solved.transfer, solved.exchange, solved.patches), 2e-6);
-  const Solved half = solve(colourful_room(), 500, Precision::kF16);
-  EXPECT_LT(transfer_residual(*half.transfer, half.exchange, half.patches), 1e-3);
-}
-
-TEST(DenseTransfer, IsLinearInTheLight) {
-  const Solved solved = solve(colourful_room(), 300);
-  const std::vector<Float3> a = test::random_light(solved.patches.size(), 1),
-                            b = test::random_light(solved.patches.size(), 2);
-  std::vector<Float3> sum(a.size()), separate(a.size());
-  const std::vector<Float3> ha = solved.indirect(a), hb = solved.indirect(b);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      sum[i][c] = 2 * a[i][c] + b[i][c];
-      separate[i][c] = 2 * ha[i][c] + hb[i][c];
-    }
-  }
-  EXPECT_LT(relative_difference(solved.indirect(sum), separate, solved.patches.area), 1e-6);
+  const Solved solved(colourful_room(), 500);
+  EXPECT_LT(transfer_residual(*solved.dense, solved.exchange, solved.patches), 2e-6);
+  const Solved half(colourful_room(), 500, Precision::kF16);
+  EXPECT_LT(transfer_residual(*half.dense, half.exchange, half.patches), 1e-3);
 }
 
 TEST(DenseTransfer, SameBitsForAnyNumberOfThreads) {
@@ -218,8 +179,8 @@ TEST(DenseTransfer, SinglePrecisionInAWhiteFurnace) {
 TEST(DenseTransfer, GreyScenesStoreOneMatrix) {
   Scene scene = test::empty_scene({0.5F, 0.5F, 0.5F});
   test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);
-  EXPECT_EQ(solve(scene, 100).transfer->storage().matrix_count, 1U);
-  EXPECT_EQ(solve(colourful_room(), 100).transfer->storage().matrix_count, 3U);
+  EXPECT_EQ(Solved(scene, 100).dense->storage().matrix_count, 1U);
+  EXPECT_EQ(Solved(colourful_room(), 100).dense->storage().matrix_count, 3U);
 }
 
 TEST(DenseTransfer, IsForecastForItsArithmeticAndChannels) {
@@ -243,7 +204,7 @@ TEST(DenseTransfer, IntegratingSphere) {
   // uniform, rho / (1 - rho) / (4 pi).
   Scene scene = test::empty_scene({0.5F, 0.5F, 0.5F});
   test::add_ball(scene, 24, 12, true);
-  const Solved solved = solve(scene, scene.triangle.size());
+  const Solved solved(scene, scene.triangle.size());
   const glm::dvec3 lamp(0.3, 0.2, -0.4);
   std::vector<Float3> m0;
   double total_area = 0;

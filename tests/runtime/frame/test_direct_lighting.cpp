@@ -103,32 +103,6 @@ TEST(DirectLighting, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
-TEST(DirectLighting, SpotEdgeIsWhereItsConeEnds) {
-  TransferData data;
-  test::add_square(data, 2, 0, 100, true, {0.5F, 0.5F, 0.5F});
-  Light lamp;
-  lamp.type = LightType::kSpot;
-  lamp.position = {0, 2, 0};
-  lamp.inner_cone_angle = 0.3F;
-  lamp.outer_cone_angle = 0.5F;
-  const std::vector<Float3> e = direct(data, {lamp});
-  int full = 0, dark = 0;
-  for (std::size_t i = 0; i < e.size(); ++i) {
-    const glm::dvec3 c = to_dvec3(data.patches.centroid[i]);
-    const double r = std::sqrt(c.x * c.x + c.z * c.z), angle = std::atan2(r, 2.0);
-    const double unattenuated = 2 / std::pow(r * r + 4, 1.5);
-    if (angle < 0.28) {
-      EXPECT_NEAR(e[i][0] / unattenuated, 1, 2e-2);
-      ++full;
-    } else if (angle > 0.52) {
-      EXPECT_EQ(e[i][0], 0);
-      ++dark;
-    }
-  }
-  EXPECT_GT(full, 1000);
-  EXPECT_GT(dark, 5000);
-}
-
 TEST(DirectLighting, OnlyChangedLightsAreTraced) {
   TransferData data;
   test::add_square(data, 2, 0, 30, true, {0.5F, 0.5F, 0.5F});

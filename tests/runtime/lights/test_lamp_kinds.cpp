@@ -10,6 +10,7 @@
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/lights/light_sampling.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sampling.h"
 #include "tests/support/expect_error.h"
 
 namespace rebounce::test_lamp_kinds {
@@ -64,27 +65,51 @@ TEST(LampKinds, RefuseNumbersThatAreNotOnes) {
   }
 }
 
-/// Of a lamp of uniform luminance, the closed form is the mean over its places.
-TEST(LampKinds, SurfacesShineAsTheirPlacesDo) {
+/// The irradiance at the origin: the mean over many places of the lamp.
+double mean_of_places(const PreparedLight& lamp, const glm::vec3& normal) {
+  constexpr int kSide = 200;
+  double sum = 0;
+  for (int k = 0; k < kSide * kSide; ++k) {
+    const glm::vec2 place((static_cast<float>(k % kSide) + 0.5F) / kSide,
+                          (static_cast<float>(k / kSide) + 0.5F) / kSide);
+    UnitLight light;
+    lamp.evaluate_places({0, 0, 0}, {&place, 1}, {&light, 1});
+    sum += light.illuminance * std::max(0.0F, glm::dot(light.direction, normal));
+  }
+  return sum / (kSide * kSide);
+}
+
+TEST(LampKinds, SurfacesShineAsTheirPlacesDoWhereverTheHorizonCuts) {
   int count = 0;
   for (const LampKind* kind : lamp_kinds()) {
     if (kind->surface == nullptr) continue;
+    SCOPED_TRACE(kind->name);
     ++count;
-    const PreparedLight lamp(good_lamp(*kind));
+    Light light = good_lamp(*kind);
     for (const glm::vec3& normal : {glm::vec3(0, 1, 0), glm::vec3(0.8F, 0.6F, 0)}) {
-      constexpr int kSide = 200;
-      double sum = 0;
-      for (int k = 0; k < kSide * kSide; ++k) {
-        const glm::vec2 place((static_cast<float>(k % kSide) + 0.5F) / kSide,
-                              (static_cast<float>(k / kSide) + 0.5F) / kSide);
-        UnitLight light;
-        lamp.evaluate_places({0, 0, 0}, {&place, 1}, {&light, 1});
-        sum += light.illuminance * std::max(0.0F, glm::dot(light.direction, normal));
-      }
-      const double mean = sum / (kSide * kSide);
-      EXPECT_GT(mean, 1e-3) << kind->name;
-      EXPECT_NEAR(lamp.unoccluded_irradiance({0, 0, 0}, normal) / mean, 1, 1e-3) << kind->name;
+      const PreparedLight lamp(light);
+      const double mean = mean_of_places(lamp, normal);
+      EXPECT_GT(mean, 1e-3);
+      EXPECT_NEAR(lamp.unoccluded_irradiance({0, 0, 0}, normal) / mean, 1, 1e-3);
     }
+    for (const LampField* field : kind->fields) {
+      if (field->rule != FieldRule::kLength) continue;
+      for (float& value : field->values(light)) value = 0.9F;
+    }
+    int cut = 0;
+    for (std::uint32_t k = 0; k < 40; ++k) {
+      const glm::dvec2 s = r2_point(k, {0.4, 0.9}), t = r2_point(k, {0.7, 0.1});
+      const glm::vec3 normal = glm::normalize(glm::vec3(2 * s.x - 1, 0.3 + s.y, 2 * t.x - 1));
+      light.position = {static_cast<float>(2 * t.y - 1), 1, 0.4F};
+      light.direction = to_float3(glm::normalize(glm::vec3(s.y - 0.5, -1, t.x - 0.5)));
+      const PreparedLight lamp(light);
+      cut += glm::dot(lamp.highest_point(normal), normal) > 0 &&
+             glm::dot(lamp.highest_point(-normal), normal) < 0;
+      const double mean = mean_of_places(lamp, normal);
+      EXPECT_NEAR(lamp.unoccluded_irradiance({0, 0, 0}, normal), mean, 0.004 * mean + 1e-4) << k;
+    }
+    EXPECT_GE(cut, 8);
+    EXPECT_LE(cut, 36);
   }
   EXPECT_GE(count, 3);
 }

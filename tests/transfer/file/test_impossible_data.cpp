@@ -196,21 +196,13 @@ TEST(TransferFile, RefusesImpossibleLightmaps) {
   });
 }
 
-TEST(TransferFile, KeepsAndChecksTheCellsOfTheSky) {
+TEST(TransferFile, RefusesImpossibleCellsOfTheSky) {
   const auto cells = [](auto change) {
     return [change](TransferData& data) {
-      data.sky_cells = {{0, 1, 1, 3}, {145, 0, 7}, {0.5F, 0.25F, 1}};
+      data.sky_cells = test::sample_sky_cells();
       change(data.sky_cells);
     };
   };
-  const test::TemporaryFolder folder;
-  TransferData data = sample_data();
-  cells([](auto&) {})(data);
-  save_transfer_file(folder / "file", data);
-  const SkyCells read = load_transfer_file(folder / "file").sky_cells;
-  EXPECT_EQ(read.entry_begin, data.sky_cells.entry_begin);
-  EXPECT_EQ(read.entry_cell, data.sky_cells.entry_cell);
-  EXPECT_EQ(read.entry_part, data.sky_cells.entry_part);
   expect_refused({
       {"sky.entry_begin: 3 rows, not 4", cells([](auto& c) { c.entry_begin.pop_back(); })},
       {"sky.entry_begin: descends", cells([](auto& c) { c.entry_begin[1] = 4; })},
@@ -224,13 +216,8 @@ TEST(TransferFile, KeepsAndChecksTheCellsOfTheSky) {
 TEST(TransferFile, RefusesImpossibleSurfaceHarmonics) {
   const auto harmonics = [](auto change) {
     return [change](TransferData& data) {
-      SurfaceHarmonics& light = data.surface_harmonics;
-      light.sky.assign(data.patches.size(), LinearHarmonics{1, 2, 3, 4});
-      light.entry_begin = {0, 2, 2, 3};
-      light.entry_patch = {1, 2, 0};
-      light.entry_weight.assign(3, LinearHarmonics{1});
-      light.sky_cells = {{0, 0, 1, 1}, {7}, {LinearHarmonics{1}}};
-      change(light);
+      data.surface_harmonics = test::sample_surface_harmonics();
+      change(data.surface_harmonics);
     };
   };
   expect_refused({

@@ -25,7 +25,7 @@ using Names = std::vector<std::string>;
 TEST(TransferFile, RoundTripsEveryField) {
   for (const Precision precision : {Precision::kF16, Precision::kF32}) {
     const test::TemporaryFolder folder;
-    const TransferData data = sample_data(precision);
+    const TransferData data = test::full_sample_data(precision);
     save_transfer_file(folder / "file", data);
     expect_equal(load_transfer_file(folder / "file"), data);
     EXPECT_EQ(folder.names(), Names{"file"});
@@ -81,20 +81,6 @@ TEST(TransferFile, SealsAsDocumented) {
   const std::string written = file;
   reseal(file);
   EXPECT_EQ(file, written);
-}
-
-TEST(TransferFile, KeepsALightmap) {
-  const test::TemporaryFolder folder;
-  TransferData data = sample_data();
-  data.lightmap = test::sample_lightmap(data);
-  save_transfer_file(folder / "file", data);
-  const Lightmap read = load_transfer_file(folder / "file").lightmap;
-  EXPECT_EQ(read.width, 2U);
-  EXPECT_EQ(read.height, 1U);
-  EXPECT_EQ(read.texcoord, data.lightmap.texcoord);
-  EXPECT_EQ(read.has_texels, data.lightmap.has_texels);
-  EXPECT_EQ(read.triangle, data.lightmap.triangle);
-  EXPECT_EQ(read.weight, data.lightmap.weight);
 }
 
 TEST(TransferFile, IgnoresATensorThatItDoesNotKnow) {

@@ -163,6 +163,31 @@ inline Lightmap sample_lightmap(const TransferData& data) {
   return map;
 }
 
+inline SkyCells sample_sky_cells() {
+  return {{0, 1, 1, 3}, {145, 0, 7}, {0.5F, 0.25F, 1}};
+}
+
+inline SurfaceHarmonics sample_surface_harmonics() {
+  SurfaceHarmonics light;
+  light.sky.assign(3, LinearHarmonics{1, 2, 3, 4});
+  light.entry_begin = {0, 2, 2, 3};
+  light.entry_patch = {1, 2, 0};
+  light.entry_weight.assign(3, LinearHarmonics{1});
+  light.sky_cells = {{0, 0, 1, 1}, {7}, {LinearHarmonics{1}}};
+  return light;
+}
+
+/// With all that a file may do without.
+inline TransferData full_sample_data(Precision precision = Precision::kF16) {
+  TransferData data = sample_data(precision);
+  data.sky_cells = sample_sky_cells();
+  data.probes = sample_probes();
+  data.probes.patch_count = data.patches.size();
+  data.lightmap = sample_lightmap(data);
+  data.surface_harmonics = sample_surface_harmonics();
+  return data;
+}
+
 /// What can be compared and printed.
 template <typename T>
 const T& plain(const T& value) {
@@ -246,7 +271,39 @@ inline void expect_equal(const BuildRecord& a, const BuildRecord& b) {
               &BuildRecord::error_max, &BuildRecord::error_bound);
 }
 
+inline void expect_equal(const SkyCells& a, const SkyCells& b) {
+  expect_same(a, b, &SkyCells::entry_begin, &SkyCells::entry_cell, &SkyCells::entry_part);
+}
+
+template <typename Weight>
+void expect_equal(const SkyHarmonics<Weight>& a, const SkyHarmonics<Weight>& b) {
+  using Cells = SkyHarmonics<Weight>;
+  expect_same(a, b, &Cells::entry_begin, &Cells::entry_cell, &Cells::entry_weight);
+}
+
+inline void expect_equal(const LightProbes& a, const LightProbes& b) {
+  expect_same(a, b, &LightProbes::position, &LightProbes::valid, &LightProbes::sky,
+              &LightProbes::entry_begin, &LightProbes::entry_patch, &LightProbes::entry_weight,
+              &LightProbes::grid, &LightProbes::patch_count);
+  expect_equal(a.sky_cells, b.sky_cells);
+}
+
+inline void expect_equal(const SurfaceHarmonics& a, const SurfaceHarmonics& b) {
+  using Light = SurfaceHarmonics;
+  expect_same(a, b, &Light::sky, &Light::entry_begin, &Light::entry_patch, &Light::entry_weight);
+  expect_equal(a.sky_cells, b.sky_cells);
+}
+
+inline void expect_equal(const Lightmap& a, const Lightmap& b) {
+  expect_same(a, b, &Lightmap::width, &Lightmap::height, &Lightmap::texcoord, &Lightmap::has_texels,
+              &Lightmap::triangle, &Lightmap::weight);
+}
+
 inline void expect_equal(const TransferData& a, const TransferData& b) {
+  expect_equal(a.sky_cells, b.sky_cells);
+  expect_equal(a.probes, b.probes);
+  expect_equal(a.lightmap, b.lightmap);
+  expect_equal(a.surface_harmonics, b.surface_harmonics);
   expect_equal(a.patches, b.patches);
   expect_equal(a.mesh, b.mesh);
   expect_equal(a.materials, b.materials);
