@@ -15,7 +15,7 @@ import aims
 import claims as claims_module
 import results
 import summary
-from formats import number, span
+from formats import span
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RESULTS = "bench/results/*/report.csv"
@@ -79,8 +79,8 @@ def reports(root=ROOT):
     return found
 
 
-def milliseconds(microseconds):
-    return f"{number(microseconds / 1000)} ms"
+def duration(microseconds):
+    return f"{microseconds:.0f} µs" if microseconds < 100 else f"{microseconds / 1000:.2g} ms"
 
 
 def readme_line(report):
@@ -93,14 +93,15 @@ def readme_line(report):
         condition = f"{results.SWITCHED}, error {error:g}"
         claim = claims_module.find(shown.claims, "equal error", condition)
         parts.append(
-            f"{milliseconds(claim.inverse_value)} to {results.percent(error)} "
-            f"(Gauss-Seidel: {milliseconds(claim.rival_value)})"
+            f"{duration(claim.inverse_value)} to an error of {results.percent(error)} "
+            f"(Gauss-Seidel: {duration(claim.rival_value)})"
         )
     patches = [h.result.patches for h in report.headlines]
     scenes = {h.result.scene for h in report.headlines}
     return (
         f"**Figures.** {SCENE.replace('_', ' ').capitalize()}, {PATCHES:,} patches, one thread of an "
-        f"{report.processor}: all bounces of a lamp that was just switched on take {parts[0]}, or {parts[1]}. "
+        f"{report.processor}: the light of a lamp that was just switched on, with all bounces, takes "
+        f"{parts[0]}, {parts[1]}. "
         f"Over {len(scenes)} scenes of {min(patches):,} to {max(patches):,} patches the product is "
         f"{span([h.switch for h in report.headlines])} times faster to {results.percent(aims.AIM_ERROR)}. "
         f"[All figures, and where Gauss-Seidel wins]({PAGE})."

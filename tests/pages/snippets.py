@@ -9,9 +9,10 @@ A fenced block of a page is
   json              read as JSON
   cmake, text       not run: they are part of what a title or a command beside them runs
 
-HOME and the checkout are folders in WORK, so that nothing outside of it is written. The checkout is
-links to the true one, with a `dev` that runs `demo` and `build` and knows the other commands by
-name, and a `rebounce` that draws a picture where it would open a window.
+HOME and the checkout are folders in WORK, so that nothing outside of it is written but demo-out. The
+checkout is links to the true one, with a `dev` that runs `demo` and `build`, and knows the other
+commands by name; what is built is BUILD, which is not built again. `rebounce` draws a picture where
+it would open a window.
 
 usage: snippets.py BUILD WORK [PAGE...]
 """
@@ -54,6 +55,12 @@ case $1 in
 esac
 """
 
+# Of ./dev, which configures and builds by presets.
+CMAKE = """#!/usr/bin/env bash
+if [[ " $* " == *" --preset "* ]]; then exit; fi
+exec '{cmake}' "$@"
+"""
+
 REBOUNCE = """#!/usr/bin/env bash
 set -euo pipefail
 if [[ ${{1:-}} == view && " $* " != *" --screenshot "* && " $* " != *" --out "* ]]; then
@@ -88,12 +95,14 @@ class Sandbox:
         (self.home / "tour").mkdir(parents=True)
         self.make_checkout(build.resolve())
         self.prefix = self.home / "tour" / "installed"
-        tools = self.checkout / "build/release"
+        tools = self.work / "tools"
+        tools.mkdir()
+        write_script(tools / "cmake", CMAKE.format(cmake=shutil.which("cmake")))
         self.environment = {
             **os.environ,
             "HOME": str(self.home),
             "REBOUNCE": str(self.checkout),
-            "PATH": f"{tools}:{os.environ['PATH']}",
+            "PATH": f"{tools}:{self.checkout / 'build/release'}:{os.environ['PATH']}",
         }
 
     def make_checkout(self, build):
@@ -157,7 +166,7 @@ def compile_and_run(sandbox, page, language, blocks):
     program = source.with_suffix("")
     # Snippets show results that they do not use.
     command = [*compiler, "-Wall", "-Wextra", "-Werror", "-Wno-unused-variable",
-               "-Wno-unused-but-set-variable", source, "-o", program, *sandbox.flags()]
+               "-Wno-unused-but-set-variable", "-Wno-unused-parameter", source, "-o", program, *sandbox.flags()]
     sandbox.run(command, sandbox.work, f"{page}: its {language} snippets")
     sandbox.run([program], sandbox.folder_of(page), f"{page}: the program of its {language} snippets")
 
