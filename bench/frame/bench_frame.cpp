@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 #include "bench/support/input.h"
 #include "bench/support/program.h"
@@ -20,7 +21,8 @@ namespace {
 
 constexpr std::array<std::size_t, 3> kLightCounts = {1, 4, 16};
 constexpr std::size_t kMovingCount = 2;  // of the lights of a whole frame
-constexpr std::size_t kMapSize = 8;      // of an irradiance map
+constexpr std::size_t kBareRays = 16384;
+constexpr std::size_t kMapSize = 8;  // of an irradiance map
 
 struct FrameOptions {
   InputOptions input{.patch_counts = {4000}};
@@ -39,11 +41,12 @@ class MovingLights {
     elsewhere_.assign(all.begin() + static_cast<std::ptrdiff_t>(count), all.end());
   }
 
-  void give_area() {
+  void turn_into(LightType type) {
     for (std::vector<Light>* lights : {&lights_, &elsewhere_}) {
       for (Light& light : *lights) {
-        light.type = LightType::kSphere;
+        light.type = type;
         light.radius = 0.05F;
+        light.outer_cone_angle = 0.6F;
       }
     }
   }
@@ -81,6 +84,7 @@ class FrameBenchmark {
     names_.clear();
     cases_.clear();
     for (const std::size_t count : kLightCounts) add_lights(count);
+    add_bare_rays();
     add("initial exitance", {}, [this] { engine_.parts().compute_initial_exitance(); });
     add("product", {}, [this] { engine_.parts().apply_transfer(); });
     add("radiosity", {}, [this] { engine_.parts().compute_radiosity(); });
@@ -106,16 +110,37 @@ class FrameBenchmark {
     const auto still = std::make_shared<Engine>(engine_);
     add("direct, none moved", count,
         [still, none] { still->parts().compute_direct(none->next(), {}); });
-    const auto spheres = std::make_shared<MovingLights>(engine_, count, count);
-    spheres->give_area();
-    add("direct, spheres moved", count,
-        [this, spheres] { engine_.parts().compute_direct(spheres->next(), {}); });
+    for (const auto& [name, type] : {std::pair("direct, spots moved", LightType::kSpot),
+                                     std::pair("direct, spheres moved", LightType::kSphere)}) {
+      const auto lights = std::make_shared<MovingLights>(engine_, count, count);
+      lights->turn_into(type);
+      add(name, count, [this, lights] { engine_.parts().compute_direct(lights->next(), {}); });
+    }
     // The whole frame keeps its own engine: what does not move is known from its last frame.
     const auto some = std::make_shared<MovingLights>(engine_, count, kMovingCount);
     const auto own = std::make_shared<Engine>(engine_);
     add("frame, two moved", count, [this, own, some] {
       own->relight(some->next(), {});
       reconstruct_at_vertices(own->data().mesh, own->indirect_irradiance(), vertices_);
+    });
+  }
+
+  /// What the ray tracer alone takes for some of the rays of a frame: from patches to one lamp.
+  void add_bare_rays() {
+    const TransferData& scene = engine_.data();
+    const RayTracer& tracer = *engine_.parts().tracer;
+    const Float3 lamp = random_point_lights(scene, tracer, 1, 7).front().position;
+    const auto rays = std::make_shared<std::vector<Ray>>(kBareRays);
+    for (std::size_t k = 0; k < kBareRays; ++k) {
+      const std::size_t patch = k * scene.patches.size() / kBareRays;
+      Ray& ray = (*rays)[k];
+      ray.origin = tracer.offset_point(scene.patches.centroid[patch], scene.patches.normal[patch]);
+      ray.t_near = 0;
+      for (int c = 0; c < 3; ++c) ray.direction[c] = lamp[c] - ray.origin[c];
+    }
+    add("16,384 shadow rays alone", {}, [&tracer, rays] {
+      for (Ray& ray : *rays) ray.t_far = 1;
+      tracer.occluded(*rays);
     });
   }
 

@@ -3,47 +3,99 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <cmath>
 
-#include "rebounce/error.h"
+#include "runtime/frame/receivers.h"
 #include "runtime/lights/lamp_shadows.h"
 #include "runtime/lights/sky_light.h"
-#include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/rays/patch_points.h"
-#include "runtime/rays/sampling.h"
 
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kBlock = 64;         // patches that a task lights
+constexpr std::size_t kBlock = Receivers::kBlock, kPart = Receivers::kPart;
 constexpr std::size_t kAddedPerTask = 16;  // blocks per task where no light is traced
+constexpr std::size_t kPointsAtOnce = 8;   // of each patch, found before their rays are traced
 
-/// Moves `places` of the unit square by `shift`, modulo 1.
-void shift_places(std::span<const glm::vec2> places, const glm::vec2& shift,
-                  std::span<glm::vec2> shifted) {
-  const auto around = [](float x) { return x < 1 ? x : x - 1; };
-  for (std::size_t k = 0; k < places.size(); ++k) {
-    const glm::vec2 moved = places[k] + shift;
-    shifted[k] = {around(moved.x), around(moved.y)};
-  }
-}
+/// The light of a lamp without a surface at a block of points.
+struct BlockLight {
+  UnitLightBlock light;
+  /// On the surfaces there, without shadow; not above 0 for light from below the horizon.
+  PatchPointBlock::Coordinates arriving;
 
-}  // namespace
-
-/// The points that receive light: the same for every light and every frame.
-struct DirectLighting::Receivers {
-  std::size_t points_per_patch = 0;
-  std::size_t area_light_samples = 0;
-  /// [points_per_patch][area_light_samples] sample points, for every lamp.
-  std::vector<glm::vec2> places;
-  std::vector<LitPoint> points;  ///< [n][points_per_patch]
-  std::vector<Box> block_box;    ///< [blocks] bounds of their points
-
-  std::span<const LitPoint> points_of(std::size_t patch) const {
-    return std::span(points).subspan(patch * points_per_patch, points_per_patch);
+  void evaluate(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part) {
+    lamp.evaluate(points, part, light);
+    const auto& [x, y, z] = light.direction;
+    const auto& [normal_x, normal_y, normal_z] = points.normal;
+#pragma omp simd
+    for (std::size_t e = part * kPart; e < (part + 1) * kPart; ++e) {
+      const float cosine = x[e] * normal_x[e] + y[e] * normal_y[e] + z[e] * normal_z[e];
+      arriving[e] = light.illuminance[e] * cosine;
+    }
   }
 };
+
+/// The light of one lamp at the slots of one block.
+struct LampAtBlock {
+  const Receivers& receivers;
+  const PreparedLight& lamp;
+  std::size_t block;
+  Receivers::Reached reached;
+
+  /// Adds the light of a lamp without a surface.
+  void add(LampShadows& shadows) const {
+    const float share = 1 / static_cast<float>(receivers.points_per_patch);
+    std::array<BlockLight, kPointsAtOnce> light;
+    for (std::size_t first = 0; first < receivers.points_per_patch; first += kPointsAtOnce) {
+      const std::size_t last = std::min(first + kPointsAtOnce, receivers.points_per_patch);
+      for (std::size_t k = first; k < last; ++k) evaluate(k, light[k - first]);
+      // Rays from the points of a patch take nearly the same way, so they follow each other.
+      for_each_slot([&](std::size_t slot) {
+        for (std::size_t k = first; k < last; ++k) {
+          const auto& [here, arriving] = light[k - first];
+          if (arriving[slot] <= 0) continue;
+          shadows.add_ray(receivers.points(block, k).at(slot), here.at(slot),
+                          share * arriving[slot], slot);
+        }
+      });
+    }
+  }
+
+  /// Adds the light of a lamp with a surface.
+  void add_surface(LampShadows& shadows) const {
+    const float share = 1 / static_cast<float>(receivers.points_per_patch);
+    const std::size_t samples = receivers.area_light_samples;
+    const auto around = [](float x) { return x < 1 ? x : x - 1; };
+    std::array<glm::vec2, kMaxAreaLightSamples> places;
+    for_each_slot([&](std::size_t slot) {
+      const glm::vec2& shift = receivers.shift[block * kBlock + slot];
+      for (std::size_t k = 0; k < receivers.points_per_patch; ++k) {
+        for (std::size_t j = 0; j < samples; ++j) {
+          const glm::vec2 moved = receivers.places[k * samples + j] + shift;
+          places[j] = {around(moved.x), around(moved.y)};
+        }
+        const PatchPointBlock& points = receivers.points(block, k);
+        shadows.add_surface(lamp, {points.at(slot), points.normal_at(slot)},
+                            std::span(places).first(samples), share, slot);
+      }
+    });
+  }
+
+ private:
+  void evaluate(std::size_t k, BlockLight& light) const {
+    for (std::size_t part = 0; part < reached.size(); ++part) {
+      if (reached[part]) light.evaluate(lamp, receivers.points(block, k), part);
+    }
+  }
+
+  template <typename Work>
+  void for_each_slot(const Work& work) const {
+    for (std::size_t slot = 0; slot < receivers.slots_in(block); ++slot) {
+      if (reached[slot / kPart]) work(slot);
+    }
+  }
+};
+
+}  // namespace
 
 /// The irradiance of one light at intensity 1.
 struct DirectLighting::LightResponse {
@@ -51,48 +103,16 @@ struct DirectLighting::LightResponse {
   bool known = false;  ///< whether `irradiance` is that of `light`
   bool stale = false;  ///< whether this frame must trace it
   glm::vec3 intensity{0};
-  std::vector<float> irradiance;  ///< [n] per unit of intensity
-  std::vector<std::uint8_t> lit;  ///< [blocks] 0: the irradiance of all patches in the block is 0
+  std::vector<float> irradiance;  ///< [slots] per unit of intensity
+  std::vector<std::uint8_t> lit;  ///< [blocks] 0: the irradiance of all slots in the block is 0
 };
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
                                const DirectLightingSettings& settings)
-    : data_(data), tracer_(tracer), receivers_(spread_receivers(data, tracer, settings)) {
+    : data_(data),
+      tracer_(tracer),
+      receivers_(std::make_shared<const Receivers>(data, tracer, settings)) {
   make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
-}
-
-std::shared_ptr<const DirectLighting::Receivers> DirectLighting::spread_receivers(
-    const TransferData& data, const RayTracer& tracer, const DirectLightingSettings& settings) {
-  if (settings.points_per_patch < 1) throw Error("direct light needs at least one point per patch");
-  if (settings.area_light_samples < 1 || settings.area_light_samples > kMaxAreaLightSamples) {
-    throw Error("direct light needs from 1 to " + std::to_string(kMaxAreaLightSamples) +
-                " samples of lamps with a surface");
-  }
-  const std::size_t n = data.patches.size();
-  auto receivers = std::make_shared<Receivers>();
-  const auto points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
-  receivers->points_per_patch = points_per_patch;
-  receivers->area_light_samples = static_cast<std::size_t>(settings.area_light_samples);
-  receivers->places.resize(points_per_patch * receivers->area_light_samples);
-  for (std::uint32_t k = 0; k < receivers->places.size(); ++k) {
-    receivers->places[k] = glm::vec2(r2_point(k, {0, 0}));
-  }
-  receivers->points.resize(n * points_per_patch);
-  receivers->block_box.resize((n + kBlock - 1) / kBlock);
-  const PatchTriangles triangles(data.mesh.triangle_patch, n);
-  std::vector<PatchPoint> spread(points_per_patch);
-  for (std::size_t i = 0; i < n; ++i) {
-    std::ranges::fill(spread, PatchPoint{data.patches.centroid[i], data.patches.normal[i]});
-    if (!triangles[i].empty()) {
-      spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), spread);
-    }
-    for (std::size_t k = 0; k < points_per_patch; ++k) {
-      const Float3 lifted = tracer.offset_point(spread[k].position, spread[k].normal);
-      receivers->points[i * points_per_patch + k] = {to_glm(lifted), to_glm(spread[k].normal)};
-      receivers->block_box[i / kBlock].add(to_glm(lifted));
-    }
-  }
-  return receivers;
 }
 
 DirectLighting::~DirectLighting() = default;
@@ -101,8 +121,8 @@ DirectLighting::DirectLighting(const DirectLighting&) = default;
 void DirectLighting::make_room(std::size_t light_count) {
   while (responses_.size() < light_count) {
     LightResponse& response = responses_.emplace_back();
-    response.irradiance.resize(data_.patches.size());
-    response.lit.resize(receivers_->block_box.size());
+    response.irradiance.resize(receivers_->size());
+    response.lit.resize(receivers_->block_count());
   }
 }
 
@@ -112,13 +132,13 @@ void DirectLighting::compute(std::span<const Light> lights, const Sky& sky,
   check_sky(sky, data_);
   prepare(lights);
   const std::size_t blocks_per_task = traced_light_count_ > 0 ? 1 : kAddedPerTask;
-  const std::size_t block_count = receivers_->block_box.size();
-  parallel_for_pieces(scheduler, block_count, blocks_per_task, [&](std::size_t block) {
-    for (std::size_t k = 0; k < light_count_; ++k) {
-      if (responses_[k].stale) respond(responses_[k], block);
-    }
-    add_up(sky, block, direct_irradiance);
-  });
+  parallel_for_pieces(scheduler, receivers_->block_count(), blocks_per_task,
+                      [&](std::size_t block) {
+                        for (std::size_t k = 0; k < light_count_; ++k) {
+                          if (responses_[k].stale) respond(responses_[k], block);
+                        }
+                        add_up(sky, block, direct_irradiance);
+                      });
 }
 
 void DirectLighting::prepare(std::span<const Light> lights) {
@@ -140,44 +160,36 @@ void DirectLighting::prepare(std::span<const Light> lights) {
 }
 
 void DirectLighting::respond(LightResponse& response, std::size_t block) const {
-  const std::size_t begin = block * kBlock,
-                    end = std::min(begin + kBlock, response.irradiance.size());
-  const std::span<float> irradiance(response.irradiance);
-  std::ranges::fill(irradiance.subspan(begin, end - begin), 0.0F);
-  const PreparedLight& light = response.light;
-  const Box& box = receivers_->block_box[block];
+  const std::span<float> irradiance =
+      std::span(response.irradiance).subspan(block * kBlock, receivers_->slots_in(block));
+  std::ranges::fill(irradiance, 0.0F);
   response.lit[block] = 0;
-  if (box.distance_squared(light.position) >= light.reach_squared) return;
+  const PreparedLight& light = response.light;
+  const Receivers::Reached reached = receivers_->reached(block, light);
+  if (std::ranges::find(reached, true) == reached.end()) return;
 
-  const float weight = 1 / static_cast<float>(receivers_->points_per_patch);
-  const std::size_t samples = receivers_->area_light_samples;
-  std::array<glm::vec2, kMaxAreaLightSamples> places;
+  const LampAtBlock here{*receivers_, light, block, reached};
   LampShadows shadows(tracer_, irradiance);
-  for (std::size_t patch = begin; patch < end; ++patch) {
-    const std::span<const LitPoint> points = receivers_->points_of(patch);
-    const glm::vec2 shift(unit_square(mix_bits(~static_cast<std::uint64_t>(patch))));
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      const std::span<glm::vec2> here = std::span(places).first(light.has_area() ? samples : 0);
-      shift_places(std::span(receivers_->places).subspan(k * samples, here.size()), shift, here);
-      shadows.add(light, points[k], here, weight, patch);
-    }
+  if (light.has_area()) {
+    here.add_surface(shadows);
+  } else {
+    here.add(shadows);
   }
   shadows.flush();
-  const auto lit = [](float e) { return e > 0; };
-  response.lit[block] = std::ranges::any_of(irradiance.subspan(begin, end - begin), lit) ? 1 : 0;
+  response.lit[block] = std::ranges::any_of(irradiance, [](float e) { return e > 0; }) ? 1 : 0;
 }
 
 void DirectLighting::add_up(const Sky& sky, std::size_t block,
                             std::span<Float3> direct_irradiance) const {
-  const std::size_t begin = block * kBlock, end = std::min(begin + kBlock, data_.patches.size());
-  for (std::size_t i = begin; i < end; ++i) direct_irradiance[i] = sky_irradiance(data_, sky, i);
-  for (std::size_t k = 0; k < light_count_; ++k) {
-    const LightResponse& response = responses_[k];
+  const std::size_t begin = block * kBlock, count = receivers_->slots_in(block);
+  const std::span<const std::uint32_t> patch = std::span(receivers_->patch).subspan(begin, count);
+  for (const std::uint32_t i : patch) direct_irradiance[i] = sky_irradiance(data_, sky, i);
+  for (const LightResponse& response : std::span(responses_).first(light_count_)) {
     const glm::vec3 intensity = response.intensity;
     if (intensity == glm::vec3(0) || response.lit[block] == 0) continue;
-    for (std::size_t i = begin; i < end; ++i) {
-      const float e = response.irradiance[i];
-      Float3& sum = direct_irradiance[i];
+    for (std::size_t k = 0; k < count; ++k) {
+      const float e = response.irradiance[begin + k];
+      Float3& sum = direct_irradiance[patch[k]];
       sum = {sum[0] + e * intensity.x, sum[1] + e * intensity.y, sum[2] + e * intensity.z};
     }
   }

@@ -13,6 +13,8 @@
 
 namespace rebounce {
 
+struct Receivers;
+
 /// Direct irradiance of the patches of one scene, with shadows.
 ///
 /// The points on patches and on lamps are chosen once, so a moving light does not flicker. The
@@ -41,12 +43,8 @@ class DirectLighting {
   int traced_light_count() const { return traced_light_count_; }
 
  private:
-  struct Receivers;
   struct LightResponse;
 
-  static std::shared_ptr<const Receivers> spread_receivers(const TransferData& data,
-                                                           const RayTracer& tracer,
-                                                           const DirectLightingSettings& settings);
   void make_room(std::size_t light_count);
   void prepare(std::span<const Light> lights);
   void respond(LightResponse& response, std::size_t block) const;

@@ -19,6 +19,13 @@ UnitLight evaluate(const PreparedLight& lamp, const glm::vec3&) {
   return {-lamp.direction, std::numeric_limits<float>::infinity(), 1};
 }
 
+void evaluate_block(const PreparedLight& lamp, const PatchPointBlock&, std::size_t part,
+                    UnitLightBlock& light) {
+  const std::size_t begin = part * UnitLightBlock::kPart;
+  const UnitLight everywhere = evaluate(lamp, {});
+  for (std::size_t k = begin; k < begin + UnitLightBlock::kPart; ++k) light.set(k, everywhere);
+}
+
 constexpr const char* kGlsl = R"(
 float directional_irradiance(vec3 to_lamp, vec3 direction, vec3 normal) {
   return max(0.0, dot(normal, direction));
@@ -36,6 +43,7 @@ constinit const LampKind kDirectionalLamp{.type = LightType::kDirectional,
                                           .shadow_map = ShadowMapKind::kPlane,
                                           .prepare = prepare,
                                           .evaluate = evaluate,
+                                          .evaluate_block = evaluate_block,
                                           .surface = nullptr,
                                           .glsl = kGlsl};
 

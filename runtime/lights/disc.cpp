@@ -178,6 +178,7 @@ constinit const LampKind kDiscLamp{.type = LightType::kDisc,
                                    .shadow_map = ShadowMapKind::kPlaces,
                                    .prepare = prepare,
                                    .evaluate = nullptr,
+                                   .evaluate_block = nullptr,
                                    .surface = &kSurface,
                                    .glsl = kGlsl,
                                    .shared_glsl = kFlatGlsl};

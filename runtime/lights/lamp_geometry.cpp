@@ -28,10 +28,35 @@ void prepare_profile(const Light& light, PreparedLight& lamp) {
 UnitLight inverse_square(const PreparedLight& lamp, const glm::vec3& point) {
   const glm::vec3 to_lamp = lamp.position - point;
   const float distance_squared = glm::dot(to_lamp, to_lamp);
-  // A point inside the lamp has no direction to it and receives nothing.
   if (!(distance_squared > 0)) return {};
   const float distance = std::sqrt(distance_squared);
   return {to_lamp / distance, distance, lamp.range_window(distance_squared) / distance_squared};
+}
+
+// The same operations, so the same bits; in numbers and without branches, so that they are
+// vectorised.
+void inverse_square(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                    UnitLightBlock& light) {
+  const glm::vec3 lamp_position = lamp.position;
+  const float reach_squared = lamp.reach_squared;
+  const std::size_t begin = part * UnitLightBlock::kPart;
+#pragma omp simd
+  for (std::size_t k = begin; k < begin + UnitLightBlock::kPart; ++k) {
+    const float x = lamp_position.x - points.position[0][k];
+    const float y = lamp_position.y - points.position[1][k];
+    const float z = lamp_position.z - points.position[2][k];
+    const float distance_squared = x * x + y * y + z * z;
+    const auto outside = static_cast<float>(distance_squared > 0);
+    const float divisor = distance_squared + (1 - outside);
+    const float distance = std::sqrt(divisor);
+    const float ratio_squared = distance_squared / reach_squared;
+    const float window = std::max(0.0F, 1 - ratio_squared * ratio_squared);
+    light.direction[0][k] = x / distance;
+    light.direction[1][k] = y / distance;
+    light.direction[2][k] = z / distance;
+    light.distance[k] = outside * distance;
+    light.illuminance[k] = outside * window / divisor;
+  }
 }
 
 void apply_profile(const PreparedLight& lamp, UnitLight& light) {
@@ -40,6 +65,16 @@ void apply_profile(const PreparedLight& lamp, UnitLight& light) {
   const float vertical = std::acos(std::clamp(glm::dot(way, lamp.direction), -1.0F, 1.0F));
   const float horizontal = std::atan2(glm::dot(way, lamp.other_side), glm::dot(way, lamp.side));
   light.illuminance *= lamp.profile->intensity(vertical, horizontal);
+}
+
+void apply_profile(const PreparedLight& lamp, std::size_t part, UnitLightBlock& light) {
+  if (!lamp.profile) return;
+  const std::size_t begin = part * UnitLightBlock::kPart;
+  for (std::size_t k = begin; k < begin + UnitLightBlock::kPart; ++k) {
+    UnitLight here = light.at(k);
+    apply_profile(lamp, here);
+    light.illuminance[k] = here.illuminance;
+  }
 }
 
 glm::vec2 golden_turn(std::uint32_t k) {

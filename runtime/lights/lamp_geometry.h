@@ -23,12 +23,16 @@ glm::vec3 least_axis(const glm::vec3& v);
 /// Prepares `lamp` for its profile, if `light` has one.
 void prepare_profile(const Light& light, PreparedLight& lamp);
 
-/// The light of a point lamp at `point`: inverse square and range (KHR_lights_punctual, "Range
-/// Property"). No light at the lamp itself.
+/// The light of a point lamp at `point`, or at the points of a part of a block: inverse square and
+/// range (KHR_lights_punctual, "Range Property"). No light at the lamp itself: a point inside it
+/// has no direction to it.
 UnitLight inverse_square(const PreparedLight& lamp, const glm::vec3& point);
+void inverse_square(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                    UnitLightBlock& light);
 
 /// Multiplies `light` by the candelas of the lamp's profile, if it has one.
 void apply_profile(const PreparedLight& lamp, UnitLight& light);
+void apply_profile(const PreparedLight& lamp, std::size_t part, UnitLightBlock& light);
 
 /// Point k of a golden-angle spiral around the unit circle.
 glm::vec2 golden_turn(std::uint32_t k);

@@ -79,6 +79,11 @@ UnitLight PreparedLight::evaluate(const glm::vec3& point) const {
   return kind->evaluate(*this, point);
 }
 
+void PreparedLight::evaluate(const PatchPointBlock& points, std::size_t part,
+                             UnitLightBlock& light) const {
+  kind->evaluate_block(*this, points, part, light);
+}
+
 void PreparedLight::evaluate_places(const glm::vec3& point, std::span<const glm::vec2> places,
                                     std::span<UnitLight> light) const {
   kind->surface->evaluate_places(*this, point, places, light);
@@ -91,15 +96,12 @@ float PreparedLight::unoccluded_irradiance(const glm::vec3& point, const glm::ve
   return window * std::numbers::pi_v<float> * kind->surface->form_factor(*this, point, normal);
 }
 
-glm::vec3 PreparedLight::highest_point(const glm::vec3& normal) const {
-  return kind->surface->highest_point(*this, normal);
+float PreparedLight::extent() const {
+  return has_area() ? radius + glm::length(side) + glm::length(other_side) : 0;
 }
 
-// KHR_lights_punctual, "Range Property".
-float PreparedLight::range_window(float distance_squared) const {
-  if (range <= 0) return 1;
-  const float ratio_squared = distance_squared / reach_squared;
-  return std::clamp(1 - ratio_squared * ratio_squared, 0.0F, 1.0F);
+glm::vec3 PreparedLight::highest_point(const glm::vec3& normal) const {
+  return kind->surface->highest_point(*this, normal);
 }
 
 }  // namespace rebounce

@@ -3,6 +3,8 @@
 // All that differs from one kind of lamp to another, in one record each. To add a kind: a
 // LightType, a file beside this one that defines its record, and a case in lamp_kind.cpp.
 
+#include <algorithm>
+#include <array>
 #include <glm/glm.hpp>
 #include <memory>
 #include <span>
@@ -11,6 +13,7 @@
 #include "rebounce/scene_data.h"
 #include "runtime/lights/lamp_field.h"
 #include "runtime/lights/lamp_mesh.h"
+#include "runtime/rays/patch_points.h"
 
 namespace rebounce {
 
@@ -21,6 +24,23 @@ struct UnitLight {
   glm::vec3 direction{0};  ///< unit, from the point to the lamp
   float distance = 0;      ///< metres
   float illuminance = 0;   ///< lx per unit of intensity on a surface that faces it
+};
+
+/// UnitLight at the points of a block, found part by part.
+struct UnitLightBlock {
+  static constexpr std::size_t kPart = 16;  ///< points of a part
+  using Coordinates = PatchPointBlock::Coordinates;
+  std::array<Coordinates, 3> direction;
+  Coordinates distance, illuminance;
+
+  UnitLight at(std::size_t k) const {
+    return {{direction[0][k], direction[1][k], direction[2][k]}, distance[k], illuminance[k]};
+  }
+  void set(std::size_t k, const UnitLight& light) {
+    for (int axis = 0; axis < 3; ++axis) direction[axis][k] = light.direction[axis];
+    distance[k] = light.distance;
+    illuminance[k] = light.illuminance;
+  }
 };
 
 /// What a light does at intensity 1, with all that does not depend on the point worked out once.
@@ -36,6 +56,9 @@ struct PreparedLight {
   /// See evaluate_light. Not for lamps with a surface.
   UnitLight evaluate(const glm::vec3& point) const;
 
+  /// As evaluate, at the points of part number `part` of a block.
+  void evaluate(const PatchPointBlock& points, std::size_t part, UnitLightBlock& light) const;
+
   /// See evaluate_light: at one point, from each of `places` of a lamp with a surface. The two are
   /// of one size.
   void evaluate_places(const glm::vec3& point, std::span<const glm::vec2> places,
@@ -49,8 +72,15 @@ struct PreparedLight {
   /// The point of a lamp with a surface that is highest above a horizon with unit `normal`.
   glm::vec3 highest_point(const glm::vec3& normal) const;
 
+  /// No point of its surface is farther from its position, metres; 0 without a surface.
+  float extent() const;
+
   /// 1 at the lamp's middle, 0 from its range on.
-  float range_window(float distance_squared) const;
+  float range_window(float distance_squared) const {
+    // KHR_lights_punctual, "Range Property".
+    const float ratio_squared = distance_squared / reach_squared;
+    return std::max(0.0F, 1 - ratio_squared * ratio_squared);
+  }
 
   const LampKind* kind = nullptr;
   glm::vec3 position{0}, direction{0};
@@ -106,7 +136,13 @@ struct LampKind {
   void (*prepare)(const Light& light, PreparedLight& lamp);
   /// As PreparedLight::evaluate; null if there is a surface.
   UnitLight (*evaluate)(const PreparedLight& lamp, const glm::vec3& point);
+  void (*evaluate_block)(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                         UnitLightBlock& light);
   const LampSurface* surface;  ///< null if there is none
+  /// False if no light arrives anywhere in a ball, radius in metres, whatever is in between. Never
+  /// wrong by rounding. Null if the lamp shines all around; its range and its surface are not asked
+  /// for.
+  bool (*may_reach)(const PreparedLight& lamp, const glm::vec3& centre, float radius) = nullptr;
 
   /// GLSL 3.30 of the viewer: `float NAME_irradiance(vec3 to_lamp, vec3 direction, vec3 normal)`,
   /// what arrives at intensity 1 where nothing is in between, but for the range; of lamps with a

@@ -7,17 +7,6 @@
 
 namespace rebounce {
 
-void LampShadows::add(const PreparedLight& lamp, const LitPoint& point,
-                      std::span<const glm::vec2> places, float weight, std::size_t sum) {
-  if (lamp.has_area()) {
-    add_surface(lamp, point, places, weight, sum);
-    return;
-  }
-  const UnitLight light = lamp.evaluate(point.position);
-  const float arriving = light.illuminance * glm::dot(light.direction, point.normal);
-  if (arriving > 0) add_ray(point, light, weight * arriving, sum);
-}
-
 void LampShadows::add_surface(const PreparedLight& lamp, const LitPoint& point,
                               std::span<const glm::vec2> places, float weight, std::size_t sum) {
   const float unoccluded = lamp.unoccluded_irradiance(point.position, point.normal);
@@ -33,20 +22,20 @@ void LampShadows::add_surface(const PreparedLight& lamp, const LitPoint& point,
   if (whole <= 0) {  // the lamp is below the horizon, except for a sliver
     const glm::vec3 path = lamp.highest_point(point.normal) - point.position;
     const float distance = glm::length(path);
-    add_ray(point, {path / distance, distance, 0}, weight * unoccluded, sum);
+    add_ray(point.position, {path / distance, distance, 0}, weight * unoccluded, sum);
     return;
   }
   const float scale = weight * unoccluded / whole;
   for (std::size_t k = 0; k < places.size(); ++k) {
-    if (part[k] > 0) add_ray(point, sample[k], scale * part[k], sum);
+    if (part[k] > 0) add_ray(point.position, sample[k], scale * part[k], sum);
   }
 }
 
-void LampShadows::add_ray(const LitPoint& point, const UnitLight& light, float irradiance,
+void LampShadows::add_ray(const glm::vec3& position, const UnitLight& light, float irradiance,
                           std::size_t sum) {
   if (count_ == kBatch) flush();
   Ray& ray = rays_[count_];
-  ray.origin = to_float3(point.position);
+  ray.origin = to_float3(position);
   ray.t_near = 0;
   ray.direction = to_float3(light.direction);
   ray.time = 0;

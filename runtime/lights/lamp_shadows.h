@@ -30,23 +30,24 @@ class LampShadows {
   LampShadows(const RayTracer& tracer, std::span<float> irradiance)
       : tracer_(tracer), irradiance_(irradiance) {}
 
-  /// Adds `weight` times the irradiance at `point` from `lamp` to sum number `sum`. For a lamp with
-  /// a surface, `places` are its sample points in [0, 1)^2, 1 to kMaxAreaLightSamples of them;
-  /// other lamps ignore them. The unshadowed irradiance of a surface is exact; the rays give the
-  /// visible fraction of it, each weighted by its own contribution (E. Heitz, S. Hill, M. McGuire,
-  /// "Combining analytic direct illumination and stochastic shadows", 2018).
-  void add(const PreparedLight& lamp, const LitPoint& point, std::span<const glm::vec2> places,
-           float weight, std::size_t sum);
+  /// Adds to sum number `sum` the part of `irradiance` that gets from the place of a lamp that
+  /// `light` tells of to `position`, which is moved off the surface.
+  void add_ray(const glm::vec3& position, const UnitLight& light, float irradiance,
+               std::size_t sum);
+
+  /// Adds `weight` times the irradiance at `point` from `lamp`, which has a surface, to sum number
+  /// `sum`. `places` are its sample points in [0, 1)^2, 1 to kMaxAreaLightSamples of them. The
+  /// unshadowed irradiance is exact; the rays give the visible fraction of it, each weighted by its
+  /// own contribution (E. Heitz, S. Hill, M. McGuire, "Combining analytic direct illumination and
+  /// stochastic shadows", 2018).
+  void add_surface(const PreparedLight& lamp, const LitPoint& point,
+                   std::span<const glm::vec2> places, float weight, std::size_t sum);
 
   /// Traces the collected rays. Then the sums are complete.
   void flush();
 
  private:
   static constexpr std::size_t kBatch = 64;  // shadow rays traced at a time
-
-  void add_surface(const PreparedLight& lamp, const LitPoint& point,
-                   std::span<const glm::vec2> places, float weight, std::size_t sum);
-  void add_ray(const LitPoint& point, const UnitLight& light, float irradiance, std::size_t sum);
 
   const RayTracer& tracer_;
   std::span<float> irradiance_;

@@ -15,6 +15,12 @@ UnitLight evaluate(const PreparedLight& lamp, const glm::vec3& point) {
   return light;
 }
 
+void evaluate_block(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                    UnitLightBlock& light) {
+  inverse_square(lamp, points, part, light);
+  apply_profile(lamp, part, light);
+}
+
 constexpr const char* kGlsl = R"(
 float point_irradiance(vec3 to_lamp, vec3 direction, vec3 normal) {
   return max(0.0, dot(normal, direction)) / max(dot(to_lamp, to_lamp), 1e-12);
@@ -32,6 +38,7 @@ constinit const LampKind kPointLamp{.type = LightType::kPoint,
                                     .shadow_map = ShadowMapKind::kCube,
                                     .prepare = prepare_profile,
                                     .evaluate = evaluate,
+                                    .evaluate_block = evaluate_block,
                                     .surface = nullptr,
                                     .glsl = kGlsl};
 

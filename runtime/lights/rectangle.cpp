@@ -95,6 +95,7 @@ constinit const LampKind kRectangleLamp{.type = LightType::kRectangle,
                                         .shadow_map = ShadowMapKind::kPlaces,
                                         .prepare = prepare,
                                         .evaluate = nullptr,
+                                        .evaluate_block = nullptr,
                                         .surface = &kSurface,
                                         .glsl = kGlsl,
                                         .shared_glsl = kFlatGlsl};

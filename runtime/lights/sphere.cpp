@@ -140,6 +140,7 @@ constinit const LampKind kSphereLamp{.type = LightType::kSphere,
                                      .shadow_map = ShadowMapKind::kPlaces,
                                      .prepare = prepare,
                                      .evaluate = nullptr,
+                                     .evaluate_block = nullptr,
                                      .surface = &kSurface,
                                      .glsl = kGlsl};
 

@@ -42,6 +42,9 @@ struct PatchPointBlock {
   static constexpr std::size_t kSize = 64;
   using Coordinates = std::array<float, kSize>;
   std::array<Coordinates, 3> position, normal;  ///< as in PatchPoint
+
+  glm::vec3 at(std::size_t k) const { return {position[0][k], position[1][k], position[2][k]}; }
+  glm::vec3 normal_at(std::size_t k) const { return {normal[0][k], normal[1][k], normal[2][k]}; }
 };
 
 /// The surface of a patch that stops light, for sampling points.

@@ -249,12 +249,15 @@ void RayTracer::occluded(std::span<Ray> rays) const {
 void RayTracer::transmittance(std::span<Ray> rays, PassageDetail detail,
                               std::span<float> part) const {
   assert(rays.size() == part.size());
-  if (rays.empty()) return;
+  if (!impl_->has_porous()) {
+    occluded(rays);
+    std::ranges::transform(rays, part.begin(),
+                           [](const Ray& ray) { return is_occluded(ray) ? 0.0F : 1.0F; });
+    return;
+  }
   // Coherent traversal calls filters more than once for one hit (Embree 3.13).
   TraceContext trace = make_context(
-      impl_->groups,
-      impl_->has_porous() ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT
-                          : RTC_INTERSECT_CONTEXT_FLAG_COHERENT,
+      impl_->groups, RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT,
       detail == PassageDetail::kTriangle ? Rule::kTriangleMeans : Rule::kMicroTriangles);
   trace.transmitted = part.data();
   // The filter identifies rays by number; their own ids are kept in an unused field meanwhile.

@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <random>
 #include <set>
 #include <string>
 
@@ -42,6 +44,7 @@ TEST(LampKinds, AreInTheOrderOfTheirTypeAndOfDifferentNames) {
 TEST(LampKinds, HaveEitherOnePlaceOrASurface) {
   for (const LampKind* kind : lamp_kinds()) {
     EXPECT_NE(kind->evaluate == nullptr, kind->surface == nullptr) << kind->name;
+    EXPECT_EQ(kind->evaluate == nullptr, kind->evaluate_block == nullptr) << kind->name;
     EXPECT_EQ(kind->surface != nullptr, kind->shadow_map == ShadowMapKind::kPlaces) << kind->name;
     const std::string glsl = kind->glsl;
     const std::string name(kind->name);
@@ -63,6 +66,46 @@ TEST(LampKinds, RefuseNumbersThatAreNotOnes) {
       test::expect_error([&] { check_light(bad); }, std::string(field->name));
     }
   }
+}
+
+TEST(LampKinds, LightBlocksOfPointsAsTheyDoEachPoint) {
+  constexpr unsigned kSeed = 5;
+  std::mt19937 engine(kSeed);
+  std::uniform_real_distribution<float> place(-1, 2);
+  const auto profile = std::make_shared<IntensityProfile>();
+  profile->vertical = {0, 2};
+  profile->horizontal = {0};
+  profile->candela = {100, 20};
+  int lit = 0, dark = 0;
+  for (const LampKind* kind : lamp_kinds()) {
+    if (kind->surface != nullptr) continue;
+    for (const bool special : {false, true}) {
+      Light light = good_lamp(*kind);
+      light.inner_cone_angle = 0.4F;
+      light.outer_cone_angle = 0.9F;
+      if (special) {
+        light.range = 2;
+        light.profile = profile;
+      }
+      const PreparedLight lamp(light);
+      PatchPointBlock points{};
+      for (auto& coordinates : points.position) {
+        for (float& x : coordinates) x = place(engine);
+      }
+      for (int axis = 0; axis < 3; ++axis) points.position[axis][17] = lamp.position[axis];
+      UnitLightBlock block;
+      for (std::size_t k = 0; k < PatchPointBlock::kSize; ++k) {
+        if (k % UnitLightBlock::kPart == 0) lamp.evaluate(points, k / UnitLightBlock::kPart, block);
+        const UnitLight one = lamp.evaluate(points.at(k)), of_block = block.at(k);
+        EXPECT_EQ(of_block.direction, one.direction) << kind->name << " " << k;
+        EXPECT_EQ(of_block.distance, one.distance) << kind->name << " " << k;
+        EXPECT_EQ(of_block.illuminance, one.illuminance) << kind->name << " " << k;
+        (one.illuminance > 0 ? lit : dark) += 1;
+      }
+    }
+  }
+  EXPECT_GT(lit, 100);
+  EXPECT_GT(dark, 50);
 }
 
 /// The irradiance at the origin: the mean over many places of the lamp.
