@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
+#include <string_view>
 
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
@@ -19,6 +21,16 @@
 
 namespace rebounce {
 namespace {
+
+std::vector<std::string> mesh_names(const Scene& scene) {
+  std::vector<std::string> names;
+  std::set<std::string_view> known{""};
+  for (const PlacedMesh& mesh : scene.placed_meshes) {
+    const std::string& name = mesh.mesh_name.empty() ? mesh.node_name : mesh.mesh_name;
+    if (known.insert(name).second) names.push_back(name);
+  }
+  return names;
+}
 
 void describe_patches(const PatchModel& model, BuildReport& report) {
   report.display_triangle_count = model.mesh.triangle.size();
@@ -49,6 +61,7 @@ class TransferBuild {
         clock_.run("import", [&](const Progress&) { return import_usable(path, settings_.scale); });
     report_.triangle_count = scene.triangle.size();
     report_.degenerate_triangle_count = scene.degenerate_triangle_count;
+    report_.mesh_names = mesh_names(scene);
     report_.warnings = scene.warnings;
     receivers_ = PatchSelection(settings_.receivers, scene, "receivers");
     sources_ = PatchSelection(settings_.sources, scene, "sources");

@@ -74,6 +74,7 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
                       {"row_sum_error_after", report.closure.row_sum_error_after},
                       {"closure_change", report.closure.relative_change},
                       {"errors", by_kind},
+                      {"meshes", report.mesh_names},
                       {"warnings", report.warnings}};
   if (report.form_factor_error) {
     json["form_factor_error_mean"] = report.form_factor_error->mean;

@@ -4,8 +4,12 @@
 #include <filesystem>
 
 #include "precompute/cli/commands.h"
+#include "precompute/cli/frame_cost.h"
 #include "precompute/cli/info_json.h"
+#include "precompute/cli/info_text.h"
 #include "precompute/patches/patch_selection.h"
+#include "rebounce/engine.h"
+#include "runtime/rays/box.h"
 #include "transfer/file/transfer_file_io.h"
 #include "transfer/operator/hierarchical_operator.h"
 
@@ -39,23 +43,28 @@ nlohmann::json counts_of(const PatchRoles& roles, std::size_t patch_count) {
           {"part_of_pairs", wanted_part(roles, patch_count)}};
 }
 
-void print_summary(nlohmann::json info) {
-  if (info["form_factors"] == "none") {
-    info["form_factors"] =
-        "none: precompute --store-form-factors or --compress-form-factors adds them";
-  }
-  for (const auto& [key, value] : info.items()) {
-    fmt::print("{:<20} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
-  }
+/// The names of materials, cameras or lights.
+template <typename Named>
+nlohmann::json names_of(const std::vector<Named>& things) {
+  nlohmann::json names = nlohmann::json::array();
+  for (const Named& thing : things) names.push_back(thing.name);
+  return names;
+}
+
+nlohmann::json bounds_of(std::span<const Float3> position) {
+  if (position.empty()) return nullptr;
+  const Box box = box_around(position);
+  return {{"low", to_float3(box.low)}, {"high", to_float3(box.high)}};
 }
 
 void run(const std::string& path, const CommonOptions& options) {
-  const TransferData data = load_transfer_file(path);
-  const nlohmann::json info = info_json(data, std::filesystem::file_size(path));
+  auto data = std::make_shared<const TransferData>(load_transfer_file(path));
+  const std::uint64_t file_bytes = std::filesystem::file_size(path);
   if (options.json) {
-    fmt::print("{}\n", info.dump(2));
-  } else {
-    print_summary(info);
+    fmt::print("{}\n", info_json(*data, file_bytes).dump(2));
+  } else if (!options.quiet) {
+    Engine engine(data);
+    fmt::print("{}", info_text(*data, file_bytes, typical_times(engine)));
   }
 }
 
@@ -76,6 +85,10 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
       {"material_count", data.materials.size()},
       {"light_count", data.lights.size()},
       {"camera_count", data.cameras.size()},
+      {"materials", names_of(data.materials)},
+      {"lights", names_of(data.lights)},
+      {"cameras", names_of(data.cameras)},
+      {"bounds", bounds_of(data.mesh.position)},
       {"form_factors", form_factors_of(data)},
       {"form_factor_count", data.exchange.column.size()},
       {"compressed_form_factor_bytes",
@@ -103,7 +116,9 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
 
 void add_info_command(CLI::App& app, const CommonOptions& options) {
   auto path = std::make_shared<std::string>();
-  CLI::App* command = app.add_subcommand("info", "What is inside a transfer file");
+  CLI::App* command = app.add_subcommand(
+      "info",
+      "What is inside a transfer file, and what a frame of it costs here; --json has every figure");
   command->add_option("file", *path, "Transfer file")->required();
   command->callback([path, &options] { run(*path, options); });
 }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "precompute/cli/commands.h"
+#include "precompute/cli/frame_cost.h"
 #include "precompute/cli/light_file.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/picture_options.h"
@@ -35,19 +36,35 @@ std::vector<float> errors_of(const Engine& engine) {
                       solver.indirect_irradiance(engine.initial_exitance()), data.patches.area);
 }
 
-void print_summary(const Picture& picture, const ChosenCamera& camera, std::span<const float> error,
-                   const RenderOptions& chosen, const CommonOptions& options) {
+/// What is said of a picture.
+struct DrawnFrame {
+  const Picture& picture;
+  const ChosenCamera& camera;
+  FrameTimes times;
+  FrameFlux flux;
+  std::span<const float> error;  ///< none unless it is shown
+};
+
+void print_summary(const DrawnFrame& drawn, const RenderOptions& chosen,
+                   const CommonOptions& options) {
+  const Picture& picture = drawn.picture;
   if (options.json) {
-    nlohmann::json summary = {{"width", picture.width},
-                              {"height", picture.height},
-                              {"show", chosen.show},
-                              {"exposure", picture.exposure},
-                              {"camera", as_json(camera)}};
-    if (!error.empty()) summary["error_max"] = *std::ranges::max_element(error);
+    nlohmann::json summary = {
+        {"width", picture.width},
+        {"height", picture.height},
+        {"show", chosen.show},
+        {"exposure", picture.exposure},
+        {"camera", as_json(drawn.camera)},
+        {"lumens", as_json(drawn.flux)},
+        {"microseconds", {{"direct", drawn.times.direct}, {"product", drawn.times.product}}}};
+    if (!drawn.error.empty()) summary["error_max"] = *std::ranges::max_element(drawn.error);
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
     fmt::print("{}: {}x{}, exposure {:+.2f} EV\n{}\n", chosen.output, picture.width, picture.height,
-               picture.exposure, described(camera));
+               picture.exposure, described(drawn.camera));
+    if (parse_show(chosen.show) == Show::kPatches) return;
+    fmt::print("{}\ndirect light {:.2f} ms, all lamps anew; product {:.3f} ms\n",
+               described(drawn.flux), drawn.times.direct / 1e3, drawn.times.product / 1e3);
   }
 }
 
@@ -65,7 +82,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
 
   Engine engine(data);
   if (chosen.key_light) setup.lights = {make_key_light(*data, *engine.parts().tracer)};
-  engine.relight(setup.lights, setup.sky);
+  const FrameTimes times = relight_timed(engine, setup.lights, setup.sky);
   const ChosenCamera camera = choose_camera(chosen.camera, *data, *engine.parts().tracer);
   settings.camera = camera.camera;
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
@@ -84,7 +101,8 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   }
   const Picture picture = renderer.render(light, settings);
   write_png(chosen.output, tone_map(picture));
-  print_summary(picture, camera, error, chosen, options);
+  print_summary({picture, camera, times, flux_of(engine, engine.indirect_irradiance()), error},
+                chosen, options);
 }
 
 }  // namespace

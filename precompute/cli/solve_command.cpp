@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -9,6 +8,7 @@
 #include "precompute/base/csv_writer.h"
 #include "precompute/base/npz_writer.h"
 #include "precompute/cli/commands.h"
+#include "precompute/cli/frame_cost.h"
 #include "precompute/cli/light_file.h"
 #include "precompute/cli/method_names.h"
 #include "rebounce/error.h"
@@ -37,28 +37,10 @@ struct Solution {
   double microseconds = 0;
 };
 
-/// Median of the microseconds that `work` returns, repeated for about half a second but at least
-/// three times.
-template <typename Work>
-double median_microseconds(const Work& work) {
-  std::vector<double> times;
-  double total = 0;
-  while (times.size() < 3 || (total < 5e5 && times.size() < 1000)) {
-    times.push_back(work());
-    total += times.back();
-  }
-  std::ranges::nth_element(times, times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2));
-  return times[times.size() / 2];
-}
-
 Solution solve_by_transfer(Engine& engine) {
   Solution solution;
-  solution.microseconds = median_microseconds([&] {
-    const auto begin = std::chrono::steady_clock::now();
-    engine.parts().apply_transfer();
-    const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
-    return time.count();
-  });
+  solution.microseconds = median_microseconds(
+      [&] { return microseconds_of([&] { engine.parts().apply_transfer(); }); });
   engine.parts().compute_radiosity();
   solution.indirect_irradiance.assign(engine.indirect_irradiance().begin(),
                                       engine.indirect_irradiance().end());
@@ -182,11 +164,45 @@ std::unique_ptr<const FormFactorOperator> choose_form_factors(const std::string&
   return make_form_factors(method, data);
 }
 
+/// What is said of a solution beside the method's own figures.
+struct SolveReport {
+  std::string form_factors;
+  std::optional<double> residual;  ///< none without form factors
+  FrameFlux flux;
+  double direct_microseconds = 0;
+};
+
+void print_summary(const SolveOptions& chosen, const SolveReport& report, const Solution& solution,
+                   const CommonOptions& options) {
+  const auto& residual = report.residual;
+  if (options.json) {
+    const nlohmann::json summary = {{"method", chosen.method},
+                                    {"form_factors", report.form_factors},
+                                    {"sweeps", solution.sweeps},
+                                    {"residual", residual ? nlohmann::json(*residual) : nullptr},
+                                    {"microseconds", solution.microseconds},
+                                    {"direct_microseconds", report.direct_microseconds},
+                                    {"lumens", as_json(report.flux)}};
+    fmt::print("{}\n", summary.dump(2));
+  } else if (!options.quiet) {
+    fmt::print("{}\n", described(report.flux));
+    const std::string sweeps =
+        solution.sweeps > 0 ? fmt::format(", {} sweeps", solution.sweeps) : "";
+    fmt::print("direct light {:.2f} ms, all lamps anew; indirect light by {} {:.3f} ms{}\n",
+               report.direct_microseconds / 1e3, chosen.method, solution.microseconds / 1e3,
+               sweeps);
+    fmt::print("{}\n", residual ? fmt::format("residual {:.2e}", *residual)
+                                : "no residual: the file has no form factors (precompute "
+                                  "--store-form-factors)");
+  }
+}
+
 void run(const SolveOptions& chosen, const CommonOptions& options) {
   LightSetup setup;
   const auto data = load_lit_scene(chosen.file, chosen.lights, setup);
   Engine engine(data);
-  engine.parts().compute_direct(setup.lights, setup.sky);
+  const double direct_microseconds =
+      microseconds_of([&] { engine.parts().compute_direct(setup.lights, setup.sky); });
   engine.parts().compute_initial_exitance();
   const std::string kind = form_factors_of(chosen, *data);
   const auto form_factors = choose_form_factors(kind, method_of(chosen), *data);
@@ -199,20 +215,12 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   std::optional<double> residual;
   if (form_factors) residual = radiosity_residual(engine, *form_factors, solution.radiosity);
   write_solution(chosen.output, engine, solution);
-  if (options.json) {
-    const nlohmann::json summary = {{"method", chosen.method},
-                                    {"form_factors", kind},
-                                    {"sweeps", solution.sweeps},
-                                    {"residual", residual ? nlohmann::json(*residual) : nullptr},
-                                    {"microseconds", solution.microseconds}};
-    fmt::print("{}\n", summary.dump(2));
-  } else if (!options.quiet) {
-    fmt::print("{}: {:.0f} microseconds, {} sweeps, {}\n", chosen.method, solution.microseconds,
-               solution.sweeps,
-               residual ? fmt::format("residual {:.2e}", *residual)
-                        : "no residual: the file has no form factors (precompute "
-                          "--store-form-factors)");
-  }
+  print_summary(chosen,
+                {.form_factors = kind,
+                 .residual = residual,
+                 .flux = flux_of(engine, solution.indirect_irradiance),
+                 .direct_microseconds = direct_microseconds},
+                solution, options);
 }
 
 }  // namespace

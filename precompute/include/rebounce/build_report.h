@@ -45,6 +45,7 @@ struct CostEstimate {
 struct BuildReport {
   std::size_t triangle_count = 0;  ///< of the scene, without degenerate ones
   std::size_t degenerate_triangle_count = 0;
+  std::vector<std::string> mesh_names;  ///< of meshes, or nodes that place one, each once
   std::size_t display_triangle_count = 0;
   std::size_t patch_count = 0;
   std::size_t sliver_count = 0;

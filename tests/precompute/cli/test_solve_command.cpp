@@ -73,6 +73,39 @@ TEST_F(SolveCommand, SolvesTheSameByEitherMethod) {
   }
 }
 
+TEST_F(SolveCommand, SaysHowMuchLightThereIsAndWhatEachStageTakes) {
+  const std::string file = precompute("box.safetensors");
+  const Words words = {"solve", file, "--lights", kLights, "-o", path("x.csv")};
+  const json solved = summary_of(words);
+  summary_of({"export", file, "--what", "patches", "-o", path("patches.npz")});
+  const auto area = test::npz_values<float>(test::unzip(path("patches.npz")), "area", "<f4");
+  const Table table = read_csv(path("x.csv"));
+  ASSERT_EQ(table.rows.size(), area.size());
+  double direct = 0, indirect = 0;
+  for (std::size_t i = 0; i < area.size(); ++i) {
+    const auto lux = [&](std::size_t first) {
+      return 0.2126 * table.rows[i][first] + 0.7152 * table.rows[i][first + 1] +
+             0.0722 * table.rows[i][first + 2];
+    };
+    direct += area[i] * lux(0);
+    indirect += area[i] * lux(3);
+  }
+  EXPECT_NEAR(solved["lumens"]["direct"].get<double>(), direct, 1e-4 * direct);
+  EXPECT_NEAR(solved["lumens"]["indirect"].get<double>(), indirect, 1e-4 * indirect);
+  EXPECT_GT(solved["lumens"]["emitted"], 0);
+  EXPECT_GT(solved["direct_microseconds"], 0);
+  const std::string said = run(words).out;
+  for (const char* part : {" lm directly from lamps and sky, ", " lm emitted by surfaces, ",
+                           " lm indirectly\ndirect light ", "indirect light by transfer "}) {
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+  }
+  const json drawn =
+      summary_of({"render", file, "--lights", kLights, "--size", "16x9", "-o", path("x.png")});
+  EXPECT_EQ(drawn["lumens"], solved["lumens"]);
+  EXPECT_GT(drawn["microseconds"]["direct"], 0);
+  EXPECT_GT(drawn["microseconds"]["product"], 0);
+}
+
 TEST_F(SolveCommand, EveryMethodReachesTheResidualItWasAsked) {
   const std::string file = precompute("box.safetensors", {"--store-form-factors"});
   for (const NamedSolveMethod& method : kSolveMethods) {
