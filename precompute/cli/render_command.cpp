@@ -66,8 +66,13 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   if (chosen.key_light) setup.lights = {make_key_light(*data, *engine.parts().tracer)};
   engine.relight(setup.lights, setup.sky);
+<<<<<<< HEAD
   const ChosenCamera camera = choose_camera(chosen.camera, *data, *engine.parts().tracer);
   settings.camera = camera.camera;
+=======
+  warn_of_lamps(engine, setup.lights, options);
+  settings.camera = choose_camera(chosen.camera, engine);
+>>>>>>> 63ce923 (From C what C++ has: names, cameras, profiles, weights, points, errors)
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);
   std::vector<float> error;
   if (settings.show == Show::kError) error = errors_of(engine);

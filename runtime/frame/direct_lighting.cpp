@@ -10,7 +10,6 @@
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 
 namespace rebounce {
@@ -57,18 +56,17 @@ struct DirectLighting::LightResponse {
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
                                const DirectLightingSettings& settings)
-    : data_(data), tracer_(tracer), receivers_(spread_receivers(data, tracer, settings)) {
+    : data_(data), tracer_(tracer), receivers_(spread_receivers(data, settings)) {
   make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
 }
 
 std::shared_ptr<const DirectLighting::Receivers> DirectLighting::spread_receivers(
-    const TransferData& data, const RayTracer& tracer, const DirectLightingSettings& settings) {
-  if (settings.points_per_patch < 1) throw Error("direct light needs at least one point per patch");
+    const TransferData& data, const DirectLightingSettings& settings) {
+  const std::vector<ReceiverPoint> points = receiver_points(data, settings);
   if (settings.area_light_samples < 1 || settings.area_light_samples > kMaxAreaLightSamples) {
     throw Error("direct light needs from 1 to " + std::to_string(kMaxAreaLightSamples) +
                 " samples of lamps with a surface");
   }
-  const std::size_t n = data.patches.size();
   auto receivers = std::make_shared<Receivers>();
   const auto points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
   receivers->points_per_patch = points_per_patch;
@@ -77,20 +75,12 @@ std::shared_ptr<const DirectLighting::Receivers> DirectLighting::spread_receiver
   for (std::uint32_t k = 0; k < receivers->places.size(); ++k) {
     receivers->places[k] = glm::vec2(r2_point(k, {0, 0}));
   }
-  receivers->points.resize(n * points_per_patch);
-  receivers->block_box.resize((n + kBlock - 1) / kBlock);
-  const PatchTriangles triangles(data.mesh.triangle_patch, n);
-  std::vector<PatchPoint> spread(points_per_patch);
-  for (std::size_t i = 0; i < n; ++i) {
-    std::ranges::fill(spread, PatchPoint{data.patches.centroid[i], data.patches.normal[i]});
-    if (!triangles[i].empty()) {
-      spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), spread);
-    }
-    for (std::size_t k = 0; k < points_per_patch; ++k) {
-      const Float3 lifted = tracer.offset_point(spread[k].position, spread[k].normal);
-      receivers->points[i * points_per_patch + k] = {to_glm(lifted), to_glm(spread[k].normal)};
-      receivers->block_box[i / kBlock].add(to_glm(lifted));
-    }
+  receivers->block_box.resize((data.patches.size() + kBlock - 1) / kBlock);
+  receivers->points.reserve(points.size());
+  for (const auto& [position, normal] : points) {
+    const std::size_t patch = receivers->points.size() / points_per_patch;
+    receivers->points.push_back({to_glm(position), to_glm(normal)});
+    receivers->block_box[patch / kBlock].add(to_glm(position));
   }
   return receivers;
 }

@@ -45,7 +45,6 @@ class DirectLighting {
   struct LightResponse;
 
   static std::shared_ptr<const Receivers> spread_receivers(const TransferData& data,
-                                                           const RayTracer& tracer,
                                                            const DirectLightingSettings& settings);
   void make_room(std::size_t light_count);
   void prepare(std::span<const Light> lights);
