@@ -20,9 +20,10 @@
  * (cd, lx, cd/m²), lengths metres, space glTF's, colours linear Rec.709.
  *
  * Threads: a transfer is immutable and may be used by any number of threads; an engine belongs to
- * one thread at a time, and a frame that begins within another's fails. A frame neither allocates nor locks, but see light_capacity. It runs where
- * parallel_for of the engine's settings says: by default on OpenMP's threads if the library is
- * built with them, else on the calling thread. */
+ * one thread at a time, and a frame that begins within another's fails. A frame neither allocates
+ * nor locks, but see light_capacity. It runs where parallel_for of the engine's settings says: by
+ * default on the calling thread and on helpers that the engine has started, none where the library
+ * is built without OpenMP. */
 
 #ifndef REBOUNCE_H
 #define REBOUNCE_H
@@ -251,8 +252,9 @@ typedef struct rebounce_engine_settings {
   uint32_t light_capacity; /* lights for which there is room at once; default 16. The first frame
                               with more makes the room it lacks, the only one that allocates */
   rebounce_parallel_for parallel_for; /* shares out the loops of the frames and outputs of the
-                                         engine and its clones; NULL, the default: OpenMP's threads,
-                                         or the calling one where the library is built without */
+                                         engine and its clones; NULL, the default: the calling
+                                         thread and helpers that they share, as many in all as
+                                         OpenMP has threads; they sleep between frames */
   void* user;                         /* what parallel_for is called with; default NULL */
 } rebounce_engine_settings;
 
@@ -291,7 +293,9 @@ rebounce_status rebounce_engine_set_sky_distribution(rebounce_engine* engine,
 rebounce_status rebounce_engine_set_emission_scale(rebounce_engine* engine, uint32_t material,
                                                    const float* scale);
 
-/* Results of the last frame, [n][3] in lx; they change with the next one. NULL if `engine` is. */
+/* Results of the last frame, [n][3] in lx; they change with the next one. NULL if `engine` is.
+ * Where it is dark the error of the operator may take indirect irradiance and radiosity a little
+ * below 0. */
 const float* rebounce_engine_direct_irradiance(const rebounce_engine* engine);
 const float* rebounce_engine_indirect_irradiance(const rebounce_engine* engine);
 const float* rebounce_engine_radiosity(const rebounce_engine* engine);
