@@ -27,6 +27,7 @@ void run(const BakeOptions& chosen, const CommonOptions& options) {
   const auto data = load_lit_scene(chosen.file, chosen.lights, setup);
   Engine engine(data);
   engine.relight(setup.lights, setup.sky);
+  warn_of_lamps(engine, setup.lights, options);
   const std::vector<Float3> emitted = irradiance_from_emitters(*data);
   const PictureLight light{.lights = setup.lights,
                            .sky = setup.sky,

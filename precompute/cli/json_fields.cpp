@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <iterator>
+#include <limits>
 
+#include "precompute/base/json_problem.h"
 #include "rebounce/error.h"
 
 namespace rebounce::cli {
@@ -17,10 +20,31 @@ float length(const Float3& v) {
   return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
+/// A number in single precision, infinite beyond its range; NaN for what is none.
+float as_float(const json& value) {
+  return value.is_number() ? value.get<float>() : std::nanf("");
+}
+
+/// What numbers must be, of which one is `bad`: in the range of single precision, or above
+/// `lowest`.
+std::string wanted(const char* numbers, float lowest, float bad) {
+  if (std::isinf(bad)) {
+    return fmt::format("{} of at most {:.1e}", numbers, std::numeric_limits<float>::max());
+  }
+  return lowest == kAnyNumber ? numbers : fmt::format("{}, at least {}", numbers, lowest);
+}
+
 }  // namespace
 
 void Field::fail(const std::string& name, const std::string& wanted) const {
-  throw Error(fmt::format("{}: \"{}\" must be {}", where, name, wanted));
+  constexpr std::size_t kShownCharacters = 40;
+  std::string given;
+  if (object.contains(name)) {
+    given = object.at(name).dump();
+    if (given.size() > kShownCharacters) given = given.substr(0, kShownCharacters) + "...";
+    given = "; it is " + given;
+  }
+  throw Error(fmt::format("{}: \"{}\" must be {}{}", where, name, wanted, given));
 }
 
 void Field::check_names(const std::vector<std::string_view>& known) const {
@@ -34,9 +58,8 @@ void Field::check_names(const std::vector<std::string_view>& known) const {
 
 float Field::number(const std::string& name, float lowest, float fallback) const {
   if (!object.contains(name)) return fallback;
-  const json& value = object.at(name);
-  const auto x = value.is_number() ? value.get<float>() : std::nanf("");
-  if (!std::isfinite(x) || x < lowest) fail(name, fmt::format("a number, at least {}", lowest));
+  const float x = as_float(object.at(name));
+  if (!std::isfinite(x) || x < lowest) fail(name, wanted("a number", lowest, x));
   return x;
 }
 
@@ -51,14 +74,12 @@ Float3 Field::triple(const std::string& name, float lowest, const Float3& fallba
   if (!object.contains(name)) return fallback;
   const json& value = object.at(name);
   Float3 result{};
-  bool good = value.is_array() && value.size() == 3;
-  for (std::size_t k = 0; good && k < 3; ++k) {
-    good = value[k].is_number();
-    if (good) result[k] = value[k].get<float>();
-    good = good && std::isfinite(result[k]) && result[k] >= lowest;
-  }
-  if (!good) {
-    fail(name, lowest < 0 ? "three numbers" : fmt::format("three numbers, at least {}", lowest));
+  if (!value.is_array() || value.size() != 3) fail(name, wanted("three numbers", lowest, 0));
+  for (std::size_t k = 0; k < 3; ++k) {
+    result[k] = as_float(value[k]);
+    if (!std::isfinite(result[k]) || result[k] < lowest) {
+      fail(name, wanted("three numbers", lowest, result[k]));
+    }
   }
   return result;
 }
@@ -77,13 +98,14 @@ Float3 Field::unit_vector(const std::string& name, const Float3& fallback) const
 }
 
 json read_json_object(const std::filesystem::path& path, const std::string& content) {
-  std::ifstream stream(path);
+  std::ifstream stream(path, std::ios::binary);
   if (!stream) throw Error("cannot open " + path.string() + "; check the name");
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
   json document;
   try {
-    document = json::parse(stream);
+    document = json::parse(text);
   } catch (const json::exception& error) {
-    throw Error(path.string() + " is not JSON: " + error.what());
+    throw Error(path.string() + " " + json_problem(error, text.size()));
   }
   if (!document.is_object()) {
     throw Error(path.string() + ": must hold an object with \"" + content + "\"");

@@ -13,6 +13,7 @@
 #include "rebounce/error.h"
 #include "rebounce/lights.h"
 #include "rebounce/sky.h"
+#include "runtime/frame/lamp_warnings.h"
 #include "runtime/lights/emitting_material.h"
 #include "runtime/lights/lamp_kind.h"
 #include "transfer/file/transfer_file_io.h"
@@ -307,7 +308,13 @@ LightSetup choose_lights(const std::filesystem::path& path, const TransferData& 
     return m[0] > 0 || m[1] > 0 || m[2] > 0;
   });
   if (setup.lights.empty() && setup.sky.luminance == 0 && !emits) {
-    throw Error("there is no light: the scene has no lights of its own; name a file with --lights");
+    throw Error("there is no light: " +
+                (path.empty()
+                     ? "the scene has no lights of its own and nothing in it emits; name a file "
+                       "with --lights"
+                     : path.string() + " has no lights and no sky, and nothing in the scene emits; "
+                                       "add one") +
+                ", or see the scene with render --key-light");
   }
   return setup;
 }
@@ -322,6 +329,14 @@ std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& 
     scale_emitter(emitter, patch_material, data);
   }
   return std::make_shared<const TransferData>(std::move(data));
+}
+
+void warn_of_lamps(const Engine& engine, std::span<const Light> lights,
+                   const CommonOptions& options) {
+  if (options.quiet) return;
+  for (const std::string& line : lamp_warnings(engine, lights)) {
+    print_note(options, "warning: " + line);
+  }
 }
 
 }  // namespace rebounce::cli

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "precompute/cli/console.h"
+#include "rebounce/engine.h"
 #include "rebounce/lights.h"
 #include "rebounce/sky.h"
 #include "transfer/file/transfer_data.h"
@@ -36,5 +38,9 @@ LightSetup choose_lights(const std::filesystem::path& path, const TransferData& 
 std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& file,
                                                    const std::filesystem::path& lights,
                                                    LightSetup& setup);
+
+/// Prints a warning for each of `lights` that lights nothing or stands in a wall (lamp_warnings).
+void warn_of_lamps(const Engine& engine, std::span<const Light> lights,
+                   const CommonOptions& options);
 
 }  // namespace rebounce::cli

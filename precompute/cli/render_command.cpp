@@ -83,6 +83,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   Engine engine(data);
   if (chosen.key_light) setup.lights = {make_key_light(*data, *engine.parts().tracer)};
   const FrameTimes times = relight_timed(engine, setup.lights, setup.sky);
+  warn_of_lamps(engine, setup.lights, options);
   const ChosenCamera camera = choose_camera(chosen.camera, *data, *engine.parts().tracer);
   settings.camera = camera.camera;
   const std::vector<Float3> emitted_irradiance = irradiance_from_emitters(*data);

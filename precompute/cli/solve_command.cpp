@@ -204,6 +204,7 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   const double direct_microseconds =
       microseconds_of([&] { engine.parts().compute_direct(setup.lights, setup.sky); });
   engine.parts().compute_initial_exitance();
+  warn_of_lamps(engine, setup.lights, options);
   const std::string kind = form_factors_of(chosen, *data);
   const auto form_factors = choose_form_factors(kind, method_of(chosen), *data);
   const Solution solution = find_solution(chosen, engine, form_factors.get());

@@ -59,10 +59,11 @@ LightSetup lights_to_begin_with(const ViewOptions& chosen, const Engine& engine)
 }
 
 ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data,
-                       ChosenCamera& camera) {
+                       const CommonOptions& options, ChosenCamera& camera) {
   Engine engine(data);
   const LightSetup lights = lights_to_begin_with(chosen, engine);
   engine.relight(lights.lights, lights.sky);
+  warn_of_lamps(engine, lights.lights, options);
   ViewerSetup setup;
   setup.title = "Rebounce: " + data->record.scene_name;
   std::tie(setup.width, setup.height) = parse_size(chosen.size);
@@ -140,7 +141,7 @@ void run(const ViewOptions& chosen, const CommonOptions& options) {
                         ? std::make_shared<const TransferData>(load_transfer_file(chosen.file))
                         : load_lit_scene(chosen.file, chosen.lights, lights);
   ChosenCamera camera;
-  ViewerSetup setup = make_setup(chosen, data, camera);
+  ViewerSetup setup = make_setup(chosen, data, options, camera);
   float frames_per_second = 30;
   if (!chosen.path.empty()) {
     frames_per_second = read_light_path(chosen.path, setup.lights, setup.spheres);

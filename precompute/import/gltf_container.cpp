@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "precompute/base/json_problem.h"
 #include "rebounce/error.h"
 
 namespace rebounce::gltf {
@@ -37,7 +40,7 @@ struct Chunk {
 // Removes the next chunk from the front of `rest`.
 Chunk next_chunk(Bytes& rest) {
   if (rest.size() < kChunkHeaderBytes) {
-    throw Error("the .glb is truncated in a chunk header; get a complete copy");
+    throw Error("the .glb is truncated in the header of a chunk; get a complete copy");
   }
   const std::size_t length = read_u32(rest, 0);
   if (length > rest.size() - kChunkHeaderBytes) {
@@ -71,6 +74,23 @@ int nesting_depth(Bytes text) {
   return deepest;
 }
 
+// Throws Error if a file that is no .glb cannot be a .gltf either.
+void check_is_json(Bytes file) {
+  constexpr std::size_t kLengthBytes = 8;  // of a header of safetensors, which is JSON
+  constexpr std::array<std::uint8_t, 3> kByteOrderMark{0xEF, 0xBB, 0xBF};
+  const auto is_before_json = [&](std::uint8_t c) {
+    return std::isspace(c) != 0 || std::ranges::find(kByteOrderMark, c) != kByteOrderMark.end();
+  };
+  const auto first = std::ranges::find_if_not(file, is_before_json);
+  if (first != file.end() && *first == '{') return;
+  if (file.size() > kLengthBytes && file[kLengthBytes] == '{' && file[kLengthBytes - 1] == 0) {
+    throw Error(
+        "this is a safetensors file, as precompute writes them, and not a scene; name the .glb or "
+        ".gltf that it was made of");
+  }
+  throw Error("this is not glTF: neither a .glb nor a JSON object; export the scene as glTF 2.0");
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> read_file(const std::filesystem::path& path) {
@@ -86,15 +106,21 @@ std::vector<std::uint8_t> read_file(const std::filesystem::path& path) {
 }
 
 Container split_container(Bytes file) {
-  if (file.size() < 4 || read_u32(file, 0) != kMagic) return {file, std::nullopt};
-  if (file.size() < kHeaderBytes) throw Error("the .glb is truncated in its header");
+  if (file.size() < 4 || read_u32(file, 0) != kMagic) {
+    check_is_json(file);
+    return {file, std::nullopt};
+  }
+  if (file.size() < kHeaderBytes)
+    throw Error("the .glb is truncated in its header; get a complete copy");
   if (const auto version = read_u32(file, 4); version != 2) {
     throw Error(fmt::format("the .glb container has version {}; only version 2 is read", version));
   }
   const std::size_t length = read_u32(file, 8);
   if (length < kHeaderBytes || length > file.size()) {
-    throw Error(fmt::format("the .glb is truncated: its header says {} bytes and {} are there",
-                            length, file.size()));
+    throw Error(
+        fmt::format("the .glb is truncated: its header says {} bytes and {} are there; get a "
+                    "complete copy",
+                    length, file.size()));
   }
   Bytes rest = file.subspan(kHeaderBytes, length - kHeaderBytes);
   const Chunk json = next_chunk(rest);
@@ -117,7 +143,7 @@ nlohmann::json parse_json(Bytes text) {
     if (!root.is_object()) throw Error("this is not glTF: the JSON is not an object");
     return root;
   } catch (const nlohmann::json::exception& failure) {
-    throw Error(fmt::format("this is not glTF: {}", failure.what()));
+    throw Error("the JSON " + json_problem(failure, text.size()));
   }
 }
 

@@ -14,6 +14,17 @@ namespace rebounce::gltf {
 namespace {
 
 constexpr auto kNegativeFactors = "{} material colours were negative and were set to 0";
+// Of textures that have nothing but a KTX2 image. Without the picture that says which parts shine,
+// all of a surface would.
+constexpr auto kUnreadColor =
+    "{} materials have colours in KTX2 images (KHR_texture_basisu), which are not read: their "
+    "factor alone is taken; for their colours export PNG, JPEG or WebP";
+constexpr auto kUnreadEmission =
+    "{} materials have emission in KTX2 images (KHR_texture_basisu), which are not read: they emit "
+    "nothing; for their light export PNG, JPEG or WebP";
+constexpr auto kUnreadTransmission =
+    "{} materials have transmission in KTX2 images (KHR_texture_basisu), which are not read: their "
+    "factor alone is taken";
 
 // The parts of a textureInfo object that the importer uses, from any of its places.
 struct TextureReference {
@@ -103,6 +114,13 @@ class TextureImport {
       if (known->second != kNone) return known->second;
     }
     return kNone;
+  }
+
+  // Whether a texture of the asset has nothing but a KTX2 image.
+  bool is_basis_universal(int index) const {
+    if (index < 0) return false;
+    const auto& texture = document_.model.textures.at(static_cast<std::size_t>(index));
+    return texture.extensions.contains("KHR_texture_basisu") && sources_of(texture).empty();
   }
 
   // The mean of the red channel of a texture of the asset, a fraction; 1 if it has no image.
@@ -247,7 +265,9 @@ class MaterialImport {
     material.double_sided = source.doubleSided;
     const BaseColor color = base_color(source, warnings_);
     material.base_color = color.factor;
-    material.base_color_texture = resolve(color.texture, texcoords.base_color);
+    if (!is_unread(color.texture.texture, kUnreadColor)) {
+      material.base_color_texture = resolve(color.texture, texcoords.base_color);
+    }
     material.alpha_mode = alpha_mode(source);
     material.alpha_cutoff = alpha_cutoff(source);
     material.base_alpha = color.alpha;
@@ -259,6 +279,13 @@ class MaterialImport {
   }
 
  private:
+  // Whether nothing of a texture is read; `warning` counts the materials of which that is so.
+  bool is_unread(int texture, const char* warning) {
+    if (!textures_.is_basis_universal(texture)) return false;
+    warnings_.count(warning);
+    return true;
+  }
+
   std::uint32_t resolve(const TextureReference& reference, TexcoordSource& texcoord) {
     if (reference.texture < 0) return kNone;
     const std::uint32_t texture = textures_(reference.texture);
@@ -271,6 +298,7 @@ class MaterialImport {
     const auto [factor, texture] = transmission(source);
     material.transmission = to_fraction(factor);
     if (material.transmission == 0 || texture < 0) return;
+    if (is_unread(texture, kUnreadTransmission)) return;
     material.transmission *= static_cast<float>(textures_.mean_red(texture));
     warnings_.count("the transmission textures of {} materials are taken for their mean");
   }
@@ -283,8 +311,10 @@ class MaterialImport {
       warnings_.count("the emission of {} unlit materials is dropped, as the extension says");
       return;
     }
+    const TextureReference texture = reference(source.emissiveTexture);
+    if (is_unread(texture.texture, kUnreadEmission)) return;
     material.emitted_luminance = luminance;
-    material.emissive_texture = resolve(reference(source.emissiveTexture), texcoord);
+    material.emissive_texture = resolve(texture, texcoord);
   }
 
   void warn_of_what_is_simplified(const tinygltf::Material& source, const Material& material) {

@@ -26,6 +26,7 @@ constexpr std::array kSupportedExtensions{
     std::string_view{"EXT_meshopt_compression"},
     std::string_view{"EXT_mesh_gpu_instancing"},
     std::string_view{"EXT_texture_webp"},
+    std::string_view{"KHR_texture_basisu"},  // not read: what is left out is a warning
     std::string_view{"KHR_texture_transform"},
     std::string_view{"KHR_materials_emissive_strength"},
     std::string_view{"KHR_materials_pbrSpecularGlossiness"},

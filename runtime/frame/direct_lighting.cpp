@@ -109,9 +109,7 @@ struct DirectLighting::LightResponse {
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
                                const DirectLightingSettings& settings)
-    : data_(data),
-      tracer_(tracer),
-      receivers_(std::make_shared<const Receivers>(data, tracer, settings)) {
+    : data_(data), tracer_(tracer), receivers_(std::make_shared<const Receivers>(data, settings)) {
   make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
 }
 

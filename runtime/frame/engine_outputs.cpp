@@ -11,11 +11,16 @@
 namespace rebounce {
 
 void vertex_irradiance(const Engine& engine, std::span<Float3> irradiance) {
-  reconstruct_at_vertices(engine.data().mesh, engine.indirect_irradiance(), irradiance,
-                          engine.scheduler());
+  light_at_vertices(engine.data().mesh, engine.indirect_irradiance(), irradiance,
+                    engine.scheduler());
+}
+
+void vertex_direct_irradiance(const Engine& engine, std::span<Float3> irradiance) {
+  light_at_vertices(engine.data().mesh, engine.direct_irradiance(), irradiance, engine.scheduler());
 }
 
 void vertex_light(Engine& engine, std::span<SurfaceLight> light) {
+  const OneThread guard(engine.parts().use);
   const TransferData& data = engine.data();
   if (data.surface_harmonics.empty()) {
     throw Error("the transfer file has no surface harmonics; make it with --surface-harmonics");
@@ -27,12 +32,14 @@ void vertex_light(Engine& engine, std::span<SurfaceLight> light) {
 }
 
 void lightmap_irradiance(Engine& engine, std::span<Float3> irradiance) {
+  const OneThread guard(engine.parts().use);
   const TransferData& data = engine.data();
   if (data.lightmap.empty()) {
     throw Error("the transfer file has no lightmap; make it with --lightmap");
   }
   const std::span<Float3> at_vertices = engine.parts().vertex_irradiance;
-  vertex_irradiance(engine, at_vertices);
+  // Clamped after the interpolation, not before it.
+  reconstruct_at_vertices(data.mesh, engine.indirect_irradiance(), at_vertices, engine.scheduler());
   interpolate_at_texels(data.lightmap, data.mesh, at_vertices, irradiance, engine.scheduler());
 }
 

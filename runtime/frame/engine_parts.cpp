@@ -18,11 +18,36 @@ std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> 
   return data;
 }
 
+#if REBOUNCE_WITH_EMBREE
+void check_lights(std::span<const Light> lights) {
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    try {
+      check_light(lights[k]);
+    } catch (const Error& error) {
+      throw Error("light " + std::to_string(k) + ": " + error.what());
+    }
+  }
+}
+#endif
+
 }  // namespace
+
+OneThread::OneThread(EngineUse& use) : use_(use) {
+  if (!use_.busy.exchange(true, std::memory_order_acquire)) return;
+  throw Error("two threads use one engine at the same time; give each a copy of it");
+}
+
+OneThread::~OneThread() {
+  use_.busy.store(false, std::memory_order_release);
+}
 
 Engine::Parts::Parts(std::shared_ptr<const TransferData> transfer_data,
                      const EngineSettings& settings)
     : data(checked(std::move(transfer_data))), scheduler(settings.scheduler) {
+  if (scheduler.parallel_for == nullptr) {
+    threads = std::make_shared<FrameThreads>();
+    scheduler = threads->scheduler();
+  }
 #if REBOUNCE_WITH_EMBREE
   tracer = std::make_shared<const RayTracer>(make_surface_tracer(data->mesh));
   direct_lighting = std::make_shared<DirectLighting>(*data, *tracer, settings.direct_lighting);
@@ -74,7 +99,8 @@ void Engine::Parts::compute_direct(std::span<const Light> lights, const Sky& fra
 }
 
 void Engine::relight(std::span<const Light> lights, const Sky& sky) {
-  for (const Light& light : lights) check_light(light);
+  const OneThread guard(parts_->use);
+  check_lights(lights);
   parts_->compute_direct(lights, sky);
   parts_->compute_initial_exitance();
   parts_->apply_transfer();
@@ -88,6 +114,7 @@ void Engine::relight(std::span<const Light> /*lights*/, const Sky& /*sky*/) {
 #endif
 
 void Engine::relight(std::span<const Float3> direct_irradiance) {
+  const OneThread guard(parts_->use);
   check_size("the direct irradiance", direct_irradiance.size(), parts_->direct_irradiance.size());
   check_light_of_patches("the direct irradiance", direct_irradiance);
   std::ranges::copy(direct_irradiance, parts_->direct_irradiance.begin());
@@ -98,6 +125,7 @@ void Engine::relight(std::span<const Float3> direct_irradiance) {
 }
 
 void Engine::set_emission_scale(std::uint32_t material, const Float3& scale) {
+  const OneThread guard(parts_->use);
   const SceneData& scene = *parts_->data;
   if (material >= scene.materials.size()) {
     throw Error("there is no material " + std::to_string(material) + "; the scene has " +

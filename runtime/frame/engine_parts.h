@@ -2,17 +2,41 @@
 
 // What an engine is made of, for those who time, replace or look into a stage of a frame.
 
+#include <atomic>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "rebounce/engine.h"
 #include "runtime/frame/direct_lighting.h"
+#include "runtime/frame/frame_threads.h"
 #include "runtime/outputs/surface_light.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
+
+/// Whether a thread is at work in an engine. That of a copy is its own.
+struct EngineUse {
+  std::atomic<bool> busy = false;
+
+  EngineUse() = default;
+  EngineUse(const EngineUse& /*other*/) {}
+  EngineUse& operator=(const EngineUse&) = delete;
+};
+
+/// A call that changes an engine. Throws Error if another thread is in one: two at once would mix
+/// their light states without a word.
+class OneThread {
+ public:
+  explicit OneThread(EngineUse& use);
+  ~OneThread();
+  OneThread(const OneThread&) = delete;
+  OneThread& operator=(const OneThread&) = delete;
+
+ private:
+  EngineUse& use_;
+};
 
 struct Engine::Parts {
   Parts(std::shared_ptr<const TransferData> transfer_data, const EngineSettings& settings);
@@ -26,7 +50,9 @@ struct Engine::Parts {
   void apply_transfer();
   void compute_radiosity();
 
+  EngineUse use;
   std::shared_ptr<const TransferData> data;
+  std::shared_ptr<FrameThreads> threads;  ///< of the engine and its copies; null with a scheduler
   Scheduler scheduler;
   std::shared_ptr<const RayTracer> tracer;          ///< null without Embree
   std::shared_ptr<DirectLighting> direct_lighting;  ///< of this engine alone; null without Embree

@@ -11,7 +11,6 @@ namespace rebounce {
 namespace {
 
 void check_settings(const DirectLightingSettings& settings) {
-  if (settings.points_per_patch < 1) throw Error("direct light needs at least one point per patch");
   if (settings.area_light_samples < 1 || settings.area_light_samples > kMaxAreaLightSamples) {
     throw Error("direct light needs from 1 to " + std::to_string(kMaxAreaLightSamples) +
                 " samples of lamps with a surface");
@@ -19,36 +18,25 @@ void check_settings(const DirectLightingSettings& settings) {
 }
 
 /// [patches][points_per_patch]
-std::vector<LitPoint> spread_over_patches(const TransferData& data, const RayTracer& tracer,
-                                          std::size_t points_per_patch) {
-  const PatchTriangles triangles(data.mesh.triangle_patch, data.patches.size());
+std::vector<LitPoint> lit_points(const TransferData& data, const DirectLightingSettings& settings) {
   std::vector<LitPoint> points;
-  std::vector<PatchPoint> spread(points_per_patch);
-  for (std::size_t i = 0; i < data.patches.size(); ++i) {
-    std::ranges::fill(spread, PatchPoint{data.patches.centroid[i], data.patches.normal[i]});
-    if (!triangles[i].empty()) {
-      spread_points(data.mesh, triangles[i], unit_square(mix_bits(i)), spread);
-    }
-    for (const PatchPoint& point : spread) {
-      const Float3 lifted = tracer.offset_point(point.position, point.normal);
-      points.push_back({to_glm(lifted), to_glm(point.normal)});
-    }
+  for (const auto& [position, normal] : receiver_points(data, settings)) {
+    points.push_back({to_glm(position), to_glm(normal)});
   }
   return points;
 }
 
 }  // namespace
 
-Receivers::Receivers(const TransferData& data, const RayTracer& tracer,
-                     const DirectLightingSettings& settings)
+Receivers::Receivers(const TransferData& data, const DirectLightingSettings& settings)
     : points_per_patch(0), area_light_samples(0) {
+  const std::vector<LitPoint> points = lit_points(data, settings);
   check_settings(settings);
   points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
   area_light_samples = static_cast<std::size_t>(settings.area_light_samples);
   places.resize(points_per_patch * area_light_samples);
   for (std::uint32_t k = 0; k < places.size(); ++k) places[k] = glm::vec2(r2_point(k, {0, 0}));
 
-  const std::vector<LitPoint> points = spread_over_patches(data, tracer, points_per_patch);
   std::vector<LitPoint> first;
   for (std::size_t i = 0; i < points.size(); i += points_per_patch) first.push_back(points[i]);
   for (const std::uint32_t of_patch : receiver_order(first, kPart)) {

@@ -13,7 +13,6 @@
 #include "runtime/frame/receiver_order.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/patch_points.h"
-#include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
@@ -24,10 +23,9 @@ struct Receivers {
   static constexpr std::size_t kBlock = PatchPointBlock::kSize, kPart = UnitLightBlock::kPart;
   using Reached = std::array<bool, kBlock / kPart>;  ///< parts of a block
 
-  /// Spreads points over the patches of `data`, which are moved off the surface by `tracer`. Throws
-  /// Error if a setting is out of range.
-  Receivers(const TransferData& data, const RayTracer& tracer,
-            const DirectLightingSettings& settings);
+  /// Takes the points of the patches of `data` (receiver_points). Throws Error if a setting is out
+  /// of range.
+  Receivers(const TransferData& data, const DirectLightingSettings& settings);
 
   std::size_t points_per_patch, area_light_samples;
   std::vector<std::uint32_t> patch;    ///< [slots]

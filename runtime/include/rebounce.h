@@ -20,9 +20,10 @@
  * (cd, lx, cd/m²), lengths metres, space glTF's, colours linear Rec.709.
  *
  * Threads: a transfer is immutable and may be used by any number of threads; an engine belongs to
- * one thread at a time. A frame neither allocates nor locks, but see light_capacity. It runs where
- * parallel_for of the engine's settings says: by default on OpenMP's threads if the library is
- * built with them, else on the calling thread. */
+ * one thread at a time, and a frame that begins within another's fails. A frame neither allocates
+ * nor locks, but see light_capacity. It runs where parallel_for of the engine's settings says: by
+ * default on the calling thread and on helpers that the engine has started, none where the library
+ * is built without OpenMP. */
 
 #ifndef REBOUNCE_H
 #define REBOUNCE_H
@@ -81,7 +82,16 @@ typedef struct rebounce_transfer_info {
   uint64_t operator_bytes; /* that a frame reads, all channels */
   uint32_t lightmap_width; /* texels; 0: there is no lightmap */
   uint32_t lightmap_height;
+  uint32_t camera_count;
+  float error_mean;  /* measured: of the indirect irradiance under many point lights, relative to it
+                        in the area-weighted L2 norm, the mean over these */
+  float error_max;   /* the largest of these */
+  float error_bound; /* above the errors of 1,000 further lights of any kind, with a probability of
+                        95 % */
 } rebounce_transfer_info;
+
+/* Writes the size, and zeros. */
+void rebounce_transfer_info_init(rebounce_transfer_info* info);
 
 rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
                                            rebounce_transfer_info* info);
@@ -96,6 +106,23 @@ const float* rebounce_transfer_vertex_normal(const rebounce_transfer* transfer);
 const uint32_t* rebounce_transfer_triangle(const rebounce_transfer* transfer);       /* [t][3] */
 const uint32_t* rebounce_transfer_triangle_patch(
     const rebounce_transfer* transfer); /* [t], or UINT32_MAX */
+
+const uint32_t* rebounce_transfer_triangle_material(const rebounce_transfer* transfer); /* [t] */
+
+/* How light at the vertices of the display mesh is made of that of patches: at vertex v the sum of
+ * weight x value of patch over [begin[v], begin[v + 1]). Weights may be negative: clamp sums of
+ * light to at least 0. NULL if there are none. */
+const uint32_t* rebounce_transfer_vertex_weight_begin(
+    const rebounce_transfer* transfer); /* [v + 1] */
+const uint32_t* rebounce_transfer_vertex_weight_patch(const rebounce_transfer* transfer);
+const float* rebounce_transfer_vertex_weight(const rebounce_transfer* transfer);
+
+/* The name of a material (UTF-8; several may share one, or have none), and the luminance [3] in
+ * cd/m² that its surfaces emit, before a texture: zeros unless it is an emitter. NULL where there
+ * is no such material. */
+const char* rebounce_transfer_material_name(const rebounce_transfer* transfer, uint32_t material);
+const float* rebounce_transfer_material_luminance(const rebounce_transfer* transfer,
+                                                  uint32_t material);
 
 /* What the operator does for each patch, of the bits below: it brings indirect light to receivers
  * alone (others have 0), and bounces the light of sources alone. NULL: every patch is both. */
@@ -112,7 +139,48 @@ const float* rebounce_transfer_lightmap_texcoord(const rebounce_transfer* transf
 const uint8_t* rebounce_transfer_lightmap_triangle(
     const rebounce_transfer* transfer); /* [t] 0, 1 */
 
+/* Writes points on the patches, points_per_patch of them on each, and the unit normals there, both
+ * [patch_count][points_per_patch][3]: those at which an engine with as many looks at its lamps. The
+ * direct irradiance of a patch is the mean of those at its points; a renderer that finds it, with
+ * shadow maps for instance, looks there too. They lie off the surface by no more than rounding
+ * needs. point_count is patch_count x points_per_patch; 8 points are an engine's default. */
+rebounce_status rebounce_transfer_receiver_points(const rebounce_transfer* transfer,
+                                                  uint32_t points_per_patch, float* position,
+                                                  float* normal, size_t point_count);
+
+/* A perspective camera of the scene, placed in the world. right, up and backward are orthonormal;
+ * it looks along -backward. */
+typedef struct rebounce_camera {
+  uint32_t struct_size; /* sizeof(rebounce_camera) */
+  float vertical_fov;   /* rad */
+  float position[3];    /* m */
+  float right[3];
+  float up[3];
+  float backward[3];
+} rebounce_camera;
+
+/* Writes the size, and a camera at the origin that looks along -z. */
+void rebounce_camera_init(rebounce_camera* camera);
+
+/* Camera `index` of the scene, of camera_count, and its name (UTF-8, may be empty); NULL where
+ * there is no such camera. */
+rebounce_status rebounce_transfer_get_camera(const rebounce_transfer* transfer, uint32_t index,
+                                             rebounce_camera* camera);
+const char* rebounce_transfer_camera_name(const rebounce_transfer* transfer, uint32_t index);
+
 /* ---- Lights ---- */
+
+/* How the light of a luminaire is spread, from its photometric data. */
+typedef struct rebounce_ies_profile rebounce_ies_profile;
+
+/* Reads the text of an IES file (LM-63, type C photometry); `name` stands for it in messages. Fails
+ * with REBOUNCE_BAD_INPUT if it is none. */
+rebounce_status rebounce_ies_profile_parse(const char* text, size_t text_size, const char* name,
+                                           rebounce_ies_profile** profile);
+
+/* Engines keep what they need of a profile: it is needed no longer than the calls whose lights name
+ * it. NULL is ignored. */
+void rebounce_ies_profile_destroy(rebounce_ies_profile* profile);
 
 typedef enum rebounce_light_type {
   REBOUNCE_LIGHT_POINT = 0,
@@ -125,18 +193,22 @@ typedef enum rebounce_light_type {
 
 /* A lamp, with the fields, units and fall-off of KHR_lights_punctual where it is one of those. */
 typedef struct rebounce_light {
-  uint32_t struct_size; /* sizeof(rebounce_light) */
-  uint32_t type;        /* rebounce_light_type; default point */
-  float position[3];    /* m, the middle; default 0; not of directional lights */
-  float direction[3];   /* unit, the way the light travels; default down; not of points, spheres */
-  float color[3];       /* >= 0; default 1 */
-  float intensity;      /* >= 0; cd (point, spot), lx (directional), cd/m² (others); default 1 */
-  float range;          /* m; no light arrives from further away; 0, the default: unlimited */
+  uint32_t struct_size;   /* sizeof(rebounce_light) */
+  uint32_t type;          /* rebounce_light_type; default point */
+  float position[3];      /* m, the middle; default 0; not of directional lights */
+  float direction[3];     /* unit, the way the light travels; default down; not of spheres, and of
+                             points without a profile */
+  float color[3];         /* >= 0; default 1 */
+  float intensity;        /* >= 0; cd (point, spot), lx (directional), cd/m² (others); default 1 */
+  float range;            /* m; no light arrives from further away; 0, the default: unlimited */
   float inner_cone_angle; /* rad from the axis, spot; default 0 */
   float outer_cone_angle; /* rad from the axis, spot, at most pi/2; default pi/4 */
   float radius;           /* m, > 0, sphere and disc */
   float size[2];          /* m, > 0, rectangle: along the tangent and across it */
-  float tangent[3];       /* rectangle: first side, not along its direction; default x */
+  float tangent[3];       /* rectangle: first side, not along its direction; where the horizontal
+                             angles of a profile begin; default x */
+  const rebounce_ies_profile* profile; /* of a luminaire: point, spot; intensity is then a factor of
+                                          its candelas, along direction; default NULL */
 } rebounce_light;
 
 /* Writes the defaults. */
@@ -180,8 +252,9 @@ typedef struct rebounce_engine_settings {
   uint32_t light_capacity; /* lights for which there is room at once; default 16. The first frame
                               with more makes the room it lacks, the only one that allocates */
   rebounce_parallel_for parallel_for; /* shares out the loops of the frames and outputs of the
-                                         engine and its clones; NULL, the default: OpenMP's threads,
-                                         or the calling one where the library is built without */
+                                         engine and its clones; NULL, the default: the calling
+                                         thread and helpers that they share, as many in all as
+                                         OpenMP has threads; they sleep between frames */
   void* user;                         /* what parallel_for is called with; default NULL */
 } rebounce_engine_settings;
 
@@ -200,12 +273,14 @@ rebounce_status rebounce_engine_clone(const rebounce_engine* engine, rebounce_en
 void rebounce_engine_destroy(rebounce_engine* engine);
 
 /* One frame. Lights are known by their number: one that is as it was is not traced again, nor one
- * that has only another colour or intensity. `sky` may be NULL: none. Fails with
- * REBOUNCE_UNSUPPORTED in a library without Embree. A frame that fails changes nothing. */
+ * that has only another colour or intensity. `sky` may be NULL: none. A light out of its range is
+ * refused with its number. Fails with REBOUNCE_UNSUPPORTED in a library without Embree. A frame
+ * that fails changes nothing. */
 rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_light* lights,
                                         size_t light_count, const rebounce_sky* sky);
 
-/* One frame with a direct irradiance [patch_count][3] in lx of the caller's own. */
+/* One frame with a direct irradiance [patch_count][3] in lx of the caller's own. What is negative
+ * or no finite number is refused with the index of its patch; the last frame then stays. */
 rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const float* irradiance,
                                                size_t patch_count);
 
@@ -218,18 +293,23 @@ rebounce_status rebounce_engine_set_sky_distribution(rebounce_engine* engine,
 rebounce_status rebounce_engine_set_emission_scale(rebounce_engine* engine, uint32_t material,
                                                    const float* scale);
 
-/* Results of the last frame, [n][3] in lx; they change with the next one. NULL if `engine` is. */
+/* Results of the last frame, [n][3] in lx; they change with the next one. NULL if `engine` is.
+ * Where it is dark the error of the operator may take indirect irradiance and radiosity a little
+ * below 0. */
 const float* rebounce_engine_direct_irradiance(const rebounce_engine* engine);
 const float* rebounce_engine_indirect_irradiance(const rebounce_engine* engine);
 const float* rebounce_engine_radiosity(const rebounce_engine* engine);
 
-/* Indirect irradiance of the last frame at the vertices of the display mesh [vertex_count][3]. */
+/* Indirect irradiance of the last frame at the vertices of the display mesh [vertex_count][3], at
+ * least 0; and direct irradiance likewise, as smooth as patches are large. */
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count);
+rebounce_status rebounce_engine_vertex_direct_irradiance(const rebounce_engine* engine,
+                                                         float* irradiance, size_t vertex_count);
 
 /* Radiance in cd/m² that arrives at the vertices from patches and sky in the last frame, lamps
- * apart: [vertex_count][4][3], coefficients of real spherical harmonics of degree 0 and 1. Needs a
- * file made with --surface-harmonics. */
+ * apart: [vertex_count][4][3], coefficients of real spherical harmonics of degree 0 and 1, which
+ * may be negative. Needs a file made with --surface-harmonics. */
 rebounce_status rebounce_engine_vertex_light(rebounce_engine* engine, float* harmonics,
                                              size_t vertex_count);
 

@@ -1,6 +1,8 @@
 #include "runtime/outputs/vertex_light.h"
 
 #include <algorithm>
+#include <limits>
+#include <string>
 
 #include "rebounce/error.h"
 
@@ -9,10 +11,8 @@ namespace {
 
 constexpr std::size_t kVerticesPerTask = 1024;
 
-}  // namespace
-
-void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_value,
-                             std::span<Float3> vertex_value, const Scheduler& scheduler) {
+void mix_patches(const DisplayMesh& mesh, std::span<const Float3> patch_value, float least,
+                 std::span<Float3> vertex_value, const Scheduler& scheduler) {
   const std::size_t vertex_count = mesh.position.size();
   if (vertex_value.size() != vertex_count) {
     throw Error("the values at vertices have " + std::to_string(vertex_value.size()) +
@@ -28,8 +28,20 @@ void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> pa
       const Float3& value = patch_value[mesh.weight_patch[k]];
       for (int c = 0; c < kChannelCount; ++c) sum[c] += mesh.weight[k] * value[c];
     }
-    vertex_value[v] = sum;
+    for (int c = 0; c < kChannelCount; ++c) vertex_value[v][c] = std::max(sum[c], least);
   });
+}
+
+}  // namespace
+
+void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_value,
+                             std::span<Float3> vertex_value, const Scheduler& scheduler) {
+  mix_patches(mesh, patch_value, -std::numeric_limits<float>::infinity(), vertex_value, scheduler);
+}
+
+void light_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_light,
+                       std::span<Float3> vertex_light, const Scheduler& scheduler) {
+  mix_patches(mesh, patch_light, 0, vertex_light, scheduler);
 }
 
 }  // namespace rebounce

@@ -14,4 +14,8 @@ namespace rebounce {
 void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_value,
                              std::span<Float3> vertex_value, const Scheduler& scheduler = {});
 
+/// The same, at least 0: weights may be negative.
+void light_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_light,
+                       std::span<Float3> vertex_light, const Scheduler& scheduler = {});
+
 }  // namespace rebounce

@@ -307,23 +307,11 @@ void RayTracer::intersect_all(const Ray& ray, std::vector<Hit>& hits) const {
 }
 
 Float3 RayTracer::offset_point(const Float3& point, const Float3& geometric_normal) const {
-  Float3 moved;
-  for (int axis = 0; axis < 3; ++axis) {
-    moved[axis] = point[axis] + impl_->offset_distance * geometric_normal[axis];
-  }
-  return moved;
+  return offset_along(point, geometric_normal, impl_->offset_distance);
 }
 
 float RayTracer::offset_distance() const {
   return impl_->offset_distance;
-}
-
-float ray_offset_distance(std::span<const Float3> position) {
-  float largest = 0;
-  for (const Float3& p : position) {
-    for (const float x : p) largest = std::max(largest, std::abs(x));
-  }
-  return largest * 0x1p-18F;  // lab/006: a shorter one loses light in large rooms
 }
 
 RayTracer make_surface_tracer(const DisplayMesh& mesh) {

@@ -7,6 +7,7 @@
 
 #include "rebounce/scene_data.h"
 #include "rebounce/types.h"
+#include "runtime/rays/ray_offset.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
@@ -77,19 +78,13 @@ class RayTracer {
   /// starts or ends there does not hit its own surface.
   Float3 offset_point(const Float3& point, const Float3& geometric_normal) const;
 
-  /// 2^-18 of the largest coordinate of the scene, in metres. A ray's origin, its end and the plane
-  /// equation each have rounding errors of about 2^-24 of the scene's largest coordinates, even
-  /// near the origin of space. The offset is a few tens of such errors: 40 micrometres in a room of
-  /// ten metres.
+  /// The ray_offset_distance() of the scene, in metres.
   float offset_distance() const;
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// The offset_distance() of a tracer over these positions.
-float ray_offset_distance(std::span<const Float3> position);
 
 /// A tracer over the first surface_count triangles of `mesh`.
 RayTracer make_surface_tracer(const DisplayMesh& mesh);

@@ -17,6 +17,62 @@
     }                                                                         \
   } while (0)
 
+/* Materials, cameras, points and weights: what an engine asks for once. */
+static void check_scene(const rebounce_transfer* transfer, const rebounce_transfer_info* info) {
+  int emitters = 0;
+  for (uint32_t m = 0; m < info->material_count; ++m) {
+    CHECK(rebounce_transfer_material_name(transfer, m) != NULL);
+    emitters += rebounce_transfer_material_luminance(transfer, m)[0] > 0;
+  }
+  CHECK(emitters > 0);
+  CHECK(rebounce_transfer_material_name(transfer, info->material_count) == NULL);
+  CHECK(rebounce_transfer_triangle_material(transfer)[0] < info->material_count);
+  CHECK(info->error_mean > 0 && info->error_max >= info->error_mean);
+  CHECK(info->error_bound >= info->error_max);
+  rebounce_camera camera;
+  rebounce_camera_init(&camera);
+  for (uint32_t k = 0; k < info->camera_count; ++k) {
+    CHECK(rebounce_transfer_get_camera(transfer, k, &camera) == REBOUNCE_OK);
+    CHECK(camera.vertical_fov > 0 && rebounce_transfer_camera_name(transfer, k) != NULL);
+  }
+  CHECK(rebounce_transfer_get_camera(transfer, info->camera_count, &camera) ==
+        REBOUNCE_INVALID_ARGUMENT);
+  const uint32_t* begin = rebounce_transfer_vertex_weight_begin(transfer);
+  const size_t weights = begin[info->vertex_count];
+  CHECK(weights > 0);
+  for (size_t k = 0; k < weights; ++k) {
+    CHECK(rebounce_transfer_vertex_weight_patch(transfer)[k] < info->patch_count);
+    CHECK(isfinite(rebounce_transfer_vertex_weight(transfer)[k]));
+  }
+  const size_t points = 4 * (size_t)info->patch_count;
+  float* position = malloc(2 * 3 * points * sizeof(float));
+  float* normal = position + 3 * points;
+  CHECK(rebounce_transfer_receiver_points(transfer, 4, position, normal, points) == REBOUNCE_OK);
+  for (size_t k = 0; k < points; ++k) {
+    const float* of = normal + 3 * k;
+    const float squared = of[0] * of[0] + of[1] * of[1] + of[2] * of[2];
+    CHECK(squared > 0.9999f && squared < 1.0001f);
+  }
+  free(position);
+}
+
+/* A lamp with a profile, which is not needed after the frame. */
+static void check_profile(rebounce_engine* engine) {
+  const char text[] =
+      "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 2 1 1 2 0 0 0\n1 1 100\n0 90\n0\n200 0\n";
+  rebounce_ies_profile* profile = NULL;
+  CHECK(rebounce_ies_profile_parse(text, strlen(text), "lamp.ies", &profile) == REBOUNCE_OK);
+  rebounce_light light;
+  rebounce_light_init(&light);
+  CHECK(light.profile == NULL);
+  light.position[1] = 1;
+  light.profile = profile;
+  const rebounce_status lit = rebounce_engine_relight(engine, &light, 1, NULL);
+  CHECK(lit == REBOUNCE_OK || lit == REBOUNCE_UNSUPPORTED);
+  rebounce_ies_profile_destroy(profile);
+  CHECK(rebounce_ies_profile_parse("none", 4, "none.ies", &profile) == REBOUNCE_BAD_INPUT);
+}
+
 static void check_failures(rebounce_engine* engine) {
   rebounce_transfer* none = NULL;
   CHECK(rebounce_transfer_load("no such file", &none) == REBOUNCE_BAD_INPUT);
@@ -74,10 +130,12 @@ int main(int argc, char** argv) {
   rebounce_transfer* transfer = NULL;
   CHECK(rebounce_transfer_load(argv[1], &transfer) == REBOUNCE_OK);
   rebounce_transfer_info info;
-  info.struct_size = sizeof(info);
+  rebounce_transfer_info_init(&info);
   CHECK(rebounce_transfer_get_info(transfer, &info) == REBOUNCE_OK);
   CHECK(info.patch_count > 0 && info.vertex_count > 0 && info.operator_bytes > 0);
   CHECK(rebounce_transfer_patch_area(transfer)[0] > 0);
+
+  check_scene(transfer, &info);
 
   rebounce_engine *engine = NULL, *second = NULL, *threaded = NULL;
   rebounce_engine_settings settings;
@@ -122,6 +180,9 @@ int main(int argc, char** argv) {
   float* vertices = malloc(3 * (size_t)info.vertex_count * sizeof(float));
   CHECK(rebounce_engine_vertex_irradiance(engine, vertices, info.vertex_count) == REBOUNCE_OK);
   CHECK(sum_of(vertices, info.vertex_count) > 0);
+  CHECK(rebounce_engine_vertex_direct_irradiance(engine, vertices, info.vertex_count) ==
+        REBOUNCE_OK);
+  CHECK(sum_of(vertices, info.vertex_count) > 0);
   if (info.probe_count > 0) {
     float* harmonics = malloc(27 * (size_t)info.probe_count * sizeof(float));
     CHECK(rebounce_engine_probe_light(engine, harmonics, info.probe_count) == REBOUNCE_OK);
@@ -147,6 +208,13 @@ int main(int argc, char** argv) {
     free(more);
     free(harmonics);
   }
+  direct[3 * (n - 1)] = -1;
+  CHECK(rebounce_engine_relight_direct(engine, direct, n) == REBOUNCE_INVALID_ARGUMENT);
+  char patch[32];
+  snprintf(patch, sizeof(patch), "patch %zu ", n - 1);
+  CHECK(strstr(rebounce_last_error(), patch) != NULL);
+  CHECK(sum_of(rebounce_engine_indirect_irradiance(engine), n) == indirect);
+  check_profile(engine);
   check_failures(engine);
   printf("%s: %zu patches, sum of indirect irradiance %g\n", rebounce_version(), n, indirect);
   free(vertices);

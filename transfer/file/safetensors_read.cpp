@@ -70,8 +70,13 @@ TensorInfo parse_tensor(const std::string& name, const json& value, std::uint64_
   info.type = parse_type(name, value["dtype"]);
   info.shape = parse_sizes(name, value["shape"], "shape");
   const TensorShape offsets = parse_sizes(name, value["data_offsets"], "data_offsets");
-  if (offsets.size() != 2 || offsets[0] > offsets[1] || offsets[1] > data_size) {
-    refuse_tensor(name, "data_offsets are not a range inside the file");
+  if (offsets.size() != 2 || offsets[0] > offsets[1]) {
+    refuse_tensor(name, "data_offsets are not a range");
+  }
+  if (offsets[1] > data_size) {
+    throw Error("it is truncated: tensor " + json(name).dump() + " ends at byte " +
+                std::to_string(offsets[1]) + " of the data, of which there are " +
+                std::to_string(data_size));
   }
   info.begin = offsets[0];
   info.end = offsets[1];
@@ -91,13 +96,29 @@ SafetensorsMetadata parse_metadata(const json& value) {
   return metadata;
 }
 
+/// What the file says; 0 if it is too short for that.
+std::uint64_t header_length(std::span<const std::byte> bytes) {
+  std::uint64_t length = 0;
+  if (bytes.size() >= kHeaderLengthSize) std::memcpy(&length, bytes.data(), kHeaderLengthSize);
+  return length;
+}
+
+/// Throws Error for a scene, which is easily named instead of the transfer file made of it.
+void refuse_scene(std::span<const std::byte> bytes, const std::string& name) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (header_length(bytes) <= kLargestHeader) return;
+  if (!text.starts_with("glTF") && !text.starts_with('{')) return;
+  throw Error(name + " looks like glTF and is no transfer file; make one of it with precompute");
+}
+
 /// The header without its length.
 std::string_view header_of(std::span<const std::byte> bytes) {
-  if (bytes.size() < kHeaderLengthSize) throw Error("shorter than a header");
-  std::uint64_t length = 0;
-  std::memcpy(&length, bytes.data(), kHeaderLengthSize);
+  if (bytes.size() < kHeaderLengthSize) throw Error("it is truncated, shorter than a header");
+  const std::uint64_t length = header_length(bytes);
   if (length > kLargestHeader) throw Error("the header claims to exceed 100 MB");
-  if (length > bytes.size() - kHeaderLengthSize) throw Error("the header exceeds the file");
+  if (length > bytes.size() - kHeaderLengthSize) {
+    throw Error("it is truncated: the header exceeds the file");
+  }
   const char* begin = reinterpret_cast<const char*>(bytes.data()) + kHeaderLengthSize;
   return {begin, static_cast<std::size_t>(length)};
 }
@@ -109,6 +130,7 @@ SafetensorsFile::SafetensorsFile(const std::filesystem::path& path)
 
 SafetensorsFile::SafetensorsFile(SharedArray<std::byte> bytes, std::string name)
     : bytes_(std::move(bytes)), name_(std::move(name)) {
+  refuse_scene(bytes_.span(), name_);
   try {
     const std::string_view header = header_of(bytes_.span());
     prefix_size_ = kHeaderLengthSize + header.size();
@@ -116,7 +138,7 @@ SafetensorsFile::SafetensorsFile(SharedArray<std::byte> bytes, std::string name)
     check_contiguous();
   } catch (const Error& error) {
     throw Error(name_ + " is not a valid safetensors file: " + error.what() +
-                "; make the file again");
+                "; get a complete copy, or make it again");
   }
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "rebounce/lights.h"
 #include "rebounce/scene_data.h"
@@ -25,9 +26,25 @@ struct DirectLightingSettings {
   int light_capacity = 16;
 };
 
+/// A point of a patch at which its direct light is looked for.
+struct ReceiverPoint {
+  Float3 position{0, 0, 0};  ///< metres, off the surface by no more than rounding needs
+  Float3 normal{0, 0, 0};    ///< unit, of the flat triangle that it lies on
+};
+
+/// The points [n][points_per_patch] at which an engine of these settings looks at its lamps: the
+/// direct irradiance of a patch is the mean of the irradiances at its points. Renderers that find
+/// it themselves, with shadow maps for instance, look there too: a centroid may lie off its patch,
+/// and sees none of a border of shadow. Throws Error if points_per_patch is below 1.
+std::vector<ReceiverPoint> receiver_points(const TransferData& data,
+                                           const DirectLightingSettings& settings = {});
+
 struct EngineSettings {
   DirectLightingSettings direct_lighting{};  ///< of no use where the caller brings the direct light
-  Scheduler scheduler{};                     ///< where frames run; copies of the engine use it too
+  /// Where frames run; copies of the engine use it too. Null: on the calling thread and on helpers
+  /// that the engine starts and shares with its copies, one fewer than OpenMP's threads (none where
+  /// the library is built without OpenMP). They sleep between frames.
+  Scheduler scheduler{};
 };
 
 /// Relights one scene: direct light, then one product with the stored operator.
@@ -37,10 +54,11 @@ struct EngineSettings {
 /// that are no sources is shown as direct light and never bounces.
 ///
 /// The transfer data are read only and may be shared by any number of engines; an engine is one
-/// light state and belongs to one thread at a time. A copy shares the data, the ray tracer and the
-/// points of the patches and has a light state of its own: that is how many threads relight one
-/// scene. After construction nothing allocates, locks, prints or touches a file, but see
-/// DirectLightingSettings::light_capacity. An engine that was moved from may only be destroyed.
+/// light state and belongs to one thread at a time: a frame that begins within another's throws
+/// Error. A copy shares the data, the ray tracer and the points of the patches and has a light
+/// state of its own: that is how many threads relight one scene. After construction nothing
+/// allocates, locks, prints or touches a file, but see DirectLightingSettings::light_capacity. An
+/// engine that was moved from may only be destroyed.
 class Engine {
  public:
   /// Makes room for everything a frame needs. Throws Error if `data` is null or has no operator, or
@@ -55,14 +73,14 @@ class Engine {
   /// One frame: finds the direct irradiance of the patches under `lights` and `sky`, and with it
   /// all that follows. Lights are known by their number: keep their order, so that only those that
   /// moved or changed shape are traced again. Throws Error if a field of a light that its type uses
-  /// is out of range, a number of the sky is negative or not finite, or the sky has a distribution
-  /// and the data do not say how much of its cells is seen; Unsupported where the library is built
-  /// without Embree. The last frame then stays.
+  /// is out of range, with the light's number, if a number of the sky is negative or not finite, or
+  /// if the sky has a distribution and the data do not say how much of its cells is seen;
+  /// Unsupported where the library is built without Embree. The last frame then stays.
   void relight(std::span<const Light> lights, const Sky& sky);
 
   /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for
   /// instance; its sky is dark. Throws Error if the size is wrong or a number is negative or not
-  /// finite; the last frame then stays.
+  /// finite, with the index of the patch; the last frame then stays.
   void relight(std::span<const Float3> direct_irradiance);
 
   /// From the next frame on, what the surfaces of material `material` emit is that of the scene
@@ -71,7 +89,8 @@ class Engine {
   /// it.
   void set_emission_scale(std::uint32_t material, const Float3& scale);
 
-  // Results, [n] in lx; valid until the next frame.
+  // Results, [n] in lx; valid until the next frame. Where it is dark the error of the operator may
+  // take indirect irradiance and radiosity a little below 0.
   std::span<const Float3> direct_irradiance() const;
   std::span<const Float3> initial_exitance() const;
   std::span<const Float3> indirect_irradiance() const;

@@ -34,11 +34,17 @@ using QuadraticProbeLight = std::array<Float3, kHarmonicCount>;
 /// 1, each of three channels.
 using SurfaceLight = std::array<Float3, kLinearHarmonicCount>;
 
-/// Writes the indirect irradiance in lx at the vertices [v], before it is clamped to at least 0; 0
-/// at those without weights.
+/// Writes the indirect irradiance in lx at the vertices [v], at least 0; 0 at those without
+/// weights. The weights keep the means of patches, for which some are negative: beside a bright
+/// patch a dark one would get less than nothing.
 void vertex_irradiance(const Engine& engine, std::span<Float3> irradiance);
 
-/// Writes the light at the vertices [v], for normal maps: see bent_irradiance. Needs a file made
+/// Writes the direct irradiance in lx at the vertices [v] likewise: as smooth as patches are large,
+/// for renderers without lamps of their own.
+void vertex_direct_irradiance(const Engine& engine, std::span<Float3> irradiance);
+
+/// Writes the light at the vertices [v], for normal maps: see bent_irradiance. It is not clamped,
+/// since coefficients are negative too. Needs a file made
 /// with --surface-harmonics.
 void vertex_light(Engine& engine, std::span<SurfaceLight> light);
 

@@ -172,8 +172,9 @@ TEST_F(SolveCommand, WritesTheSameSolutionAsCsvAndNpz) {
 TEST_F(SolveCommand, RefusesAMalformedLightFileWithTheField) {
   const std::string file = precompute("box.safetensors");
   const std::pair<std::string, std::string> cases[] = {
-      {"", "JSON"},
-      {"{", "JSON"},
+      {"", "is truncated: it ends at byte 0"},
+      {R"({"lights": [{"intensity")", "is truncated: it ends at byte 24"},
+      {R"({"lights": [{"intensity": 1 2}]})", "is not JSON: parse error at line 1, column 29"},
       {"[]", "\"lights\""},
       {R"({"lamps": []})", "\"lamps\""},
       {R"({"lights": {}})", "\"lights\""},
@@ -184,12 +185,16 @@ TEST_F(SolveCommand, RefusesAMalformedLightFileWithTheField) {
       {R"({"lights": [{"name": 3}]})", "\"name\""},
       {R"({"lights": [{"position": [1, 2]}]})", "\"position\""},
       {R"({"lights": [{"position": [1, 2, "3"]}]})", "\"position\""},
-      {R"({"lights": [{"position": [1, 2, 1e300]}]})", "\"position\""},
+      {R"({"lights": [{"position": [1, 2, 1e300]}]})",
+       "\"position\" must be three numbers of at most 3.4e+38; it is [1,2,1e+300]"},
       {R"({"lights": [{"direction": [0, 0, 0]}]})", "\"direction\""},
       {R"({"lights": [{"color": [1, -1, 1]}]})", "\"color\""},
       {R"({"lights": [{"color": 1}]})", "\"color\""},
       {R"({"lights": [{"intensity": -5}]})", "\"intensity\""},
-      {R"({"lights": [{"intensity": "bright"}]})", "\"intensity\""},
+      {R"({"lights": [{"intensity": 1e39}]})",
+       "\"intensity\" must be a number of at most 3.4e+38; it is 1e+39"},
+      {R"({"lights": [{"intensity": "bright"}]})",
+       "\"intensity\" must be a number, at least 0; it is \"bright\""},
       {R"({"lights": [{"range": -1}]})", "\"range\""},
       {R"({"lights": [{"spot": 1}]})", "\"spot\""},
       {R"({"lights": [{"spot": {"angle": 1}}]})", "\"angle\""},
@@ -225,6 +230,28 @@ TEST_F(SolveCommand, RefusesAMalformedLightFileWithTheField) {
     const std::string lights = write("bad.lights.json", text);
     expect_refused({"solve", file, "--lights", lights, "-o", path("x.csv")}, field);
   }
+}
+
+TEST_F(SolveCommand, WarnsOfALampThatLightsNothing) {
+  const std::string file = precompute("box.safetensors");
+  const std::string lights = write("far.lights.json", R"({"lights": [{"position": [0.3, 0.4, 0.3]},
+      {"name": "cellar", "position": [0.3, -3, 0.3]}]})");
+  const Words solve = {"solve", file, "--lights", lights, "-o", path("x.csv")};
+  const test::Outcome outcome = run(solve);
+  EXPECT_EQ(outcome.exit_code, test::kDone);
+  EXPECT_EQ(outcome.err,
+            "warning: light 1 \"cellar\" (point) lights nothing: check its position, direction and "
+            "range\n");
+}
+
+TEST_F(SolveCommand, SaysWhatToDoWhereThereIsNoLight) {
+  const std::string file = path("dark.safetensors");
+  summary_of({"precompute", kScenes + "two_rooms.gltf", "--patches", "60", "-o", file});
+  expect_refused({"solve", file, "-o", path("x.csv")}, "name a file with --lights");
+  const std::string none = write("none.lights.json", R"({"lights": []})");
+  expect_refused({"solve", file, "--lights", none, "-o", path("x.csv")},
+                 "none.lights.json has no lights and no sky");
+  expect_refused({"render", file, "--lights", none, "-o", path("x.png")}, "render --key-light");
 }
 
 TEST_F(SolveCommand, TakesEveryKindOfLight) {

@@ -328,7 +328,8 @@ TEST_F(ViewCommand, RefusesPathsThatMakeNoSense) {
     EXPECT_TRUE(test::is_one_line(outcome.err)) << outcome.err;
     EXPECT_NE(outcome.err.find(part), std::string::npos) << outcome.err;
   };
-  refused("{", "is not JSON");
+  refused("{", "is truncated: it ends at byte 1");
+  refused("{1}", "is not JSON: parse error at line 1");
   refused(R"({"motion": []})", "unknown field");
   refused(R"({"motions": [{"light": 7, "circle": {}}]})", "\"light\"");
   refused(R"({"motions": [{"light": 0}]})", "must have one of");

@@ -55,9 +55,9 @@ TEST_F(ImportRefusals, FileThatIsNotThere) {
 TEST_F(ImportRefusals, TruncatedGlb) {
   const std::string whole = triangle_.glb();
   for (const std::size_t length : {whole.size() - 1, whole.size() / 2, std::size_t{13}}) {
-    expect_refused_bytes(whole.substr(0, length), {"truncated"});
+    expect_refused_bytes(whole.substr(0, length), {"truncated", "complete copy"});
   }
-  expect_refused_bytes(whole.substr(0, 8), {"header"});
+  expect_refused_bytes(whole.substr(0, 8), {"header", "complete copy"});
 }
 
 TEST_F(ImportRefusals, GlbOfAnotherVersionOrOrder) {
@@ -71,9 +71,16 @@ TEST_F(ImportRefusals, GlbOfAnotherVersionOrOrder) {
 
 TEST_F(ImportRefusals, WhatIsNotJson) {
   expect_refused_bytes("", {"not glTF"});
-  expect_refused_bytes("{\"asset\":\n{", {"not glTF"});
+  expect_refused_bytes("{\"asset\":\n{", {"truncated", "byte 11"});
+  expect_refused_bytes("{\"asset\":\n?}", {"not JSON", "line 2"});
+  expect_refused_bytes("solid cube", {"not glTF", "export"});
   expect_refused_bytes("[1, 2]", {"not glTF"});
   expect_refused_bytes("{}", {"asset.version"});
+}
+
+TEST_F(ImportRefusals, ATransferFile) {
+  const std::string length("\x0e\0\0\0\0\0\0\0", 8);
+  expect_refused_bytes(length + "{\"__metadata__\"", {"safetensors", "not a scene"});
 }
 
 TEST_F(ImportRefusals, JsonNestedWithoutEnd) {

@@ -106,7 +106,7 @@ TEST(Engine, LightThatIsNoneIsRefusedAndTheLastFrameStays) {
     Light bad_lamp = lamp;
     bad_lamp.intensity = bad;
     const std::array<Light, 2> lamps = {lamp_at(0.7F), bad_lamp};
-    test::expect_error([&] { engine.relight(lamps, {}); }, "intensity");
+    test::expect_error([&] { engine.relight(lamps, {}); }, "light 1: a light's intensity");
     expect_unchanged();
     test::expect_error([&] { engine.relight({&lamp, 1}, {.luminance = bad}); }, "sky");
     expect_unchanged();

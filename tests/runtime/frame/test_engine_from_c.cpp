@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "rebounce.h"
+#include "rebounce/engine.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_scene_data.h"
@@ -27,8 +28,19 @@ class FromC : public testing::Test {
     mesh.base_color_texcoord.resize(mesh.position.size());
     mesh.emissive_texcoord.resize(mesh.position.size());
     mesh.vertex_color.resize(mesh.position.size());
-    mesh.weight_begin.resize(mesh.position.size() + 1);
-    data.materials.resize(1);
+    add_weights(mesh);
+    data.materials.resize(2);
+    data.materials[0].name = "plaster";
+    data.materials[1].name = "screen";
+    data.materials[1].emitted_luminance = {1, 2, 3};
+    data.mesh.triangle_material[5] = 1;
+    data.cameras.resize(2);
+    data.cameras[1].name = "door";
+    data.cameras[1].position = {1, 2, 3};
+    data.cameras[1].vertical_fov = 0.5F;
+    data.record.error_mean = 0.25;
+    data.record.error_max = 0.5;
+    data.record.error_bound = 0.75;
     data.lightmap = one_texel_for_each(mesh);
     data.surface_harmonics.sky.assign(data.patches.size(), LinearHarmonics{1, 1});
     data.surface_harmonics.entry_begin.assign(data.patches.size() + 1, 0);
@@ -43,6 +55,28 @@ class FromC : public testing::Test {
   void TearDown() override {
     rebounce_engine_destroy(engine_);
     rebounce_transfer_release(transfer_);
+  }
+
+  /// Each vertex is that of its patch, but the first, which takes it twice and subtracts the last.
+  static void add_weights(DisplayMesh& mesh) {
+    mesh.weight_begin = {0};
+    const auto patch_count = static_cast<std::uint32_t>(mesh.position.size() / 3);
+    for (std::uint32_t v = 0; v < mesh.position.size(); ++v) {
+      mesh.weight_patch.push_back(v / 3);
+      mesh.weight.push_back(v == 0 ? 2.0F : 1.0F);
+      if (v == 0) {
+        mesh.weight_patch.push_back(patch_count - 1);
+        mesh.weight.push_back(-1.0F);
+      }
+      mesh.weight_begin.push_back(static_cast<std::uint32_t>(mesh.weight.size()));
+    }
+  }
+
+  rebounce_transfer_info info() const {
+    rebounce_transfer_info info;
+    rebounce_transfer_info_init(&info);
+    EXPECT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
+    return info;
   }
 
   /// Every patch sees half of its sky in the zenith.
@@ -147,6 +181,122 @@ TEST_F(FromC, ASkyHasADistributionWhereTheFileKnowsItsCells) {
   sky[3] = -1;
   EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, sky.data()), REBOUNCE_INVALID_ARGUMENT);
   EXPECT_EQ(rebounce_engine_set_sky_distribution(engine_, nullptr), REBOUNCE_OK);
+}
+
+TEST_F(FromC, MaterialsCamerasAndErrorsAreTold) {
+  const rebounce_transfer_info told = info();
+  EXPECT_EQ(told.material_count, 2U);
+  EXPECT_STREQ(rebounce_transfer_material_name(transfer_, 0), "plaster");
+  EXPECT_STREQ(rebounce_transfer_material_name(transfer_, 1), "screen");
+  EXPECT_EQ(rebounce_transfer_material_name(transfer_, 2), nullptr);
+  EXPECT_EQ(rebounce_transfer_material_luminance(transfer_, 0)[2], 0);
+  EXPECT_EQ(rebounce_transfer_material_luminance(transfer_, 1)[2], 3);
+  EXPECT_EQ(rebounce_transfer_material_luminance(nullptr, 0), nullptr);
+  EXPECT_EQ(rebounce_transfer_triangle_material(transfer_)[5], 1U);
+  EXPECT_EQ(told.error_mean, 0.25F);
+  EXPECT_EQ(told.error_max, 0.5F);
+  EXPECT_EQ(told.error_bound, 0.75F);
+
+  EXPECT_EQ(told.camera_count, 2U);
+  rebounce_camera camera;
+  rebounce_camera_init(&camera);
+  EXPECT_EQ(camera.backward[2], 1);
+  ASSERT_EQ(rebounce_transfer_get_camera(transfer_, 1, &camera), REBOUNCE_OK);
+  EXPECT_EQ(camera.position[2], 3);
+  EXPECT_EQ(camera.vertical_fov, 0.5F);
+  EXPECT_STREQ(rebounce_transfer_camera_name(transfer_, 1), "door");
+  EXPECT_STREQ(rebounce_transfer_camera_name(transfer_, 0), "");
+  EXPECT_EQ(rebounce_transfer_camera_name(transfer_, 2), nullptr);
+  EXPECT_EQ(rebounce_transfer_get_camera(transfer_, 2, &camera), REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_STREQ(rebounce_last_error(), "there is no camera 2; the scene has 2");
+}
+
+TEST_F(FromC, LightAtVerticesIsThatOfTheWeightsAndNeverNegative) {
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  const std::uint32_t count = info().vertex_count;
+  const std::uint32_t* const begin = rebounce_transfer_vertex_weight_begin(transfer_);
+  const std::uint32_t* const patch = rebounce_transfer_vertex_weight_patch(transfer_);
+  const float* const weight = rebounce_transfer_vertex_weight(transfer_);
+  std::vector<float> direct(3 * std::size_t{count}), indirect(direct.size());
+  EXPECT_EQ(test::count_allocations([&] {
+              rebounce_engine_vertex_direct_irradiance(engine_, direct.data(), count);
+              rebounce_engine_vertex_irradiance(engine_, indirect.data(), count);
+            }),
+            0);
+  for (std::uint32_t v = 0; v < count; ++v) {
+    float of_direct = 0, of_indirect = 0;
+    for (std::uint32_t k = begin[v]; k < begin[v + 1]; ++k) {
+      of_direct += weight[k] * rebounce_engine_direct_irradiance(engine_)[3 * patch[k]];
+      of_indirect += weight[k] * rebounce_engine_indirect_irradiance(engine_)[3 * patch[k]];
+    }
+    EXPECT_FLOAT_EQ(direct[3 * v], std::max(0.0F, of_direct));
+    EXPECT_FLOAT_EQ(indirect[3 * v], std::max(0.0F, of_indirect));
+  }
+  EXPECT_GT(direct[3], 0);
+  // A frame with the light of the last patch alone takes the first vertex below 0.
+  std::vector<float> last(3 * std::size_t{info().patch_count}, 0.0F);
+  std::fill(last.end() - 3, last.end(), 5.0F);
+  ASSERT_EQ(rebounce_engine_relight_direct(engine_, last.data(), info().patch_count), REBOUNCE_OK);
+  rebounce_engine_vertex_direct_irradiance(engine_, direct.data(), count);
+  EXPECT_EQ(direct[0], 0);
+  EXPECT_EQ(direct.back(), 5);
+  EXPECT_EQ(rebounce_engine_vertex_direct_irradiance(engine_, direct.data(), count - 1),
+            REBOUNCE_INVALID_ARGUMENT);
+}
+
+TEST_F(FromC, DirectLightIsTheMeanOverTheReceiverPoints) {
+  constexpr std::size_t kPoints = 8;
+  const std::size_t n = info().patch_count;
+  std::vector<float> position(3 * kPoints * n), normal(position.size());
+  ASSERT_EQ(rebounce_transfer_receiver_points(transfer_, kPoints, position.data(), normal.data(),
+                                              kPoints * n),
+            REBOUNCE_OK);
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  for (std::size_t i = 0; i < n; ++i) {
+    double sum = 0;
+    for (std::size_t k = kPoints * i; k < kPoints * (i + 1); ++k) {
+      double along = 0, squared = 0;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double path = double{lamp_.position[axis]} - position[3 * k + axis];
+        along += path * normal[3 * k + axis];
+        squared += path * path;
+      }
+      sum += std::max(0.0, along) / std::pow(squared, 1.5);  // nothing is in between
+    }
+    EXPECT_NEAR(rebounce_engine_direct_irradiance(engine_)[3 * i], sum / kPoints, 1e-5 * sum);
+  }
+  EXPECT_EQ(rebounce_transfer_receiver_points(transfer_, 4, position.data(), normal.data(), 5),
+            REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_EQ(rebounce_transfer_receiver_points(transfer_, 0, position.data(), normal.data(), 0),
+            REBOUNCE_INVALID_ARGUMENT);
+}
+
+TEST_F(FromC, ALuminaireHasAProfile) {
+  const std::string text =
+      "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 3 1 1 2 0 0 0\n1 1 100\n0 45 90\n0\n200 100 0\n";
+  rebounce_ies_profile* profile = nullptr;
+  ASSERT_EQ(rebounce_ies_profile_parse(text.data(), text.size(), "lamp.ies", &profile), REBOUNCE_OK)
+      << rebounce_last_error();
+  lamp_.profile = profile;
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  const std::size_t numbers = 3 * std::size_t{info().patch_count};
+  const float* const direct = rebounce_engine_direct_irradiance(engine_);
+  const std::vector<float> shaped(direct, direct + numbers);
+  rebounce_ies_profile_destroy(profile);
+
+  // The same by the C++ interface.
+  Engine engine(load_transfer(folder_ / "room.safetensors"));
+  Light lamp;
+  lamp.position = {lamp_.position[0], lamp_.position[1], lamp_.position[2]};
+  lamp.profile = parse_ies_profile(text, "lamp.ies");
+  engine.relight({&lamp, 1}, {});
+  EXPECT_EQ(0,
+            std::memcmp(shaped.data(), engine.direct_irradiance().data(), numbers * sizeof(float)));
+  EXPECT_GT(shaped[0], 10);
+
+  ASSERT_EQ(rebounce_ies_profile_parse("no", 2, "lamp.ies", &profile), REBOUNCE_BAD_INPUT);
+  EXPECT_EQ(profile, nullptr);
+  EXPECT_NE(std::string(rebounce_last_error()).find("lamp.ies"), std::string::npos);
 }
 
 TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {
@@ -258,6 +408,42 @@ TEST_F(FromC, AnErrorIsALineAndBelongsToItsThread) {
   EXPECT_NE(here.find("struct_size"), std::string::npos);
   EXPECT_EQ(here.find('\n'), std::string::npos);
   std::thread([] { EXPECT_STREQ(rebounce_last_error(), ""); }).join();
+}
+
+TEST_F(FromC, AMessageNamesTheLightOrTheFunctionThatFillsTheStructure) {
+  std::array<rebounce_light, 3> lights = {lamp_, lamp_, lamp_};
+  lights[2].intensity = NAN;
+  EXPECT_EQ(rebounce_engine_relight(engine_, lights.data(), 3, nullptr), REBOUNCE_INVALID_ARGUMENT);
+  EXPECT_TRUE(std::string(rebounce_last_error()).starts_with("light 2: ")) << rebounce_last_error();
+  lights[0].struct_size = 0;
+  rebounce_engine_relight(engine_, lights.data(), 1, nullptr);
+  EXPECT_NE(std::string(rebounce_last_error()).find("rebounce_light_init"), std::string::npos);
+  rebounce_transfer_info unfilled{};
+  rebounce_transfer_get_info(transfer_, &unfilled);
+  EXPECT_NE(std::string(rebounce_last_error()).find("rebounce_transfer_info_init"),
+            std::string::npos);
+  rebounce_camera camera{};
+  rebounce_transfer_get_camera(transfer_, 0, &camera);
+  EXPECT_NE(std::string(rebounce_last_error()).find("rebounce_camera_init"), std::string::npos);
+  rebounce_engine_settings settings{};
+  rebounce_engine* none = nullptr;
+  rebounce_engine_create(transfer_, &settings, &none);
+  EXPECT_NE(std::string(rebounce_last_error()).find("rebounce_engine_settings_init"),
+            std::string::npos);
+}
+
+TEST_F(FromC, LightOfTheCallersIsRefusedWithItsPatchAndTheLastFrameStays) {
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  const std::size_t n = info().patch_count;
+  const float* const radiosity = rebounce_engine_radiosity(engine_);
+  const std::vector<float> before(radiosity, radiosity + 3 * n);
+  for (const float bad : {NAN, INFINITY, -1.0F}) {
+    std::vector<float> direct(3 * n, 1.0F);
+    direct[3 * 7 + 1] = bad;
+    EXPECT_EQ(rebounce_engine_relight_direct(engine_, direct.data(), n), REBOUNCE_INVALID_ARGUMENT);
+    EXPECT_NE(std::string(rebounce_last_error()).find("patch 7 "), std::string::npos);
+    EXPECT_TRUE(std::equal(before.begin(), before.end(), rebounce_engine_radiosity(engine_)));
+  }
 }
 
 TEST_F(FromC, LightsOutOfRangeAreRefused) {

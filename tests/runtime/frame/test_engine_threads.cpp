@@ -9,6 +9,7 @@
 #include "rebounce/engine.h"
 #include "rebounce/outputs.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/test_scene_data.h"
 #include "tests/support/thread_pool.h"
 
@@ -184,6 +185,39 @@ TEST(EngineThreads, AFrameWithAllOutputsDoesNotAllocate) {
     const int count = test::count_allocations([&] { frame(engine, second, outputs); });
     EXPECT_EQ(count, 0);
   }
+}
+
+/// Another thread that relights an engine within its frame, and what it is told.
+struct Meddler {
+  Engine* engine = nullptr;
+  std::string message;
+};
+
+TEST(EngineThreads, AFrameWithinAFrameIsRefused) {
+  Meddler meddler;
+  const Scheduler scheduler = {
+      [](void* user, std::uint32_t count, Scheduler::Task task, void* context) {
+        Meddler& other = *static_cast<Meddler*>(user);
+        std::thread([&] {
+          if (other.engine == nullptr) return;
+          other.message = test::error_of([&] { other.engine->relight(lights_of(1, 1), {}); });
+        }).join();
+        kOneThread.parallel_for(nullptr, count, task, context);
+      },
+      &meddler};
+  Engine engine(room(6), {.scheduler = scheduler});
+  engine.relight(lights_of(0, 0), {});
+  const std::vector<Float3> alone(engine.radiosity().begin(), engine.radiosity().end());
+  engine.relight(lights_of(1, 1), {});
+  meddler.engine = &engine;
+  engine.relight(lights_of(0, 0), {});
+  EXPECT_NE(meddler.message.find("two threads"), std::string::npos);
+  EXPECT_TRUE(std::ranges::equal(alone, engine.radiosity()));
+  // A copy is another engine.
+  Engine copy(engine);
+  meddler.engine = nullptr;
+  copy.relight(lights_of(0, 0), {});
+  EXPECT_TRUE(std::ranges::equal(alone, copy.radiosity()));
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST(Receivers, HaveEveryPatchOnceNearItsLike) {
   SCOPED_TRACE(kSeed);
   std::mt19937 engine(kSeed);
   const TransferData data = random_squares(engine, 41);  // the last part is not full
-  const Receivers receivers(data, make_surface_tracer(data.mesh), {.points_per_patch = 3});
+  const Receivers receivers(data, {.points_per_patch = 3});
   ASSERT_EQ(receivers.size(), data.patches.size());
   std::vector<std::uint32_t> sorted = receivers.patch;
   std::ranges::sort(sorted);
@@ -74,8 +74,7 @@ TEST(Receivers, WhatIsOutOfReachGetsNoLight) {
   SCOPED_TRACE(kSeed);
   std::mt19937 engine(kSeed);
   const TransferData data = random_squares(engine, 80);
-  const RayTracer tracer = make_surface_tracer(data.mesh);
-  const Receivers receivers(data, tracer, {.points_per_patch = 2});
+  const Receivers receivers(data, {.points_per_patch = 2});
   for (const LampKind* kind : lamp_kinds()) {
     int reached_count = 0, out_count = 0, lit_count = 0;
     for (int k = 0; k < 40; ++k) {
@@ -107,7 +106,7 @@ TEST(Receivers, DirectLightIsThatOfAllPoints) {
   const TransferData data = random_squares(engine, 41);
   const RayTracer tracer = make_surface_tracer(data.mesh);
   constexpr DirectLightingSettings kSettings{.points_per_patch = 11};  // not all at once
-  const Receivers receivers(data, tracer, kSettings);
+  const Receivers receivers(data, kSettings);
   DirectLighting lighting(data, tracer, kSettings);
   std::vector<Float3> irradiance(data.patches.size());
   int shadowed = 0, lit = 0;

@@ -44,6 +44,11 @@ TEST(TransferFile, RefusesAnotherVersionWithBothNumbers) {
 TEST(TransferFile, RefusesOtherFiles) {
   const test::TemporaryFolder folder;
   expect_error([&] { load_transfer_file(folder / "none"); }, "cannot read");
+  for (const std::string& scene :
+       {std::string("glTF\2\0\0\0", 8), std::string("{\"asset\": {}}")}) {
+    test::write_bytes(folder / "scene", scene);
+    expect_error([&] { load_transfer_file(folder / "scene"); }, "make one of it with precompute");
+  }
   write_safetensors(folder / "other", lay_out_safetensors({}, {{"format", "pt"}}));
   expect_error([&] { load_transfer_file(folder / "other"); }, "is not a transfer file");
   write_safetensors(

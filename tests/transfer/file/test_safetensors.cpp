@@ -162,10 +162,10 @@ std::vector<Malformed> malformed_headers() {
   huge[7] = 127;
   const auto file = [](const std::string& header) { return file_with(header, "123"); };
   return {
-      {"nothing", "", "shorter than a header"},
-      {"half a length", std::string(7, '\0'), "shorter than a header"},
+      {"nothing", "", "truncated, shorter than a header"},
+      {"half a length", std::string(7, '\0'), "truncated, shorter than a header"},
       {"no header", std::string(8, '\0'), "not a JSON object"},
-      {"a header beyond the file", beyond, "exceeds the file"},
+      {"a header beyond the file", beyond, "truncated: the header exceeds the file"},
       {"a header beyond the limit", huge, "exceed 100 MB"},
       {"a header cut short", file_with("{" + good, "}123"), "not valid JSON"},
       {"an array", file("[]"), "not a JSON object"},
@@ -204,7 +204,7 @@ std::vector<Malformed> malformed_tensors() {
        "not a whole number"},
       {"a shape that is no array", one("U8", "8", "[0,8]"), "shape is not an array"},
       {"offsets that descend", one("U8", "[8]", "[8,0]"), "not a range"},
-      {"offsets beyond the file", one("U8", "[9]", "[0,9]"), "not a range"},
+      {"offsets beyond the file", one("U8", "[9]", "[0,9]"), "it is truncated: tensor"},
       {"three offsets", one("U8", "[8]", "[0,8,8]"), "not a range"},
       {"a missing key", file_with(R"({"a":{"dtype":"U8","shape":[0]}})", ""), "not described by"},
       {"a key too many",
@@ -251,7 +251,7 @@ TEST(Safetensors, ReportsAFileThatCannotBeRead) {
   expect_error([&] { SafetensorsFile(folder / "none"); }, "cannot read");
   expect_error([&] { SafetensorsFile(folder / ""); }, "not a regular file");
   test::write_bytes(folder / "empty", "");
-  expect_error([&] { SafetensorsFile(folder / "empty"); }, "shorter than a header");
+  expect_error([&] { SafetensorsFile(folder / "empty"); }, "truncated, shorter than a header");
 }
 
 /// One to four random edits: what a bad disk, a bad tool or a bad person might do.

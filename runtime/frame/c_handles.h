@@ -1,0 +1,99 @@
+#pragma once
+
+// What the files of the C interface (rebounce.h) share: handles around the C++ classes, and
+// exceptions turned into statuses.
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+#include <span>
+#include <vector>
+
+#include "rebounce.h"
+#include "rebounce/error.h"
+#include "runtime/frame/engine_parts.h"
+#include "transfer/file/transfer_data.h"
+
+// NOLINTBEGIN(readability-identifier-naming): the names of a C interface
+
+struct rebounce_transfer {
+  std::shared_ptr<const rebounce::TransferData> data;
+  std::atomic<int> references = 1;
+};
+
+struct rebounce_ies_profile {
+  std::shared_ptr<const rebounce::IntensityProfile> profile;
+};
+
+struct rebounce_engine {
+  rebounce::Engine engine;
+  std::vector<rebounce::Light> lights;                                ///< of the current frame
+  std::shared_ptr<const rebounce::SkyDistribution> sky_distribution;  ///< may be null
+  rebounce::EngineUse use;                                            ///< of the two above
+
+  explicit rebounce_engine(rebounce::Engine made) : engine(std::move(made)) {}
+};
+
+// NOLINTEND(readability-identifier-naming)
+
+namespace rebounce::c {
+
+static_assert(sizeof(Float3) == 3 * sizeof(float));
+
+/// Keeps `message` for rebounce_last_error() and returns `status`.
+rebounce_status fail(rebounce_status status, const char* message) noexcept;
+
+/// Fails with a message about an argument of `function` that is NULL.
+rebounce_status missing(const char* function) noexcept;
+
+/// Runs `work`; an Error from it becomes `status`.
+template <typename Work>
+rebounce_status guarded(rebounce_status status, const Work& work) noexcept {
+  try {
+    return work();
+  } catch (const Unsupported& error) {
+    return fail(REBOUNCE_UNSUPPORTED, error.what());
+  } catch (const Error& error) {
+    return fail(status, error.what());
+  } catch (const std::bad_alloc&) {
+    return fail(REBOUNCE_OUT_OF_MEMORY, "out of memory; close something or use a smaller scene");
+  } catch (const std::exception& error) {
+    return fail(REBOUNCE_INTERNAL, error.what());
+  } catch (...) {
+    return fail(REBOUNCE_INTERNAL, "unknown exception");
+  }
+}
+
+/// A table's numbers; null if it is empty.
+template <typename Triple>
+const float* floats(std::span<const Triple> values) {
+  return values.empty() ? nullptr : values.front().data();
+}
+
+inline Float3 triple(const float* values) {
+  return {values[0], values[1], values[2]};
+}
+
+/// Throws Error unless `size` is that of some version of a structure of at least `least_size`
+/// bytes, which the function `init` fills in.
+void check_struct_size(std::uint32_t size, std::size_t least_size, const char* init);
+
+/// Copies the members that the caller's version of the structure has; the others keep `defaults`.
+template <typename Struct>
+Struct take(const Struct* given, Struct defaults, std::size_t least_size, const char* init) {
+  check_struct_size(given->struct_size, least_size, init);
+  std::memcpy(&defaults, given, std::min<std::size_t>(given->struct_size, sizeof(Struct)));
+  return defaults;
+}
+
+/// Copies to the caller's structure the members that its version has.
+template <typename Struct>
+void give(const Struct& filled, Struct* given) {
+  std::memcpy(given, &filled, std::min<std::size_t>(given->struct_size, sizeof(Struct)));
+}
+
+}  // namespace rebounce::c
