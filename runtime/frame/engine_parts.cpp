@@ -44,10 +44,6 @@ OneThread::~OneThread() {
 Engine::Parts::Parts(std::shared_ptr<const TransferData> transfer_data,
                      const EngineSettings& settings)
     : data(checked(std::move(transfer_data))), scheduler(settings.scheduler) {
-  if (scheduler.parallel_for == nullptr) {
-    threads = std::make_shared<FrameThreads>();
-    scheduler = threads->scheduler();
-  }
 #if REBOUNCE_WITH_EMBREE
   tracer = std::make_shared<const RayTracer>(make_surface_tracer(data->mesh));
   direct_lighting = std::make_shared<DirectLighting>(*data, *tracer, settings.direct_lighting);

@@ -9,7 +9,6 @@
 
 #include "rebounce/engine.h"
 #include "runtime/frame/direct_lighting.h"
-#include "runtime/frame/frame_threads.h"
 #include "runtime/outputs/surface_light.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
@@ -52,7 +51,6 @@ struct Engine::Parts {
 
   EngineUse use;
   std::shared_ptr<const TransferData> data;
-  std::shared_ptr<FrameThreads> threads;  ///< of the engine and its copies; null with a scheduler
   Scheduler scheduler;
   std::shared_ptr<const RayTracer> tracer;          ///< null without Embree
   std::shared_ptr<DirectLighting> direct_lighting;  ///< of this engine alone; null without Embree

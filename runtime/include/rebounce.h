@@ -22,8 +22,7 @@
  * Threads: a transfer is immutable and may be used by any number of threads; an engine belongs to
  * one thread at a time, and a frame that begins within another's fails. A frame neither allocates
  * nor locks, but see light_capacity. It runs where parallel_for of the engine's settings says: by
- * default on the calling thread and on helpers that the engine has started, none where the library
- * is built without OpenMP. */
+ * default on OpenMP's threads if the library is built with them, else on the calling thread. */
 
 #ifndef REBOUNCE_H
 #define REBOUNCE_H
@@ -252,9 +251,8 @@ typedef struct rebounce_engine_settings {
   uint32_t light_capacity; /* lights for which there is room at once; default 16. The first frame
                               with more makes the room it lacks, the only one that allocates */
   rebounce_parallel_for parallel_for; /* shares out the loops of the frames and outputs of the
-                                         engine and its clones; NULL, the default: the calling
-                                         thread and helpers that they share, as many in all as
-                                         OpenMP has threads; they sleep between frames */
+                                         engine and its clones; NULL, the default: OpenMP's threads,
+                                         or the calling one where the library is built without */
   void* user;                         /* what parallel_for is called with; default NULL */
 } rebounce_engine_settings;
 

@@ -1,9 +1,5 @@
 #include "transfer/base/parallel.h"
 
-#ifdef _OPENMP
-#include <omp.h>
-#endif
-
 namespace rebounce {
 namespace {
 
@@ -24,14 +20,6 @@ void run_with_openmp(std::initializer_list<ParallelLoop> loops) {
 #endif
 
 }  // namespace
-
-int default_thread_count() {
-#ifdef _OPENMP
-  return omp_get_max_threads();
-#else
-  return 1;
-#endif
-}
 
 void run_in_turn(const Scheduler& scheduler, std::initializer_list<ParallelLoop> loops) {
 #ifdef _OPENMP

@@ -26,10 +26,6 @@ struct ParallelLoop {
         context(const_cast<Work*>(&work)) {}
 };
 
-/// Threads that a loop without a scheduler runs on: those that OpenMP would give the calling
-/// thread, or 1 where the library is built without it.
-int default_thread_count();
-
 /// Runs the loops one after the other, each when all tasks of the one before are done. Allocates
 /// nothing. A scheduler is not asked for a loop of less than two tasks.
 void run_in_turn(const Scheduler& scheduler, std::initializer_list<ParallelLoop> loops);

@@ -41,10 +41,7 @@ std::vector<ReceiverPoint> receiver_points(const TransferData& data,
 
 struct EngineSettings {
   DirectLightingSettings direct_lighting{};  ///< of no use where the caller brings the direct light
-  /// Where frames run; copies of the engine use it too. Null: on the calling thread and on helpers
-  /// that the engine starts and shares with its copies, one fewer than OpenMP's threads (none where
-  /// the library is built without OpenMP). They sleep between frames.
-  Scheduler scheduler{};
+  Scheduler scheduler{};                     ///< where frames run; copies of the engine use it too
 };
 
 /// Relights one scene: direct light, then one product with the stored operator.
@@ -89,8 +86,7 @@ class Engine {
   /// it.
   void set_emission_scale(std::uint32_t material, const Float3& scale);
 
-  // Results, [n] in lx; valid until the next frame. Where it is dark the error of the operator may
-  // take indirect irradiance and radiosity a little below 0.
+  // Results, [n] in lx; valid until the next frame.
   std::span<const Float3> direct_irradiance() const;
   std::span<const Float3> initial_exitance() const;
   std::span<const Float3> indirect_irradiance() const;
