@@ -25,7 +25,7 @@ struct EngineUse {
 };
 
 /// A call that changes an engine. Throws Error if another thread is in one: two at once would mix
-/// their light states without a word.
+/// their light states silently.
 class OneThread {
  public:
   explicit OneThread(EngineUse& use);

@@ -1,6 +1,6 @@
 #pragma once
 
-// An order of receiving patches, and bounds of what follows each other in it.
+// An order of the patches that receive light, and bounds of runs of patches in it.
 
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -22,15 +22,15 @@ struct ReceiverBounds {
 
   void add(const LitPoint& point);
 
-  /// False if nothing of `lamp` arrives at any of the points, whatever is in between: they are out
-  /// of its range or its cone, or face away from it. Never wrong by rounding; there must be a
-  /// point.
+  /// False if no light of `lamp` arrives at any of the points, even if nothing is in between: they
+  /// are out of its range or its cone, or face away from it. Rounding never makes it false. There
+  /// must be a point.
   bool may_receive(const PreparedLight& lamp) const;
 };
 
-/// An order of patches, given by a point of each, in which those that lie near each other and face
-/// similar ways follow each other, also within pieces of `piece`, which are told apart before they
-/// are ordered. The result depends on the points alone.
+/// An order of patches in which those that lie near each other and face similar ways follow each
+/// other. A patch is given by one of its points. Runs of `piece` patches are chosen first, then
+/// ordered within. The result depends on the points alone.
 std::vector<std::uint32_t> receiver_order(std::span<const LitPoint> patch, std::size_t piece);
 
 }  // namespace rebounce

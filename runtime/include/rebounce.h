@@ -65,8 +65,8 @@ typedef struct rebounce_transfer rebounce_transfer;
 /* Loads a transfer file (UTF-8 path), checks all of it, and writes a handle with one reference. */
 rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** transfer);
 
-/* One more reference, for another owner; one less, and at the last the data go once no engine uses
- * them any more. NULL is ignored. */
+/* Retain adds a reference, for another owner; release takes one away. The data are freed when no
+ * reference is left and no engine uses them. NULL is ignored. */
 void rebounce_transfer_retain(rebounce_transfer* transfer);
 void rebounce_transfer_release(rebounce_transfer* transfer);
 
@@ -339,8 +339,8 @@ void rebounce_harmonics_irradiance_to_degree_4(const float* harmonics, const flo
                                                float* irradiance);
 
 /* Irradiance in lx at the light probes on surfaces of each of the unit normals [normal_count][3]:
- * [probe_count][normal_count][3]. True of small bright surfaces in view too, which harmonics blur.
- */
+ * [probe_count][normal_count][3]. Small bright surfaces in view are sharp, where harmonics blur
+ * them. */
 rebounce_status rebounce_engine_probe_irradiance(const rebounce_engine* engine,
                                                  const float* normals, size_t normal_count,
                                                  float* irradiance, size_t probe_count);

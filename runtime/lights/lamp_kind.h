@@ -43,10 +43,10 @@ struct UnitLightBlock {
   }
 };
 
-/// What a light does at intensity 1, with all that does not depend on the point worked out once.
-/// Two are equal if they light every point alike. Its kind fills in what it uses.
+/// A light of intensity 1, with all values that do not depend on the lit point. Two are equal if
+/// they light every point alike. The kind of the light fills in the members that it uses.
 struct PreparedLight {
-  PreparedLight() = default;  ///< may be compared and assigned to, and no more
+  PreparedLight() = default;  ///< may only be compared and assigned to
   explicit PreparedLight(const Light& light);
 
   bool operator==(const PreparedLight&) const = default;
@@ -59,20 +59,20 @@ struct PreparedLight {
   /// As evaluate, at the points of part number `part` of a block.
   void evaluate(const PatchPointBlock& points, std::size_t part, UnitLightBlock& light) const;
 
-  /// See evaluate_light: at one point, from each of `places` of a lamp with a surface. The two are
-  /// of one size.
+  /// See evaluate_light: at one point, from each of `places` of a lamp with a surface. `light` has
+  /// as many entries.
   void evaluate_places(const glm::vec3& point, std::span<const glm::vec2> places,
                        std::span<UnitLight> light) const;
 
-  /// The irradiance at `point` on a surface with unit `normal`, per unit of intensity, of a lamp
-  /// with a surface of which nothing is hidden: closed forms, cut at the horizon, windowed by the
-  /// range.
+  /// The irradiance at `point` on a surface with unit `normal`, per unit of intensity, from a lamp
+  /// with a surface if nothing is in between: closed forms, cut at the horizon, times the window of
+  /// the range.
   float unoccluded_irradiance(const glm::vec3& point, const glm::vec3& normal) const;
 
   /// The point of a lamp with a surface that is highest above a horizon with unit `normal`.
   glm::vec3 highest_point(const glm::vec3& normal) const;
 
-  /// No point of its surface is farther from its position, metres; 0 without a surface.
+  /// Metres from its position within which its whole surface lies; 0 without a surface.
   float extent() const;
 
   /// 1 at the lamp's middle, 0 from its range on.
@@ -84,16 +84,16 @@ struct PreparedLight {
 
   const LampKind* kind = nullptr;
   glm::vec3 position{0}, direction{0};
-  /// Perpendicular: unit with a profile, half the sides of a rectangle, radii of a disc. The second
-  /// is 90 degrees on from the first, counter-clockwise to someone who looks along `direction`, as
-  /// the horizontal angles of a profile run.
+  /// Perpendicular to each other and to `direction`: unit vectors with a profile, half the sides of
+  /// a rectangle, radii of a disc. The second is 90 degrees on from the first, counter-clockwise
+  /// for an observer who looks along `direction`, as the horizontal angles of a profile are.
   glm::vec3 side{0}, other_side{0};
   /// No light arrives at points whose distance squared from the position is reach_squared or more;
   /// infinite if there is no range.
   float range = 0, reach_squared = 0;
   float cone_cosine = 0, cone_scale = 0;
   float radius = 0;
-  float area = 0;  ///< m², of what shines
+  float area = 0;  ///< m², of the surface that shines
   std::shared_ptr<const IntensityProfile> profile;
 };
 
@@ -104,12 +104,12 @@ enum class ShadowMapKind : std::uint8_t {
   kPlaces,  ///< cubes around places all over its surface
 };
 
-/// What only lamps with a surface have.
+/// The part of a LampKind that only lamps with a surface have.
 struct LampSurface {
   /// As PreparedLight::evaluate_places.
   void (*evaluate_places)(const PreparedLight& lamp, const glm::vec3& point,
                           std::span<const glm::vec2> places, std::span<UnitLight> light);
-  /// From a differential element to what shines on it, cut at the element's horizon.
+  /// From a differential element to the lamp, cut at the element's horizon.
   float (*form_factor)(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal);
   /// As PreparedLight::highest_point.
   glm::vec3 (*highest_point)(const PreparedLight& lamp, const glm::vec3& normal);
@@ -120,7 +120,7 @@ struct LampSurface {
   LampMesh (*mesh)(const PreparedLight& lamp);
   /// Candela straight ahead at intensity 1, seen from afar.
   float (*candela)(const PreparedLight& lamp);
-  /// Of KHR_lights_punctual, a point or a spot over its half-space: what comes nearest to it.
+  /// The light of KHR_lights_punctual that comes nearest: a point, or a spot over its half-space.
   LightType punctual;
 };
 
@@ -132,16 +132,16 @@ struct LampKind {
   std::span<const LampField* const> fields;  ///< that it uses
   ShadowMapKind shadow_map;
 
-  /// Fills in what `lamp`, which has its place and range, needs besides.
+  /// Fills in the members of `lamp` that this kind uses; position and range are there.
   void (*prepare)(const Light& light, PreparedLight& lamp);
   /// As PreparedLight::evaluate; null if there is a surface.
   UnitLight (*evaluate)(const PreparedLight& lamp, const glm::vec3& point);
   void (*evaluate_block)(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
                          UnitLightBlock& light);
   const LampSurface* surface;  ///< null if there is none
-  /// False if no light arrives anywhere in a ball, radius in metres, whatever is in between. Never
-  /// wrong by rounding. Null if the lamp shines all around; its range and its surface are not asked
-  /// for.
+  /// False if no light arrives anywhere in a ball, even if nothing is in between; `radius` in
+  /// metres. Rounding never makes it false. Looks neither at the range nor at the surface. Null if
+  /// the lamp shines all around.
   bool (*may_reach)(const PreparedLight& lamp, const glm::vec3& centre, float radius) = nullptr;
 
   /// GLSL 3.30 of the viewer: `float NAME_irradiance(vec3 to_lamp, vec3 direction, vec3 normal)`,
@@ -150,7 +150,7 @@ struct LampKind {
   /// Uniforms: lamp_direction, lamp_radius, lamp_side, lamp_other_side (as PreparedLight has them),
   /// cos_inner, cos_outer; constant kPi.
   const char* glsl;
-  const char* shared_glsl = "";  ///< comes before it, once for all kinds that name the same
+  const char* shared_glsl = "";  ///< comes before it, once for all kinds that share it
 
   bool uses(const LampField& field) const;
   bool has_place() const { return uses(kPosition); }

@@ -30,8 +30,8 @@ class LampShadows {
   LampShadows(const RayTracer& tracer, std::span<float> irradiance)
       : tracer_(tracer), irradiance_(irradiance) {}
 
-  /// Adds to sum number `sum` the part of `irradiance` that gets from the place of a lamp that
-  /// `light` tells of to `position`, which is moved off the surface.
+  /// Adds to sum number `sum` the part of `irradiance` that gets through to `position` from a lamp,
+  /// or one place of it, in the direction of `light`. `position` is moved off the surface.
   void add_ray(const glm::vec3& position, const UnitLight& light, float irradiance,
                std::size_t sum);
 

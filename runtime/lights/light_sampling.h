@@ -30,7 +30,7 @@ inline float shadow_ray_length(float distance) {
 IncidentLight evaluate_light(const Light& light, const Float3& point,
                              const Float2& place = {0.5F, 0.5F});
 
-/// Checks the fields that the type of `light` uses against their ranges (scene_description.h).
+/// Checks the fields that the type of `light` uses against their ranges (rebounce/lights.h).
 /// Throws Error that names the field.
 void check_light(const Light& light);
 

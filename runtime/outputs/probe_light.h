@@ -10,7 +10,7 @@
 namespace rebounce {
 
 /// Writes the light that arrives at each probe [p] from patches of `radiosity` [n] in lx and from
-/// `sky`, by its cells where the probes know them, else as its mean; that of lamps is not in it.
+/// `sky`: by its cells where the probes know them, else by its mean. It has no light of lamps.
 /// Degree 4 is that of the sky alone, whose light is sharp, and zero where the cells are not known.
 /// Probes that are not valid get none. Neither allocates nor locks; the same bits for any
 /// `scheduler`. Throws Error if a size is wrong.

@@ -10,7 +10,7 @@
 namespace rebounce {
 
 /// Writes the light that arrives at each patch [n] from patches of `radiosity` [n] in lx and from
-/// `sky`, by its cells where the harmonics know them, else as its mean; that of lamps is not in it.
+/// `sky`: by its cells where the harmonics know them, else by its mean. It has no light of lamps.
 /// Neither allocates nor locks; the same bits for any `scheduler`. Throws Error if a size is wrong.
 void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const Float3> radiosity,
                              const Sky& sky, std::span<SurfaceLight> light,

@@ -41,7 +41,7 @@ constexpr std::size_t piece_count(std::size_t count, std::size_t size) {
   return (count + size - 1) / size;
 }
 
-/// What calls work(i) for each entry i of a piece, to be a task.
+/// The task of a loop over pieces: it calls work(i) for each entry i of its piece.
 template <typename Work>
 auto on_piece(std::size_t count, std::size_t size, const Work& work) {
   return [=, &work](std::size_t piece) {

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-// The header, a tensor, its shape.
+// How deep a header is nested: the header, a tensor, its shape.
 constexpr std::size_t kHeaderDepth = 3;
 
 // Errors of a header do not name the file; the constructor adds its name.

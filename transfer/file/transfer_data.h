@@ -28,7 +28,7 @@ struct TransferData : SceneData {
   FormFactorLinks links;  ///< empty unless they were requested
   std::shared_ptr<const TransferOperator> transfer;
   std::string settings_json;  ///< every setting of the build, one JSON object
-  std::string report_json;    ///< scene report, seconds by phase, rays: one JSON object
+  std::string report_json;    ///< what the build found, no times: one JSON object
 };
 
 }  // namespace rebounce

@@ -35,7 +35,7 @@ struct ReceiverPoint {
 /// The points [n][points_per_patch] at which an engine of these settings looks at its lamps: the
 /// direct irradiance of a patch is the mean of the irradiances at its points. Renderers that find
 /// it themselves, with shadow maps for instance, look there too: a centroid may lie off its patch,
-/// and sees none of a border of shadow. Throws Error if points_per_patch is below 1.
+/// and is either in shadow or not. Throws Error if points_per_patch is below 1.
 std::vector<ReceiverPoint> receiver_points(const TransferData& data,
                                            const DirectLightingSettings& settings = {});
 
@@ -46,16 +46,16 @@ struct EngineSettings {
 
 /// Relights one scene: direct light, then one product with the stored operator.
 ///
-/// Where that has receivers and sources (patch_roles), the indirect irradiance of all other patches
-/// than receivers is 0, and their radiosity what they give off the first time; light on patches
-/// that are no sources is shown as direct light and never bounces.
+/// The operator may have receivers and sources (patch_roles). Patches that are no receivers then
+/// have an indirect irradiance of 0, and their radiosity is their initial exitance. Light on
+/// patches that are no sources is shown as direct light and never bounces.
 ///
-/// The transfer data are read only and may be shared by any number of engines; an engine is one
-/// light state and belongs to one thread at a time: a frame that begins within another's throws
-/// Error. A copy shares the data, the ray tracer and the points of the patches and has a light
-/// state of its own: that is how many threads relight one scene. After construction nothing
-/// allocates, locks, prints or touches a file, but see DirectLightingSettings::light_capacity. An
-/// engine that was moved from may only be destroyed.
+/// The transfer data are read only and may be shared by any number of engines. An engine is one
+/// light state and belongs to one thread at a time: a frame that begins during another one throws
+/// Error. A copy shares the data, the ray tracer and the points of the patches, and has a light
+/// state of its own, for another thread. After construction nothing allocates, locks, prints or
+/// touches a file, but see DirectLightingSettings::light_capacity. An engine that was moved from
+/// may only be destroyed.
 class Engine {
  public:
   /// Makes room for everything a frame needs. Throws Error if `data` is null or has no operator, or

@@ -59,22 +59,22 @@ void probe_light(const Engine& engine, std::span<ProbeLight> light);
 void probe_light(const Engine& engine, std::span<QuadraticProbeLight> light);
 
 /// Writes the irradiance in lx at each probe k on surfaces of each of the K unit `normals`:
-/// irradiance[k K + normal], [p][K], at least 0. True of small bright surfaces in view too, which
-/// harmonics blur.
+/// irradiance[k K + normal], [p][K], at least 0. Small bright surfaces in view are sharp, where
+/// harmonics blur them.
 void probe_irradiance(const Engine& engine, std::span<const Float3> normals,
                       std::span<Float3> irradiance);
 
-/// The light at a point in the air, between the eight probes around it, without those that are not
-/// valid; outside of their grid that of its border. Zero where none of the eight is valid, or if
-/// the probes are no grid. In time it is as many probes as are around the point.
+/// The light at a point in the air, interpolated between the valid ones of the eight probes around
+/// it; outside of their grid, the light at its border. Zero where none of the eight is valid, or if
+/// the probes are no grid. It takes the time of the probes around the point.
 ProbeLight light_in_air(const Engine& engine, const Float3& position);
 
 /// The irradiance there on surfaces of each of the unit `normals`: irradiance [K] in lx.
 void irradiance_in_air(const Engine& engine, const Float3& position,
                        std::span<const Float3> normals, std::span<Float3> irradiance);
 
-/// The light at any point of the grid of `probes` by what probe_light wrote [p], otherwise as
-/// light_in_air: for many points of a frame.
+/// The same as light_in_air, from the light [p] that probe_light wrote: faster for many points of a
+/// frame.
 ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,
                               const Float3& position);
 

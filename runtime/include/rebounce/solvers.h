@@ -1,8 +1,8 @@
 #pragma once
 
 // Iterative solutions of the radiosity system (I - rho F) B = M0 with the form factors of a
-// transfer file, for light that is truer than the stored operator, and to compare with.
-// notes/concepts/solvers.md tells the methods.
+// transfer file, for light that is more exact than the stored operator's, and for
+// comparison. notes/concepts/solvers.md explains the methods.
 
 #include <array>
 #include <cstddef>
@@ -97,8 +97,8 @@ class Solver {
   /// The last solution B [n] in lx; valid until the next solve.
   std::span<const Float3> radiosity() const;
 
-  /// Takes other reflectances [n], which hold from the next solve on, exactly; M0 is to be made
-  /// with them too. Throws Error if the size is wrong or one is not in [0, 1).
+  /// Sets other reflectances [n], exactly, from the next solve on; M0 must be computed with them
+  /// too. Throws Error if the size is wrong or one is not in [0, 1).
   void set_reflectance(std::span<const Float3> reflectance);
 
   /// The next solve starts from `radiosity` [n] in lx. Throws Error if the size is wrong or a

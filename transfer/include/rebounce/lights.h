@@ -19,8 +19,8 @@ struct IntensityProfile {
   std::vector<float> vertical;    ///< radians, ascending, within [0, pi]; at least one
   std::vector<float> horizontal;  ///< radians, ascending from 0; at least one
   std::vector<float> candela;     ///< [horizontal][vertical], each >= 0
-  /// The luminaire repeats itself, mirrored, beyond the last horizontal angle: that is a quarter or
-  /// half of a turn. Otherwise it is a whole one, or the only one.
+  /// True if the last horizontal angle is a quarter or half of a turn: beyond it the luminaire
+  /// repeats itself, mirrored. Otherwise the last angle is a whole turn, or there is only one.
   bool mirrored = false;
 
   /// Intensity in candela, interpolated bilinearly; 0 beyond the vertical angles. `vertical_angle`
@@ -30,8 +30,8 @@ struct IntensityProfile {
 
 /// Reads the photometric data of a luminaire from the text of an IES file (ANSI/IES LM-63-1986 to
 /// -2019, type C photometry), with its multiplier and ballast factor; keywords and the lamp's shape
-/// are skipped. `name` stands for the file in messages. Throws Error if the text is not that, or of
-/// type A or B, or its angles are not those of a type C measurement.
+/// are skipped. `name` stands for the file in messages. Throws Error if the text is no such file,
+/// is of type A or B, or has angles that are not those of a type C measurement.
 std::shared_ptr<const IntensityProfile> parse_ies_profile(std::string_view text,
                                                           const std::string& name);
 
@@ -55,8 +55,8 @@ struct Light {
   float outer_cone_angle = 0.785398163F;  ///< radians from the axis: none outside (spot)
   float radius = 0;                       ///< metres, > 0 (sphere, disc)
   Float2 size{0, 0};                      ///< metres, > 0: along `tangent`, across it (rectangle)
-  /// Not along `direction`, of which it is made perpendicular: the first side of a rectangle, and
-  /// where the horizontal angles of a profile begin.
+  /// The way of the first side of a rectangle, and of horizontal angle 0 of a profile. It is made
+  /// perpendicular to `direction`, and must not be parallel to it.
   Float3 tangent{1, 0, 0};
   std::shared_ptr<const IntensityProfile> profile;  ///< of a luminaire (point, spot); may be null
 };

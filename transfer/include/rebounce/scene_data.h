@@ -68,8 +68,8 @@ struct PatchTable {
 };
 
 /// Which patches an operator brings light to, its receivers, and which it takes light from, its
-/// sources. A patch may be both, or neither: it reflects light on its way from one to the other
-/// all the same.
+/// sources. A patch may be both, or neither. A patch that is neither still reflects light on its
+/// way from sources to receivers.
 struct PatchRoles {
   static constexpr std::uint8_t kReceiver = 1, kSource = 2, kBoth = kReceiver | kSource;
 

@@ -2,7 +2,7 @@
 
 namespace rebounce::shaders {
 
-/// The sky behind everything, by its cells (transfer/sky_cells.h).
+/// The sky behind everything, by its cells (rebounce/sky.h).
 inline constexpr const char* kSkyFragment = R"(#version 330 core
 uniform vec3 right, up, forward;  // right and up as long as half the picture at unit distance
 uniform vec2 picture_size;        // pixels
