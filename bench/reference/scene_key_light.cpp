@@ -77,7 +77,8 @@ std::vector<SurfacePoint> those_inside(std::vector<SurfacePoint> points, const R
   };
   std::vector<SurfacePoint> inside = points;
   std::erase_if(inside, is_outside);
-  return inside.empty() ? points : inside;
+  if (inside.empty()) return points;
+  return inside;
 }
 
 /// The part of `receivers` that face `place` with nothing between.

@@ -76,8 +76,9 @@ class EdgeTable {
 
   /// The triangles at the edge between two ends, `low` < `high`; empty if there is no such edge.
   std::span<HalfEdge> find(std::uint32_t low, std::uint32_t high) {
-    const auto found = std::ranges::equal_range(around(low), high, {}, &HalfEdge::high);
-    return {found.begin(), found.end()};
+    const std::span<HalfEdge> all = around(low);
+    return {std::ranges::lower_bound(all, high, {}, &HalfEdge::high),
+            std::ranges::upper_bound(all, high, {}, &HalfEdge::high)};
   }
   std::span<const HalfEdge> find(std::uint32_t low, std::uint32_t high) const {
     return const_cast<EdgeTable*>(this)->find(low, high);

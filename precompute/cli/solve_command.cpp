@@ -126,7 +126,7 @@ std::string form_factors_of(const SolveOptions& chosen, const TransferData& data
   if (hierarchical && !chosen.form_factors.empty() && chosen.form_factors != kLinks) {
     throw Error("--method hierarchical always uses links; leave out --form-factors");
   }
-  const std::string asked = hierarchical ? kLinks : chosen.form_factors;
+  std::string asked = hierarchical ? kLinks : chosen.form_factors;
   if (asked == kLinks && data.links.empty()) {
     throw Error(chosen.file + " has no links; make it again with precompute --store-links");
   }

@@ -34,8 +34,7 @@ void append_rows(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
 Eigen::MatrixXd make_orthonormal(Eigen::MatrixXd& basis) {
   const Index rank = basis.cols();
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(basis);
-  const Eigen::MatrixXd factor =
-      qr.matrixQR().topRows(rank).template triangularView<Eigen::Upper>();
+  Eigen::MatrixXd factor = qr.matrixQR().topRows(rank).template triangularView<Eigen::Upper>();
   basis = qr.householderQ() * Eigen::MatrixXd::Identity(basis.rows(), rank);
   return factor;
 }

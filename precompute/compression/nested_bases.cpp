@@ -512,7 +512,8 @@ class Nesting {
 Storage nest_bases(Storage storage, const NestingFrame& frame) {
   load_blas();
   Nesting nesting(storage, frame);
-  return nesting.pays() ? nesting.nested() : storage;
+  if (nesting.pays()) return nesting.nested();
+  return storage;
 }
 
 }  // namespace rebounce

@@ -130,9 +130,10 @@ class TextureImport {
       const auto image = decode(document_.images.at(static_cast<std::size_t>(source)), source);
       if (!image) continue;
       const std::vector<std::uint8_t>& rgba = image->image.rgba;
+      const std::size_t pixel_count = rgba.size() / 4;
       double sum = 0;
-      for (std::size_t k = 0; k < rgba.size(); k += 4) sum += rgba[k];
-      return sum / (255.0 * static_cast<double>(rgba.size() / 4));
+      for (std::size_t k = 0; k < pixel_count; ++k) sum += rgba[4 * k];
+      return sum / (255.0 * static_cast<double>(pixel_count));
     }
     return 1;
   }

@@ -138,8 +138,7 @@ void HierarchicalMatrix::entries(std::uint32_t matrix, std::span<const std::uint
     blocks.insert(blocks.end(), touching_[strip].begin(), touching_[strip].end());
   }
   std::ranges::sort(blocks);
-  const auto rest = std::ranges::unique(blocks);
-  blocks.erase(rest.begin(), rest.end());
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
   for (const std::uint32_t b : blocks) add_block(matrix, b, row_places, column_places, entries);
 }
 

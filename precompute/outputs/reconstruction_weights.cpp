@@ -263,7 +263,7 @@ class ReconstructionWeights {
     }
     if (std::ranges::any_of(near, is(Exposure::kOpen))) return only(near, is(Exposure::kOpen));
     if (std::ranges::any_of(near, is(Exposure::kMixed))) {
-      const std::vector<ReconstructionSite> farther =
+      std::vector<ReconstructionSite> farther =
           only(within(kFartherReach * receivers_[v].reach), is(Exposure::kOpen));
       if (!farther.empty()) return farther;
     }

@@ -266,7 +266,7 @@ void ClusterMerging::join_neighbours(std::uint32_t a, std::uint32_t b,
     std::vector<std::uint32_t>().swap(neighbours_[part]);
   }
   std::ranges::sort(all);
-  all.erase(std::ranges::unique(all).begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
 }
 
 std::vector<std::uint32_t> ClusterMerging::alive() const {

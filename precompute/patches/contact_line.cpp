@@ -6,7 +6,6 @@
 #include <functional>
 #include <limits>
 #include <numeric>
-#include <ranges>
 #include <utility>
 
 #include "precompute/sampling/box_tree.h"
@@ -92,7 +91,7 @@ class LineJoiner {
     for (double before = 0; last - first > before;) {
       before = last - first;
       std::ranges::for_each(intervals, take);
-      std::ranges::for_each(intervals | std::views::reverse, take);
+      std::for_each(intervals.rbegin(), intervals.rend(), take);
     }
     return line.part(first, last);
   }

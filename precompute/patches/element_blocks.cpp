@@ -42,7 +42,7 @@ class BlockMerging {
 
   ElementClusters run(const Progress& progress) {
     std::vector<Steps> steps(block_count());
-    const auto batch = static_cast<std::size_t>(4 * omp_get_max_threads());
+    const auto batch = 4 * static_cast<std::size_t>(omp_get_max_threads());
     for (std::size_t first = 0; first < steps.size(); first += batch) {
       report_progress(progress, static_cast<double>(first) / static_cast<double>(steps.size()));
       const std::size_t end = std::min(first + batch, steps.size());

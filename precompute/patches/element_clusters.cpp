@@ -137,7 +137,7 @@ class ElementMerging {
     }
     std::erase_if(edges, [](const auto& pair) { return pair.first == pair.second; });
     std::ranges::sort(edges);
-    edges.erase(std::ranges::unique(edges).begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
     merging.connect(edges);
     std::vector<Float3> centroid;
     for (const ElementCluster& cluster : start.cluster)

@@ -20,7 +20,7 @@ bool are_two_sides(const Uint3& a, const Uint3& b) {
 
 void sort_and_unique(Pairs& pairs) {
   std::ranges::sort(pairs);
-  pairs.erase(std::ranges::unique(pairs).begin(), pairs.end());
+  pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
 }
 
 // The height of lines of sight above the surface, as a fraction of their length: they pass over the

@@ -40,7 +40,7 @@ std::uint32_t sky_cell(const Float3& direction) {
   const double count = kRowCells[wanted];
   const double turns =
       std::atan2(x, -z) / (2 * std::numbers::pi) + 1;  // from north, clockwise; in [0.5, 1.5]
-  return first + static_cast<std::uint32_t>(turns * count + 0.5) % kRowCells[wanted];
+  return first + static_cast<std::uint32_t>(std::lround(turns * count)) % kRowCells[wanted];
 }
 
 Float3 point_of_sky_cell(std::uint32_t cell, const Float2& place) {

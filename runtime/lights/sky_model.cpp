@@ -88,8 +88,9 @@ SkyDistribution cie_sky(int type, const Float3& sun_direction, float ground_refl
   for (std::uint32_t cell = 1; cell < kSkyCellCount; ++cell) {
     double sum = 0, received = 0;
     for (int k = 0; k < kPointsAcross * kPointsAcross; ++k) {
-      const Float2 place = {static_cast<float>((k / kPointsAcross + 0.5) / kPointsAcross),
-                            static_cast<float>((k % kPointsAcross + 0.5) / kPointsAcross)};
+      const int row = k / kPointsAcross, column = k % kPointsAcross;
+      const Float2 place = {static_cast<float>((row + 0.5) / kPointsAcross),
+                            static_cast<float>((column + 0.5) / kPointsAcross)};
       const glm::dvec3 direction = to_dvec3(point_of_sky_cell(cell, place));
       const double luminance = sky.luminance(direction);
       sum += luminance;

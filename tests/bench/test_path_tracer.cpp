@@ -30,7 +30,7 @@ IrradianceEstimate measure(const Scene& scene, std::span<const SurfacePoint> poi
                            std::uint32_t samples, std::vector<Light> lights = {}, Sky sky = {},
                            std::uint64_t seed = 1) {
   const RayTracer tracer = make_scene_tracer(scene);
-  return indirect_irradiance({scene, tracer, lights, sky}, points, samples, seed);
+  return indirect_irradiance({scene, tracer, lights, std::move(sky)}, points, samples, seed);
 }
 
 std::vector<SurfacePoint> points_on(const Scene& scene, std::size_t count) {

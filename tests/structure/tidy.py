@@ -5,7 +5,9 @@ usage: tidy.py BUILD_FOLDER
 
 A source is checked again when it, a project header that it includes, its compiler flags, the
 configuration or clang-tidy itself has changed. What was clean is kept as empty files in
-$XDG_CACHE_HOME/rebounce-tidy (default ~/.cache). Exit status 1 if any source has a finding.
+$XDG_CACHE_HOME/rebounce-tidy (default ~/.cache). The sources of a folder that are compiled together
+are checked together: most of the time goes into headers of others. Exit status 1 if there is a
+finding.
 """
 
 import concurrent.futures
@@ -44,7 +46,7 @@ def content_key(source, command, tool):
     digest.update(command.replace(str(ROOT), "").encode())
     for file in included_files(source):
         digest.update(str(file.relative_to(ROOT)).encode())
-        digest.update(hashlib.sha256(file.read_bytes()).digest())
+        digest.update(hashlib.sha256(file.read_bytes().replace(os.fsencode(ROOT), b"")).digest())
     return digest.hexdigest()
 
 
@@ -66,9 +68,9 @@ def main():
     marks = {}
     for entry in json.loads(pathlib.Path(build, "compile_commands.json").read_text()):
         source = pathlib.Path(entry["file"]).resolve()
-        if ROOT in source.parents and pathlib.Path(build).resolve() not in source.parents:
-            marks[source] = cache / content_key(source, entry["command"], tool)
-    waiting = sorted(source for source, mark in marks.items() if not mark.exists())
+        marks[source] = cache / content_key(source, entry["command"], tool)
+    waiting = [source for source, mark in marks.items() if not mark.exists()]
+    waiting.sort(key=lambda source: -sum(file.stat().st_size for file in included_files(source)))
     print(f"clang-tidy: {len(marks) - len(waiting)} sources unchanged, {len(waiting)} to check",
           flush=True)
 

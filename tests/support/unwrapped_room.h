@@ -21,12 +21,11 @@ class QuadMesh {
     const auto first = static_cast<std::uint32_t>(position_.size() / 3);
     const float size = 1.0F / static_cast<float>(cells_);
     const std::array<std::array<float, 2>, 4> chart = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+    const auto row = cell / cells_, column = cell % cells_;
     for (std::size_t k = 0; k < 4; ++k) {
       position_.insert(position_.end(), quad[k].begin(), quad[k].end());
-      texcoord_.push_back(size *
-                          (static_cast<float>(cell % cells_) + 0.125F + 0.75F * chart[k][0]));
-      texcoord_.push_back(size *
-                          (static_cast<float>(cell / cells_) + 0.125F + 0.75F * chart[k][1]));
+      texcoord_.push_back(size * (static_cast<float>(column) + 0.125F + 0.75F * chart[k][0]));
+      texcoord_.push_back(size * (static_cast<float>(row) + 0.125F + 0.75F * chart[k][1]));
     }
     for (const std::uint32_t k : {0U, 1U, 2U, 0U, 2U, 3U}) index_.push_back(first + k);
   }

@@ -231,7 +231,7 @@ Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact)
 
 }  // namespace
 
-Storage stream_values(const Storage& storage) {
+Storage stream_values(Storage storage) {
   check_hierarchical_storage(storage);
   if (storage.order == Order::kStreamed) return storage;
   Storage streamed = storage;

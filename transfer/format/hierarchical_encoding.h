@@ -6,7 +6,7 @@ namespace rebounce {
 
 /// The same operator with its values in the order kStreamed. A low-rank block with only one rank
 /// above zero gets rank zero. Throws Error if the tables or the number of values are not valid.
-HierarchicalStorage stream_values(const HierarchicalStorage& storage);
+HierarchicalStorage stream_values(HierarchicalStorage storage);
 
 /// Rounds values in f32 to `precision` and writes them in the order kStreamed. In 8 bits the result
 /// has the residuals that its blocks ask for. If the operator has scales of positions, these grow

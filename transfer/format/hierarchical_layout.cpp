@@ -102,8 +102,7 @@ void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {
   const auto same = [](const Cluster& a, const Cluster& b) {
     return a.begin == b.begin && a.size == b.size;
   };
-  const auto rest = std::ranges::unique(clusters, same);
-  clusters.erase(rest.begin(), rest.end());
+  clusters.erase(std::unique(clusters.begin(), clusters.end(), same), clusters.end());
 }
 
 std::uint32_t HierarchicalLayout::cluster_at(std::uint32_t begin, std::uint32_t size) const {

@@ -132,7 +132,7 @@ std::vector<double> of_positions(const ValueReader& read, Range rows, std::size_
 }  // namespace
 
 Storage decode(const Storage& storage) {
-  const Storage streamed = stream_values(storage);
+  Storage streamed = stream_values(storage);
   const HierarchicalPrecision exact = hierarchical_precision(Precision::kF32);
   if (streamed.precision == exact) return streamed;
   Storage decoded = streamed;

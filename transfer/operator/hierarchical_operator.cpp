@@ -334,7 +334,7 @@ std::uint64_t HierarchicalOperator::Receivers::value_count() const {
 }
 
 HierarchicalOperator::HierarchicalOperator(HierarchicalStorage storage)
-    : storage_(std::make_shared<HierarchicalStorage>(stream_values(storage))),
+    : storage_(std::make_shared<HierarchicalStorage>(stream_values(std::move(storage)))),
       layout_(std::make_shared<HierarchicalLayout>(*storage_)) {
   const std::size_t n = storage_->area.size();
   gather_scale_.reserve(n);

@@ -195,7 +195,7 @@ TEST_F(ViewCommand, ASphereTakesTheColourOfTheWallsThatItFaces) {
   for (int x = 0; x < image.width; ++x) {
     double red = 0, green = 0;
     for (int y = 0; y < image.height; ++y) {
-      const auto k = static_cast<std::size_t>(3 * (y * image.width + x));
+      const auto k = 3 * static_cast<std::size_t>(y * image.width + x);
       if (image.rgb[k] == without.rgb[k] && image.rgb[k + 1] == without.rgb[k + 1]) continue;
       red += image.rgb[k];
       green += image.rgb[k + 1];
@@ -247,7 +247,7 @@ TEST_F(ViewCommand, SplitsTheScreenBetweenMethods) {
   for (int y = 0; y < split.height; ++y) {
     for (int x = 0; x < split.width; ++x) {
       if (std::abs(x - split.width / 2) < 3) continue;
-      const auto k = static_cast<std::size_t>(3 * (y * split.width + x));
+      const auto k = 3 * static_cast<std::size_t>(y * split.width + x);
       (x < split.width / 2 ? left : right) += std::abs(split.rgb[k] - exact.rgb[k]);
     }
   }

@@ -30,10 +30,11 @@ PatchTable box_of(int side) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const float wall : {0.0F, 1.0F}) {
       for (int k = 0; k < side * side; ++k) {
+        const int row = k / side, column = k % side;
         Float3 at, normal{};
         at[axis] = wall;
-        at[(axis + 1) % 3] = step * (static_cast<float>(k % side) + 0.5F);
-        at[(axis + 2) % 3] = step * (static_cast<float>(k / side) + 0.5F);
+        at[(axis + 1) % 3] = step * (static_cast<float>(column) + 0.5F);
+        at[(axis + 2) % 3] = step * (static_cast<float>(row) + 0.5F);
         normal[axis] = wall == 0 ? 1 : -1;
         patches.area.push_back(step * step);
         patches.centroid.push_back(at);

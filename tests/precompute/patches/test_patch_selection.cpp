@@ -43,8 +43,7 @@ std::vector<float> selected_x(const std::string& list) {
     if (selected[i] != 0) x.push_back(std::round(model.patches.centroid[i][0]));
   }
   std::ranges::sort(x);
-  const auto rest = std::ranges::unique(x);
-  x.erase(rest.begin(), rest.end());
+  x.erase(std::unique(x.begin(), x.end()), x.end());
   return x;
 }
 

@@ -199,8 +199,9 @@ TEST(OctahedralMap, UnfoldsTheSphere) {
       u = std::copysign(1 - std::abs(v), u);
       v = std::copysign(1 - std::abs(inner), v);
     }
-    EXPECT_NEAR(u, (2 * static_cast<float>(k % kMapSize) + 1) / kMapSize - 1, 1e-6);
-    EXPECT_NEAR(v, (2 * static_cast<float>(k / kMapSize) + 1) / kMapSize - 1, 1e-6);
+    const auto row = k / kMapSize, column = k % kMapSize;
+    EXPECT_NEAR(u, (2 * static_cast<float>(column) + 1) / kMapSize - 1, 1e-6);
+    EXPECT_NEAR(v, (2 * static_cast<float>(row) + 1) / kMapSize - 1, 1e-6);
   }
 }
 

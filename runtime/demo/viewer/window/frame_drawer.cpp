@@ -33,7 +33,7 @@ bool has_same_place(const ViewerSphere& a, const ViewerSphere& b) {
 
 }  // namespace
 
-FrameDrawer::FrameDrawer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup)
+FrameDrawer::FrameDrawer(const std::shared_ptr<const TransferData>& data, const ViewerSetup& setup)
     : lit_(data, setup.reference, setup.make_probes), gpu_(*data), renderer_(gpu_, data->mesh) {}
 
 void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebuffer) {

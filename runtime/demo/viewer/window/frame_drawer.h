@@ -15,7 +15,7 @@ namespace rebounce {
 /// Draws frames, from light to picture. Needs a current OpenGL context.
 class FrameDrawer {
  public:
-  FrameDrawer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup);
+  FrameDrawer(const std::shared_ptr<const TransferData>& data, const ViewerSetup& setup);
 
   /// Relights and draws `state` into `framebuffer`.
   void draw(ViewerState& state, int width, int height, GLuint framebuffer);

@@ -77,7 +77,7 @@ ViewerState begin(const ViewerSetup& setup) {
 
 }  // namespace
 
-void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& setup,
+void run_viewer(const std::shared_ptr<const TransferData>& data, const ViewerSetup& setup,
                 const std::function<bool()>& keep_open) {
   Window window(setup.width, setup.height, setup.title);
   FrameDrawer drawer(data, setup);
@@ -99,8 +99,8 @@ void run_viewer(std::shared_ptr<const TransferData> data, const ViewerSetup& set
   }
 }
 
-StageTimes draw_viewer_frames(std::shared_ptr<const TransferData> data, const ViewerSetup& setup,
-                              int frame_count, float frames_per_second,
+StageTimes draw_viewer_frames(const std::shared_ptr<const TransferData>& data,
+                              const ViewerSetup& setup, int frame_count, float frames_per_second,
                               const std::function<void(int, const ScreenImage&)>& take) {
   if (frame_count < 1) throw Error("the viewer was asked for no frame; ask for at least one");
   const HeadlessContext context;

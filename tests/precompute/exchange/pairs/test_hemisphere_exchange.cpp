@@ -38,7 +38,8 @@ Scene room_of_balls(int count) {
   for (int k = 0; k < count; ++k) {
     const std::size_t first = scene.position.size();
     test::add_ball(scene, 16, 12, false);
-    const glm::dvec3 centre(0.5 + 0.62 * (k % 5), 0.301 + 0.4 * (k % 3), 0.6 + 0.7 * (k / 5));
+    const int row = k / 5, column = k % 5;
+    const glm::dvec3 centre(0.5 + 0.62 * column, 0.301 + 0.4 * (k % 3), 0.6 + 0.7 * row);
     for (std::size_t v = first; v < scene.position.size(); ++v) {
       scene.position[v] = to_float3(0.3 * to_dvec3(scene.position[v]) + centre);
     }
