@@ -37,7 +37,7 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   const rebounce_light given = take(entry, defaults, kLightSize1, kLightInit);
   if (given.type >= lamp_kinds().size()) {
     throw Error("light " + std::to_string(k) + " is of type " + std::to_string(given.type) +
-                ", which there is not");
+                ", which does not exist; give one of rebounce_light_type");
   }
   light.type = static_cast<LightType>(given.type);
   light.position = triple(given.position);
