@@ -28,8 +28,8 @@ struct NumpyTypeTraits {
 };
 
 /// Indexed by NumpyType.
-constexpr std::array<NumpyTypeTraits, 4> kNumpyTypes{
-    {{"<f4", 4}, {"<f8", 8}, {"<u4", 4}, {"<u8", 8}}};
+constexpr std::array<NumpyTypeTraits, 7> kNumpyTypes{
+    {{"<f4", 4}, {"<f8", 8}, {"<u4", 4}, {"<u8", 8}, {"<i4", 4}, {"<i8", 8}, {"|S3", 3}}};
 
 const NumpyTypeTraits& traits(NumpyType type) {
   return kNumpyTypes[static_cast<std::size_t>(type)];

@@ -13,7 +13,8 @@
 
 namespace rebounce {
 
-enum class NumpyType : std::uint8_t { kF4, kF8, kU4, kU8 };
+/// kS3 is text of three bytes.
+enum class NumpyType : std::uint8_t { kF4, kF8, kU4, kU8, kI4, kI8, kS3 };
 
 /// The NumPy type that stores a C++ type as it is.
 template <typename T>
@@ -24,6 +25,8 @@ constexpr NumpyType numpy_type() {
     return NumpyType::kF8;
   else if constexpr (std::same_as<T, std::uint32_t>)
     return NumpyType::kU4;
+  else if constexpr (std::same_as<T, std::int64_t>)
+    return NumpyType::kI8;
   else {
     static_assert(std::same_as<T, std::uint64_t>, "no NumPy type stores this C++ type");
     return NumpyType::kU8;

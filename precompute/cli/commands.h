@@ -14,6 +14,7 @@ void add_solve_command(CLI::App& app, const CommonOptions& options);
 void add_export_command(CLI::App& app, const CommonOptions& options);
 void add_render_command(CLI::App& app, const CommonOptions& options);
 void add_bake_command(CLI::App& app, const CommonOptions& options);
+void add_view_factors_command(CLI::App& app, const CommonOptions& options);
 // Only in builds with the viewer.
 void add_view_command(CLI::App& app, const CommonOptions& options);
 

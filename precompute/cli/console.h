@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <string>
 #include <string_view>
@@ -48,6 +49,9 @@ class ProgressBar {
   std::string phase_;
   Clock::time_point phase_begin_{}, last_shown_;
 };
+
+/// The most memory that the program has held so far.
+std::uint64_t peak_memory_bytes();
 
 /// Prints `line` on standard error unless `quiet`.
 void print_note(const CommonOptions& options, const std::string& line);

@@ -50,6 +50,7 @@ int run(int argc, char** argv) {
   rebounce::cli::add_export_command(app, options);
   rebounce::cli::add_render_command(app, options);
   rebounce::cli::add_bake_command(app, options);
+  rebounce::cli::add_view_factors_command(app, options);
 #ifdef REBOUNCE_WITH_VIEWER
   rebounce::cli::add_view_command(app, options);
 #endif

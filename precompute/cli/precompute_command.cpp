@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
@@ -27,12 +26,6 @@ struct PrecomputeOptions {
   double memory_limit_gib = 0;
   std::vector<float> probes;
 };
-
-std::uint64_t peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 std::string rough_time(double seconds) {
   if (seconds < 120) return fmt::format("{:.0f} s", std::max(seconds, 1.0));

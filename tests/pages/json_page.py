@@ -26,7 +26,24 @@ COMMANDS = {
     "bake": ["box", "-o", "box.glb", "--triangles", "100"],
     "view": ["box", "--screenshot", "view.png", "--size", "16x16"],
     "export": ["box", "--what", "patches", "-o", "patches.npz"],
+    "view-factors": ["box.stl", "-o", "factors.npz", "--quality", "low"],
 }
+
+
+# Two facets that face each other.
+FACETS = """solid two
+facet
+vertex 0 0 0
+vertex 1 0 0
+vertex 0 1 0
+endfacet
+facet
+vertex 0 0 1
+vertex 0 1 1
+vertex 1 0 1
+endfacet
+endsolid
+"""
 
 
 def fields_of_page():
@@ -41,6 +58,7 @@ def fields_of_page():
 
 
 def fields_of_program(program, folder):
+    (pathlib.Path(folder) / "box.stl").write_text(FACETS, encoding="utf-8")
     found = {}
     for command, words in COMMANDS.items():
         done = subprocess.run(

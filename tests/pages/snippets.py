@@ -35,6 +35,7 @@ GUIDE = (
     "viewer",
     "bake",
     "tuning",
+    "view_factors",
     "when_to_use_something_else",
 )
 PAGES = ("README.md", *(f"notes/guide/{name}.md" for name in GUIDE))

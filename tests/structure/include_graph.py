@@ -48,6 +48,7 @@ ROOMS = {
     "precompute/inverse": "Y from form factors: dense, or column by column.",
     "precompute/compression": "Y and form factors to a tolerance, as blocks of low rank.",
     "precompute/outputs": "Lightmap, probes, bent normals and weights of vertices.",
+    "precompute/facets": "View factors between given polygons, and their files.",
     "precompute/build": "The offline stage from end to end.",
     "precompute/cli": "The command line.",
     "tests/scenes": "Scenes that tests, benchmarks and pages share.",
