@@ -3,6 +3,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -24,6 +25,9 @@ constexpr std::size_t kCacheBytes = std::size_t{96} << 20;
 /// Samples of cases that take less are means over as many runs as take this long, seconds.
 constexpr double kSampleSeconds = 1e-3;
 
+/// Runs are timed after so many sweeps, and after others the line through these says.
+constexpr std::array kTimedSweeps = {1, 2, 6};
+
 /// Sweeps of one frame at most.
 constexpr int kMostFrameSweeps = 64;
 
@@ -31,6 +35,23 @@ double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
   return *middle;
+}
+
+/// The line through times by sweeps whose slope is the median of those of all pairs (P. K. Sen,
+/// "Estimates of the regression coefficient based on Kendall's tau", 1968): a time that was
+/// disturbed does not turn it.
+RunTime fit(const std::map<int, double>& time_by_sweeps) {
+  std::vector<double> slopes, starts;
+  for (auto a = time_by_sweeps.begin(); a != time_by_sweeps.end(); ++a) {
+    for (auto b = std::next(a); b != time_by_sweeps.end(); ++b) {
+      slopes.push_back((b->second - a->second) / (b->first - a->first));
+    }
+  }
+  const auto& [sweeps, time] = *time_by_sweeps.begin();
+  if (slopes.empty()) return {0, time / sweeps};
+  const double slope = std::max(0.0, median(slopes));
+  for (const auto& [k, t] : time_by_sweeps) starts.push_back(t - k * slope);
+  return {std::max(0.0, median(starts)), slope};
 }
 
 class AccuracyBench {
@@ -43,7 +64,7 @@ class AccuracyBench {
         progress_(progress),
         cases_(make_light_cases(contenders, settings, progress)) {
     for (const Form& form : contenders.forms) {
-      own_[form.name] = solve_on(*form.form_factors, contenders, cases_, progress);
+      own_[form.name] = solve_on(form, contenders, cases_, progress);
     }
   }
 
@@ -58,11 +79,14 @@ class AccuracyBench {
   }
 
  private:
-  /// A timed run: how it begins and how many sweeps it makes.
-  using TimeKey = std::tuple<std::size_t, bool, int>;  ///< contestant, cold start, sweeps
+  /// What is timed: a contestant, and whether it starts in the dark.
+  using Start = std::pair<std::size_t, bool>;
+  /// A timed run, and how many sweeps it makes.
+  using TimeKey = std::pair<Start, int>;
 
-  const std::vector<std::vector<Float3>>& own_after(const Contestant& contestant) const {
-    return own_.at(contestant.form).after;
+  /// A case's solution on the contestant's own form of F.
+  const std::vector<Float3>& own_solution(const Contestant& contestant, std::size_t k) const {
+    return own_.at(contestant.form)[k];
   }
 
   void begin(const Contestant& contestant, std::size_t k, Method& method) const {
@@ -70,7 +94,8 @@ class AccuracyBench {
     if (cases_[k].cold()) {
       method.reset();
     } else if (method.iterates()) {
-      method.start_from(own_.at(contestant.form).before[k]);
+      // Every change of a lamp begins where its first one, from zero, ends.
+      method.start_from(own_solution(contestant, k % settings_.lamp_count));
     }
   }
 
@@ -105,20 +130,26 @@ class AccuracyBench {
       result.error += against_reference / settings_.lamp_count;
       result.error_max = std::max(result.error_max, against_reference);
       result.iteration_error +=
-          (method.iterates() ? error(own_after(contestants_[contestant])[k]) : against_reference) /
+          (method.iterates() ? error(own_solution(contestants_[contestant], k))
+                             : against_reference) /
           settings_.lamp_count;
     }
     return result;
   }
 
-  static TimeKey key_of(const AccuracyRow& row) {
-    return {row.contestant, row.sweeps > 0 && row.change == "from zero", row.sweeps};
+  static Start start_of(const AccuracyRow& row) {
+    return {row.contestant, row.sweeps > 0 && row.change == "from zero"};
   }
 
   /// Adds the times, each found once for all rows that share it.
   void time(std::vector<AccuracyRow>& rows) const {
     std::map<TimeKey, Timing> warm, cold;
-    for (const AccuracyRow& r : rows) warm[key_of(r)] = {};
+    for (const AccuracyRow& r : rows) {
+      if (r.sweeps == 0) warm[{start_of(r), 0}] = {};
+      for (const int sweeps : kTimedSweeps) {
+        if (r.sweeps > 0) warm[{start_of(r), sweeps}] = {};
+      }
+    }
     cold = warm;
     const int threads = omp_get_max_threads();
     omp_set_num_threads(settings_.solve_threads);
@@ -126,9 +157,24 @@ class AccuracyBench {
     fill_in(cold, true);
     omp_set_num_threads(threads);
     for (AccuracyRow& r : rows) {
-      r.time = warm.at(key_of(r));
-      r.cold_time = cold.at(key_of(r));
+      r.time = time_of(r, warm);
+      r.cold_time = time_of(r, cold);
     }
+  }
+
+  /// Of a product as it was timed; of an iteration by the line through what was.
+  static Timing time_of(const AccuracyRow& row, const std::map<TimeKey, Timing>& times) {
+    if (row.sweeps == 0) return times.at({start_of(row), 0});
+    std::map<int, double> by_sweeps;
+    Timing result;
+    for (const int sweeps : kTimedSweeps) {
+      const Timing& timing = times.at({start_of(row), sweeps});
+      by_sweeps[sweeps] = timing.median;
+      result.spread = std::max(result.spread, timing.spread);
+    }
+    const RunTime line = fit(by_sweeps);
+    result.median = line.start + row.sweeps * line.sweep;
+    return result;
   }
 
   void fill_in(std::map<TimeKey, Timing>& times, bool cold_caches) const {
@@ -141,7 +187,8 @@ class AccuracyBench {
     std::vector<TimedCase> timed;
     std::size_t begun = 0;
     for (const auto& [key, unused] : times) {
-      const auto [contestant, cold, sweeps] = key;
+      const auto [start, sweeps] = key;
+      const auto [contestant, cold] = start;
       Method& method = *methods[contestant];
       const std::size_t k = cold ? 0 : static_cast<std::size_t>(settings_.lamp_count);
       timed.push_back(
@@ -169,7 +216,7 @@ class AccuracyBench {
   const ReportSettings& settings_;
   const ReportProgress& progress_;
   std::vector<LightCase> cases_;
-  std::map<std::string, OwnSolutions> own_;  ///< by form
+  std::map<std::string, std::vector<std::vector<Float3>>> own_;  ///< by form; solve_on
 };
 
 }  // namespace
@@ -186,27 +233,6 @@ std::vector<AccuracyRow> measure_accuracy(const Contenders& contenders,
                                           const ReportProgress& progress) {
   return AccuracyBench(contenders, contestants, settings, progress).measure();
 }
-
-namespace {
-
-/// The line through times by sweeps whose slope is the median of those of all pairs (P. K. Sen,
-/// "Estimates of the regression coefficient based on Kendall's tau", 1968): a time that was
-/// disturbed does not turn it.
-RunTime fit(const std::map<int, double>& time_by_sweeps) {
-  std::vector<double> slopes, starts;
-  for (auto a = time_by_sweeps.begin(); a != time_by_sweeps.end(); ++a) {
-    for (auto b = std::next(a); b != time_by_sweeps.end(); ++b) {
-      slopes.push_back((b->second - a->second) / (b->first - a->first));
-    }
-  }
-  const auto& [sweeps, time] = *time_by_sweeps.begin();
-  if (slopes.empty()) return {0, time / sweeps};
-  const double slope = std::max(0.0, median(slopes));
-  for (const auto& [k, t] : time_by_sweeps) starts.push_back(t - k * slope);
-  return {std::max(0.0, median(starts)), slope};
-}
-
-}  // namespace
 
 std::vector<RunTime> run_times(const std::vector<AccuracyRow>& rows, std::size_t contestant_count) {
   std::vector<RunTime> times(contestant_count);

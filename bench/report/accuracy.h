@@ -22,8 +22,8 @@ struct AccuracyRow {
 };
 
 /// Errors and times of every contestant after every change: for iterations after each of
-/// settings.sweeps until they have converged. All times are interleaved. Throws Cancelled if asked
-/// to stop.
+/// settings.sweeps until they have converged. All times are interleaved; those of iterations are of
+/// a line through the times of a few numbers of sweeps. Throws Cancelled if asked to stop.
 std::vector<AccuracyRow> measure_accuracy(const Contenders& contenders,
                                           const std::vector<Contestant>& contestants,
                                           const ReportSettings& settings,

@@ -47,7 +47,7 @@ nlohmann::ordered_json json_of(const ReportSettings& settings, bool quick) {
           {"frames", settings.frame_count},
           {"budgets_microseconds", settings.budgets},
           {"motions", settings.motions},
-          {"form_factor_tolerances", settings.form_factor_tolerances},
+          {"tolerances", settings.tolerances},
           {"ranks", settings.ranks}};
 }
 

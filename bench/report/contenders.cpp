@@ -11,6 +11,7 @@
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/compression/low_rank_transfer.h"
+#include "precompute/compression/tolerance_search.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/fitting_lights.h"
 #include "rebounce/error.h"
@@ -20,8 +21,8 @@
 namespace rebounce::bench {
 namespace {
 
-// As the inverse has it. Sweeps are faster than with halves, and light is rounded by 3e-5 only.
-constexpr Precision kFormFactorPrecision = Precision::kQ8;
+// Of both sides. Sweeps are faster than with halves, and light is rounded by 3e-5 only.
+constexpr Precision kPrecision = Precision::kQ8;
 
 /// Builds one thing after the other and notes what each costs.
 class ContenderBuilder {
@@ -32,12 +33,14 @@ class ContenderBuilder {
   Contenders build(const std::string& scene) {
     build_data(scene);
     lights_ = draw_fitting_lights(*result_.data, *result_.tracer, settings_.seed);
-    for (const OperatorChoice& choice : settings_.operators) add_hierarchical(choice);
+    for (const double tolerance : settings_.tolerances) add_hierarchical(tolerance);
     add_dense();
     result_.forms = exact_forms(*result_.data);
     const DrawnLights radiosities = radiosities_of(lights_, *result_.data);
-    for (const double tolerance : settings_.form_factor_tolerances) {
+    const FormFactorMatrix matrix(result_.data->exchange, result_.data->patches.area);
+    for (const double tolerance : settings_.tolerances) {
       add_compressed(tolerance, radiosities);
+      add_shared(matrix, tolerance, radiosities);
     }
     for (const std::size_t rank : settings_.ranks) add_low_rank(rank);
     if (settings_.links) result_.forms.push_back(links_form(*result_.data));
@@ -84,12 +87,11 @@ class ContenderBuilder {
 
   void add_dense() { result_.operators.push_back({"dense f32", result_.data->transfer}); }
 
-  void add_hierarchical(const OperatorChoice& choice) {
-    const std::string name = fmt::format("hierarchical {} {}", percent(choice.tolerance),
-                                         precision_name(choice.precision));
+  void add_hierarchical(double tolerance) {
+    const std::string name = hierarchical_name(tolerance);
     const auto work = [&](const Progress& progress) {
       return build_hierarchical_transfer(dense(), result_.data->patches, lights_.view(),
-                                         {choice.tolerance, choice.precision}, progress);
+                                         {tolerance, kPrecision}, progress);
     };
     result_.operators.push_back({name, timed(name, work, bytes_of_operator)});
   }
@@ -106,16 +108,27 @@ class ContenderBuilder {
     const std::string name = compressed_name(tolerance);
     const auto work = [&](const Progress& progress) {
       return compress_form_factors(result_.data->exchange, result_.data->patches,
-                                   radiosities.view(), {tolerance, kFormFactorPrecision}, progress);
+                                   radiosities.view(), {tolerance, kPrecision}, progress);
     };
     const auto compressed = timed("form factors " + name, work, bytes_of_operator);
-    if (!compressed_) compressed_ = compressed;
+    if (tolerance == kDefaultTolerance) compressed_ = compressed;
     result_.forms.push_back(compressed_form(name, compressed));
+  }
+
+  void add_shared(const FormFactorMatrix& matrix, double tolerance,
+                  const DrawnLights& radiosities) {
+    const std::string name = shared_name(tolerance);
+    const auto work = [&](const Progress& progress) {
+      return compress_to_tolerance(matrix, result_.data->patches, radiosities.view(),
+                                   {tolerance, kPrecision}, progress);
+    };
+    result_.forms.push_back(
+        shared_form(name, timed("form factors " + name, work, bytes_of_operator)));
   }
 
   void measure_file() {
     TransferData stored = *result_.data;
-    stored.transfer = result_.operators.front().transfer;
+    stored.transfer = result_.transfer(hierarchical_name(kDefaultTolerance));
     stored.compressed_form_factors = compressed_;
     stored.links = {};
     const auto path = std::filesystem::temp_directory_path() /
@@ -133,7 +146,7 @@ class ContenderBuilder {
   const ReportProgress& progress_;
   Contenders result_;
   DrawnLights lights_;
-  std::shared_ptr<const HierarchicalOperator> compressed_;  ///< the first
+  std::shared_ptr<const HierarchicalOperator> compressed_;  ///< at the default tolerance
 };
 
 }  // namespace
@@ -143,6 +156,17 @@ const std::shared_ptr<const FormFactorOperator>& Contenders::form(std::string_vi
   if (found == forms.end())
     throw Error("the report has no form factors named " + std::string(name));
   return found->form_factors;
+}
+
+const std::shared_ptr<const TransferOperator>& Contenders::transfer(std::string_view name) const {
+  const auto found = std::ranges::find(operators, name, &StoredOperator::name);
+  if (found == operators.end())
+    throw Error("the report has no operator named " + std::string(name));
+  return found->transfer;
+}
+
+std::string hierarchical_name(double tolerance) {
+  return "hierarchical " + percent(tolerance);
 }
 
 Contenders build_contenders(const std::string& scene, const ReportSettings& settings,

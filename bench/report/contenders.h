@@ -18,9 +18,12 @@ using ReportProgress = std::function<bool(std::string_view, double)>;
 
 /// Y in one form.
 struct StoredOperator {
-  std::string name;  ///< "dense f32", "hierarchical 0.5 % f16", "low rank 64", ...
+  std::string name;  ///< "dense f32", "hierarchical 0.5 %", "low rank 64", ...
   std::shared_ptr<const TransferOperator> transfer;
 };
+
+/// "hierarchical 0.5 %"
+std::string hierarchical_name(double tolerance);
 
 /// What one phase of the offline stage took.
 struct Cost {
@@ -34,15 +37,19 @@ struct Cost {
 struct Contenders {
   std::shared_ptr<const TransferData> data;
   std::unique_ptr<const RayTracer> tracer;
-  std::vector<StoredOperator> operators;  ///< hierarchical ones first, in the settings' order
-  std::vector<Form> forms;                ///< exact ones first
+  std::vector<StoredOperator> operators;
+  std::vector<Form> forms;  ///< exact ones first
   std::vector<Cost> costs;
   BuildReport report;
   std::size_t peak_memory_bytes = 0;  ///< of the process, when the dense operator was there
-  std::size_t file_bytes = 0;         ///< of a file with the first operator and first compressed F
+  std::size_t file_bytes =
+      0;  ///< of a file with operator and compressed F at the default tolerance
 
   /// Throws Error if there is no such form.
   const std::shared_ptr<const FormFactorOperator>& form(std::string_view name) const;
+
+  /// Throws Error if there is no such operator.
+  const std::shared_ptr<const TransferOperator>& transfer(std::string_view name) const;
 };
 
 /// Builds them. Throws Error if the scene cannot be used, Cancelled if asked to stop.

@@ -68,7 +68,8 @@ std::vector<LightCase> make_light_cases(const Contenders& contenders,
   const std::vector<bool> painted = repainted_patches(data);
   std::vector<LightCase> cases;
   for (int lamp = 0; lamp < settings.lamp_count; ++lamp) {
-    const auto changes = light_changes(data, settings.motions, settings.seed + lamp);
+    const auto changes = light_changes(data, settings.motions, settings.seed + lamp,
+                                       kLampTypes[lamp % kLampTypes.size()]);
     for (const LightChange& change : changes) {
       cases.push_back({change.name, change.before, change.after, data.patches.reflectance, {}});
     }
@@ -86,23 +87,19 @@ std::vector<LightCase> make_light_cases(const Contenders& contenders,
   return ordered;
 }
 
-OwnSolutions solve_on(const FormFactorOperator& form, const Contenders& contenders,
-                      const std::vector<LightCase>& cases, const ReportProgress& progress) {
+std::vector<std::vector<Float3>> solve_on(const Form& form, const Contenders& contenders,
+                                          const std::vector<LightCase>& cases,
+                                          const ReportProgress& progress) {
+  const bool exact = form.name == kExactRows || form.name == kExactHalf;
   const PatchTable& patches = contenders.data->patches;
-  const auto solve = [&](const std::vector<Float3>& light, const std::vector<Float3>& reflectance) {
-    std::vector<Float3> radiosity(light.size());
-    if (!light.empty()) {
-      solve_radiosity(SolveMethod::kConjugateGradient, form, {patches.area, reflectance}, light,
-                      {.max_sweeps = 1000, .residual = 1e-7}, radiosity);
-    }
-    return radiosity;
-  };
-  OwnSolutions own{std::vector<std::vector<Float3>>(cases.size()),
-                   std::vector<std::vector<Float3>>(cases.size())};
+  std::vector<std::vector<Float3>> own(cases.size());
   const Progress part = [&](double done) { return progress("own solutions", done); };
   in_parallel(cases.size(), part, [&](std::size_t k) {
-    own.before[k] = solve(cases[k].before, patches.reflectance);
-    own.after[k] = solve(cases[k].after, cases[k].reflectance);
+    own[k] = cases[k].truth;
+    if (exact) return;
+    solve_radiosity(SolveMethod::kConjugateGradient, *form.form_factors,
+                    {patches.area, cases[k].reflectance}, cases[k].after,
+                    {.max_sweeps = 1000, .residual = 1e-7}, own[k]);
   });
   return own;
 }

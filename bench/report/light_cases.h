@@ -23,19 +23,17 @@ struct LightCase {
 inline constexpr const char* kRepainted = "repainted";
 
 /// The changes of light_changes.h for each of settings.lamp_count lamps, and a repainted scene
-/// under each; all lamps of a change follow each other. Throws Error if the scene cannot be lit so,
-/// Cancelled if asked to stop.
+/// under each; all lamps of a change follow each other, and what a change begins with is what the
+/// first one, "from zero", ends with. Throws Error if the scene cannot be lit so, Cancelled if
+/// asked to stop.
 std::vector<LightCase> make_light_cases(const Contenders& contenders,
                                         const ReportSettings& settings,
                                         const ReportProgress& progress);
 
-/// What one form of F makes of the cases: its own solutions.
-struct OwnSolutions {
-  std::vector<std::vector<Float3>> before, after;  ///< B [n] in lx for each case
-};
-
-/// Finds them by conjugate gradients. Throws Cancelled if asked to stop.
-OwnSolutions solve_on(const FormFactorOperator& form, const Contenders& contenders,
-                      const std::vector<LightCase>& cases, const ReportProgress& progress);
+/// What one form of F makes of the cases: the solution B [n] in lx after each, by conjugate
+/// gradients. That of exact form factors is the truth. Throws Cancelled if asked to stop.
+std::vector<std::vector<Float3>> solve_on(const Form& form, const Contenders& contenders,
+                                          const std::vector<LightCase>& cases,
+                                          const ReportProgress& progress);
 
 }  // namespace rebounce::bench

@@ -120,7 +120,9 @@ LightPath sixteen(const Places& places, int frame_count) {
   std::vector<Light> lamps;
   std::vector<LightMotion> motions;
   for (std::size_t k = 0; k < kManyLamps; ++k) {
-    lamps.push_back(places.lamp(k));
+    const Light& target = places.lamp(places.next_from(k));
+    lamps.push_back(lamp_of_type(kLampTypes[k % kLampTypes.size()], places.lamp(k), target.position,
+                                 places.diagonal()));
     motions.push_back(swing(places, k, kSwingPeriod * (1 + 0.25F * static_cast<float>(k))));
   }
   return moving("sixteen lamps", lamps, motions, frame_count);

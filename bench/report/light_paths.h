@@ -18,8 +18,8 @@ struct LightPath {
 /// A slow and a fast walk (0.1 and 1 % of the scene's diagonal a frame) from place to place in free
 /// space, a swinging lamp (two seconds there and back), a lamp switched every half second beside
 /// one of a twentieth that stays, a lamp whose colour goes round in five seconds beside a white
-/// one, and sixteen lamps that swing at paces of their own. The same `seed`, the same paths. Throws
-/// Error if no lamp lights much of the scene.
+/// one, and sixteen lamps of all types of kLampTypes that swing at paces of their own. The same
+/// `seed`, the same paths. Throws Error if no lamp lights much of the scene.
 std::vector<LightPath> make_light_paths(const TransferData& data, const RayTracer& tracer,
                                         int frame_count, std::uint64_t seed);
 

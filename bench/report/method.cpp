@@ -5,6 +5,7 @@
 
 #include "rebounce/error.h"
 #include "transfer/base/reflection.h"
+#include "transfer/exchange/relaxation.h"
 
 namespace rebounce::bench {
 namespace {
@@ -66,12 +67,6 @@ std::string name_of(SolveMethod method) {
   return std::string(std::ranges::find(kSolveMethods, method, &NamedSolveMethod::method)->name);
 }
 
-const StoredOperator& find_operator(const Contenders& contenders, const std::string& name) {
-  const auto found = std::ranges::find(contenders.operators, name, &StoredOperator::name);
-  if (found == contenders.operators.end()) throw Error("the report has no operator named " + name);
-  return *found;
-}
-
 /// What the products are called, by their kind.
 std::string product_name(const TransferOperator& transfer) {
   if (transfer.kind() == OperatorKind::kDense) return kDenseInverse;
@@ -84,23 +79,41 @@ void add_products(const Contenders& contenders, std::vector<Contestant>& list) {
     list.push_back({.name = product_name(*stored.transfer),
                     .transfer = stored.name,
                     .bytes = stored.transfer->bytes(),
+                    .bytes_read = stored.transfer->bytes_per_apply(),
                     .product = true});
   }
+}
+
+/// What one sweep of a method reads of F, bytes; what it reads twice counts twice.
+std::size_t bytes_per_sweep(SolveMethod method, const Form& form) {
+  const FormFactorOperator& form_factors = *form.form_factors;
+  const bool symmetric = method == SolveMethod::kSymmetricGaussSeidel;
+  if (method != SolveMethod::kGaussSeidel && !symmetric) return form_factors.bytes_per_gather();
+  const auto relaxation = dynamic_cast<const SweepableFormFactors&>(form_factors).make_relaxation();
+  return form_factors.bytes() *
+         relaxation->reads_per_sweep(symmetric ? SweepOrder::kSymmetric : SweepOrder::kForward);
 }
 
 Contestant iteration(SolveMethod method, const Form& form) {
   const std::string name = form.name == kLinks && method == SolveMethod::kGathering
                                ? "hierarchical radiosity"
                                : name_of(method);
-  return {.name = name, .form = form.name, .bytes = form.form_factors->bytes(), .method = method};
+  return {.name = name,
+          .form = form.name,
+          .bytes = form.form_factors->bytes(),
+          .bytes_read = bytes_per_sweep(method, form),
+          .method = method};
 }
 
-/// Whether `form` is one that `method` may be fastest on.
+/// Whether `form` is one that `method` may be fastest on. What only gathers has the smaller form of
+/// each compressed F, whose bases are shared; what sweeps cannot use it.
 bool suits(SolveMethod method, const Form& form) {
   if (form.name == kLinks) return method == SolveMethod::kGathering;
   if (form.name == kExactRows) return method == SolveMethod::kGaussSeidel;
   if (form.name == kExactHalf) return method != SolveMethod::kGaussSeidel;
-  return true;
+  const bool sweeps =
+      method == SolveMethod::kGaussSeidel || method == SolveMethod::kSymmetricGaussSeidel;
+  return sweeps == can_sweep(form);
 }
 
 void add_iterations(const Contenders& contenders, std::vector<Contestant>& list) {
@@ -111,17 +124,25 @@ void add_iterations(const Contenders& contenders, std::vector<Contestant>& list)
   }
 }
 
-/// What needs both: on exact form factors and on the most exact compressed ones.
+/// What needs both: coarse operators, on exact form factors and on all finer compressed ones.
 void add_refinements(const Contenders& contenders, const ReportSettings& settings,
                      std::vector<Contestant>& list) {
-  const StoredOperator& stored = contenders.operators.front();
-  for (const std::string& form :
-       {std::string(kExactHalf), compressed_name(settings.form_factor_tolerances.front())}) {
-    list.push_back({.name = name_of(SolveMethod::kRefine),
-                    .transfer = stored.name,
-                    .form = form,
-                    .bytes = stored.transfer->bytes() + contenders.form(form)->bytes(),
-                    .method = SolveMethod::kRefine});
+  for (const double refined : settings.refined_tolerances) {
+    const std::string name = hierarchical_name(refined);
+    std::vector<std::string> forms = {kExactHalf};
+    for (const double tolerance : settings.tolerances) {
+      if (tolerance < refined) forms.push_back(shared_name(tolerance));
+    }
+    const TransferOperator& transfer = *contenders.transfer(name);
+    for (const std::string& form : forms) {
+      const FormFactorOperator& form_factors = *contenders.form(form);
+      list.push_back({.name = name_of(SolveMethod::kRefine),
+                      .transfer = name,
+                      .form = form,
+                      .bytes = transfer.bytes() + form_factors.bytes(),
+                      .bytes_read = transfer.bytes_per_apply() + form_factors.bytes_per_gather(),
+                      .method = SolveMethod::kRefine});
+    }
   }
 }
 
@@ -130,10 +151,9 @@ void add_refinements(const Contenders& contenders, const ReportSettings& setting
 std::unique_ptr<Method> Contestant::make(const Contenders& contenders) const {
   const PatchTable& patches = contenders.data->patches;
   if (product) {
-    return std::make_unique<ProductMethod>(*find_operator(contenders, transfer).transfer,
-                                           patches.reflectance);
+    return std::make_unique<ProductMethod>(*contenders.transfer(transfer), patches.reflectance);
   }
-  const auto stored = transfer.empty() ? nullptr : find_operator(contenders, transfer).transfer;
+  const auto stored = transfer.empty() ? nullptr : contenders.transfer(transfer);
   return std::make_unique<IterativeMethod>(
       make_solver(method, *contenders.form(form), {patches.area, patches.reflectance}, stored));
 }

@@ -38,7 +38,9 @@ struct Contestant {
   std::string name;        ///< "inverse", "low rank", "refine", "gauss-seidel"...
   std::string transfer{};  ///< which operator it has; empty: none
   std::string form{};      ///< which form of F it has; empty: none
-  std::size_t bytes = 0;   ///< that a run or a sweep reads of them
+  std::size_t bytes = 0;   ///< of them
+  std::size_t bytes_read =
+      0;  ///< that a product or a sweep reads of them, what is read twice twice
 
   /// Of the named method; `product`: one product with the operator instead.
   SolveMethod method = SolveMethod::kGathering;

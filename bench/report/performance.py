@@ -31,8 +31,8 @@ CONDITIONS = """Errors are of the light that patches reflect after it came from 
 area-weighted L2 over three channels, against conjugate gradients in double precision on the exact form factors. Each
 side has its best form. The inverse: hierarchical at several tolerances, dense, or refined. Gauss-Seidel: forward or
 symmetric, on exact form factors or on compressed ones at several tolerances, whichever is fastest to the error. Warm
-starts begin at the solution of the frame before. Times are of the light of the patches alone: direct light and outputs
-come on top, for both sides. Relighting runs on one thread."""
+starts begin at the solution of the frame before. Times are of the light of the patches alone, but for a whole frame.
+Relighting runs on one thread."""
 
 
 @dataclasses.dataclass
@@ -65,10 +65,12 @@ class Report:
 
 
 def claim_of(row):
-    values = {field.name: row[field.name] for field in dataclasses.fields(claims_module.Claim)}
+    values = {field.name: row.get(field.name) for field in dataclasses.fields(claims_module.Claim)}
     values["patches"] = int(values["patches"])
     for name in ("inverse_value", "rival_value"):
         values[name] = float(values[name])
+    for name in ("inverse_bytes", "rival_bytes"):
+        values[name] = int(values[name]) if values[name] else None
     return claims_module.Claim(**values)
 
 

@@ -76,7 +76,8 @@ TruthResult measure_truth(const std::string& scene, const Contenders& contenders
   Engine engine(contenders.data);
   engine.relight(truth.lights(), {});
   const auto exitance = engine.initial_exitance();
-  const auto compressed = product(*contenders.operators.front().transfer, exitance);
+  const auto compressed =
+      product(*contenders.transfer(hierarchical_name(kDefaultTolerance)), exitance);
   const auto dense = product(*data.transfer, exitance);
   const auto better = better_solution(scene, settings, exitance, progress);
 

@@ -13,7 +13,8 @@ struct TruthResult {
   reference::RelativeError discretisation;
   reference::RelativeError reconstruction;  ///< everything, interpolated over the mesh, at points
   double form_factors = 0;  ///< H with the form factors against H with far more rays
-  double compression = 0;   ///< H by the first hierarchical operator against H by the dense one
+  double compression =
+      0;  ///< H by the operator of the default tolerance against H by the dense one
 };
 
 /// Measures them on `scene`, from which `contenders` were built. Throws Cancelled if asked to stop.

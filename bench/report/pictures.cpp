@@ -136,10 +136,10 @@ Pictures draw_pictures(const Contenders& contenders, const std::vector<Contestan
   pictures.reference = painter.save_reference();
 
   const auto inverse =
-      std::ranges::find(contestants, contenders.operators.front().name, &Contestant::transfer);
+      std::ranges::find(contestants, hierarchical_name(kDefaultTolerance), &Contestant::transfer);
   pictures.time = times[inverse - contestants.begin()].start;
   const std::vector<Float3> indirect =
-      product(*contenders.operators.front().transfer, painter.initial_exitance());
+      product(*contenders.transfer(inverse->transfer), painter.initial_exitance());
   DrawnMethod by_inverse{.name = inverse->name + ", " + inverse->transfer};
   painter.save_method(indirect, "inverse", by_inverse);
   pictures.methods.push_back(by_inverse);

@@ -8,6 +8,8 @@
 #include "bench/report/method.h"
 #include "bench/report/physical_errors.h"
 #include "bench/report/pictures.h"
+#include "bench/report/rest_of_frame.h"
+#include "bench/support/read_buffer.h"
 
 namespace rebounce::bench {
 namespace {
@@ -37,6 +39,7 @@ ordered_json json_of(const AccuracyRow& row, const Contestant& contestant) {
                {"error", row.error},
                {"error_max", row.error_max},
                {"iteration_error", row.iteration_error},
+               {"bytes_read", static_cast<double>(contestant.bytes_read) * std::max(1, row.sweeps)},
                {"microseconds", row.time.median * kMicro},
                {"spread", row.time.spread},
                {"microseconds_cold_cache", row.cold_time.median * kMicro},
@@ -130,6 +133,7 @@ ordered_json describe(const Contenders& contenders) {
           {"links", contenders.report.link_count},
           {"rays", contenders.report.ray_count},
           {"file_bytes", contenders.file_bytes},
+          {"memory_bandwidth", measure_memory_bandwidth()},
           {"exchange_bytes", 8 * data.exchange.column.size()},
           {"peak_memory_bytes", contenders.peak_memory_bytes},
           {"costs", json_of(contenders.costs)}};
@@ -156,6 +160,11 @@ ordered_json measure_scene(const std::string& scene, const ReportSettings& setti
        measure_frames(contenders, contestants, times, truth_error, settings, progress)) {
     json["frames"].push_back(json_of(row, contestants[row.contestant]));
   }
+  const RestOfFrame rest = measure_rest_of_frame(contenders, settings, progress);
+  json["rest_of_frame"] = {{"direct_microseconds", rest.direct.median * kMicro},
+                           {"direct_spread", rest.direct.spread},
+                           {"outputs_microseconds", rest.outputs.median * kMicro},
+                           {"outputs_spread", rest.outputs.spread}};
   const FurnaceResult furnace = measure_furnace(*contenders.data);
   json["furnace"] = {{"error_mean", furnace.error_mean}, {"error_max", furnace.error_max}};
   if (settings.truth) json["truth"] = json_of(measure_truth(scene, contenders, settings, progress));

@@ -3,10 +3,10 @@
 namespace rebounce::bench {
 
 void ReportSettings::make_quick() {
-  operators = {{0.005, Precision::kQ8}, {0.001, Precision::kQ8}};
-  form_factor_tolerances = {0.0003, 0.001};
+  tolerances = {0.001, kDefaultTolerance};
+  refined_tolerances = {kDefaultTolerance};
   ranks = {64};
-  lamp_count = 2;
+  lamp_count = 5;
   motions = {0.001, 0.01, 0.05};
   sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 24, 48};
   repeats = 3;
@@ -19,25 +19,19 @@ void ReportSettings::make_quick() {
 }
 
 void ReportSettings::make_large() {
-  operators = {{0.005, Precision::kQ8},
-               {0.02, Precision::kQ8},
-               {0.002, Precision::kQ8},
-               {0.001, Precision::kQ8},
-               {0.0003, Precision::kQ8}};
-  form_factor_tolerances = {0.0003, 0.001, 0.003};
   ranks = {256};
-  lamp_count = 2;
   motions = {0.001, 0.01, 0.05};
   sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 24};
   repeats = 5;
 }
 
 void ReportSettings::make_huge() {
-  operators = {{0.005, Precision::kQ8}, {0.002, Precision::kQ8}, {0.001, Precision::kQ8}};
-  form_factor_tolerances = {0.0003, 0.0005, 0.001};
-  motions = {0.001, 0.01};
-  sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16};
+  tolerances = {0.0003, 0.001, 0.002, kDefaultTolerance, 0.02};
+  lamp_count = 16;
+  motions = {0.01};
+  sweeps = {1, 2, 3, 4, 6, 8, 10, 12, 16};
   repeats = 3;
+  frame_count = 90;
   truth_probe_rays = 16;
 }
 

@@ -5,38 +5,28 @@
 #include <vector>
 
 #include "bench/reference/compare.h"
-#include "precompute/compression/hierarchical_settings.h"
-#include "transfer/base/precision.h"
+#include "rebounce/build_settings.h"
 
 namespace rebounce::bench {
-
-/// A hierarchical operator that takes part.
-struct OperatorChoice {
-  double tolerance = kDefaultTolerance;
-  Precision precision = Precision::kQ8;
-};
 
 /// What is measured on one scene with one number of patches. More of anything takes longer.
 struct ReportSettings {
   std::size_t patch_count = 1000;
   std::uint64_t seed = 1;
 
-  /// Hierarchical operators; the first is the one that pictures, truth and refinement use.
-  std::vector<OperatorChoice> operators = {
-      {0.005, Precision::kQ8}, {0.02, Precision::kQ8},   {0.002, Precision::kQ8},
-      {0.001, Precision::kQ8}, {0.0003, Precision::kQ8}, {0.005, Precision::kF16},
-  };
-  /// At which form factors are compressed; the first is what refinement has beside exact ones.
-  std::vector<double> form_factor_tolerances = {0.0003, 0.001, 0.003, 0.01};
+  /// At which both sides compress their matrix: the hierarchical operators and the form factors
+  /// have the same menu, ascending. kDefaultTolerance, which pictures and truth use, is one of it.
+  std::vector<double> tolerances = {0.0003, 0.0005, 0.001, 0.002, kDefaultTolerance, 0.01, 0.02};
+  /// Of the operators that refinement begins from; each with every form of F that is finer.
+  std::vector<double> refined_tolerances = {kDefaultTolerance, 0.02};
   std::vector<std::size_t> ranks = {64, 256, 512};  ///< of low-rank operators
   bool links = true;                                ///< hierarchical radiosity takes part
 
-  int lamp_count = 4;  ///< lamps over which errors are averaged
+  int lamp_count = 20;  ///< over which errors are averaged; of all kinds of kLampTypes in turns
   /// Parts of the scene's diagonal by which a lamp is moved, each in (0, 0.2].
   std::vector<double> motions = {0.0003, 0.001, 0.003, 0.01, 0.05, 0.2};
   /// Sweeps after which an iteration is looked at, ascending.
-  std::vector<int> sweeps = {1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11,
-                             12, 13, 14, 15, 16, 18, 20, 24, 32, 48, 64};
+  std::vector<int> sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 24, 32, 48};
   int repeats = 7;        ///< timings of each thing
   int solve_threads = 1;  ///< OpenMP threads while relighting is timed; building has all
 

@@ -10,7 +10,7 @@ INVERSES = ("inverse", "dense inverse", "refine")
 PRODUCTS = ("inverse", "dense inverse", "low rank")
 
 FROM_ZERO, SWITCHED, REPAINTED = "from zero", "switched", "repainted"
-TARGETS = (0.01, 0.003, 0.001, 0.0001)
+TARGETS = (0.01, 0.005, 0.003, 0.001, 0.0001)
 
 
 def percent(part):

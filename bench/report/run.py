@@ -170,7 +170,10 @@ def write_page(headlines, missing, date, pictures, folder):
     all_results = [h.result for h in headlines]
     page.paragraph(summary.provenance(all_results, date))
     page.paragraph(summary.missing_line(missing).replace("*", ""))
-    page.table(aims.HEADLINE_NAMES, [h.row() for h in headlines], "Summary")
+    for error in aims.HEADLINE_ERRORS:
+        shown = [h.row(error) for h in headlines if h.equal_error(error)]
+        page.table(aims.HEADLINE_NAMES, shown, f"To an error of {results_module.percent(error)}")
+    page.table(aims.LAG_NAMES, [h.lag_row() for h in headlines], "Equally compressed, and lag")
     for line in aims.aims(headlines).splitlines():
         page.paragraph(line)
     page.heading("Accuracy and time")

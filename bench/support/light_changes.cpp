@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/glm.hpp>
+#include <numbers>
 
 #include "precompute/lights/random_lights.h"
 #include "rebounce/error.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/reflection.h"
 
@@ -83,19 +86,42 @@ bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to) {
   return !is_occluded(ray[0]);
 }
 
+Light lamp_of_type(LightType type, const Light& place, const Float3& target, double diagonal) {
+  constexpr double kRadius = 0.005, kLength = 0.02, kWidth = 0.01;  // of the diagonal
+  constexpr float kInnerCone = 0.35F, kOuterCone = 0.7F;            // radians
+  Light lamp = place;
+  lamp.type = type;
+  const glm::dvec3 way = to_dvec3(target) - to_dvec3(place.position);
+  if (glm::length(way) > 0) lamp.direction = to_float3(glm::normalize(way));
+  lamp.tangent = std::abs(lamp.direction[0]) < 0.8F ? Float3{1, 0, 0} : Float3{0, 1, 0};
+  lamp.inner_cone_angle = kInnerCone;
+  lamp.outer_cone_angle = kOuterCone;
+  lamp.radius = static_cast<float>(kRadius * diagonal);
+  lamp.size = {static_cast<float>(kLength * diagonal), static_cast<float>(kWidth * diagonal)};
+  if (type == LightType::kRectangle) lamp.intensity /= lamp.size[0] * lamp.size[1];
+  if (type == LightType::kSphere || type == LightType::kDisc) {
+    lamp.intensity /= std::numbers::pi_v<float> * lamp.radius * lamp.radius;
+  }
+  return lamp;
+}
+
 std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
-                                       std::uint64_t seed) {
+                                       std::uint64_t seed, LightType type) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
   DirectLighting direct(data, tracer);
   const double size = box_around(data.mesh.position).diagonal();
-  const auto [lamp, other] = find_places(data, tracer, 0.2 * size, seed);
-  const std::vector<Float3> before = light_of(lamp, data, direct);
+  const auto [place, other] = find_places(data, tracer, 0.2 * size, seed);
+  const Float3& target = data.patches.centroid[mix_bits(seed) % data.patches.size()];
+  const auto light_at = [&](const Light& there) {
+    return light_of(lamp_of_type(type, there, target, size), data, direct);
+  };
+  const std::vector<Float3> before = light_at(place);
   std::vector<LightChange> changes = {{"from zero", {}, before}};
   for (const double part : motions) {
     changes.push_back({fmt::format("moved {:g} %", 100 * part), before,
-                       light_of(moved(lamp, other, part * size), data, direct)});
+                       light_at(moved(place, other, part * size))});
   }
-  changes.push_back({"switched", before, light_of(other, data, direct)});
+  changes.push_back({"switched", before, light_at(other)});
   return changes;
 }
 

@@ -22,12 +22,24 @@ struct LightChange {
 /// Parts of the scene's diagonal by which a lamp is moved, unless others are wanted.
 inline constexpr std::array kMotions = {0.01, 0.05, 0.2};
 
+/// The types of lamp that have a place.
+inline constexpr std::array kLampTypes = {LightType::kPoint, LightType::kSpot, LightType::kSphere,
+                                          LightType::kRectangle, LightType::kDisc};
+
+/// A lamp of `type` where the lamp `place` is, in a scene with that diagonal (metres), as bright
+/// along its axis. Spheres and discs have 0.5 % of the diagonal as radius, rectangles 2 by 1 %. A
+/// spot has a cone of 40 degrees from axis to edge, half of it full. Spots, rectangles and discs
+/// shine towards `target`.
+Light lamp_of_type(LightType type, const Light& place, const Float3& target, double diagonal);
+
 /// One lamp in the free space of the scene, of those that `seed` draws: switched on in the dark,
 /// moved by these parts of the scene's diagonal ("moved 1 %"; each in (0, 0.2]), and replaced by
-/// another one elsewhere ("switched"), towards which it moved. Throws Error if it lights nothing.
+/// another one elsewhere ("switched"), towards which it moved. It is of `type`, and what shines one
+/// way only shines towards a patch that `seed` draws, wherever the lamp is. Throws Error if it
+/// lights nothing.
 std::vector<LightChange> light_changes(const TransferData& data,
                                        std::span<const double> motions = kMotions,
-                                       std::uint64_t seed = 1);
+                                       std::uint64_t seed = 1, LightType type = LightType::kPoint);
 
 /// What the patches give off first, M0 [n] in lx, under one lamp. Throws Error if that is nothing.
 std::vector<Float3> light_of(const Light& lamp, const TransferData& data, DirectLighting& direct);

@@ -8,7 +8,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "bench/report/frames.h"
 #include "bench/report/light_paths.h"
@@ -111,7 +113,8 @@ class QuickReport : public testing::Test {
     const ReportSettings settings = quick_settings();
     double mean = 0;
     for (int lamp = 0; lamp < settings.lamp_count; ++lamp) {
-      const LightChange change = light_changes(*data_, settings.motions, 1 + lamp)[k];
+      const LightType type = kLampTypes[lamp % kLampTypes.size()];
+      const LightChange change = light_changes(*data_, settings.motions, 1 + lamp, type)[k];
       mean += error(solve(change), truth(change.after), change.after) / settings.lamp_count;
     }
     return mean;
@@ -135,7 +138,7 @@ TEST_F(QuickReport, ErrorsOfTheInverseAreThoseOfTheProduct) {
   const auto transfer = compressed_operator(0.005);
   const auto& reported =
       row("accuracy",
-          {{"transfer", "hierarchical 0.5 % q8"}, {"method", "inverse"}, {"change", "switched"}});
+          {{"transfer", "hierarchical 0.5 %"}, {"method", "inverse"}, {"change", "switched"}});
   EXPECT_EQ(reported.at("bytes"), transfer->bytes());
   const std::size_t switched = quick_settings().motions.size() + 1;
   const double direct = mean_error(
@@ -162,6 +165,56 @@ TEST_F(QuickReport, ErrorsOfGaussSeidelAreThoseOfTheSolver) {
     EXPECT_NEAR(reported.at("error"), mean_error(0, solve), 1e-6);
     EXPECT_GT(reported.at("microseconds"), 0);
   }
+}
+
+TEST_F(QuickReport, BothSidesHaveTheSameTolerances) {
+  std::set<std::string> operators, swept, gathered;
+  for (const nlohmann::json& row : report_->at("accuracy")) {
+    const std::string form = row.at("form"), transfer = row.at("transfer");
+    if (row.at("method") == "inverse") operators.insert(transfer);
+    if (row.at("method") == "gauss-seidel" && form.starts_with("compressed")) swept.insert(form);
+    if (row.at("method") == "conjugate-gradient" && form.starts_with("shared")) {
+      gathered.insert(form);
+    }
+  }
+  EXPECT_EQ(operators.size(), quick_settings().tolerances.size());
+  EXPECT_EQ(swept.size(), operators.size());
+  EXPECT_EQ(gathered.size(), operators.size());
+}
+
+TEST_F(QuickReport, TimesOfIterationsLieOnALine) {
+  std::map<int, double> times;
+  for (const nlohmann::json& row : report_->at("accuracy")) {
+    if (row.at("method") == "gauss-seidel" && row.at("form") == "exact rows" &&
+        row.at("change") == "switched") {
+      times[row.at("sweeps")] = row.at("microseconds");
+    }
+  }
+  ASSERT_GE(times.size(), 8U);
+  const double slope = (times.at(8) - times.at(1)) / 7;
+  EXPECT_GE(slope, 0);
+  for (const auto& [sweeps, time] : times) {
+    EXPECT_NEAR(time, times.at(1) + (sweeps - 1) * slope, 1e-6 * time) << sweeps << " sweeps";
+  }
+}
+
+TEST_F(QuickReport, AFrameCostsMoreThanTheLightOfThePatches) {
+  const nlohmann::json& rest = report_->at("rest_of_frame");
+  EXPECT_GT(rest.at("direct_microseconds"), 0);
+  EXPECT_GT(rest.at("outputs_microseconds"), 0);
+}
+
+TEST(LampOfType, ShinesTowardsItsTargetWithOneCandela) {
+  Light place;
+  place.position = {1, 2, 3};
+  const Light disc = lamp_of_type(LightType::kDisc, place, {1, 0, 3}, 10);
+  EXPECT_EQ(disc.direction, (Float3{0, -1, 0}));
+  EXPECT_NEAR(disc.intensity * 3.14159265F * disc.radius * disc.radius, 1, 1e-5);
+  const Light rectangle = lamp_of_type(LightType::kRectangle, place, {5, 2, 3}, 10);
+  EXPECT_EQ(rectangle.direction, (Float3{1, 0, 0}));
+  EXPECT_NEAR(rectangle.intensity * rectangle.size[0] * rectangle.size[1], 1, 1e-5);
+  const Light spot = lamp_of_type(LightType::kSpot, place, place.position, 10);
+  EXPECT_EQ(spot.direction, place.direction) << "a target at its place has no direction";
 }
 
 TEST_F(QuickReport, MoreSweepsErrLessUntilTheyHaveConverged) {
