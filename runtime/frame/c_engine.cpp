@@ -26,11 +26,10 @@ constexpr const char* kLightInit = "rebounce_light_init";
 void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   rebounce_light defaults;
   rebounce_light_init(&defaults);
-  check_struct_size(lights->struct_size, kLightSize1, kLightInit);
-  const auto* const bytes = reinterpret_cast<const char*>(lights);
-  const auto* const entry =
-      reinterpret_cast<const rebounce_light*>(bytes + k * lights->struct_size);
-  if (entry->struct_size != lights->struct_size) {
+  const std::uint32_t size = stated_size(lights);
+  check_struct_size(size, kLightSize1, kLightInit);
+  const char* const entry = reinterpret_cast<const char*>(lights) + k * size;
+  if (stated_size(entry) != size) {
     throw Error("light " + std::to_string(k) +
                 " has another struct_size than the first; fill it with " + kLightInit);
   }

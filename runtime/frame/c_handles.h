@@ -82,18 +82,28 @@ inline Float3 triple(const float* values) {
 /// bytes, which the function `init` fills in.
 void check_struct_size(std::uint32_t size, std::size_t least_size, const char* init);
 
+/// What a caller states as its size in the first member of a structure. An older version, with
+/// fewer members, may be aligned to less than today's.
+inline std::uint32_t stated_size(const void* given) {
+  std::uint32_t size;
+  std::memcpy(&size, given, sizeof(size));
+  return size;
+}
+
 /// Copies the members that the caller's version of the structure has; the others keep `defaults`.
 template <typename Struct>
-Struct take(const Struct* given, Struct defaults, std::size_t least_size, const char* init) {
-  check_struct_size(given->struct_size, least_size, init);
-  std::memcpy(&defaults, given, std::min<std::size_t>(given->struct_size, sizeof(Struct)));
+Struct take(const void* given, Struct defaults, std::size_t least_size, const char* init) {
+  static_assert(offsetof(Struct, struct_size) == 0);
+  const std::uint32_t size = stated_size(given);
+  check_struct_size(size, least_size, init);
+  std::memcpy(&defaults, given, std::min<std::size_t>(size, sizeof(Struct)));
   return defaults;
 }
 
 /// Copies to the caller's structure the members that its version has.
 template <typename Struct>
-void give(const Struct& filled, Struct* given) {
-  std::memcpy(given, &filled, std::min<std::size_t>(given->struct_size, sizeof(Struct)));
+void give(const Struct& filled, void* given) {
+  std::memcpy(given, &filled, std::min<std::size_t>(stated_size(given), sizeof(Struct)));
 }
 
 }  // namespace rebounce::c

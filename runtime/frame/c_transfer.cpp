@@ -72,7 +72,7 @@ rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
                                            rebounce_transfer_info* info) {
   if (transfer == nullptr || info == nullptr) return missing("rebounce_transfer_get_info");
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    rebounce_transfer_info filled = take(info, *info, kInfoSize1, "rebounce_transfer_info_init");
+    auto filled = take(info, rebounce_transfer_info{}, kInfoSize1, "rebounce_transfer_info_init");
     const TransferData& data = *transfer->data;
     filled.patch_count = static_cast<std::uint32_t>(data.patches.size());
     filled.vertex_count = static_cast<std::uint32_t>(data.mesh.position.size());
@@ -177,7 +177,7 @@ rebounce_status rebounce_transfer_get_camera(const rebounce_transfer* transfer, 
                                              rebounce_camera* camera) {
   if (transfer == nullptr || camera == nullptr) return missing("rebounce_transfer_get_camera");
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    rebounce_camera filled = take(camera, *camera, kCameraSize1, "rebounce_camera_init");
+    auto filled = take(camera, rebounce_camera{}, kCameraSize1, "rebounce_camera_init");
     const Camera* const found = entry(transfer, &SceneData::cameras, index);
     if (found == nullptr) {
       throw Error("there is no camera " + std::to_string(index) + "; the scene has " +

@@ -306,6 +306,13 @@ TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {
   ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
   EXPECT_GT(info.patch_count, 0U);
   EXPECT_EQ(info.lightmap_width, 77U);
+
+  // The address sanitizer sees where this memory ends.
+  std::vector<std::uint32_t> known(info.struct_size / sizeof(std::uint32_t));
+  known[0] = info.struct_size;
+  auto* const as_given = reinterpret_cast<rebounce_transfer_info*>(known.data());
+  ASSERT_EQ(rebounce_transfer_get_info(transfer_, as_given), REBOUNCE_OK);
+  EXPECT_EQ(known[1], info.patch_count);
 }
 
 /// The structures as they were in version 1 of the interface.
