@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include "runtime/rays/float3_glm.h"
 
@@ -17,7 +18,9 @@ extern const LampKind kPointLamp, kSpotLamp, kDirectionalLamp, kSphereLamp, kRec
 
 namespace {
 
-constexpr const LampKind* find(LightType type) {
+/// Nothing beyond the last of LightType. Not null: whether an address is null is no constant
+/// expression to a compiler that checks for undefined behaviour.
+constexpr std::optional<const LampKind*> find(LightType type) {
   switch (type) {
     case LightType::kPoint:
       return &kPointLamp;
@@ -32,18 +35,18 @@ constexpr const LampKind* find(LightType type) {
     case LightType::kDisc:
       return &kDiscLamp;
   }
-  return nullptr;
+  return std::nullopt;
 }
 
 constexpr std::size_t count_kinds() {
   std::size_t count = 0;
-  while (find(static_cast<LightType>(count)) != nullptr) ++count;
+  while (find(static_cast<LightType>(count))) ++count;
   return count;
 }
 
 constexpr auto kKinds = [] {
   std::array<const LampKind*, count_kinds()> kinds{};
-  for (std::size_t k = 0; k < kinds.size(); ++k) kinds[k] = find(static_cast<LightType>(k));
+  for (std::size_t k = 0; k < kinds.size(); ++k) kinds[k] = *find(static_cast<LightType>(k));
   return kinds;
 }();
 
