@@ -5,6 +5,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "precompute/build/build_advice.h"
 #include "precompute/build/transfer_build.h"
 #include "precompute/cli/commands.h"
 #include "precompute/cli/info_json.h"
@@ -119,6 +120,7 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   std::string times;
   for (const auto& [phase, s] : report.seconds) times += fmt::format("{} {:.1f} s, ", phase, s);
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
+  for (const std::string& line : build_advice(data, report)) fmt::print("advice: {}\n", line);
 }
 
 /// The file is written even if a tolerance is not reached; it holds the measured errors.

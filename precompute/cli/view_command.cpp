@@ -162,7 +162,8 @@ void add_picture_options(CLI::App& command, ViewOptions& chosen) {
   });
   command.add_option(
       "--path", chosen.path,
-      "How lamps and spheres move: a .json file (notes/reference/light_path_file.md)");
+      "How lamps and spheres move, in the window or in the pictures of --out: a .json file "
+      "(notes/reference/light_path_file.md)");
   CLI::Option* out = command.add_option(
       "--out", chosen.out, "Write pictures frame_00000.png ... into this folder, without a window");
   out->excludes(screenshot);

@@ -111,6 +111,18 @@ TEST_F(PrecomputeCommand, CompressesToATolerance) {
   EXPECT_EQ(test::npz_values<float>(arrays, "transfer", "<f4").size(), 3 * n * n);
 }
 
+TEST_F(PrecomputeCommand, AdvisesWhereAPatchTakesManyBytes) {
+  const auto said = [&](const Words& options) {
+    Words words = {"precompute", kScene, "--patches", "300", "-o", path("box.safetensors")};
+    words.insert(words.end(), options.begin(), options.end());
+    return run(words).out;
+  };
+  EXPECT_EQ(said({}).find("advice: "), std::string::npos);
+  const std::string many = said({"--precision", "f32", "--tolerance", "0.0005"});
+  EXPECT_NE(many.find("bytes per patch are many"), std::string::npos) << many;
+  EXPECT_NE(many.find("--tolerance, --precision q8"), std::string::npos) << many;
+}
+
 TEST_F(PrecomputeCommand, AMissedToleranceFails) {
   // Half precision cannot be this exact.
   expect_failure({"precompute", kScene, "--patches", "300", "--operator", "hierarchical",

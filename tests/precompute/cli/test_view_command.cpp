@@ -163,6 +163,23 @@ TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {
   EXPECT_LT(difference(screenshot(light), drawn).mean, 2.0);
 }
 
+TEST_F(ViewCommand, NoSunShinesThroughTheSeamsOfAClosedRoom) {
+  const std::string room = path("room.safetensors");
+  ASSERT_EQ(run({"precompute", kScenes + "furnished_room.gltf", "--patches", "300", "--quality",
+                 "low", "--tolerance", "0.05", "--quiet", "-o", room})
+                .exit_code,
+            kDone);
+  const std::string sun = write("sun.lights.json", R"({"lights": [
+      {"type": "directional", "direction": [-0.6, -0.6, -0.9], "intensity": 20000}]})");
+  const Outcome outcome = run({"view", room, "--lights", sun, "--exposure", "-9", "--quiet",
+                               "--screenshot", path("dark.png")});
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image dark = read_image(path("dark.png"));
+  ASSERT_EQ(dark.width, 1280);
+  // A thousand of its pixels are on seams; at a low angle single ones are still found lit.
+  EXPECT_LE(std::ranges::count_if(dark.rgb, [](int value) { return value > 40; }), 3 * 40);
+}
+
 TEST_F(ViewCommand, WhatIsMaskedAwayIsNotDrawn) {
   std::ifstream scene(kScene);
   json document = json::parse(scene);
@@ -357,6 +374,8 @@ TEST_F(ViewCommand, SaysInOneLineThatThereIsNoDisplay) {
   EXPECT_EQ(outcome.exit_code, kBadInput);
   EXPECT_TRUE(test::is_one_line(outcome.err)) << outcome.err;
   EXPECT_NE(outcome.err.find("cannot open a window"), std::string::npos) << outcome.err;
+  // A path moves lamps in the window too; it is --out that does without one.
+  EXPECT_NE(outcome.err.find("--out FOLDER"), std::string::npos) << outcome.err;
   EXPECT_EQ(run({"view", file_, "--frames", "3"}).exit_code, kUsage);
 }
 

@@ -128,12 +128,15 @@ void GpuScene::sort_triangles() {
   attach_table(triangle_patch_texture_, GL_R32UI, triangle_patches_);
 }
 
-/// Opaque surface comes first, as one range.
+/// Opaque surface comes first: what is one-sided as one range, then the rest.
 void GpuScene::sort_surface() {
   const DisplayMesh& mesh = data_.mesh;
+  const auto is_two_sided = [&](std::uint32_t t) { return mesh.back_triangle[t] != kNone; };
   const auto group = [&](std::uint32_t t) {
     const std::uint32_t material = mesh.triangle_material[t];
-    return alpha_test(data_.materials[material]) == kAllThere ? 0 : material + 1;
+    const std::uint32_t kind =
+        alpha_test(data_.materials[material]) == kAllThere ? 0 : material + 1;
+    return 2 * kind + static_cast<std::uint32_t>(is_two_sided(t));
   };
   std::vector<std::uint32_t> order(mesh.surface_count());
   std::iota(order.begin(), order.end(), 0U);
@@ -141,7 +144,7 @@ void GpuScene::sort_surface() {
   std::vector<Uint3> triangles;
   for (std::uint32_t k = 0; k < order.size(); ++k) {
     if (k == 0 || group(order[k]) != group(order[k - 1])) {
-      surface_ranges_.push_back({mesh.triangle_material[order[k]], k, k});
+      surface_ranges_.push_back({mesh.triangle_material[order[k]], k, k, is_two_sided(order[k])});
     }
     surface_ranges_.back().end = k + 1;
     triangles.push_back(mesh.triangle[order[k]]);
@@ -168,6 +171,7 @@ void GpuScene::make_vertex_arrays() {
   glBindVertexArray(surface_array_.name());
   glBindBuffer(GL_ARRAY_BUFFER, static_vertices_.name());
   point_to(kPositionAttribute, 3, sizeof(StaticVertex), offsetof(StaticVertex, position));
+  point_to(kNormalAttribute, 3, sizeof(StaticVertex), offsetof(StaticVertex, normal));
   point_to(kBaseColorTexcoordAttribute, 2, sizeof(StaticVertex),
            offsetof(StaticVertex, base_color_texcoord));
   glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, surface_indices_.name());
@@ -249,12 +253,25 @@ void GpuScene::draw_patches(const GlProgram& program, Side side) const {
 
 void GpuScene::draw_surface(const GlProgram& program) const {
   glBindVertexArray(surface_array_.name());
+  for (const Range& range : surface_ranges_) draw_caster(program, range);
+}
+
+void GpuScene::draw_backs(const GlProgram& program) const {
+  glBindVertexArray(surface_array_.name());
+  glEnable(GL_CULL_FACE);
+  glCullFace(GL_FRONT);
   for (const Range& range : surface_ranges_) {
-    const Material& material = data_.materials[range.material];
-    bind(0, GL_TEXTURE_2D, texture_name(material.base_color_texture));
-    alpha_test(material).set(program);
-    draw_range(range);
+    if (!range.two_sided) draw_caster(program, range);
   }
+  glCullFace(GL_BACK);
+  glDisable(GL_CULL_FACE);
+}
+
+void GpuScene::draw_caster(const GlProgram& program, const Range& range) const {
+  const Material& material = data_.materials[range.material];
+  bind(0, GL_TEXTURE_2D, texture_name(material.base_color_texture));
+  alpha_test(material).set(program);
+  draw_range(range);
 }
 
 }  // namespace rebounce

@@ -40,12 +40,15 @@ class GpuScene {
   /// Draws the surface once, for shadows; binds base colours to unit 0 and sets base_alpha and
   /// alpha_cutoff.
   void draw_surface(const GlProgram& program) const;
+  /// The same, of what is one-sided and seen from its back.
+  void draw_backs(const GlProgram& program) const;
 
  private:
   // Triangles of one material.
   struct Range {
     std::uint32_t material = 0;
     std::uint32_t begin = 0, end = 0;
+    bool two_sided = false;  // of the surface
   };
 
   void sort_triangles();
@@ -54,6 +57,7 @@ class GpuScene {
   void load_textures();
   GLuint texture_name(std::uint32_t texture) const;
   void draw_range(const Range& range) const;
+  void draw_caster(const GlProgram& program, const Range& range) const;
 
   const TransferData& data_;
   std::vector<Range> ranges_, surface_ranges_;

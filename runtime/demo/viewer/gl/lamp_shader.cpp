@@ -15,6 +15,8 @@ namespace {
 /// as in R. Fernando, "Percentage-closer soft shadows", SIGGRAPH 2005.
 constexpr const char* kBegin = R"(#version 330 core
 in vec3 world_position, shading_normal, color;
+// On the triangle also where it covers a pixel in part, and not past the seam of two walls.
+centroid in vec3 covered_position;
 in vec2 base_uv;
 uniform sampler2D base_color_texture;
 uniform vec3 base_color, eye;
@@ -41,7 +43,7 @@ out vec4 result;
 
 const float kPi = 3.14159265;
 const int kTaps = 16;
-const float kRadius = 1.5;  // texels
+const float kRadius = 1.0;  // texels
 const int kPlaceTaps = 8;
 const float kWidest = 2.0;  // half shadow of a place, in what it stands for
 
@@ -71,7 +73,7 @@ mat2x3 across(vec3 way) {
 // From where a shadow map is to the receiver, off its surface by what a slanted texel and the taps
 // around it reach.
 vec3 lifted_way(vec3 way, vec3 geometric_normal) {
-  return way + geometric_normal * (smallest_offset + (kRadius + 1) * texel * largest(way));
+  return way + geometric_normal * (smallest_offset + (kRadius + 2) * texel * largest(way));
 }
 
 float cube_visibility(vec3 way) {
@@ -86,7 +88,7 @@ float cube_visibility(vec3 way) {
 }
 
 float plane_visibility(vec3 point, vec3 geometric_normal) {
-  vec3 off = point + geometric_normal * (smallest_offset + (kRadius + 1) * texel);
+  vec3 off = point + geometric_normal * (smallest_offset + (kRadius + 2) * texel);
   vec3 at = (plane_from_world * vec4(off, 1)).xyz * 0.5 + 0.5;
   vec2 spread = kRadius / vec2(textureSize(plane_shadow, 0));
   float sum = 0;
@@ -178,7 +180,7 @@ float range_window(float distance_squared) {
 
 void main() {
   vec4 base = texture(base_color_texture, base_uv);
-  vec3 to_lamp = shadow_map == 1 ? -lamp_direction : lamp_position - world_position;
+  vec3 to_lamp = shadow_map == 1 ? -lamp_direction : lamp_position - covered_position;
   vec3 direction = to_lamp * inversesqrt(max(dot(to_lamp, to_lamp), 1e-12));
   vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
   if (dot(geometric_normal, eye - world_position) < 0) geometric_normal = -geometric_normal;
@@ -188,9 +190,9 @@ void main() {
   strength *= range_window(dot(to_lamp, to_lamp));
   if (strength <= 0 || base_alpha * base.a < alpha_cutoff) discard;
   if (shadow_map == 1) {
-    strength *= plane_visibility(world_position, geometric_normal);
+    strength *= plane_visibility(covered_position, geometric_normal);
   } else if (shadow_map == 2) {
-    strength *= surface_visibility(world_position, normal, geometric_normal);
+    strength *= surface_visibility(covered_position, normal, geometric_normal);
   } else {
     strength *= cube_visibility(lifted_way(-to_lamp, geometric_normal));
   }

@@ -16,10 +16,11 @@ layout(location = 5) in vec3 first_flight;  // sky and emitters, lx
 layout(location = 6) in vec3 bounced;       // lx
 uniform mat4 clip_from_world;
 out vec3 world_position, shading_normal, color, first_light, bounced_light;
+centroid out vec3 covered_position;
 out vec2 base_uv, emissive_uv;
 invariant gl_Position;
 void main() {
-  world_position = position;
+  world_position = covered_position = position;
   shading_normal = normal;
   color = vertex_color;
   base_uv = base_color_texcoord;
@@ -73,14 +74,22 @@ void main() {
 }
 )";
 
+/// Draws a surface, or another `behind_texels` behind it.
 inline constexpr const char* kShadowVertex = R"(#version 330 core
 layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
 layout(location = 3) in vec2 base_color_texcoord;
 uniform mat4 clip_from_world;
+uniform float behind_texels;
+uniform float texel;   // metres; of a cube at unit distance
+uniform int from_eye;  // a cube's map, and not a plane's
+uniform vec3 eye;
 out vec2 base_uv;
 void main() {
   base_uv = base_color_texcoord;
-  gl_Position = clip_from_world * vec4(position, 1);
+  vec3 way = abs(position - eye);
+  float size = texel * (from_eye == 1 ? max(max(way.x, way.y), way.z) : 1.0);
+  gl_Position = clip_from_world * vec4(position - behind_texels * size * normal, 1);
 }
 )";
 

@@ -136,6 +136,9 @@ void ShadowMap::draw_faces(const glm::vec3& eye, int side, const ShadowCasters& 
   const glm::mat4 projection =
       glm::perspective(glm::radians(90.0F), 1.0F, near_far_.x, near_far_.y);
   glViewport(0, 0, side, side);
+  program.set("texel", texel_);
+  program.set("from_eye", 1);
+  program.set("eye", eye);
   for (const CubeFace& face : kFaces) {
     attach(face);
     glClear(GL_DEPTH_BUFFER_BIT);
@@ -200,6 +203,8 @@ void ShadowMap::draw_plane(const Light& light, const ShadowCasters& casters,
   glViewport(0, 0, kPlaneSide, kPlaneSide);
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, plane_.name(), 0);
   glClear(GL_DEPTH_BUFFER_BIT);
+  program.set("texel", texel_);
+  program.set("from_eye", 0);
   program.set("clip_from_world", plane_from_world_);
   casters.draw(program);
 }

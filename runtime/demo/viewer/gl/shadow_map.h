@@ -24,6 +24,12 @@ struct ShadowCasters {
   int version = 0;  ///< changes with the bodies or their positions
 
   void draw(const GlProgram& program) const {
+    // A wall without thickness holds off a lamp at its back from the seams with other walls too:
+    // like a wall that is as thick as its shadow map is coarse.
+    constexpr float kThickness = 3;  // texels
+    program.set("behind_texels", kThickness);
+    scene.draw_backs(program);
+    program.set("behind_texels", 0.0F);
     scene.draw_surface(program);
     bodies.draw_surface(program);
   }

@@ -21,10 +21,18 @@ constexpr float kHandleRadius = 9;  // pixels
 constexpr float kTurnPerPixel = 0.004F;
 constexpr float kCrossingSeconds = 6;  // to fly along the scene's diagonal
 constexpr float kHurry = 4;            // speed factor with Shift
+constexpr float kLampWay = 0.85F;      // of the way to the surface, for a lamp that is added there
+constexpr const char* kMenu = "menu of a place";
 
 glm::vec2 screen_size() {
   const ImVec2 size = ImGui::GetIO().DisplaySize;
   return {size.x, size.y};
+}
+
+// Whether the right button has left the place that it was pressed at.
+bool was_dragged() {
+  const ImVec2 way = ImGui::GetMouseDragDelta(ImGuiMouseButton_Right);
+  return way.x != 0 || way.y != 0;
 }
 
 bool has_place(const Light& light) {
@@ -72,6 +80,15 @@ void shift_all(Float3& position, LightMotion& motion, const glm::vec3& shift) {
   move(motion.from);
   move(motion.to);
   for (LightMotion::Key& key : motion.keys) move(key.position);
+}
+
+// The unit direction from the eye through the mouse.
+glm::vec3 way_to_mouse(const Camera& camera) {
+  const ImVec2 mouse = ImGui::GetIO().MousePos;
+  const glm::vec2 off =
+      (glm::vec2(mouse.x, mouse.y) - 0.5F * screen_size()) * metres_per_pixel(camera, 1);
+  return glm::normalize(off.x * to_glm(camera.right) - off.y * to_glm(camera.up) -
+                        to_glm(camera.backward));
 }
 
 // The mouse's movement of an object at `place`, metres: in the plane of the view, or with Shift
@@ -164,12 +181,7 @@ float Controls::distance_along(const glm::vec3& origin, const glm::vec3& directi
 
 std::optional<std::size_t> Controls::sphere_under_mouse(const ViewerState& state) const {
   const Camera camera = state.camera.camera();
-  const ImVec2 mouse = ImGui::GetIO().MousePos;
-  const glm::vec2 off =
-      (glm::vec2(mouse.x, mouse.y) - 0.5F * screen_size()) * metres_per_pixel(camera, 1);
-  const glm::vec3 eye = to_glm(camera.position);
-  const glm::vec3 direction = glm::normalize(off.x * to_glm(camera.right) -
-                                             off.y * to_glm(camera.up) - to_glm(camera.backward));
+  const glm::vec3 eye = to_glm(camera.position), direction = way_to_mouse(camera);
   std::optional<std::size_t> nearest;
   float least = distance_along(eye, direction);
   for (std::size_t k = 0; k < state.spheres.size(); ++k) {
@@ -205,9 +217,48 @@ void Controls::take_hold(ViewerState& state) {
   if (sphere) state.selected_sphere = *sphere;
 }
 
+void Controls::open_menu(const ViewerState& state) {
+  const Camera camera = state.camera.camera();
+  clicked_ = {.lamp = lamp_under_mouse(state),
+              .eye = to_glm(camera.position),
+              .direction = way_to_mouse(camera)};
+  if (!clicked_.lamp) clicked_.sphere = sphere_under_mouse(state);
+  clicked_.distance = distance_along(clicked_.eye, clicked_.direction);
+  ImGui::OpenPopup(kMenu);
+}
+
+void Controls::draw_menu(ViewerState& state) const {
+  if (!ImGui::BeginPopup(kMenu)) return;
+  const auto& [lamp, sphere, eye, direction, distance] = clicked_;
+  const float size = bounds_.diagonal();
+  if (lamp && *lamp < state.lights.size()) {
+    ViewerLight& chosen = state.lights[*lamp];
+    if (ImGui::MenuItem("Remove this lamp")) {
+      state.remove_lamp(*lamp);
+    } else if (ImGui::MenuItem(chosen.on ? "Switch it off" : "Switch it on")) {
+      chosen.on = !chosen.on;
+    }
+  } else if (sphere && *sphere < state.spheres.size()) {
+    if (ImGui::MenuItem("Remove this sphere")) state.remove_sphere(*sphere);
+  } else {
+    // In front of the surface, so that it lights it.
+    if (ImGui::MenuItem("Add a lamp here")) {
+      state.add_lamp(eye + kLampWay * distance * direction, direction, size);
+    }
+    if (ImGui::MenuItem("Add a sphere here")) {
+      const float gap = 2 * ViewerState::kSpherePart * size;
+      state.add_sphere(eye + std::max(distance - gap, 0.5F * distance) * direction, size);
+    }
+  }
+  ImGui::EndPopup();
+}
+
 void Controls::steer(ViewerState& state) {
   const ImGuiIO& io = ImGui::GetIO();
   if (!io.WantCaptureMouse) {
+    if (ImGui::IsMouseReleased(ImGuiMouseButton_Right) && orbiting_ && !was_dragged()) {
+      open_menu(state);
+    }
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Left)) take_hold(state);
     if (ImGui::IsMouseClicked(ImGuiMouseButton_Right)) {
       orbiting_ = true;

@@ -231,14 +231,6 @@ void list_line(std::size_t k, const std::string& name, std::size_t& selected) {
   ImGui::PopID();
 }
 
-ViewerLight lamp_ahead(const FlyCamera& camera, float size) {
-  ViewerLight lamp;
-  lamp.light.position = to_float3(camera.position() + 0.3F * size * camera.forward());
-  lamp.light.intensity = 4 * size * size;  // some lux at the other end of the scene
-  lamp.light.direction = to_float3(camera.forward());
-  return lamp;
-}
-
 }  // namespace
 
 void Panels::smooth(const StageTimes& times) {
@@ -327,17 +319,15 @@ void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
     list_line(k, state.lights[k].light.name, state.selected);
   }
   if (ImGui::Button("Add")) {
-    state.lights.push_back(lamp_ahead(state.camera, size));
-    state.selected = state.lights.size() - 1;
+    const glm::vec3 ahead = state.camera.forward();
+    state.add_lamp(state.camera.position() + 0.3F * size * ahead, ahead, size);
   }
   if (state.selected < state.lights.size()) {
     ImGui::SameLine();
     const bool remove = ImGui::Button("Remove");
     ImGui::Separator();
     edit_lamp(state.lights[state.selected], state.camera, size);
-    if (remove) {
-      state.lights.erase(state.lights.begin() + static_cast<std::ptrdiff_t>(state.selected));
-    }
+    if (remove) state.remove_lamp(state.selected);
   }
   ImGui::Separator();
   ImGui::ColorEdit3("sky", state.sky.color.data(), ImGuiColorEditFlags_Float);
@@ -352,20 +342,14 @@ void Panels::draw_spheres(ViewerState& state, const FrameDrawer& frame) const {
   ImGui::Checkbox("show spheres", &state.shows_spheres);
   for (std::size_t k = 0; k < state.spheres.size(); ++k) list_line(k, "", state.selected_sphere);
   if (ImGui::Button("Add")) {
-    ViewerSphere sphere{.radius = 0.03F * size};
-    sphere.position = to_float3(state.camera.position() + 0.25F * size * state.camera.forward());
-    state.spheres.push_back(sphere);
-    state.selected_sphere = state.spheres.size() - 1;
+    state.add_sphere(state.camera.position() + 0.25F * size * state.camera.forward(), size);
   }
   if (state.selected_sphere < state.spheres.size()) {
     ImGui::SameLine();
     const bool remove = ImGui::Button("Remove");
     ImGui::Separator();
     edit_sphere(state.spheres[state.selected_sphere], size);
-    if (remove) {
-      state.spheres.erase(state.spheres.begin() +
-                          static_cast<std::ptrdiff_t>(state.selected_sphere));
-    }
+    if (remove) state.remove_sphere(state.selected_sphere);
   }
   ImGui::PopID();
 }

@@ -91,6 +91,7 @@ void run_viewer(const std::shared_ptr<const TransferData>& data, const ViewerSet
     if (window.width() > 0 && window.height() > 0) {
       drawer.draw(state, window.width(), window.height(), 0);
     }
+    controls.draw_menu(state);
     if (state.shows_panels) {
       controls.draw_handles(state);
       panels.draw(state, drawer);

@@ -3,6 +3,7 @@
 #include "rebounce/sky.h"
 #include "runtime/demo/motion/fly_camera.h"
 #include "runtime/demo/viewer/window/viewer_setup.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 
@@ -37,6 +38,31 @@ struct ViewerState {
     }
     return now;
   }
+
+  /// Adds a point lamp that suits a scene of `size` metres, aimed along `direction`, and selects
+  /// it.
+  void add_lamp(const glm::vec3& position, const glm::vec3& direction, float size) {
+    ViewerLight lamp;
+    lamp.light.position = to_float3(position);
+    lamp.light.direction = to_float3(direction);
+    lamp.light.intensity = 4 * size * size;  // some lux at the other end of the scene
+    lights.push_back(lamp);
+    selected = lights.size() - 1;
+  }
+
+  /// Adds a sphere that suits a scene of `size` metres, and selects it.
+  void add_sphere(const glm::vec3& position, float size) {
+    spheres.push_back({.position = to_float3(position), .radius = kSpherePart * size});
+    selected_sphere = spheres.size() - 1;
+    shows_spheres = true;
+  }
+
+  void remove_lamp(std::size_t k) { lights.erase(lights.begin() + static_cast<std::ptrdiff_t>(k)); }
+  void remove_sphere(std::size_t k) {
+    spheres.erase(spheres.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+
+  static constexpr float kSpherePart = 0.03F;  ///< radius of an added sphere, part of the size
 
   std::vector<ViewerLight> lights;
   std::vector<ViewerSphere> spheres;

@@ -16,8 +16,10 @@ namespace {
   glfwGetError(&reason);
   const std::string why = reason != nullptr ? reason : "no OpenGL 3.3";
   glfwTerminate();
-  throw Error("cannot open a window (" + why +
-              "); run it where there is a display, or use --screenshot or --path");
+  throw Error(
+      "cannot open a window (" + why +
+      "); run it where there is a display, or write pictures with --screenshot FILE or --out "
+      "FOLDER");
 }
 
 }  // namespace
