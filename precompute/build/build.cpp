@@ -59,6 +59,11 @@ class TransferBuild {
   Scene import_scene(const std::filesystem::path& path) {
     Scene scene =
         clock_.run("import", [&](const Progress&) { return import_usable(path, settings_.scale); });
+    describe_scene(scene);
+    return scene;
+  }
+
+  void describe_scene(const Scene& scene) {
     report_.triangle_count = scene.triangle.size();
     report_.degenerate_triangle_count = scene.degenerate_triangle_count;
     report_.mesh_names = mesh_names(scene);
@@ -72,7 +77,6 @@ class TransferBuild {
     data_.record.generator = std::string("rebounce ") + version();
     data_.record.scene_name = scene.name;
     data_.record.scene_hash = scene.hash;
-    return scene;
   }
 
   /// Makes the patches. Throws Error if the rest needs more memory than allowed, or cannot be made
@@ -122,6 +126,15 @@ class TransferBuild {
     data_.emitted_irradiance = irradiance_from_emitters(data_);
   }
 
+  /// All that follows on the scene.
+  TransferData run(Scene scene) {
+    make_patches(std::move(scene));
+    find_exchange();
+    make_operator();
+    return take();
+  }
+
+ private:
   /// The data, with those form factors alone that are to be kept.
   TransferData take() {
     if (!settings_.store_form_factors) data_.exchange = {};
@@ -129,7 +142,6 @@ class TransferBuild {
     return std::move(data_);
   }
 
- private:
   /// Forecasts the time of a build from pairs, from short samples.
   void forecast_pairs() {
     tracer_.emplace(make_surface_tracer(model_.mesh));
@@ -164,10 +176,15 @@ TransferData build_transfer_data(const std::filesystem::path& scene_path,
                                  const BuildProgress& progress,
                                  const EstimateListener& on_estimate) {
   TransferBuild build(settings, report, progress, on_estimate);
-  build.make_patches(build.import_scene(scene_path));
-  build.find_exchange();
-  build.make_operator();
-  return build.take();
+  return build.run(build.import_scene(scene_path));
+}
+
+TransferData build_transfer_data(Scene scene, const BuildSettings& settings, BuildReport& report,
+                                 const BuildProgress& progress,
+                                 const EstimateListener& on_estimate) {
+  TransferBuild build(settings, report, progress, on_estimate);
+  build.describe_scene(scene);
+  return build.run(std::move(scene));
 }
 
 std::shared_ptr<const TransferData> build_transfer(const std::filesystem::path& scene_path,

@@ -6,6 +6,7 @@ A fenced block of a page is
   X title="NAME"    written to NAME in that folder
   cpp, c            without a title: all of a page are one program, which is compiled against the
                     installed package and run; statements go into main, in order
+  python            all of a page are one program, which is run with the package that is built
   json              read as JSON
   cmake, text       not run: they are part of what a title or a command beside them runs
 
@@ -35,12 +36,14 @@ GUIDE = (
     "viewer",
     "bake",
     "tuning",
+    "python",
     "view_factors",
+    "light_in_buildings",
     "when_to_use_something_else",
 )
 PAGES = ("README.md", *(f"notes/guide/{name}.md" for name in GUIDE))
 IN_CHECKOUT = ("README.md", "notes/guide/install.md")
-LANGUAGES = ("sh", "cpp", "c", "json", "cmake", "text")
+LANGUAGES = ("sh", "cpp", "c", "python", "json", "cmake", "text")
 
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
@@ -172,6 +175,17 @@ def compile_and_run(sandbox, page, language, blocks):
     sandbox.run([program], sandbox.folder_of(page), f"{page}: the program of its {language} snippets")
 
 
+def run_python(sandbox, page, blocks):
+    if not blocks or not (sandbox.checkout / "build/release/python").exists():
+        return
+    folder = sandbox.folder_of(page)
+    shutil.copy(ROOT / "tests/scenes/cornell_box.gltf", folder)
+    program = sandbox.work / (page.replace("/", "_") + ".py")
+    program.write_text("\n".join(blocks), encoding="utf-8")
+    package = f"PYTHONPATH={sandbox.checkout / 'build/release/python'}"
+    sandbox.run(["env", package, "/usr/bin/python3", program], folder, f"{page}: its python snippets")
+
+
 def run_page(sandbox, page):
     snippets, count = {}, 0
     for language, title, code, line in blocks_of(page):
@@ -185,8 +199,9 @@ def run_page(sandbox, page):
             script = sandbox.work / "block.sh"
             script.write_text(code, encoding="utf-8")
             sandbox.run(["bash", "-euo", "pipefail", script], folder, where)
-        elif language in ("cpp", "c"):
+        elif language in ("cpp", "c", "python"):
             snippets.setdefault(language, []).append(code)
+    run_python(sandbox, page, snippets.pop("python", []))
     for language, blocks in snippets.items():
         compile_and_run(sandbox, page, language, blocks)
     print(f"{page}: {count} blocks", flush=True)

@@ -174,6 +174,7 @@ class RawExchangeBuilder {
                    std::vector<ExchangeEntry>& row) {
     append_fine(i, settings_.probe_rays, wanted, scratch, row);
     append_coarse(i, row);
+    row.shrink_to_fit();  // all rows together are the largest thing there is
     std::ranges::sort(row, {}, &ExchangeEntry::column);
   }
 

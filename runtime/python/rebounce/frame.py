@@ -1,0 +1,183 @@
+"""Light: lamps, skies, frames and solutions by iteration."""
+
+import dataclasses
+import json
+import math
+import os
+from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+
+if TYPE_CHECKING:
+    from .transfer import TransferData
+
+Floats = npt.NDArray[np.float32]
+Triple = Union[Tuple[float, float, float], Sequence[float], npt.NDArray[Any]]
+
+
+@dataclasses.dataclass
+class Light:
+    """A lamp, with the fields and units of KHR_lights_punctual and of light files.
+
+    type: "point", "spot", "directional", "sphere", "rectangle" or "disc".
+    position: metres. direction: the way the light travels, of unit length.
+    color: linear Rec.709. intensity: candela (point, spot), lux (directional), cd/m² (surfaces).
+    range: metres, 0 for none. Cone angles in radians. radius, size: metres, of surfaces.
+    """
+
+    type: str = "point"
+    name: str = ""
+    position: Triple = (0.0, 0.0, 0.0)
+    direction: Triple = (0.0, -1.0, 0.0)
+    color: Triple = (1.0, 1.0, 1.0)
+    intensity: float = 1.0
+    range: float = 0.0
+    inner_cone_angle: float = 0.0
+    outer_cone_angle: float = math.pi / 4
+    radius: float = 0.0
+    size: Sequence[float] = (0.0, 0.0)
+    tangent: Triple = (1.0, 0.0, 0.0)
+
+
+@dataclasses.dataclass
+class Sky:
+    """What is seen where nothing is hit.
+
+    luminance: cd/m². color: linear Rec.709.
+    distribution: [146] the luminance of each cell in parts of `luminance`, or None for the same in
+    all directions. Cell 0 is all that is below the horizon, 1 to 145 are Tregenza's.
+    """
+
+    luminance: float = 0.0
+    color: Triple = (1.0, 1.0, 1.0)
+    distribution: Optional[npt.ArrayLike] = None
+
+
+def cie_sky(kind: int, sun_direction: Triple, ground_reflectance: float = 0.2) -> Floats:
+    """[146] the CIE standard general sky number `kind`, 1 to 15, in parts of the zenith's luminance.
+
+    sun_direction: the way that sunlight travels. Raises Error if an argument is out of range.
+    """
+    return _core.cie_sky(kind, [float(x) for x in sun_direction], ground_reflectance)
+
+
+def sky_cell_directions(per_side: int = 4) -> Tuple[Floats, npt.NDArray[np.uint32]]:
+    """Unit directions spread evenly over the 145 cells above the horizon: [145 k², 3] and their cells."""
+    places = [(a + 0.5) / per_side for a in range(per_side)]
+    points = [
+        _core.point_of_sky_cell(cell, (a, b)) for cell in range(1, 146) for a in places for b in places
+    ]
+    cells = np.repeat(np.arange(1, 146, dtype=np.uint32), per_side * per_side)
+    return np.array(points, np.float32), cells
+
+
+def load_lights(path: Union[str, "os.PathLike[str]"]) -> Tuple[List[Light], Sky]:
+    """The lamps and the sky of a light file (.json), as `rebounce solve --lights` takes it.
+
+    Lamps of IES profiles and skies of the CIE are left to the command line: raises ValueError.
+    """
+    with open(path, encoding="utf-8") as file:
+        document = json.load(file)
+    names = {field.name for field in dataclasses.fields(Light)}
+    lights = []
+    for number, fields in enumerate(document.get("lights", [])):
+        fields = dict(fields)
+        spot = fields.pop("spot", {})
+        for theirs, ours in (("innerConeAngle", "inner_cone_angle"), ("outerConeAngle", "outer_cone_angle")):
+            if theirs in spot:
+                fields[ours] = spot[theirs]
+        unknown = fields.keys() - names
+        if unknown:
+            raise ValueError(f"{os.fspath(path)}: light {number} has the field {sorted(unknown)[0]!r}")
+        lights.append(Light(**fields))
+    sky = document.get("sky", {})
+    unknown = sky.keys() - {"color", "luminance"}
+    if unknown:
+        raise ValueError(f"{os.fspath(path)}: the sky has the field {sorted(unknown)[0]!r}")
+    return lights, Sky(sky.get("luminance", 0.0), sky.get("color", (1.0, 1.0, 1.0)))
+
+
+class Engine:
+    """Relights one scene: direct light, then one product with the operator.
+
+    One light state, for one thread at a time. Results are views of the last frame, [n, 3] in lx:
+    copy what is to outlive the next one.
+    """
+
+    def __init__(
+        self, data: "TransferData", points_per_patch: int = 8, area_light_samples: int = 4
+    ) -> None:
+        self._core = _core.Engine(data._core, points_per_patch, area_light_samples)
+
+    def relight(self, lights: Sequence[Light] = (), sky: Optional[Sky] = None) -> None:
+        """One frame. Raises Error, with the number of the light, if a field is out of range."""
+        self._core.relight(list(lights), sky)
+
+    def relight_by_direct(self, direct_irradiance: npt.ArrayLike) -> None:
+        """One frame with the direct irradiance [n, 3] in lx of the caller."""
+        self._core.relight_by_direct(np.ascontiguousarray(direct_irradiance, dtype=np.float32))
+
+    def set_emission_scale(self, material: int, scale: Union[float, Triple]) -> None:
+        """From the next frame on, material `material` emits `scale` times what the scene says."""
+        self._core.set_emission_scale(material, [float(x) for x in np.broadcast_to(scale, 3)])
+
+    @property
+    def direct_irradiance(self) -> Floats:
+        """[n, 3] lx straight from lamps and sky."""
+        return self._core.direct_irradiance
+
+    @property
+    def initial_exitance(self) -> Floats:
+        """[n, 3] lx: reflectance times direct irradiance, and what the patches emit."""
+        return self._core.initial_exitance
+
+    @property
+    def indirect_irradiance(self) -> Floats:
+        """[n, 3] lx from other patches, after all reflections."""
+        return self._core.indirect_irradiance
+
+    @property
+    def radiosity(self) -> Floats:
+        """[n, 3] lx that leaves the patches."""
+        return self._core.radiosity
+
+
+@dataclasses.dataclass
+class Solution:
+    """What solve() gives: radiosity [n, 3] in lx, and how it was found."""
+
+    radiosity: Floats
+    sweeps: int
+    residual: float
+    converged: bool
+    diverged: bool
+    microseconds: float
+
+
+def solve(
+    data: "TransferData",
+    initial_exitance: npt.ArrayLike,
+    method: str = "transfer",
+    residual: float = 1e-6,
+    max_sweeps: int = 100,
+) -> Solution:
+    """Solves (I - rho F) B = M0 for M0 [n, 3] in lx.
+
+    method: "transfer", the product with the operator, or an iteration with the form factors that the
+    data keep: "gathering", "jacobi", "gauss-seidel", "symmetric-gauss-seidel",
+    "conjugate-gradient", "refine" (from the operator's solution), or "hierarchical" (with links).
+    It stops at the relative `residual` or after `max_sweeps`.
+    """
+    exitance = np.ascontiguousarray(initial_exitance, dtype=np.float32)
+    if exitance.shape != (data.patch_count, 3):
+        raise ValueError(
+            f"initial_exitance has the shape {list(exitance.shape)}, and needs [{data.patch_count}, 3]"
+        )
+    if method != "transfer":
+        radiosity, how = _core.solve(data._core, exitance, method, residual, max_sweeps)
+        return Solution(radiosity, **how)
+    indirect = (data.transfer @ exitance.T.ravel()).reshape(3, -1).T
+    return Solution(exitance + data.reflectance * indirect, 0, math.nan, True, False, math.nan)

@@ -1,0 +1,321 @@
+"""Transfer data: what precompute makes, and the operators in it."""
+
+import json
+import os
+from typing import Any, Dict, Optional, Tuple, Union
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse
+from scipy.sparse.linalg import LinearOperator
+
+from . import _core
+from ._progress import Progress, log, reporting
+from .scene import Scene
+
+Path = Union[str, "os.PathLike[str]"]
+Array = npt.NDArray[Any]
+
+
+def _block(x: Array, rows: int, dtype: Any) -> Array:
+    """`x` as a C-contiguous block [rows, columns]; the same memory if it is one."""
+    block = x.reshape(rows, -1) if x.ndim == 1 else x
+    return np.ascontiguousarray(block, dtype=dtype)
+
+
+class TransferOperator(LinearOperator):  # type: ignore[misc]
+    """Y = F (I - rho F)^-1: takes initial exitance in lx to indirect irradiance in lx.
+
+    Shape [3n, 3n], channel by channel: entry c n + i is channel c of patch i. `op @ x` for x [3n] or
+    [3n, k]; float32 stays float32. Columns (hours, lamps) go through together without copies of x.
+    `op.H` is the adjoint, A Y A^-1 with the areas A. `op.channel(c)` is one channel, [n, n].
+    """
+
+    def __init__(self, data: "TransferData", dtype: npt.DTypeLike = np.float32) -> None:
+        n = data.patch_count
+        self._data = data
+        super().__init__(np.dtype(dtype), (3 * n, 3 * n))
+
+    @property
+    def bound(self) -> float:
+        """A bound of the relative error of indirect light that few lights in a thousand exceed."""
+        return float(self._data.record["error_bound"])
+
+    @property
+    def error(self) -> float:
+        """The relative area-weighted L2 error of indirect light that was measured, in the mean."""
+        return float(self._data.record["error_mean"])
+
+    @property
+    def tolerance(self) -> float:
+        """The error that was asked for."""
+        return float(self._data.record["tolerance"])
+
+    def _apply(self, x: Array, adjoint: bool) -> Array:
+        dtype = np.float32 if x.dtype == np.float32 else np.float64
+        return self._data._core.apply(_block(x, self.shape[0], dtype), adjoint)
+
+    def _matvec(self, x: Array) -> Array:
+        return self._apply(x, False).reshape(x.shape)
+
+    def _rmatvec(self, x: Array) -> Array:
+        return self._apply(x, True).reshape(x.shape)
+
+    def _matmat(self, x: Array) -> Array:
+        return self._apply(x, False)
+
+    def _rmatmat(self, x: Array) -> Array:
+        return self._apply(x, True)
+
+    def channel(self, c: int) -> "ChannelOperator":
+        """One channel, 0 to 2, as an operator of shape [n, n]."""
+        return ChannelOperator(self, c)
+
+
+class ChannelOperator(LinearOperator):  # type: ignore[misc]
+    """One channel of Y, of shape [n, n]. It costs as much as all three."""
+
+    def __init__(self, whole: TransferOperator, c: int) -> None:
+        if c not in (0, 1, 2):
+            raise ValueError(f"channels are 0, 1 and 2, not {c}")
+        n = whole.shape[0] // 3
+        self._whole = whole
+        self._rows = slice(c * n, (c + 1) * n)
+        super().__init__(whole.dtype, (n, n))
+
+    def _apply(self, x: Array, adjoint: bool) -> Array:
+        dtype = np.float32 if x.dtype == np.float32 else np.float64
+        block = _block(x, self.shape[0], dtype)
+        light = np.zeros((self._whole.shape[0], block.shape[1]), dtype)
+        light[self._rows] = block
+        return self._whole._apply(light, adjoint)[self._rows]
+
+    def _matvec(self, x: Array) -> Array:
+        return self._apply(x, False).reshape(x.shape)
+
+    def _rmatvec(self, x: Array) -> Array:
+        return self._apply(x, True).reshape(x.shape)
+
+    def _matmat(self, x: Array) -> Array:
+        return self._apply(x, False)
+
+    def _rmatmat(self, x: Array) -> Array:
+        return self._apply(x, True)
+
+
+class FormFactorOperator(LinearOperator):  # type: ignore[misc]
+    """F of shape [n, n]: F[i, j] is the fraction of the light of patch i that arrives at patch j.
+
+    Raises Error where the data keep no form factors; see precompute(form_factors=...).
+    """
+
+    def __init__(self, data: "TransferData", dtype: npt.DTypeLike = np.float32) -> None:
+        self._data = data
+        self._core = _core.FormFactors(data._core)
+        super().__init__(np.dtype(dtype), (data.patch_count, data.patch_count))
+
+    def _apply(self, x: Array, adjoint: bool) -> Array:
+        dtype = np.float32 if x.dtype == np.float32 else np.float64
+        return self._core.gather(_block(x, self.shape[0], dtype), adjoint)
+
+    def _matvec(self, x: Array) -> Array:
+        return self._apply(x, False).reshape(x.shape)
+
+    def _rmatvec(self, x: Array) -> Array:
+        return self._apply(x, True).reshape(x.shape)
+
+    def _matmat(self, x: Array) -> Array:
+        return self._apply(x, False)
+
+    def _rmatmat(self, x: Array) -> Array:
+        return self._apply(x, True)
+
+    def tocsr(self, threshold: float = 0.0) -> "scipy.sparse.csr_matrix":
+        """F as a sparse matrix of float64, of pairs with a factor of at least `threshold` either way.
+
+        Needs form_factors="exact".
+        """
+        indptr, indices, exchange = self._data._core.exchange()
+        upper = scipy.sparse.csr_matrix(
+            (exchange.astype(np.float64), indices.astype(np.int32), indptr.astype(np.int64)),
+            shape=self.shape,
+        )
+        area = self._data.area.astype(np.float64)
+        if threshold > 0:
+            pairs = upper.tocoo()
+            kept = pairs.data / np.minimum(area[pairs.row], area[pairs.col]) >= threshold
+            upper = scipy.sparse.csr_matrix(
+                (pairs.data[kept], (pairs.row[kept], pairs.col[kept])), shape=self.shape
+            )
+        diagonal = scipy.sparse.diags(upper.diagonal())
+        return scipy.sparse.csr_matrix(scipy.sparse.diags(1 / area) @ (upper + upper.T - diagonal))
+
+    def toarray(self) -> Array:
+        """F as an array [n, n] of float64."""
+        if self._data._core.exchange_is_stored:
+            return np.asarray(self.tocsr().toarray())
+        return np.asarray(self @ np.eye(self.shape[0]))
+
+
+class TransferData:
+    """What precompute makes and files hold: patches, the operator, form factors on request."""
+
+    def __init__(self, core: "_core.Data", ids: Optional[npt.NDArray[np.int64]] = None) -> None:
+        self._core = core
+        self._ids = ids
+        self._patches: Dict[str, Array] = core.patches()
+        self.record: Dict[str, Any] = core.record()
+        self.record["settings"] = json.loads(self.record["settings"] or "{}")
+        self.record["report"] = json.loads(self.record["report"] or "{}")
+
+    @property
+    def patch_count(self) -> int:
+        return self._core.patch_count
+
+    @property
+    def area(self) -> npt.NDArray[np.float32]:
+        """[n] m²; a view, as all arrays here."""
+        return self._patches["area"]
+
+    @property
+    def centroid(self) -> npt.NDArray[np.float32]:
+        """[n, 3] metres."""
+        return self._patches["centroid"]
+
+    @property
+    def normal(self) -> npt.NDArray[np.float32]:
+        """[n, 3] of unit length."""
+        return self._patches["normal"]
+
+    @property
+    def reflectance(self) -> npt.NDArray[np.float32]:
+        """[n, 3] in [0, 1)."""
+        return self._patches["reflectance"]
+
+    @property
+    def emitted_exitance(self) -> npt.NDArray[np.float32]:
+        """[n, 3] lx: pi times the luminance that a patch emits."""
+        return self._patches["emitted_exitance"]
+
+    @property
+    def sky_visibility(self) -> npt.NDArray[np.float32]:
+        """[n] fraction of the light of a patch that leaves the scene."""
+        return self._patches["sky_visibility"]
+
+    @property
+    def absorbed(self) -> npt.NDArray[np.float32]:
+        """[n] fraction of the light of a patch that meets backs."""
+        return self._patches["absorbed"]
+
+    @property
+    def mesh(self) -> Dict[str, Any]:
+        """What is shown: `position` [v, 3], `triangle` [t, 3], `triangle_patch` and
+        `triangle_material` [t]; a triangle without a patch has 4294967295."""
+        return self._core.mesh()
+
+    @property
+    def patch_ids(self) -> npt.NDArray[np.int64]:
+        """[n] the id of each patch, of a Scene made with ids: that of most of its triangles."""
+        if self._ids is None:
+            raise ValueError("the scene was not made with ids")
+        mesh = self.mesh
+        patch, material = mesh["triangle_patch"], mesh["triangle_material"]
+        corner = mesh["position"][mesh["triangle"]].astype(np.float64)
+        area = np.linalg.norm(
+            np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1
+        )
+        known = patch < self.patch_count
+        weight = scipy.sparse.csr_matrix(
+            (area[known], (patch[known], material[known])),
+            shape=(self.patch_count, len(self._ids)),
+        )
+        result: npt.NDArray[np.int64] = self._ids[np.asarray(weight.argmax(axis=1)).ravel()]
+        return result
+
+    @property
+    def transfer(self) -> TransferOperator:
+        """Y, [3n, 3n]."""
+        return TransferOperator(self)
+
+    @property
+    def form_factors(self) -> FormFactorOperator:
+        """F, [n, n]. Raises Error unless the data keep form factors."""
+        return FormFactorOperator(self)
+
+    @property
+    def has_form_factors(self) -> bool:
+        return self._core.has_form_factors
+
+    def __repr__(self) -> str:
+        return (
+            f"<rebounce.TransferData {self.record['scene']}: {self.patch_count} patches, "
+            f"{self.record['operator']}, {self.record['operator_bytes']} bytes>"
+        )
+
+
+def precompute(
+    scene: Union[Scene, Path],
+    patches: int = 4096,
+    tolerance: float = 0.005,
+    form_factors: Optional[str] = None,
+    *,
+    patch_size: Optional[float] = None,
+    quality: str = "default",
+    operator: str = "hierarchical",
+    links: bool = False,
+    seed: int = 1,
+    progress: Progress = None,
+) -> TransferData:
+    """The offline stage.
+
+    scene: a Scene, or the path of a .glb or .gltf file.
+    patches: wanted number of patches, at least 1; patch_size: or their largest length, metres.
+    tolerance: error of the indirect light that the operator may have in the mean, in [1e-5, 0.5].
+    form_factors: None, "compressed" (to the tolerance) or "exact" (all pairs), for `solve` and
+        TransferData.form_factors.
+    quality: of form factors, "low", "default" (0.5 %) or "high" (0.1 %).
+    operator: "hierarchical", "low-rank" or "dense".
+    links: keep links, for solve(method="hierarchical").
+    progress: see rebounce's other long work: None for a bar on terminals and in notebooks, True,
+        False, or a function of (phase, fraction).
+    Raises Error if the scene cannot be used, KeyboardInterrupt on Ctrl-C.
+    """
+    if form_factors not in (None, "compressed", "exact"):
+        raise ValueError(f'form_factors is None, "compressed" or "exact", not {form_factors!r}')
+    if patches < 1:
+        raise ValueError("patches must be at least 1")
+    if not 1e-5 <= tolerance <= 0.5:
+        raise ValueError("tolerance is not in [1e-5, 0.5]")
+    if not isinstance(scene, Scene):
+        from .scene import load_scene
+
+        scene = load_scene(scene)
+    options: Dict[str, Any] = {
+        "patches": patches,
+        "tolerance": tolerance,
+        "quality": quality,
+        "operator": operator,
+        "seed": seed,
+        "store_form_factors": form_factors == "exact",
+        "store_links": links,
+        "form_factor_tolerance": tolerance if form_factors == "compressed" else 0.0,
+    }
+    if patch_size is not None:
+        options["patch_size"] = patch_size
+    with reporting(progress) as report:
+        core, warnings = _core.build(scene._core, options, report)
+    for warning in warnings:
+        log.warning("%s", warning)
+    data = TransferData(core, scene._ids)
+    log.info("%r", data)
+    return data
+
+
+def load(path: Path) -> TransferData:
+    """Reads a transfer file. It must not change while the data are in use. Raises Error."""
+    return TransferData(_core.load(os.fspath(path)))
+
+
+def save(path: Path, data: TransferData) -> None:
+    """Writes a transfer file whole or not at all. Raises Error."""
+    _core.save(os.fspath(path), data._core)

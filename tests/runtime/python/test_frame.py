@@ -1,0 +1,123 @@
+"""Engines, lamps, skies, solutions, sensors."""
+
+import numpy as np
+import pytest
+
+import rebounce
+from conftest import ROOT
+
+LAMP = rebounce.Light(position=(1.0, 1.6, 1.1), intensity=50)
+
+
+def test_engine_gives_what_the_operator_says(small_room):
+    engine = rebounce.Engine(small_room)
+    engine.relight([LAMP])
+    M0, H = engine.initial_exitance, engine.indirect_irradiance
+    assert np.allclose(M0, small_room.reflectance * engine.direct_irradiance, rtol=1e-5)
+    product = (small_room.transfer @ M0.T.ravel()).reshape(3, -1).T
+    assert np.allclose(product, H, rtol=1e-4)
+    assert np.allclose(engine.radiosity, M0 + small_room.reflectance * H, rtol=1e-5)
+    # What the lamp gives is 4 pi candela of lumen, and all of it arrives somewhere.
+    flux = small_room.area @ engine.direct_irradiance
+    assert flux == pytest.approx(4 * np.pi * 50, rel=0.02)
+
+
+def test_results_are_views_of_the_last_frame(small_room):
+    engine = rebounce.Engine(small_room)
+    engine.relight([LAMP])
+    light = engine.radiosity
+    kept = light.copy()
+    assert not light.flags.writeable and light.base is not None
+    engine.relight([LAMP, LAMP])
+    assert np.allclose(light, 2 * kept, rtol=1e-4)
+    engine.relight_by_direct(np.ones((small_room.patch_count, 3)))
+    assert np.allclose(engine.direct_irradiance, 1)
+
+
+def test_wrong_lights_are_refused(small_room):
+    engine = rebounce.Engine(small_room)
+    with pytest.raises(ValueError, match="light 0"):
+        engine.relight([rebounce.Light(position=(0, 0))])
+    with pytest.raises(ValueError, match="type"):
+        engine.relight([rebounce.Light(type="candle")])
+    with pytest.raises(rebounce.Error, match="light 1"):
+        engine.relight([LAMP, rebounce.Light(intensity=-1)])
+    with pytest.raises(ValueError, match="needs"):
+        engine.relight_by_direct(np.ones((3, 3)))
+
+
+@pytest.mark.parametrize(
+    "method",
+    ["transfer", "gathering", "jacobi", "gauss-seidel", "symmetric-gauss-seidel",
+     "conjugate-gradient", "refine", "hierarchical"],
+)  # fmt: skip
+def test_solve_by_every_method(cornell, method):
+    engine = rebounce.Engine(cornell)
+    engine.relight([rebounce.Light(position=(0, 1, 0), intensity=80)])
+    solution = rebounce.solve(cornell, engine.initial_exitance, method)
+    apart = np.linalg.norm(solution.radiosity - engine.radiosity) / np.linalg.norm(engine.radiosity)
+    assert apart < 0.02
+    with pytest.raises(ValueError, match="initial_exitance"):
+        rebounce.solve(cornell, np.ones(3), method)
+    with pytest.raises(ValueError, match="no method"):
+        rebounce.solve(cornell, engine.initial_exitance, "magic")
+
+
+def test_lights_of_a_file():
+    lights, sky = rebounce.load_lights(ROOT / "tests/scenes/ceiling_point.lights.json")
+    assert lights and lights[0].type == "point"
+    assert sky.luminance >= 0
+
+
+def open_box():
+    from conftest import box, triangles_of
+
+    vertices, faces = box(high=(2, 2, 2))
+    top = np.all(vertices[faces][:, :, 1] == 2, axis=1)
+    scene = rebounce.Scene(vertices, triangles_of(faces[~top]), reflectance=0.0)
+    return rebounce.precompute(scene, patches=100, quality="low", progress=False)
+
+
+def test_sensors_see_sky_and_lamps():
+    data = open_box()
+    positions, normals = [[1, 0.001, 1], [1, 0.5, 1]], [[0, 2, 0], [0, -1, 0]]
+    sensors = rebounce.Sensors(data, positions, normals, rays=20000)
+    engine = rebounce.Engine(data)
+    sky = rebounce.Sky(luminance=100)
+    engine.relight([], sky)
+    light = sensors.illuminance(engine, [], sky)
+    # From the middle of the floor the opening of 2 m is four rectangles of 1 m at a distance of 2:
+    # 4 / (2 pi) (A / sqrt(1 + A²) atan(B / sqrt(1 + A²)) twice), A = B = 1 / 2.
+    a = 0.5 / np.sqrt(1.25)
+    seen = 4 / (2 * np.pi) * 2 * a * np.arctan(0.5 / np.sqrt(1.25))
+    assert light[0] == pytest.approx(np.pi * 100 * seen, rel=0.01)
+    assert np.allclose(light[1], 0)  # walls are black
+    lamp = rebounce.Light(position=(1, 1.501, 1), intensity=90)
+    assert sensors.direct([lamp])[0] == pytest.approx(40, rel=1e-3)
+    assert np.allclose(sensors.direct([lamp])[1], 0)
+    with pytest.raises(ValueError, match="normals"):
+        rebounce.Sensors(data, positions, normals[:1])
+
+
+@pytest.mark.parametrize("kind", [1, 5, 12])
+def test_cie_skies_give_what_their_luminances_integrate_to(kind):
+    """A sensor in the open under a CIE sky: its illuminance is the integral of L cos."""
+    vertices = [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]
+    scene = rebounce.Scene(vertices, [[0, 2, 1], [0, 3, 2]], reflectance=0.2)
+    data = rebounce.precompute(scene, patches=8, quality="low", progress=False)
+    sun = -np.array([0.5, 0.7, 0.2])
+    cells = rebounce.cie_sky(kind, sun)
+    sensors = rebounce.Sensors(data, [[0, 1, 0]], [[0, 1, 0]], rays=50000)
+    engine = rebounce.Engine(data)
+    sky = rebounce.Sky(1000, distribution=cells)
+    engine.relight([], sky)
+    directions, of = rebounce.sky_cell_directions(4)
+    from rebounce import _core
+
+    solid_angle = np.array([_core.sky_cell_solid_angle(int(c)) for c in of]) / 16
+    expected = 1000 * np.sum(cells[of] * directions[:, 1] * solid_angle)
+    assert sensors.illuminance(engine, [], sky)[0] == pytest.approx(expected, rel=0.01)
+    if kind == 1:  # overcast: 7 pi / 9 of the zenith's luminance (Moon and Spencer)
+        assert expected == pytest.approx(1000 * 7 * np.pi / 9, rel=0.02)
+    if kind == 5:
+        assert expected == pytest.approx(1000 * np.pi, rel=0.01)
