@@ -199,6 +199,7 @@ BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost,
   const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
   const Spectrum rows = left_spectrum(block.entries, largest, seed);
   LowRankBlock result;
+  result.on_diagonal = block.on_diagonal;
   if (block.on_diagonal) {
     truncate_diagonal(block, rows, largest, cost, result);
   } else {

@@ -23,6 +23,7 @@ struct WideBlock {
 struct LowRankBlock {
   Eigen::MatrixXd row_basis;               ///< [rows][row rank], orthonormal columns
   Eigen::MatrixXd column_basis;            ///< [columns][column rank], orthonormal columns
+  bool on_diagonal = false;                ///< the row basis is that of the columns too
   std::vector<Eigen::MatrixXd> couplings;  ///< [matrices], [row rank][column rank]
   double error_squared = 0;                ///< squared Frobenius norm, all matrices together
 

@@ -56,12 +56,11 @@ Index worthwhile_residual_rank(const MatrixXd& vectors, double multiplier,
 
 ResidualRanks find_residual_ranks(const LowRankBlock& block, const BlockWeights& weights,
                                   const CompressionCost& cost) {
-  const bool on_diagonal = block.column_basis.cols() == 0 && block.row_basis.cols() > 0;
   const BasisEnd row{block.row_basis, weights.row};
-  const BasisEnd column{on_diagonal ? block.row_basis : block.column_basis, weights.column};
+  const BasisEnd column{block.on_diagonal ? block.row_basis : block.column_basis, weights.column};
   ResidualRanks ranks;
   ranks.row = residual_rank_of(row, column, block.couplings, cost);
-  if (on_diagonal) {
+  if (block.on_diagonal) {
     ranks.column = ranks.row;
     return ranks;
   }

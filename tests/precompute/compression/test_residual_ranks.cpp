@@ -23,7 +23,8 @@ LowRankBlock block_with(const VectorXd& coupling, bool on_diagonal = false) {
   };
   LowRankBlock block;
   block.row_basis = basis();
-  block.column_basis = on_diagonal ? MatrixXd(kSize, 0) : basis();
+  block.on_diagonal = on_diagonal;
+  if (!on_diagonal) block.column_basis = basis();
   block.couplings.push_back(coupling.asDiagonal());
   return block;
 }
@@ -73,6 +74,18 @@ TEST(ResidualRanks, WhereLightIsStrongThereAreMore) {
   EXPECT_EQ(find_residual_ranks(block, {&even, &even}, cost).row, 1);
   EXPECT_EQ(find_residual_ranks(block, {&strong, &even}, cost).row, 2);
   EXPECT_EQ(find_residual_ranks(block, {&even, &strong}, cost).row, 2);
+}
+
+TEST(ResidualRanks, NoneWhereTheOtherEndHasNoRank) {
+  const ClusterWeight even = weight(1, 0);
+  const ClusterWeight wider = {VectorXd::Ones(2 * kSize), VectorXd::Unit(2 * kSize, 5),
+                               VectorXd::Zero(1)};
+  LowRankBlock block = block_with(VectorXd{{1, 0.1, 0.01}});
+  block.column_basis.resize(2 * kSize, 0);
+  block.couplings = {MatrixXd(3, 0)};
+  const ResidualRanks found = find_residual_ranks(block, {&even, &wider}, {.multiplier = 1e-7});
+  EXPECT_EQ(found.row, 0);
+  EXPECT_EQ(found.column, 0);
 }
 
 TEST(ResidualRanks, NoneWhereNothingIsWanted) {
