@@ -24,8 +24,9 @@ struct BlockLight {
 
   void evaluate(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part) {
     lamp.evaluate(points, part, light);
-    const auto& [x, y, z] = light.direction;
-    const auto& [normal_x, normal_y, normal_z] = points.normal;
+    const auto &x = light.direction[0], &y = light.direction[1], &z = light.direction[2];
+    const auto &normal_x = points.normal[0], &normal_y = points.normal[1],
+               &normal_z = points.normal[2];
 #pragma omp simd
     for (std::size_t e = part * kPart; e < (part + 1) * kPart; ++e) {
       const float cosine = x[e] * normal_x[e] + y[e] * normal_y[e] + z[e] * normal_z[e];

@@ -24,7 +24,7 @@ class CameraOption : public CommandLine {
     document.erase("cameras");
     for (json& node : document["nodes"]) node.erase("camera");
     const std::string scene = write("room.gltf", document.dump());
-    const std::string file = path("room" + patches + ".safetensors");
+    std::string file = path("room" + patches + ".safetensors");
     EXPECT_EQ(run({"precompute", scene, "--patches", patches, "--quality", "low", "--tolerance",
                    "0.1", "--quiet", "-o", file})
                   .exit_code,
