@@ -53,6 +53,21 @@ rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** tra
   });
 }
 
+rebounce_status rebounce_transfer_read(const void* bytes, size_t size, const char* name,
+                                       rebounce_transfer** transfer) {
+  if (bytes == nullptr || name == nullptr || transfer == nullptr) {
+    return missing("rebounce_transfer_read");
+  }
+  *transfer = nullptr;
+  return guarded(REBOUNCE_BAD_INPUT, [&] {
+    const auto* const first = static_cast<const std::byte*>(bytes);
+    auto handle = std::make_unique<rebounce_transfer>();
+    handle->data = read_transfer({first, first + size}, name);
+    *transfer = handle.release();
+    return REBOUNCE_OK;
+  });
+}
+
 void rebounce_transfer_retain(rebounce_transfer* transfer) {
   if (transfer != nullptr) transfer->references.fetch_add(1, std::memory_order_relaxed);
 }

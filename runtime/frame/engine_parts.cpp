@@ -18,7 +18,8 @@ std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> 
   return data;
 }
 
-#if REBOUNCE_WITH_EMBREE
+}  // namespace
+
 void check_lights(std::span<const Light> lights) {
   for (std::size_t k = 0; k < lights.size(); ++k) {
     try {
@@ -28,9 +29,6 @@ void check_lights(std::span<const Light> lights) {
     }
   }
 }
-#endif
-
-}  // namespace
 
 OneThread::OneThread(EngineUse& use) : use_(use) {
   if (!use_.busy.exchange(true, std::memory_order_acquire)) return;
@@ -44,10 +42,8 @@ OneThread::~OneThread() {
 Engine::Parts::Parts(std::shared_ptr<const TransferData> transfer_data,
                      const EngineSettings& settings)
     : data(checked(std::move(transfer_data))), scheduler(settings.scheduler) {
-#if REBOUNCE_WITH_EMBREE
   tracer = std::make_shared<const RayTracer>(make_surface_tracer(data->mesh));
   direct_lighting = std::make_shared<DirectLighting>(*data, *tracer, settings.direct_lighting);
-#endif
   const std::size_t n = data->patches.size();
   emitting_material =
       std::make_shared<const std::vector<std::uint32_t>>(find_emitting_material(*data));
@@ -79,16 +75,13 @@ Engine::Engine(std::shared_ptr<const TransferData> data, const EngineSettings& s
     : parts_(std::make_unique<Parts>(std::move(data), settings)) {}
 
 Engine::Engine(const Engine& other) : parts_(std::make_unique<Parts>(*other.parts_)) {
-#if REBOUNCE_WITH_EMBREE
   parts_->direct_lighting = std::make_shared<DirectLighting>(*other.parts_->direct_lighting);
-#endif
 }
 
 Engine::~Engine() = default;
 Engine::Engine(Engine&& other) noexcept = default;
 Engine& Engine::operator=(Engine&& other) noexcept = default;
 
-#if REBOUNCE_WITH_EMBREE
 void Engine::Parts::compute_direct(std::span<const Light> lights, const Sky& frame_sky) {
   direct_lighting->compute(lights, frame_sky, direct_irradiance, scheduler);
   sky = frame_sky;
@@ -102,12 +95,6 @@ void Engine::relight(std::span<const Light> lights, const Sky& sky) {
   parts_->apply_transfer();
   parts_->compute_radiosity();
 }
-#else
-void Engine::relight(std::span<const Light> /*lights*/, const Sky& /*sky*/) {
-  throw Unsupported(
-      "this library was built without Embree and traces no light; bring the direct irradiance");
-}
-#endif
 
 void Engine::relight(std::span<const Float3> direct_irradiance) {
   const OneThread guard(parts_->use);

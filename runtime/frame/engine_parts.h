@@ -37,13 +37,16 @@ class OneThread {
   EngineUse& use_;
 };
 
+/// Throws Error with the number of the first light that has a field out of its range.
+void check_lights(std::span<const Light> lights);
+
 struct Engine::Parts {
   Parts(std::shared_ptr<const TransferData> transfer_data, const EngineSettings& settings);
   Parts(const Parts& other);
   Parts& operator=(const Parts&) = delete;
 
   // The stages of a frame. `lights` are within their ranges; the first stage throws as check_sky
-  // does, and needs Embree.
+  // does.
   void compute_direct(std::span<const Light> lights, const Sky& frame_sky);
   void compute_initial_exitance();
   void apply_transfer();
@@ -52,8 +55,8 @@ struct Engine::Parts {
   EngineUse use;
   std::shared_ptr<const TransferData> data;
   Scheduler scheduler;
-  std::shared_ptr<const RayTracer> tracer;          ///< null without Embree
-  std::shared_ptr<DirectLighting> direct_lighting;  ///< of this engine alone; null without Embree
+  std::shared_ptr<const RayTracer> tracer;
+  std::shared_ptr<DirectLighting> direct_lighting;                      ///< of this engine alone
   std::shared_ptr<const std::vector<std::uint32_t>> emitting_material;  ///< [n]
   Sky sky;                                                              ///< of the last frame
   std::vector<Float3> emitted_exitance;

@@ -1,4 +1,4 @@
-// Where patches look for direct light. Without Embree too: callers that bring it need the points.
+// Where patches look for direct light. Callers that bring it need the points too.
 
 #include "rebounce/engine.h"
 #include "rebounce/error.h"

@@ -65,6 +65,10 @@ typedef struct rebounce_transfer rebounce_transfer;
 /* Loads a transfer file (UTF-8 path), checks all of it, and writes a handle with one reference. */
 rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** transfer);
 
+/* Reads one from memory, of which it keeps a copy; `name` (UTF-8) stands for it in messages. */
+rebounce_status rebounce_transfer_read(const void* bytes, size_t size, const char* name,
+                                       rebounce_transfer** transfer);
+
 /* Retain adds a reference, for another owner; release takes one away. The data are freed when no
  * reference is left and no engine uses them. NULL is ignored. */
 void rebounce_transfer_retain(rebounce_transfer* transfer);
@@ -272,8 +276,7 @@ void rebounce_engine_destroy(rebounce_engine* engine);
 
 /* One frame. Lights are known by their number: one that is as it was is not traced again, nor one
  * that has only another colour or intensity. `sky` may be NULL: none. A light out of its range is
- * refused with its number. Fails with REBOUNCE_UNSUPPORTED in a library without Embree. A frame
- * that fails changes nothing. */
+ * refused with its number. A frame that fails changes nothing. */
 rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_light* lights,
                                         size_t light_count, const rebounce_sky* sky);
 

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "rebounce/error.h"
-#include "runtime/rays/sampling.h"
+#include "runtime/rays/opacity_passage.h"
 #include "transfer/data/opacity_maps.h"
 
 namespace rebounce {
@@ -91,18 +91,6 @@ Hit to_hit(const RTCRayHit& traced, const TriangleGroups& groups) {
           .front = facing < 0};
 }
 
-// A number in [0, 1) that depends only on the ray and the triangle.
-float chance(const RTCRay& ray, std::uint32_t triangle) {
-  const auto bits = [](float x, float y) {
-    return (static_cast<std::uint64_t>(std::bit_cast<std::uint32_t>(x)) << 32) |
-           std::bit_cast<std::uint32_t>(y);
-  };
-  std::uint64_t mixed = mix_bits(triangle ^ bits(ray.org_x, ray.org_y));
-  mixed = mix_bits(mixed ^ bits(ray.org_z, ray.dir_x));
-  mixed = mix_bits(mixed ^ bits(ray.dir_y, ray.dir_z));
-  return static_cast<float>(mixed >> 40) * 0x1p-24F;
-}
-
 // True if the ray stops at this hit of the porous group.
 bool stops(const RTCRay& ray, const RTCHit& hit, const TraceContext& trace) {
   const TriangleGroup& group = (*trace.groups)[kPorous];
@@ -111,15 +99,13 @@ bool stops(const RTCRay& ray, const RTCHit& hit, const TraceContext& trace) {
     trace.transmitted[ray.id] *= group.transmitted[hit.primID];
     return false;
   }
-  const std::span<const std::uint8_t> map = group.opacity.of_triangle(hit.primID);
-  const std::uint8_t opacity = map[micro_triangle_at(opacity_map_level(map.size()), hit.u, hit.v)];
-  const float part = static_cast<float>(opacity) / OpacityMaps::kOpaque;
+  const float part = stopped_part(group.opacity.of_triangle(hit.primID), hit.u, hit.v);
   if (trace.rule == Rule::kMicroTriangles) {
     trace.transmitted[ray.id] *= 1 - part;
     return false;
   }
-  if (opacity == 0 || opacity == OpacityMaps::kOpaque) return opacity != 0;
-  return chance(ray, group.index_of(hit.primID)) < part;
+  return stops_by_chance({ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z},
+                         group.index_of(hit.primID), part);
 }
 
 // The filter of the porous group: lets rays continue.
@@ -306,16 +292,8 @@ void RayTracer::intersect_all(const Ray& ray, std::vector<Hit>& hits) const {
   rtcIntersect1(impl_->scene, &trace.context, &traced);
 }
 
-Float3 RayTracer::offset_point(const Float3& point, const Float3& geometric_normal) const {
-  return offset_along(point, geometric_normal, impl_->offset_distance);
-}
-
 float RayTracer::offset_distance() const {
   return impl_->offset_distance;
-}
-
-RayTracer make_surface_tracer(const DisplayMesh& mesh) {
-  return {mesh.position, std::span(mesh.triangle).first(mesh.surface_count()), mesh.opacity};
 }
 
 }  // namespace rebounce

@@ -46,7 +46,8 @@ enum class PassageDetail : std::uint8_t {
   kMicroTriangle,  ///< the opacity at the hit point
 };
 
-/// Triangles for ray tracing. Immutable; any number of threads may use it.
+/// Triangles for ray tracing: by Embree, or by a TriangleTree in builds without it. Immutable; any
+/// number of threads may use it.
 class RayTracer {
  public:
   /// Builds the acceleration structure over all triangles. Indices must be in range. `opacity` may
@@ -76,7 +77,9 @@ class RayTracer {
 
   /// `point` moved by offset_distance() along the unit `geometric_normal`, so that a ray that
   /// starts or ends there does not hit its own surface.
-  Float3 offset_point(const Float3& point, const Float3& geometric_normal) const;
+  Float3 offset_point(const Float3& point, const Float3& geometric_normal) const {
+    return offset_along(point, geometric_normal, offset_distance());
+  }
 
   /// The ray_offset_distance() of the scene, in metres.
   float offset_distance() const;
@@ -87,7 +90,9 @@ class RayTracer {
 };
 
 /// A tracer over the first surface_count triangles of `mesh`.
-RayTracer make_surface_tracer(const DisplayMesh& mesh);
+inline RayTracer make_surface_tracer(const DisplayMesh& mesh) {
+  return {mesh.position, std::span(mesh.triangle).first(mesh.surface_count()), mesh.opacity};
+}
 
 /// True if RayTracer::occluded or transmittance found an opaque triangle along the ray.
 inline bool is_occluded(const Ray& ray) {

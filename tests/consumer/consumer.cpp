@@ -1,5 +1,5 @@
-// Relights a transfer file: by lights, if the library traces them, by the direct irradiance that
-// those gave, and by that on threads of its own; then solves it by iteration.
+// Relights a transfer file: by lights, by the direct irradiance that those gave, and by that on
+// threads of its own; then solves it by iteration.
 
 #include <algorithm>
 #include <cmath>
@@ -22,15 +22,11 @@ void require(bool condition, const char* what) {
   if (!condition) throw rebounce::Error(what);
 }
 
-/// The direct irradiance of a lamp, or one that is made up where none is traced.
-std::vector<rebounce::Float3> direct_light(rebounce::Engine& engine, std::size_t patch_count) {
+/// The direct irradiance of a lamp.
+std::vector<rebounce::Float3> direct_light(rebounce::Engine& engine) {
   rebounce::Light lamp;
   lamp.position = {0, 1, 0};
-  try {
-    engine.relight({&lamp, 1}, {});
-  } catch (const rebounce::Unsupported&) {
-    return std::vector<rebounce::Float3>(patch_count, {100, 90, 80});
-  }
+  engine.relight({&lamp, 1}, {});
   return {engine.direct_irradiance().begin(), engine.direct_irradiance().end()};
 }
 
@@ -53,7 +49,7 @@ int main(int argc, char** argv) {
     const auto data = rebounce::load_transfer(argv[1]);
     const rebounce::SceneData& scene = rebounce::scene_data(*data);
     rebounce::Engine engine(data);
-    const std::vector<rebounce::Float3> direct = direct_light(engine, scene.patches.size());
+    const std::vector<rebounce::Float3> direct = direct_light(engine);
     engine.relight(direct);
     check_refusals(engine, direct);
     rebounce::test::ThreadPool pool(2);

@@ -1,19 +1,22 @@
 #include "rebounce/operators.h"
 
 #include <algorithm>
+#include <span>
 
 #include "rebounce/error.h"
 
 namespace rebounce {
 
 const char* operator_name(OperatorKind kind) {
-  const auto* const named = std::ranges::find(kOperatorKinds, kind, &NamedOperatorKind::kind);
-  return named == kOperatorKinds.end() ? "none" : named->name;
+  const std::span kinds(kOperatorKinds);
+  const auto named = std::ranges::find(kinds, kind, &NamedOperatorKind::kind);
+  return named == kinds.end() ? "none" : named->name;
 }
 
 OperatorKind operator_kind(std::string_view name) {
-  const auto* const named = std::ranges::find(kOperatorKinds, name, &NamedOperatorKind::name);
-  if (named == kOperatorKinds.end()) {
+  const std::span kinds(kOperatorKinds);
+  const auto named = std::ranges::find(kinds, name, &NamedOperatorKind::name);
+  if (named == kinds.end()) {
     throw Error("there is no operator of the kind \"" + std::string(name) + "\"");
   }
   return named->kind;

@@ -1,6 +1,7 @@
 #include "transfer/base/precision.h"
 
 #include <algorithm>
+#include <span>
 #include <string_view>
 
 #include "rebounce/error.h"
@@ -31,8 +32,9 @@ std::string precision_name(Precision precision) {
 }
 
 Precision precision_named(std::string_view name) {
-  const auto* const named = std::ranges::find(kOfferedPrecisions, name, &OfferedPrecision::name);
-  if (named == kOfferedPrecisions.end()) {
+  const std::span offers(kOfferedPrecisions);
+  const auto named = std::ranges::find(offers, name, &OfferedPrecision::name);
+  if (named == offers.end()) {
     throw Error("there is no precision \"" + std::string(name) + "\"");
   }
   return named->precision;

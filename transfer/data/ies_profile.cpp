@@ -4,11 +4,11 @@
 #include "rebounce/lights.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
 #include "rebounce/error.h"
+#include "transfer/base/number_text.h"
 
 namespace rebounce {
 namespace {
@@ -81,7 +81,7 @@ class IesReader {
     rest_.remove_prefix(std::min(begin, rest_.size()));
     if (rest_.starts_with('+')) rest_.remove_prefix(1);
     float value = 0;
-    const auto [end, error] = std::from_chars(rest_.data(), rest_.data() + rest_.size(), value);
+    const auto [end, error] = read_number(rest_.data(), rest_.data() + rest_.size(), value);
     if (error != std::errc() || !std::isfinite(value)) {
       refuse(std::string("has no number where its ") + what + " must be");
     }

@@ -53,9 +53,10 @@ std::size_t ExchangeBlocks::bytes() const {
 }
 
 ExchangeBlocks::Row ExchangeBlocks::row(std::size_t row) const {
-  const std::uint64_t begin = row_begin_[row], inside = inside_begin_[row];
-  return {block_.data() + begin, position_.data() + begin, inside - begin,
-          row_begin_[row + 1] - inside};
+  const auto begin = static_cast<std::size_t>(row_begin_[row]);
+  const auto inside = static_cast<std::size_t>(inside_begin_[row]);
+  const auto end = static_cast<std::size_t>(row_begin_[row + 1]);
+  return {block_.data() + begin, position_.data() + begin, inside - begin, end - inside};
 }
 
 void ExchangeBlocks::do_gather(std::span<const Float3> in, std::span<Float3> out,

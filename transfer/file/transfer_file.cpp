@@ -9,6 +9,12 @@ std::shared_ptr<const TransferData> load_transfer(const std::filesystem::path& p
   return std::make_shared<const TransferData>(load_transfer_file(path));
 }
 
+std::shared_ptr<const TransferData> read_transfer(std::vector<std::byte> bytes,
+                                                  const std::string& name) {
+  return std::make_shared<const TransferData>(
+      read_transfer_file(SafetensorsFile(SharedArray(std::move(bytes)), name)));
+}
+
 void save_transfer(const std::filesystem::path& path, const TransferData& data) {
   save_transfer_file(path, data);
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "transfer/file/safetensors.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
@@ -21,5 +22,8 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
 /// Verifies version, checksum, the size and range of every tensor before anything is used; throws
 /// Error with the reason when the file is not one, is damaged, or is of another version.
 TransferData load_transfer_file(const std::filesystem::path& path);
+
+/// Reads a transfer file likewise; the operator and the form factors stay parts of its memory.
+TransferData read_transfer_file(const SafetensorsFile& file);
 
 }  // namespace rebounce

@@ -1,10 +1,11 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "rebounce/error.h"
+#include "transfer/base/number_text.h"
 #include "transfer/exchange/form_factor_blocks.h"
 #include "transfer/file/checked_json.h"
 #include "transfer/file/transfer_data_check.h"
@@ -37,7 +38,7 @@ Number number(const SafetensorsFile& file, const char* name) {
   const std::string& text = metadata(file, name);
   const char* end = text.data() + text.size();
   Number value{};
-  const auto result = std::from_chars(text.data(), end, value);
+  const auto result = read_number(text.data(), end, value);
   if (result.ec != std::errc() || result.ptr != end) {
     refuse(file, std::string("metadata ") + name + " is not a number");
   }
@@ -306,9 +307,10 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
 std::shared_ptr<const TransferOperator> read_operator(const SafetensorsFile& file,
                                                       const TransferData& data) {
   const std::vector<float>& area = data.patches.area;
-  const auto* const named =
-      std::ranges::find(kOperatorKinds, metadata(file, key::kOperator), &NamedOperatorKind::name);
-  switch (named == kOperatorKinds.end() ? OperatorKind::kNoOperator : named->kind) {
+  const std::span kinds(kOperatorKinds);
+  const auto named =
+      std::ranges::find(kinds, metadata(file, key::kOperator), &NamedOperatorKind::name);
+  switch (named == kinds.end() ? OperatorKind::kNoOperator : named->kind) {
     case OperatorKind::kDense:
       return read_dense_operator(file, area);
     case OperatorKind::kHierarchical:
@@ -369,7 +371,10 @@ Lightmap read_lightmap(const SafetensorsFile& file) {
 }  // namespace
 
 TransferData load_transfer_file(const std::filesystem::path& path) {
-  const SafetensorsFile file(path);
+  return read_transfer_file(SafetensorsFile(path));
+}
+
+TransferData read_transfer_file(const SafetensorsFile& file) {
   check_version(file);
   check_checksum(file);
 

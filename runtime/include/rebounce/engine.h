@@ -71,8 +71,8 @@ class Engine {
   /// all that follows. Lights are known by their number: keep their order, so that only those that
   /// moved or changed shape are traced again. Throws Error if a field of a light that its type uses
   /// is out of range, with the light's number, if a number of the sky is negative or not finite, or
-  /// if the sky has a distribution and the data do not say how much of its cells is seen;
-  /// Unsupported where the library is built without Embree. The last frame then stays.
+  /// if the sky has a distribution and the data do not say how much of its cells is seen. The last
+  /// frame then stays.
   void relight(std::span<const Light> lights, const Sky& sky);
 
   /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for

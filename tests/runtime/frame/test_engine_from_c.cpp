@@ -2,8 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <span>
+#include <string>
 #include <thread>
 
 #include "rebounce.h"
@@ -72,6 +77,12 @@ class FromC : public testing::Test {
     }
   }
 
+  /// The bytes of the file of the transfer.
+  std::string bytes() const {
+    std::ifstream file(folder_ / "room.safetensors", std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
   rebounce_transfer_info info() const {
     rebounce_transfer_info info;
     rebounce_transfer_info_init(&info);
@@ -106,6 +117,32 @@ class FromC : public testing::Test {
   rebounce_engine* engine_ = nullptr;
   rebounce_light lamp_{};
 };
+
+TEST_F(FromC, ReadsAFileFromMemory) {
+  std::string file = bytes();
+  rebounce_transfer* read = nullptr;
+  ASSERT_EQ(rebounce_transfer_read(file.data(), file.size(), "room", &read), REBOUNCE_OK);
+  rebounce_engine* engine = nullptr;
+  ASSERT_EQ(rebounce_engine_create(read, nullptr, &engine), REBOUNCE_OK);
+  file.assign(file.size(), 'x');  // it keeps a copy
+  ASSERT_EQ(rebounce_engine_relight(engine, &lamp_, 1, nullptr), REBOUNCE_OK);
+  ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
+  const std::size_t count = 3 * std::size_t{info().patch_count};
+  const std::span light(rebounce_engine_radiosity(engine), count);
+  EXPECT_TRUE(std::ranges::equal(light, std::span(rebounce_engine_radiosity(engine_), count)));
+  rebounce_engine_destroy(engine);
+  rebounce_transfer_release(read);
+}
+
+TEST_F(FromC, RefusesMemoryThatIsNoFile) {
+  const std::string file = bytes();
+  rebounce_transfer* read = nullptr;
+  EXPECT_EQ(rebounce_transfer_read(file.data(), file.size() - 1, "room", &read),
+            REBOUNCE_BAD_INPUT);
+  EXPECT_EQ(std::string(rebounce_last_error()).find("room"), 0U);
+  EXPECT_EQ(read, nullptr);
+  EXPECT_EQ(rebounce_transfer_read(nullptr, 0, "room", &read), REBOUNCE_INVALID_ARGUMENT);
+}
 
 TEST_F(FromC, AFrameDoesNotAllocate) {
   ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "rebounce/operators.h"
 #include "rebounce/scene_data.h"
@@ -20,6 +22,11 @@ struct TransferData;
 /// is none, is damaged (version, checksum, the size and range of every tensor), or is of another
 /// version.
 std::shared_ptr<const TransferData> load_transfer(const std::filesystem::path& path);
+
+/// Reads a transfer file from memory, where it stays while the operator and the form factors are in
+/// use; `name` stands for it in messages. Throws Error as load_transfer does.
+std::shared_ptr<const TransferData> read_transfer(std::vector<std::byte> bytes,
+                                                  const std::string& name);
 
 /// Writes `data` whole or not at all: into a temporary file beside `path`, flushed to disk and then
 /// renamed over it. Throws Error if the folder is missing, not writable or full.
