@@ -31,6 +31,7 @@ ROOMS = {
     "runtime/outputs": "Light of patches taken to vertices, texels and probes.",
     "runtime/frame": "One frame: direct light, one product, radiosity; the same for C.",
     "runtime/solvers": "The same light by iteration.",
+    "runtime/web/module": "The runtime for WebAssembly: what a page calls, and exceptions there.",
     "runtime/demo/image": "Images, colours, exposure, tone curve, textures, PNG.",
     "runtime/demo/shading": "What arrives at a point of the surface, and what it reflects.",
     "runtime/demo/picture": "Cameras, and a picture without a window.",

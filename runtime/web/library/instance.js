@@ -1,0 +1,122 @@
+// The WebAssembly instance: memory, strings and calls that fail.
+
+import { wasm } from './wasm.js';
+
+/** Thrown for what Rebounce refuses: one line that says what is wrong, and what to do. */
+export class RebounceError extends Error {
+  constructor(message) {
+    super(message);
+    this.name = 'RebounceError';
+  }
+}
+
+let compiled = null;  // promise of a module
+let shared = null;    // promise of the instance that all files live in
+
+/** Whether this browser can run the module: SIMD and exceptions of WebAssembly. */
+export function isSupported() {
+  // A module with a function that has a v128 constant, and a tag of an exception.
+  const probe = new Uint8Array([
+    0, 97, 115, 109, 1, 0, 0, 0, 1, 8, 2, 96, 0, 1, 123, 96, 0, 0, 3, 2, 1, 0, 13, 3, 1, 0, 1,
+    10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11,
+  ]);
+  return typeof WebAssembly === 'object' && typeof DecompressionStream === 'function' &&
+      WebAssembly.validate(probe);
+}
+
+async function compile() {
+  if (!isSupported()) {
+    throw new RebounceError(
+        'this browser lacks SIMD or exceptions of WebAssembly; use one of 2023 or later');
+  }
+  const packed = Uint8Array.from(atob(wasm), (c) => c.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip'));
+  return WebAssembly.compile(await new Response(stream).arrayBuffer());
+}
+
+/** A running module. All transfer files share one; its memory grows only when one is loaded. */
+export class Instance {
+  #exports;
+  #encoder = new TextEncoder();
+  #decoder = new TextDecoder();
+  broken = false;
+
+  /** @returns {Promise<Instance>} the shared one, or a new one after that broke */
+  static async get() {
+    const now = await shared;
+    if (now && !now.broken) return now;
+    compiled ??= compile();
+    shared = compiled.then(async (module) => {
+      const instance = new Instance();
+      await instance.#start(module);
+      return instance;
+    });
+    return shared;
+  }
+
+  async #start(module) {
+    const failed = () => 52;  // nothing can be written: there are no files
+    const { exports } = await WebAssembly.instantiate(module, {
+      rebounce: { now: () => performance.now() },
+      wasi_snapshot_preview1: { fd_close: failed, fd_seek: failed, fd_write: failed },
+    });
+    this.#exports = exports;
+    exports._initialize();
+  }
+
+  /** Calls a function; a trap makes the instance useless, and says so. */
+  call(name, ...args) {
+    if (this.broken) throw new RebounceError('the module has stopped; load the file again');
+    try {
+      return this.#exports[name](...args);
+    } catch (error) {
+      this.broken = true;
+      throw new RebounceError(`the module has stopped (${error.message}); load the file again`);
+    }
+  }
+
+  /** Calls a function that returns a status, and throws what the library says of a failure. */
+  check(name, ...args) {
+    if (this.call(name, ...args) !== 0) {
+      throw new RebounceError(this.text(this.call('rebounce_last_error')));
+    }
+  }
+
+  allocate(size) {
+    const address = this.call('malloc', size);
+    if (address === 0) throw new RebounceError('out of memory; close something');
+    return address;
+  }
+  release(address) {
+    if (!this.broken) this.call('free', address);
+  }
+
+  /** Copies `bytes` to new memory. */
+  put(bytes) {
+    const address = this.allocate(bytes.byteLength);
+    new Uint8Array(this.#exports.memory.buffer, address, bytes.byteLength).set(bytes);
+    return address;
+  }
+  putText(text) {
+    return this.put(this.#encoder.encode(`${text}\0`));
+  }
+  text(address) {
+    const bytes = new Uint8Array(this.#exports.memory.buffer);
+    return this.#decoder.decode(bytes.slice(address, bytes.indexOf(0, address)));
+  }
+
+  // Views of memory: valid until a file is loaded.
+  floats(address, count) {
+    return new Float32Array(this.#exports.memory.buffer, address, count);
+  }
+  doubles(address, count) {
+    return new Float64Array(this.#exports.memory.buffer, address, count);
+  }
+  words(address, count) {
+    return new Uint32Array(this.#exports.memory.buffer, address, count);
+  }
+
+  get memoryBytes() {
+    return this.#exports.memory.buffer.byteLength;
+  }
+}

@@ -1,0 +1,251 @@
+// Rebounce in the browser: loads transfer files and relights their scenes.
+
+import { Instance, RebounceError, isSupported } from './instance.js';
+import { plainLightSize, writeLight } from './plain_light.js';
+import { readSafetensors } from './safetensors.js';
+
+export { RebounceError, isSupported };
+
+const skyCellCount = 146;
+const stages = ['direct', 'exitance', 'product', 'radiosity'];
+
+/** Fetches a file whole; `onProgress(part)` is told how much of it has come, in [0, 1]. */
+async function fetchWhole(url, onProgress) {
+  let response;
+  try {
+    response = await fetch(url);
+  } catch (error) {
+    throw new RebounceError(`${url} cannot be fetched (${error.message})`);
+  }
+  if (!response.ok) {
+    throw new RebounceError(`${url} cannot be fetched: the server says ${response.status}`);
+  }
+  const length = Number(response.headers.get('content-length'));
+  const packed = response.headers.has('content-encoding');  // then the length is of other bytes
+  const parts = [];
+  let size = 0;
+  const reader = response.body.getReader();
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) break;
+    parts.push(value);
+    size += value.byteLength;
+    if (length > 0 && !packed) onProgress(Math.min(1, size / length));
+  }
+  onProgress(1);
+  return new Blob(parts).arrayBuffer();
+}
+
+/** All that a transfer file holds. */
+export class Transfer {
+  #instance;
+  #address;
+
+  /** Loads a transfer file from a URL or from memory. */
+  static async load(source, { onProgress = () => {}, name } = {}) {
+    const isBuffer = source instanceof ArrayBuffer;
+    const [buffer, instance] = await Promise.all([
+      isBuffer ? source : fetchWhole(source, onProgress), Instance.get(),
+    ]);
+    return new Transfer(instance, buffer, name ?? (isBuffer ? 'the file' : String(source)));
+  }
+
+  constructor(instance, buffer, name) {
+    this.#instance = instance;
+    const bytes = instance.put(new Uint8Array(buffer));
+    const title = instance.putText(name);
+    const result = instance.allocate(4);
+    try {
+      instance.check('rebounce_transfer_read', bytes, buffer.byteLength, title, result);
+      this.#address = instance.words(result, 1)[0];
+    } finally {
+      for (const address of [bytes, title, result]) instance.release(address);
+    }
+    const file = readSafetensors(buffer);
+    this.mesh = readMesh(file);
+    this.materials = readMaterials(file);
+    this.cameras = readCameras(file);
+    this.patchCount = file.tensor('patch.area').length;
+    this.seesSky = file.tensor('patch.sky_visibility').some((part) => part > 0.01);
+    this.errorMean = Number(file.metadata.error_mean);
+  }
+
+  /** Makes an engine: one state of the light of this scene. */
+  createEngine(settings) {
+    return new Engine(this.#instance, this.#address, this, settings);
+  }
+
+  /** Frees the file's memory, when its engines have been disposed of too. */
+  dispose() {
+    if (this.#address && !this.#instance.broken) {
+      this.#instance.call('rebounce_transfer_release', this.#address);
+    }
+    this.#address = 0;
+  }
+}
+
+/** One state of the light of a scene. */
+export class Engine {
+  #instance;
+  #address;
+  #lights = { address: 0, capacity: 0 };
+  #sky;
+  #milliseconds;
+  #vertices;
+
+  constructor(instance, transfer, { patchCount, mesh },
+              { pointsPerPatch = 8, areaLightSamples = 4, lightCapacity = 16 } = {}) {
+    this.#instance = instance;
+    this.patchCount = patchCount;
+    this.vertexCount = mesh.position.length / 3;
+    /** Milliseconds of the stages of the last frame. */
+    this.timings = { direct: 0, product: 0, vertices: 0, total: 0 };
+    const settings = instance.put(new Uint8Array(
+        new Uint32Array([16, pointsPerPatch, areaLightSamples, lightCapacity]).buffer));
+    const result = instance.allocate(4);
+    try {
+      instance.check('rebounce_engine_create', transfer, settings, result);
+      this.#address = instance.words(result, 1)[0];
+    } finally {
+      instance.release(settings);
+      instance.release(result);
+    }
+    this.#sky = instance.allocate(4 * 4);
+    this.#milliseconds = instance.allocate(8 * stages.length);
+    this.#vertices = instance.allocate(12 * this.vertexCount);
+    this.#makeRoom(lightCapacity);
+  }
+
+  #makeRoom(count) {
+    if (count <= this.#lights.capacity) return;
+    if (this.#lights.address) this.#instance.release(this.#lights.address);
+    this.#lights = {
+      address: this.#instance.allocate(4 * plainLightSize * count), capacity: count,
+    };
+  }
+
+  /** One frame: all that follows from `lights` and `sky`. */
+  relight(lights, sky = {}) {
+    this.#makeRoom(lights.length);
+    const plain = this.#instance.floats(this.#lights.address, plainLightSize * lights.length);
+    lights.forEach((light, k) => writeLight(light, plain, k * plainLightSize));
+    this.#instance.floats(this.#sky, 4).set([...(sky.color ?? [1, 1, 1]), sky.luminance ?? 0]);
+    this.#instance.check('rebounce_web_relight', this.#address, this.#lights.address, lights.length,
+                         this.#sky, this.#milliseconds);
+    const [direct, before, product, after] =
+        this.#instance.doubles(this.#milliseconds, stages.length);
+    Object.assign(this.timings, { direct, product, total: direct + before + product + after });
+    return this.timings;
+  }
+
+  /** From the next frame on, the sky looks as the CIE's sky of this type, times its luminance. */
+  setSky(type, sunDirection, groundReflectance = 0.2) {
+    const instance = this.#instance;
+    const sun = instance.put(new Uint8Array(new Float32Array(sunDirection).buffer));
+    const cells = instance.allocate(4 * skyCellCount);
+    try {
+      instance.check('rebounce_cie_sky', type, sun, groundReflectance, cells);
+      instance.check('rebounce_engine_set_sky_distribution', this.#address, cells);
+    } finally {
+      instance.release(sun);
+      instance.release(cells);
+    }
+  }
+
+  /** From the next frame on, the surfaces of a material emit that of the scene times `scale`. */
+  setEmissionScale(material, scale) {
+    const address = this.#instance.put(new Uint8Array(new Float32Array(scale).buffer));
+    try {
+      this.#instance.check('rebounce_engine_set_emission_scale', this.#address, material, address);
+    } finally {
+      this.#instance.release(address);
+    }
+  }
+
+  #result(name) {
+    return this.#instance.floats(this.#instance.call(name, this.#address), 3 * this.patchCount);
+  }
+  directIrradiance() {
+    return this.#result('rebounce_engine_direct_irradiance');
+  }
+  indirectIrradiance() {
+    return this.#result('rebounce_engine_indirect_irradiance');
+  }
+  radiosity() {
+    return this.#result('rebounce_engine_radiosity');
+  }
+
+  #atVertices(name) {
+    const begin = performance.now();
+    this.#instance.check(name, this.#address, this.#vertices, this.vertexCount);
+    this.timings.vertices = performance.now() - begin;
+    return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
+  }
+  vertexIrradiance() {
+    return this.#atVertices('rebounce_engine_vertex_irradiance');
+  }
+  vertexDirectIrradiance() {
+    return this.#atVertices('rebounce_engine_vertex_direct_irradiance');
+  }
+
+  /** Frees the engine's memory. */
+  dispose() {
+    if (this.#address && !this.#instance.broken) {
+      this.#instance.call('rebounce_engine_destroy', this.#address);
+      for (const address of
+           [this.#lights.address, this.#sky, this.#milliseconds, this.#vertices]) {
+        this.#instance.release(address);
+      }
+    }
+    this.#address = 0;
+  }
+}
+
+function readMesh(file) {
+  const surfaceCount = file.tensor('mesh.back_triangle').length;
+  return {
+    position: file.tensor('mesh.position'),
+    normal: file.tensor('mesh.normal'),
+    texcoord: file.tensor('mesh.base_color_texcoord'),
+    color: file.tensor('mesh.vertex_color'),
+    triangle: file.tensor('mesh.triangle'),
+    triangleMaterial: file.tensor('mesh.triangle_material'),
+    surfaceCount,
+  };
+}
+
+const none = 0xFFFFFFFF;
+
+function readMaterials(file) {
+  const color = file.tensor('material.base_color');
+  const luminance = file.tensor('material.emitted_luminance');
+  const texture = file.tensor('material.base_color_texture');
+  const alphaMode = file.tensor('material.alpha_mode');
+  const cutoff = file.tensor('material.alpha_cutoff');
+  const alpha = file.tensor('material.base_alpha');
+  const wraps = [file.tensor('texture.wrap_s'), file.tensor('texture.wrap_t')];
+  const names = JSON.parse(file.metadata.names ?? '{}').materials ?? [];
+  return Array.from(texture, (number, k) => ({
+    name: names[k] ?? '',
+    baseColor: [...color.subarray(3 * k, 3 * k + 3)],
+    emittedLuminance: [...luminance.subarray(3 * k, 3 * k + 3)],
+    alphaMode: ['opaque', 'mask', 'blend'][alphaMode[k]],
+    alphaCutoff: cutoff[k],
+    alpha: alpha[k],
+    texture: number === none ? null : {
+      image: file.tensor(`texture.${number}`),
+      wrap: wraps.map((wrap) => ['repeat', 'clamp', 'mirror'][wrap[number]]),
+    },
+  }));
+}
+
+function readCameras(file) {
+  const fov = file.tensor('camera.vertical_fov');
+  const vector = (name, k) => [...file.tensor(`camera.${name}`).subarray(3 * k, 3 * k + 3)];
+  return Array.from(fov, (verticalFov, k) => ({
+    verticalFov,
+    position: vector('position', k),
+    up: vector('up', k),
+    backward: vector('backward', k),
+  }));
+}

@@ -1,0 +1,91 @@
+// What the page calls besides rebounce.h: a frame of lights in plain arrays, timed by stages.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "rebounce.h"
+#include "runtime/frame/c_handles.h"
+
+extern "C" {
+
+/// The time in milliseconds, by the clock of the page.
+[[clang::import_module("rebounce"), clang::import_name("now")]] double rebounce_web_now();
+
+}  // extern "C"
+
+namespace rebounce::c {
+namespace {
+
+/// A lamp as the page writes it: the fields of Light in their order, but name and profile.
+struct PlainLight {
+  float type;
+  Float3 position, direction, color;
+  float intensity, range, inner_cone_angle, outer_cone_angle, radius;
+  Float2 size;
+  Float3 tangent;
+};
+static_assert(sizeof(PlainLight) == 20 * sizeof(float));
+
+void take_plain(const PlainLight& plain, Light& light) {
+  light.type = static_cast<LightType>(plain.type);
+  light.position = plain.position;
+  light.direction = plain.direction;
+  light.color = plain.color;
+  light.intensity = plain.intensity;
+  light.range = plain.range;
+  light.inner_cone_angle = plain.inner_cone_angle;
+  light.outer_cone_angle = plain.outer_cone_angle;
+  light.radius = plain.radius;
+  light.size = plain.size;
+  light.tangent = plain.tangent;
+}
+
+/// Times the stages of a frame, one after the other.
+class StageClock {
+ public:
+  explicit StageClock(double* milliseconds) : next_(milliseconds), begin_(rebounce_web_now()) {}
+  void end_stage() {
+    const double now = rebounce_web_now();
+    *next_++ = now - begin_;
+    begin_ = now;
+  }
+
+ private:
+  double* next_;
+  double begin_;
+};
+
+}  // namespace
+
+extern "C" {
+
+/// Relights as rebounce_engine_relight does; `sky` is colour and luminance. Writes the milliseconds
+/// of direct light, product, and the sums before and after it.
+[[clang::export_name("rebounce_web_relight")]] rebounce_status rebounce_web_relight(
+    rebounce_engine* engine, const PlainLight* lights, std::size_t light_count,
+    const std::array<float, 4>* sky, double* milliseconds) {
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    engine->lights.resize(light_count);
+    for (std::size_t k = 0; k < light_count; ++k) take_plain(lights[k], engine->lights[k]);
+    check_lights(engine->lights);
+    const auto& [red, green, blue, luminance] = *sky;
+    Engine::Parts& parts = engine->engine.parts();
+    const OneThread guard(parts.use);
+    StageClock clock(milliseconds);
+    parts.compute_direct(engine->lights, {{red, green, blue}, luminance, engine->sky_distribution});
+    clock.end_stage();
+    parts.compute_initial_exitance();
+    clock.end_stage();
+    parts.apply_transfer();
+    clock.end_stage();
+    parts.compute_radiosity();
+    clock.end_stage();
+    return REBOUNCE_OK;
+  });
+}
+
+}  // extern "C"
+
+}  // namespace rebounce::c

@@ -1,0 +1,126 @@
+// The page: loads a scene, and draws a frame whenever the browser shows one.
+
+import { isSupported } from '../library/rebounce.js';
+import { Hand } from './hand.js';
+import { Panel } from './panel.js';
+import { scenes } from './scenes.js';
+import { Stage } from './stage.js';
+
+const loading = document.getElementById('loading');
+const message = document.getElementById('message');
+
+function say(title, text, action) {
+  message.replaceChildren();
+  const strong = document.createElement('strong');
+  strong.textContent = title;
+  message.append(strong, text);
+  if (action) {
+    const button = document.createElement('button');
+    button.textContent = action.title;
+    button.addEventListener('click', () => {
+      message.hidden = true;
+      action.run();
+    });
+    message.append(document.createElement('br'), button);
+  }
+  message.hidden = false;
+}
+
+function progress(part) {
+  loading.classList.toggle('on', part < 1);
+  loading.setAttribute('aria-valuenow', Math.round(100 * part));
+  loading.firstElementChild.style.width = `${100 * part}%`;
+}
+
+function makeStage() {
+  if (!isSupported()) {
+    say('This browser cannot run the page',
+        'It lacks SIMD or exceptions of WebAssembly. Browsers of 2023 and later have both.');
+    return null;
+  }
+  try {
+    return new Stage(document.getElementById('view'));
+  } catch {
+    say('There is no WebGL 2 here', 'Switch hardware acceleration on, or use another browser.');
+    return null;
+  }
+}
+
+const stage = makeStage();
+let panel = null, running = false, lastTimings = {};
+
+function frame() {
+  if (!running) return;
+  try {
+    const draw = stage.frame();
+    lastTimings = { ...stage.lighting.timings, draw };
+    panel.showTimes(lastTimings, stage.lighting.transfer.patchCount);
+  } catch (error) {
+    running = false;
+    say('The light has stopped', error.message, { title: 'Load the page again', run: reload });
+  }
+  requestAnimationFrame(frame);
+}
+
+function reload() {
+  location.reload();
+}
+
+async function open(id) {
+  const description = scenes.find((scene) => scene.id === id) ?? scenes[0];
+  const wasRunning = running;
+  progress(0.02);
+  try {
+    await stage.load(description, `scenes/${description.id}.safetensors`, progress);
+    message.hidden = true;
+    history.replaceState(null, '', `#${description.id}`);
+    panel.showScene();
+    running = true;
+    if (!wasRunning) requestAnimationFrame(frame);
+  } catch (error) {
+    say('This scene cannot be shown', error.message, { title: 'Try again', run: () => open(id) });
+    throw error;
+  } finally {
+    progress(1);
+  }
+}
+
+function start() {
+  panel = new Panel(stage, scenes, (id) => open(id).catch(() => {}));
+  new Hand(stage, () => panel.showLamps());
+  addEventListener('resize', () => stage.resize());
+  stage.canvas.addEventListener('webglcontextlost', (event) => {
+    event.preventDefault();
+    running = false;
+    say('The graphics card was taken away', 'The picture comes back when the browser gives it back.',
+        { title: 'Load the page again', run: reload });
+  });
+  stage.canvas.addEventListener('webglcontextrestored', reload);
+  return open(location.hash.slice(1));
+}
+
+/** For tests, and for the curious. */
+window.rebounce = {
+  ready: stage ? start() : Promise.reject(new Error(message.textContent)),
+  stage,
+  get patchCount() {
+    return stage.lighting.transfer.patchCount;
+  },
+  /** Relights by lights in the fields of a light file alone, until `resume()`. */
+  setLights(lights, sky = {}) {
+    running = false;
+    stage.lighting.update(lights, sky);
+    lastTimings = { ...stage.lighting.timings };
+    stage.renderer.render(stage.scene, stage.camera);
+  },
+  resume() {
+    if (running) return;
+    running = true;
+    requestAnimationFrame(frame);
+  },
+  indirectIrradiance: () => stage.lighting.engine.indirectIrradiance().slice(),
+  get timings() {
+    return lastTimings;
+  },
+};
+window.rebounce.ready.catch(() => {});

@@ -1,0 +1,163 @@
+// The controls around the canvas.
+
+import { clockText } from './sun.js';
+import { mostLamps } from './stage.js';
+
+const element = (name, attributes = {}, ...children) => {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...children);
+  return made;
+};
+const byId = (id) => document.getElementById(id);
+
+export class Panel {
+  #stage;
+  #part = 'all';
+  #times = new Map();
+
+  constructor(stage, scenes, onScene) {
+    this.#stage = stage;
+    for (const scene of scenes) {
+      const button = element('button', { 'data-scene': scene.id }, scene.title);
+      button.addEventListener('click', () => onScene(scene.id));
+      byId('scenes').append(button);
+    }
+    byId('add').addEventListener('click', () => this.addLamp());
+    byId('swing').addEventListener('click', () => this.toggleSwing());
+    byId('hour').addEventListener('input', (event) => this.#setHour(Number(event.target.value)));
+    for (const button of byId('parts').children) {
+      button.addEventListener('click', () => this.show(button.dataset.part));
+    }
+    addEventListener('keydown', (event) => this.#onKey(event));
+    this.#makeTimes();
+  }
+
+  #onKey(event) {
+    if (event.target.matches('input, button') && event.key === ' ') return;
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const parts = { 1: 'all', 2: 'bounced', 3: 'direct' };
+    if (parts[event.key]) this.show(parts[event.key]);
+    else if (event.key === ' ') this.toggleSwing();
+    else if (event.key === 'a') this.addLamp();
+    else return;
+    event.preventDefault();
+  }
+
+  addLamp() {
+    const { bounds, description } = this.#stage;
+    const middle = bounds.min.clone().lerp(bounds.max, 0.5).toArray();
+    const colors = ['#ffd2a1', '#9cc4ff', '#ff9c8f', '#b8ffb0'];
+    this.#stage.addLamp({
+      position: middle, color: colors[this.#stage.lamps.length % colors.length],
+      intensity: 0.6 * description.lamps[0].intensity,
+    });
+    this.showLamps();
+  }
+
+  toggleSwing() {
+    this.#stage.swinging = !this.#stage.swinging;
+    byId('swing').setAttribute('aria-pressed', this.#stage.swinging);
+  }
+
+  show(part) {
+    this.#part = part;
+    this.#stage.show(part);
+    for (const button of byId('parts').children) {
+      button.setAttribute('aria-checked', button.dataset.part === part);
+    }
+  }
+
+  #setHour(hour) {
+    this.#stage.setHour(hour);
+    this.#stage.relight();
+    this.#stage.expose();
+    byId('clock').textContent = clockText(hour);
+  }
+
+  /** To be called when another scene is there. */
+  showScene() {
+    const { description, hour } = this.#stage;
+    for (const button of byId('scenes').children) {
+      button.setAttribute('aria-current', button.dataset.scene === description.id);
+    }
+    byId('sun').hidden = hour === null;
+    if (hour !== null) {
+      byId('hour').value = hour;
+      byId('clock').textContent = clockText(hour);
+    }
+    this.show(this.#part);
+    this.showLamps();
+  }
+
+  /** To be called when lamps were added, taken away or chosen. */
+  showLamps() {
+    byId('lamps').replaceChildren(...this.#stage.lamps.map((lamp) => this.#lampItem(lamp)));
+    byId('add').disabled = this.#stage.lamps.length >= mostLamps;
+  }
+
+  #lampItem(lamp) {
+    const color = element('input', { type: 'color', value: lamp.color, 'aria-label': 'Colour' });
+    color.addEventListener('input', () => { lamp.color = color.value; });
+    const power = element('input', {
+      type: 'range', min: -2, max: 2, step: 0.01, value: Math.log2(lamp.part),
+      'aria-label': 'Brightness',
+    });
+    power.addEventListener('input', () => {
+      lamp.part = 2 ** Number(power.value);
+      lamp.refresh();
+    });
+    const toggle = element(
+        'button', { class: 'power', 'aria-pressed': lamp.on, title: 'Switch on or off' });
+    toggle.addEventListener('click', () => {
+      lamp.on = !lamp.on;
+      lamp.refresh();
+      toggle.setAttribute('aria-pressed', lamp.on);
+    });
+    const remove = element('button', { class: 'remove', title: 'Remove' }, '\u00D7');
+    remove.addEventListener('click', () => {
+      this.#stage.removeLamp(lamp);
+      this.showLamps();
+    });
+    const item = element('li', {}, color, power, toggle, remove);
+    item.classList.toggle('chosen', lamp === this.#stage.chosen);
+    item.addEventListener('pointerdown', () => {
+      this.#stage.chosen = lamp;
+      for (const other of byId('lamps').children) other.classList.toggle('chosen', other === item);
+    });
+    return item;
+  }
+
+  #makeTimes() {
+    const stages = [
+      ['direct', 'Direct light'], ['product', 'All bounces'], ['vertices', 'Vertices'],
+      ['draw', 'Drawing'],
+    ];
+    for (const [name, title] of stages) {
+      const value = document.createTextNode('');
+      const optional = name === 'vertices' || name === 'draw' ? ' optional' : '';
+      byId('times').firstElementChild.append(element(
+          'div', { class: name + optional }, element('dt', {}, title),
+          element('dd', {}, value, ' ', element('small', {}, 'ms'))));
+      this.#times.set(name, { value, mean: 0 });
+    }
+    const patches = document.createTextNode('');
+    byId('times').firstElementChild.append(
+        element('div', {}, element('dt', {}, 'Patches'), element('dd', {}, patches)));
+    this.#times.set('patches', { value: patches });
+  }
+
+  /** Shows the milliseconds of the stages, smoothed. */
+  showTimes(timings, patchCount) {
+    for (const [name, { value, mean }] of this.#times) {
+      if (name === 'patches') continue;
+      const smooth = mean + 0.1 * (timings[name] - mean);
+      this.#times.get(name).mean = smooth;
+      const text = smooth.toFixed(1);
+      if (value.data !== text) value.data = text;
+    }
+    const text = patchCount.toLocaleString('en');
+    const { value } = this.#times.get('patches');
+    if (value.data !== text) value.data = text;
+  }
+}

@@ -1,0 +1,193 @@
+// What is on the canvas: a scene that Rebounce lights, its lamps, and the camera.
+
+import * as THREE from 'three';
+import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { TransferLighting } from '../library/transfer_lighting.js';
+import { Lamp } from './lamp.js';
+import { sunAndSky } from './sun.js';
+
+export const mostLamps = 4;
+
+export class Stage {
+  lamps = [];
+  chosen = null;
+  swinging = false;
+  hour = null;
+
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
+    this.renderer.toneMapping = THREE.AgXToneMapping;
+    this.renderer.shadowMap.enabled = true;
+    this.scene = new THREE.Scene();
+    this.camera = new THREE.PerspectiveCamera();
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.enableDamping = true;
+    this.sun = new THREE.DirectionalLight();
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.set(2048, 2048);
+    this.sun.shadow.bias = -0.001;
+    this.begun = performance.now();
+  }
+
+  /** Shows another scene; the one before stays until this one is there. */
+  async load(description, url, onProgress) {
+    const lighting = await TransferLighting.load(url, { onProgress });
+    this.#clear();
+    this.lighting = lighting;
+    this.description = description;
+    this.hour = description.hour ?? null;
+    this.scene.add(lighting.mesh);
+    if (description.darkEmitters) this.#darken();
+    lighting.mesh.geometry.computeBoundingSphere();
+    lighting.mesh.geometry.computeBoundingBox();
+    this.bounds = lighting.mesh.geometry.boundingBox;
+    this.size = lighting.mesh.geometry.boundingSphere.radius;
+    this.#placeCamera();
+    this.#placeSun();
+    for (const lamp of description.lamps) this.addLamp(lamp);
+    this.setHour(this.hour);
+    this.relight();
+    this.expose();
+  }
+
+  #clear() {
+    for (const lamp of [...this.lamps]) this.removeLamp(lamp);
+    if (this.lighting) {
+      this.scene.remove(this.lighting.mesh);
+      this.lighting.dispose();
+    }
+    this.scene.remove(this.sun, this.sun.target);
+  }
+
+  #darken() {
+    this.lighting.mesh.material.forEach((material, k) => {
+      if (material.emissive.getHex() === 0) return;
+      this.lighting.engine.setEmissionScale(k, [0, 0, 0]);
+      material.emissive.set(0);
+    });
+  }
+
+  #placeCamera() {
+    const { camera: position, target, fov } = this.description;
+    const [given] = this.lighting.transfer.cameras;
+    this.camera.near = this.size / 200;
+    this.camera.far = this.size * 20;
+    this.fov = fov ?? THREE.MathUtils.radToDeg(given.verticalFov);
+    this.camera.position.set(...(position ?? given.position));
+    const middle = this.bounds.getCenter(new THREE.Vector3());
+    if (target) {
+      this.controls.target.set(...target);
+    } else {
+      const backward = new THREE.Vector3(...given.backward);
+      const distance = Math.max(0.5, this.camera.position.distanceTo(middle));
+      this.controls.target.copy(this.camera.position).addScaledVector(backward, -distance);
+    }
+    this.controls.update();
+    this.resize();
+  }
+
+  #placeSun() {
+    if (this.hour === null) return;
+    const { camera } = this.sun.shadow;
+    camera.left = camera.bottom = -this.size;
+    camera.right = camera.top = this.size;
+    camera.far = 4 * this.size;
+    camera.updateProjectionMatrix();
+    this.sun.shadow.normalBias = this.size / 500;
+    this.sun.target.position.copy(this.bounds.getCenter(new THREE.Vector3()));
+    this.scene.add(this.sun, this.sun.target);
+  }
+
+  resize() {
+    const { clientWidth, clientHeight } = this.canvas;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    // A narrow picture shows as much from side to side as a square one.
+    const half = Math.tan(THREE.MathUtils.degToRad((this.fov ?? 50) / 2));
+    const wider = Math.max(1, 1 / this.camera.aspect);
+    this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(half * wider));
+    this.camera.updateProjectionMatrix();
+  }
+
+  addLamp(description) {
+    if (this.lamps.length >= mostLamps) return;
+    const lamp = new Lamp(description, this.description.lampRadius, 4 * this.size);
+    this.lamps.push(lamp);
+    this.scene.add(lamp.object);
+    this.chosen = lamp;
+  }
+
+  removeLamp(lamp) {
+    this.lamps.splice(this.lamps.indexOf(lamp), 1);
+    this.scene.remove(lamp.object);
+    lamp.dispose();
+    if (this.chosen === lamp) this.chosen = this.lamps.at(-1) ?? null;
+  }
+
+  /** Moves a lamp to `position`, or as near to it as the scene reaches. */
+  moveLamp(lamp, position) {
+    const margin = 1.5 * this.description.lampRadius;
+    lamp.home.copy(position).clamp(
+        this.bounds.min.clone().addScalar(margin), this.bounds.max.clone().subScalar(margin));
+    lamp.object.position.copy(lamp.home);
+  }
+
+  /** Sets sun and sky; null: neither. */
+  setHour(hour) {
+    this.hour = hour;
+    this.sky = {};
+    if (hour === null) {
+      this.scene.background = new THREE.Color('#101114');
+      return;
+    }
+    const { sun, sky, shown } = sunAndSky(hour);
+    this.sky = sky;
+    this.scene.background = new THREE.Color(...shown);
+    this.sun.intensity = sun?.intensity ?? 0;
+    this.sun.castShadow = sun !== null;
+    if (!sun) return;
+    this.sun.color.setRGB(...sun.color);
+    this.sun.position.copy(this.sun.target.position)
+        .addScaledVector(new THREE.Vector3(...sun.direction).normalize(), -2 * this.size);
+  }
+
+  /** Shows 'all' light, or 'bounced' or 'direct' light alone. */
+  show(part) {
+    this.lighting.show(part === 'bounced' ? 0 : 1, part === 'direct' ? 0 : 1);
+  }
+
+  get lights() {
+    return [...this.lamps.map((lamp) => lamp.light), ...(this.hour === null ? [] : [this.sun])];
+  }
+
+  relight() {
+    this.scene.updateMatrixWorld();
+    this.lighting.update(this.lights, this.sky);
+  }
+
+  /** Chooses the exposure by the light that there is. */
+  expose() {
+    const light = this.lighting.engine.radiosity();
+    const mean = light.reduce((sum, value) => sum + value, 0) / light.length;
+    this.renderer.toneMappingExposure = 0.3 * Math.PI / Math.max(mean, 1e-3);
+  }
+
+  /** One frame: relights and draws; the milliseconds that the drawing took to ask for. */
+  frame() {
+    if (this.swinging) {
+      const seconds = (performance.now() - this.begun) / 1000;
+      this.lamps.forEach((lamp, k) => lamp.swing(seconds + 1.3 * k, 0.16 * this.size));
+    }
+    this.controls.update();
+    this.relight();
+    for (const lamp of this.lamps) {
+      lamp.ring.quaternion.copy(this.camera.quaternion);
+      lamp.ring.visible = lamp === this.chosen;
+    }
+    const begin = performance.now();
+    this.renderer.render(this.scene, this.camera);
+    return performance.now() - begin;
+  }
+}

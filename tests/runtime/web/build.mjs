@@ -1,0 +1,29 @@
+// Builds the module and the page, with a small scene. Usage: node build.mjs PROGRAM FOLDER
+
+import { execFileSync } from 'node:child_process';
+import { copyFileSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { lights, root, sky, skipWithout, web } from './support.mjs';
+
+const [, , program, folder] = process.argv;
+skipWithout('/usr/bin/clang++-19', 'clang++-19');
+skipWithout('/usr/include/wasm32-wasi/c++/v1/vector', 'libc++-19-dev-wasm32');
+skipWithout(join(web, 'node_modules/three/package.json'), 'node_modules; run ./dev web');
+
+const run = (...command) =>
+    execFileSync(command[0], command.slice(1), { stdio: 'inherit', cwd: root });
+const module = join(folder, 'module');
+run('cmake', '-S', web, '-B', module, '-G', 'Ninja',
+    `-DCMAKE_TOOLCHAIN_FILE=${join(web, 'wasi.cmake')}`);
+run('cmake', '--build', module);
+run('node', join(web, 'pack_module.mjs'), join(module, 'rebounce.wasm'));
+
+const page = join(folder, 'page');
+run('node', join(web, 'build_page.mjs'), page);
+const scene = join(folder, 'cornell_box.safetensors');
+run(program, 'precompute', 'tests/scenes/cornell_box.gltf', '--patches', '500', '--quiet', '-o',
+    scene);
+copyFileSync(scene, join(page, 'scenes/cornell_box.safetensors'));
+writeFileSync(join(folder, 'lights.json'), JSON.stringify({ lights, sky }));
+run(program, 'solve', scene, '--lights', join(folder, 'lights.json'), '--quiet', '-o',
+    join(folder, 'native.csv'));

@@ -1,0 +1,29 @@
+// What the tests of the page share: where things are, and what is left out without them.
+
+import { existsSync } from 'node:fs';
+import { join } from 'node:path';
+import { fileURLToPath } from 'node:url';
+
+export const root = fileURLToPath(new URL('../../..', import.meta.url));
+export const web = join(root, 'runtime/web');
+
+/** Ends the program as CTest's SKIP_RETURN_CODE says if something that it needs is missing. */
+export function skipWithout(path, what) {
+  if (existsSync(path)) return;
+  console.log(`skipped: there is no ${what} (${path})`);
+  process.exit(77);
+}
+
+/** The lamps that tests light the Cornell box with, and a sky. */
+export const lights = [
+  { type: 'point', position: [0.2, 0.42, 0.2], color: [1, 0.8, 0.6], intensity: 4 },
+  {
+    type: 'spot', position: [0.3, 0.5, 0.1], direction: [0.3, -1, 0.2], intensity: 10,
+    spot: { innerConeAngle: 0.3, outerConeAngle: 0.6 },
+  },
+  {
+    type: 'rectangle', position: [0.28, 0.5, 0.28], width: 0.1, height: 0.2, intensity: 100,
+  },
+  { type: 'directional', direction: [0.2, -0.4, 1], intensity: 30 },
+];
+export const sky = { color: [0.6, 0.8, 1], luminance: 20 };

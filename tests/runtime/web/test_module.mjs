@@ -1,0 +1,106 @@
+// The runtime as WebAssembly against the native one. Usage: node test_module.mjs FOLDER
+
+import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { lights, sky, skipWithout, web } from './support.mjs';
+
+const folder = process.argv[2];
+const scene = join(folder, 'cornell_box.safetensors');
+skipWithout(join(folder, 'native.csv'), 'module; see the test WebBuild');
+
+const { RebounceError, Transfer } = await import(join(web, 'library/rebounce.js'));
+const { Instance } = await import(join(web, 'library/instance.js'));
+const bytes = new Uint8Array(readFileSync(scene));
+const load = (changed = bytes) => Transfer.load(changed.slice().buffer, { name: 'box' });
+
+/** The columns of a table whose names begin with `name`, row by row. */
+function columns(table, name) {
+  const [head, ...rows] = table.trim().split('\n').map((line) => line.split(','));
+  const wanted = head.flatMap((title, k) => (title.startsWith(name) ? [k] : []));
+  return rows.flatMap((row) => wanted.map((k) => Number(row[k])));
+}
+
+test('its light is that of the native library', async () => {
+  const transfer = await load();
+  const engine = transfer.createEngine();
+  engine.relight(lights, sky);
+  const native = readFileSync(join(folder, 'native.csv'), 'utf8');
+  for (const [name, light] of [
+    ['direct_irradiance', engine.directIrradiance()],
+    ['indirect_irradiance', engine.indirectIrradiance()],
+    ['radiosity', engine.radiosity()],
+  ]) {
+    const expected = columns(native, name);
+    assert.equal(light.length, expected.length);
+    const mean = expected.reduce((a, b) => a + b) / expected.length;
+    assert.ok(mean > 1, `${name}: the test shows something`);
+    const largest = expected.reduce((most, x, k) => Math.max(most, Math.abs(x - light[k])), 0);
+    assert.ok(largest < 1e-4 * mean, `${name}: ${largest} of a mean of ${mean}`);
+  }
+  engine.dispose();
+  transfer.dispose();
+});
+
+test('what is out of range is refused, and the last frame stays', async () => {
+  const transfer = await load();
+  const engine = transfer.createEngine();
+  engine.relight(lights);
+  const before = engine.indirectIrradiance().slice();
+  for (const [bad, message] of [
+    [[{}, { intensity: -1 }], /light 1: .*intensity/], [[{ type: 'sphere' }], /light 0: .*radius/],
+    [[{ type: 'candle' }], /candle/],
+  ]) {
+    assert.throws(() => engine.relight(bad), (error) => {
+      assert.ok(error instanceof RebounceError);
+      assert.match(error.message, message);
+      return true;
+    });
+  }
+  assert.throws(() => engine.setSky(99, [0, -1, 0]), RebounceError);
+  assert.throws(() => engine.setEmissionScale(1000, [1, 1, 1]), /material/);
+  assert.deepEqual(engine.indirectIrradiance(), before);
+  engine.relight(lights);
+  assert.deepEqual(engine.indirectIrradiance(), before);
+  engine.dispose();
+  transfer.dispose();
+});
+
+test('a file that is damaged is refused with a reason', async () => {
+  for (const size of [0, 4, 100, bytes.length / 2 | 0, bytes.length - 1]) {
+    await assert.rejects(load(bytes.subarray(0, size)), RebounceError);
+  }
+  const flipped = bytes.slice();
+  flipped[bytes.length - 100] ^= 1;
+  await assert.rejects(load(flipped), /checksum/);
+  await assert.rejects(load(new TextEncoder().encode('<html>Not found</html>')), RebounceError);
+});
+
+test('600 frames and 20 loads take no further memory', async () => {
+  const instance = await Instance.get();
+  const transfer = await load();
+  const engine = transfer.createEngine();
+  const moved = (k) => [{ ...lights[0], position: [0.1 + 0.0005 * k, 0.3, 0.2] }, lights[2]];
+  engine.relight(moved(0));
+  const before = instance.memoryBytes;
+  for (let k = 0; k < 600; ++k) {
+    engine.relight(moved(k), sky);
+    engine.vertexIrradiance();
+  }
+  assert.equal(instance.memoryBytes, before);
+  engine.dispose();
+  transfer.dispose();
+  for (let k = 0; k < 20; ++k) {
+    const again = await load();
+    again.createEngine().dispose();
+    again.dispose();
+  }
+  assert.ok(instance.memoryBytes <= before + (1 << 20), 'what is disposed of is free');
+});
+
+test('the module is small', () => {
+  const text = readFileSync(join(web, 'library/wasm.js'), 'utf8');
+  const packed = Buffer.from(/'([^']+)'/.exec(text)[1], 'base64');
+  assert.ok(packed.length < 200e3, `${packed.length} bytes`);
+});
