@@ -7,6 +7,15 @@ import { fileURLToPath } from 'node:url';
 export const root = fileURLToPath(new URL('../../..', import.meta.url));
 export const web = join(root, 'runtime/web');
 
+export const chromiumPath = '/usr/bin/chromium';
+
+/** Of Chromium, to draw in software and ask nothing of the net. */
+export const launchArguments = [
+  '--headless', '--no-sandbox', '--disable-quic', '--no-first-run',
+  '--disable-background-networking', '--disable-component-update', '--disable-sync',
+  '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+];
+
 /** Ends the program as CTest's SKIP_RETURN_CODE says if something that it needs is missing. */
 export function skipWithout(path, what) {
   if (existsSync(path)) return;

@@ -4,10 +4,9 @@ import assert from 'node:assert/strict';
 import { copyFileSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, afterEach, before, test } from 'node:test';
-import { lights, skipWithout, web } from './support.mjs';
+import { chromiumPath, launchArguments, lights, skipWithout, web } from './support.mjs';
 
 const folder = process.argv[2];
-const chromiumPath = '/usr/bin/chromium';
 skipWithout(join(folder, 'native.csv'), 'page; see the test WebBuild');
 skipWithout(chromiumPath, 'Chromium');
 
@@ -19,14 +18,7 @@ const scene = join(scenes, 'cornell_box.safetensors');
 let server, browser;
 before(async () => {
   server = await serve(join(folder, 'page'));
-  browser = await chromium.launch({
-    executablePath: chromiumPath,
-    args: [
-      '--headless', '--no-sandbox', '--disable-quic', '--no-first-run',
-      '--disable-background-networking', '--disable-component-update', '--disable-sync',
-      '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-    ],
-  });
+  browser = await chromium.launch({ executablePath: chromiumPath, args: launchArguments });
 });
 after(async () => {
   await browser?.close();
