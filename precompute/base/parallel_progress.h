@@ -29,6 +29,15 @@ class ParallelProgress {
     }
   }
 
+  /// As stopped(), but asks once more: for iterations that take long.
+  bool look() {
+    if (progress_ && omp_get_thread_num() == 0 &&
+        !progress_(static_cast<double>(done_) / static_cast<double>(count_))) {
+      stop_ = true;
+    }
+    return stop_;
+  }
+
   /// Call this after the loop. Throws Cancelled if the loop was stopped.
   void finish() const {
     if (stop_) throw Cancelled();

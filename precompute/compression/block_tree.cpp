@@ -44,8 +44,10 @@ class PieceCompressor {
  public:
   PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
                   const std::vector<ClusterWeight>& weights, const WantedBlocks& wanted,
-                  const PartSizes& sizes, double multiplier, const BlockPiece& piece)
-      : tree_(tree),
+                  const PartSizes& sizes, double multiplier, const BlockPiece& piece,
+                  ParallelProgress& loop)
+      : loop_(loop),
+        tree_(tree),
         weights_(weights),
         wanted_(wanted),
         sizes_(sizes),
@@ -107,7 +109,7 @@ class PieceCompressor {
   }
 
   BlockPart compress(std::uint32_t row, std::uint32_t column) const {
-    if (!wanted_.wanted(row, column)) return {};
+    if (loop_.look() || !wanted_.wanted(row, column)) return {};
     if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return compress_children(row, column);
     const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
     const TransferBlock place{.row_begin = rows.begin,
@@ -210,6 +212,7 @@ class PieceCompressor {
     return part;
   }
 
+  ParallelProgress& loop_;  ///< of the pieces
   const ClusterTree& tree_;
   const std::vector<ClusterWeight>& weights_;
   const WantedBlocks& wanted_;
@@ -270,8 +273,9 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   for (std::size_t k = 0; k < pieces.size(); ++k) {
     if (loop.stopped()) continue;
     if (wants(pieces[k])) {
-      parts[k] = PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, multiplier, pieces[k])
-                     .compress();
+      parts[k] =
+          PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, multiplier, pieces[k], loop)
+              .compress();
     }
     loop.advance();
   }

@@ -119,8 +119,10 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
   const ReferenceLighting validation = validation_truth(matrix, lights.validation);
+  report_progress(progress, 0);
   MatrixCompression compression(matrix, patches, lights.training,
                                 part_sizes(settings, patches.size()), options_of(settings));
+  report_progress(progress, 0);
   const double tolerance = settings.tolerance;
   MultiplierSearch search(compression.multiplier_for(search_start(settings, patches.size())),
                           {kAim * tolerance, kMost * tolerance});
