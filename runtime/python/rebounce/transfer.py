@@ -27,7 +27,8 @@ class TransferOperator(LinearOperator):  # type: ignore[misc]
     """Y = F (I - rho F)^-1: takes initial exitance in lx to indirect irradiance in lx.
 
     Shape [3n, 3n], channel by channel: entry c n + i is channel c of patch i. `op @ x` for x [3n] or
-    [3n, k]; float32 stays float32. Columns (hours, lamps) go through together without copies of x.
+    [3n, k]; float32 stays float32. Columns (hours, lamps) go through together without copies of x,
+    fastest where they lie one after the other in memory (order="F"); the result lies as x does.
     `op.H` is the adjoint, A Y A^-1 with the areas A. `op.channel(c)` is one channel, [n, n].
     """
 
@@ -53,7 +54,9 @@ class TransferOperator(LinearOperator):  # type: ignore[misc]
 
     def _apply(self, x: Array, adjoint: bool) -> Array:
         dtype = np.float32 if x.dtype == np.float32 else np.float64
-        return self._data._core.apply(_block(x, self.shape[0], dtype), adjoint)
+        if x.ndim == 2 and x.flags.f_contiguous and x.dtype == dtype:
+            return self._data._core.apply(x.T, adjoint, True).T
+        return self._data._core.apply(_block(x, self.shape[0], dtype), adjoint, False)
 
     def _matvec(self, x: Array) -> Array:
         return self._apply(x, False).reshape(x.shape)
