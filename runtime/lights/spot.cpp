@@ -39,7 +39,7 @@ void evaluate_block(const PreparedLight& lamp, const PatchPointBlock& points, st
   const glm::vec3 axis = lamp.direction;
   const float cone_cosine = lamp.cone_cosine, cone_scale = lamp.cone_scale;
   const std::size_t begin = part * UnitLightBlock::kPart;
-  const auto& [x, y, z] = light.direction;
+  const auto &x = light.direction[0], &y = light.direction[1], &z = light.direction[2];
 #pragma omp simd
   for (std::size_t k = begin; k < begin + UnitLightBlock::kPart; ++k) {
     const float cosine = -(x[k] * axis.x + y[k] * axis.y + z[k] * axis.z);

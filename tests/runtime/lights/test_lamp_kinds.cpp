@@ -113,8 +113,9 @@ double mean_of_places(const PreparedLight& lamp, const glm::vec3& normal) {
   constexpr int kSide = 200;
   double sum = 0;
   for (int k = 0; k < kSide * kSide; ++k) {
-    const glm::vec2 place((static_cast<float>(k % kSide) + 0.5F) / kSide,
-                          (static_cast<float>(k / kSide) + 0.5F) / kSide);
+    const int row = k / kSide, column = k % kSide;
+    const glm::vec2 place((static_cast<float>(column) + 0.5F) / kSide,
+                          (static_cast<float>(row) + 0.5F) / kSide);
     UnitLight light;
     lamp.evaluate_places({0, 0, 0}, {&place, 1}, {&light, 1});
     sum += light.illuminance * std::max(0.0F, glm::dot(light.direction, normal));
