@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
+#include <map>
 #include <sstream>
 
+#include "tests/precompute/facets/city_facets.h"
 #include "tests/support/command_line.h"
 #include "tests/support/npz_reader.h"
 
@@ -81,6 +84,48 @@ TEST_F(ViewFactorsCommand, WritesTheFilesOfUDales) {
   const std::string sky = text_of(path("case/svf.inp.064"));
   EXPECT_TRUE(sky.starts_with("# sky view factors\n0.80")) << sky;
   EXPECT_EQ(std::ranges::count(sky, '\n'), 3);
+}
+
+TEST_F(ViewFactorsCommand, FilesOfAStreetPassTheChecksOfUDales) {
+  const Facets facets = test::street_canyon(1);
+  std::ostringstream obj;
+  for (const glm::dvec3& v : facets.vertex) obj << "v " << v.x << ' ' << v.y << ' ' << v.z << '\n';
+  for (std::size_t k = 0; k < facets.size(); ++k) {
+    obj << 'f';
+    for (const std::uint32_t v : facets.corners(k)) obj << ' ' << v + 1;
+    obj << '\n';
+  }
+  const auto summary = summary_of(
+      {"view-factors", write("street.obj", obj.str()), "-o", path("street"), "--quality", "low"});
+  EXPECT_GT(summary["dropped_pairs"], 0);
+  EXPECT_LE(summary["dropped_of_row"], 5e-4);
+
+  std::vector<double> area, sum;
+  std::ifstream sky(path("street/svf.inp.001"));
+  std::string comment;
+  std::getline(sky, comment);
+  for (std::size_t k = 0; k < facets.size(); ++k) {
+    area.push_back(glm::length(facets.vector_area(k)));
+    sky >> sum.emplace_back();
+    ASSERT_GE(sum[k], 0);
+    ASSERT_LE(sum[k], 1);
+  }
+  std::map<std::pair<std::size_t, std::size_t>, double> exchange;
+  std::ifstream matrix(path("street/vfsparse.inp.001"));
+  std::size_t i = 0, j = 0;
+  double factor = 0;
+  while (matrix >> i >> j >> factor) {
+    ASSERT_GT(factor, 0);
+    ASSERT_LE(factor, 1);
+    ASSERT_LE(area[i - 1] * factor, std::min(area[i - 1], area[j - 1]));
+    sum[i - 1] += factor;
+    exchange[{i, j}] = area[i - 1] * factor;
+  }
+  EXPECT_EQ(exchange.size(), summary["factor_count"]);
+  for (const auto& [pair, there] : exchange) {
+    ASSERT_NEAR(exchange.at({pair.second, pair.first}), there, 1e-8 * there);
+  }
+  for (const double all : sum) ASSERT_NEAR(all, 1, 1e-3);
 }
 
 TEST_F(ViewFactorsCommand, AddsExchangeFactorsOfAnEnclosure) {
