@@ -41,7 +41,7 @@ class TriangleTree {
       const Entry next = stack[--waiting];
       if (next.t > t_far) continue;
       if (next.child < 0) {
-        t_far = visit_leaf(beam, leaf_[static_cast<std::size_t>(~next.child)], t_far, visit);
+        t_far = visit_leaf(beam, leaf_[leaf_number(next.child)], t_far, visit);
         if (t_far < beam.t_near) return;
         continue;
       }
@@ -94,6 +94,10 @@ class TriangleTree {
   struct Range;
   class Builder;
 
+  static std::size_t leaf_number(std::int32_t child) {
+    const std::int32_t number = ~child;
+    return static_cast<std::size_t>(number);
+  }
   static Four repeat(float x) { return Four{x, x, x, x}; }
   static Four smaller(const Four& a, const Four& b) { return a < b ? a : b; }
   static Four larger(const Four& a, const Four& b) { return a > b ? a : b; }

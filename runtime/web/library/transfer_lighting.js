@@ -8,7 +8,8 @@ const attributeName = 'bouncedIrradiance';
 /** The three.js light as a light of Rebounce; null for one that is neither lamp nor sun. */
 export function toLight(light) {
   const position = light.getWorldPosition(new THREE.Vector3()).toArray();
-  const plain = { position, color: light.color.toArray(), intensity: light.intensity };
+  const intensity = light.visible ? light.intensity : 0;
+  const plain = { position, color: light.color.toArray(), intensity };
   const alongTarget = () => light.target.getWorldPosition(new THREE.Vector3())
                                 .sub(light.getWorldPosition(new THREE.Vector3())).toArray();
   if (light.isPointLight) return { ...plain, type: 'point', range: light.distance };

@@ -71,7 +71,8 @@ async function open(id) {
   const wasRunning = running;
   progress(0.02);
   try {
-    await stage.load(description, `scenes/${description.id}.safetensors`, progress);
+    const shown = await stage.load(description, `scenes/${description.id}.safetensors`, progress);
+    if (!shown) return;
     message.hidden = true;
     history.replaceState(null, '', `#${description.id}`);
     panel.showScene();

@@ -56,7 +56,7 @@ export class Panel {
   }
 
   toggleSwing() {
-    this.#stage.swinging = !this.#stage.swinging;
+    this.#stage.toggleSwing();
     byId('swing').setAttribute('aria-pressed', this.#stage.swinging);
   }
 

@@ -13,6 +13,7 @@ export class Stage {
   chosen = null;
   swinging = false;
   hour = null;
+  #turn = 0;
 
   constructor(canvas) {
     this.canvas = canvas;
@@ -30,9 +31,17 @@ export class Stage {
     this.begun = performance.now();
   }
 
-  /** Shows another scene; the one before stays until this one is there. */
+  /**
+   * Shows another scene; the one before stays until this one is there.
+   * @returns {Promise<boolean>} false if a later call came before the file
+   */
   async load(description, url, onProgress) {
+    const turn = ++this.#turn;
     const lighting = await TransferLighting.load(url, { onProgress });
+    if (turn !== this.#turn) {
+      lighting.dispose();
+      return false;
+    }
     this.#clear();
     this.lighting = lighting;
     this.description = description;
@@ -49,6 +58,7 @@ export class Stage {
     this.setHour(this.hour);
     this.relight();
     this.expose();
+    return true;
   }
 
   #clear() {
@@ -132,6 +142,12 @@ export class Stage {
     lamp.home.copy(position).clamp(
         this.bounds.min.clone().addScalar(margin), this.bounds.max.clone().subScalar(margin));
     lamp.object.position.copy(lamp.home);
+  }
+
+  /** Lets lamps swing around where they are, or leaves them where they have come to. */
+  toggleSwing() {
+    this.swinging = !this.swinging;
+    for (const lamp of this.lamps) lamp.home.copy(lamp.object.position);
   }
 
   /** Sets sun and sky; null: neither. */

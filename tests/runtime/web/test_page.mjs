@@ -33,6 +33,7 @@ afterEach(async () => {
 /** Opens the page; `faults` gathers what it says on its console. */
 async function open(viewport = { width: 640, height: 480 }, prepare = () => {}) {
   const page = await browser.newPage({ viewport });
+  page.setDefaultTimeout(120000);  // drawing is slow without a graphics card
   opened.push(page);
   const faults = [];
   page.on('pageerror', (error) => faults.push(String(error)));
