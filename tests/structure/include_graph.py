@@ -52,7 +52,7 @@ ROOMS = {
     "precompute/facets": "View factors between given polygons, and their files.",
     "precompute/build": "The offline stage from end to end.",
     "precompute/cli": "The command line.",
-    "runtime/python": "The Python package: its module, its pages in Python, its tests.",
+    "runtime/python": "The Python package: its module in C++, and what is written in Python.",
     "tests/scenes": "Scenes that tests, benchmarks and pages share.",
     "tests/support": "Made-up scenes, readers and counters that tests and benchmarks share.",
     "bench/support": "Tables, timing, scenes and light changes that the benchmarks share.",
