@@ -25,7 +25,7 @@ constexpr double kMostLeak = 0.01;
 struct FacetExchange {
   std::vector<std::uint64_t> row_begin = {0};
   std::vector<std::uint32_t> column;
-  std::vector<double> exchange;  ///< area i x F(i, j)
+  std::vector<float> exchange;  ///< area i x F(i, j)
 };
 
 /// Sums by facet of something by patch.
@@ -76,7 +76,7 @@ class FacetSums {
       std::ranges::sort(touched);
       for (const std::uint32_t j : touched) {
         sums.column.push_back(j);
-        sums.exchange.push_back(std::exchange(of_column[j], 0.0));
+        sums.exchange.push_back(static_cast<float>(std::exchange(of_column[j], 0.0)));
       }
       touched.clear();
       sums.row_begin.push_back(sums.column.size());

@@ -89,6 +89,7 @@ using Areas = std::vector<std::vector<float>>;
 Areas exchange_areas(const ExchangeRows& rows) {
   Areas areas(rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
+    areas[i].reserve(rows[i].size());
     for (const ExchangeEntry& entry : rows[i]) areas[i].push_back(entry.exchange_area);
   }
   return areas;
