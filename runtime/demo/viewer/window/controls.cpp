@@ -219,9 +219,10 @@ void Controls::take_hold(ViewerState& state) {
 
 void Controls::open_menu(const ViewerState& state) {
   const Camera camera = state.camera.camera();
-  clicked_ = {.lamp = lamp_under_mouse(state),
-              .eye = to_glm(camera.position),
-              .direction = way_to_mouse(camera)};
+  clicked_ = {};
+  clicked_.lamp = lamp_under_mouse(state);
+  clicked_.eye = to_glm(camera.position);
+  clicked_.direction = way_to_mouse(camera);
   if (!clicked_.lamp) clicked_.sphere = sphere_under_mouse(state);
   clicked_.distance = distance_along(clicked_.eye, clicked_.direction);
   ImGui::OpenPopup(kMenu);
