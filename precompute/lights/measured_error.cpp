@@ -10,6 +10,7 @@
 #include "precompute/lights/reference_solution.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
+#include "transfer/base/parallel.h"
 
 namespace rebounce {
 namespace {
@@ -76,16 +77,17 @@ std::vector<LightError> light_errors(const TransferData& data,
       if (arrives_nowhere(truths[k], some[k], area)) continue;
       const double all = area_norm(truths[k], area);
       data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
-      received.add(area_norm(truths[k], area), all);
-      errors.push_back({.arriving = area_norm(truths[k], area) / area_norm(some[k], area)});
+      const double seen = area_norm(truths[k], area);
+      received.add(seen, all);
+      errors.push_back({.arriving = seen / area_norm(some[k], area)});
       data.transfer->apply(some[k], indirect_irradiance, workspace);
       results.push_back(indirect_irradiance);
       arrived.push_back(std::move(truths[k]));
     }
   }
-  for (std::size_t k = 0; k < results.size(); ++k) {
+  parallel_for({}, results.size(), [&](std::size_t k) {
     errors[k].error = received_error(results[k], arrived[k], area, received.reference(k));
-  }
+  });
   return errors;
 }
 

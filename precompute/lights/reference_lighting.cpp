@@ -5,6 +5,7 @@
 
 #include "precompute/lights/random_lights.h"
 #include "transfer/base/area_norm.h"
+#include "transfer/base/parallel.h"
 
 namespace rebounce {
 namespace {
@@ -19,17 +20,17 @@ void multiply_channel(const SymmetricMatrix& matrix, int channel, Lights lights,
                       std::span<std::vector<Float3>> results) {
   const std::span<const float> area = matrix.area();
   Eigen::MatrixXf x(area.size(), lights.size());
-  for (std::size_t k = 0; k < lights.size(); ++k) {
+  parallel_for({}, lights.size(), [&](std::size_t k) {
     for (std::size_t i = 0; i < area.size(); ++i) {
       x(i, k) = std::sqrt(area[i]) * lights[k][i][channel];
     }
-  }
+  });
   const Eigen::MatrixXf y = matrix.multiply(matrix.channel_matrix()[channel], x);
-  for (std::size_t k = 0; k < lights.size(); ++k) {
+  parallel_for({}, lights.size(), [&](std::size_t k) {
     for (std::size_t i = 0; i < area.size(); ++i) {
       results[k][i][channel] = y(i, k) / std::sqrt(area[i]);
     }
-  }
+  });
 }
 
 }  // namespace
@@ -81,12 +82,13 @@ void ReferenceLighting::leave_out_dark() {
 }
 
 std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) const {
-  std::vector<double> errors;
-  errors.reserve(lights_.size());
-  for (std::size_t k = 0; k < lights_.size(); ++k) {
-    errors.push_back(
-        received_error(product(transfer, lights_[k]), truths_[k], area_, received_.reference(k)));
-  }
+  std::vector<std::vector<Float3>> results;
+  results.reserve(lights_.size());
+  for (const std::vector<Float3>& light : lights_) results.push_back(product(transfer, light));
+  std::vector<double> errors(lights_.size());
+  parallel_for({}, lights_.size(), [&](std::size_t k) {
+    errors[k] = received_error(results[k], truths_[k], area_, received_.reference(k));
+  });
   return errors;
 }
 

@@ -59,6 +59,7 @@ ROOMS = {
     "bench/reference": "The reference path tracer, and the comparison with it.",
     "bench/apply": "The product: microseconds, bytes, and the bandwidth that is reached.",
     "bench/frame": "A whole frame by stages.",
+    "bench/first_frames": "The first frames of processes, each by itself.",
     "bench/build": "The offline stage by phases.",
     "bench/solve": "Sweeps over form factors, and operators under fresh lights against their bounds.",
     "bench/report": "Everything that ./dev report shows.",

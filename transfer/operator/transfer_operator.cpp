@@ -6,6 +6,18 @@
 #include "transfer/base/argument_check.h"
 
 namespace rebounce {
+namespace {
+
+// lab/078: to read fewer bytes takes one thread less time than to start others.
+constexpr std::size_t kSmallProductBytes = 256 * 1024;
+
+// All tasks on the calling thread.
+constexpr Scheduler kCallingThread{
+    [](void* /*user*/, std::uint32_t count, Scheduler::Task task, void* context) {
+      for (std::uint32_t i = 0; i < count; ++i) task(context, i);
+    }};
+
+}  // namespace
 
 const PatchRoles& TransferOperator::roles() const {
   static const PatchRoles all_both;
@@ -22,7 +34,9 @@ void TransferOperator::apply(std::span<const Float3> initial_exitance,
   check_size("operator: initial exitance", initial_exitance.size(), patch_count());
   check_size("operator: indirect irradiance", indirect_irradiance.size(), patch_count());
   check_workspace("operator: workspace", workspace.size(), workspace_size());
-  do_apply(initial_exitance, indirect_irradiance, workspace, scheduler);
+  const bool starts_threads = scheduler.parallel_for == nullptr;
+  const bool alone = starts_threads && bytes_per_apply() < kSmallProductBytes;
+  do_apply(initial_exitance, indirect_irradiance, workspace, alone ? kCallingThread : scheduler);
 }
 
 void TransferOperator::apply_batch(std::size_t light_count,

@@ -41,8 +41,8 @@ class TransferOperator {
   /// Writes the indirect irradiance [n] in lx that follows from `initial_exitance` [n] in lx.
   /// Patches that are no receivers get 0; light of patches that are no sources has no effect. The
   /// two arrays must not overlap. `workspace` has at least workspace_size() floats and is
-  /// overwritten. Does not allocate or lock. Gives the same bits for any `scheduler`. Throws Error
-  /// if a size is wrong, as the functions below do.
+  /// overwritten. Does not allocate or lock. Gives the same bits for any `scheduler`; without one,
+  /// little work stays on this thread. Throws Error if a size is wrong, as the functions below do.
   void apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
              std::span<float> workspace, const Scheduler& scheduler = {}) const;
 
