@@ -10,7 +10,7 @@
 namespace rebounce {
 namespace {
 
-// Number of lights that the matrix is read for at a time.
+// Number of lights that are multiplied at a time.
 constexpr std::size_t kBatch = 64;
 
 using Lights = std::span<const std::vector<Float3>>;
@@ -82,13 +82,18 @@ void ReferenceLighting::leave_out_dark() {
 }
 
 std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) const {
-  std::vector<std::vector<Float3>> results;
-  results.reserve(lights_.size());
-  for (const std::vector<Float3>& light : lights_) results.push_back(product(transfer, light));
   std::vector<double> errors(lights_.size());
-  parallel_for({}, lights_.size(), [&](std::size_t k) {
-    errors[k] = received_error(results[k], truths_[k], area_, received_.reference(k));
-  });
+  std::vector<std::vector<Float3>> results;
+  for (std::size_t first = 0; first < errors.size(); first += kBatch) {
+    const std::size_t count = std::min(kBatch, errors.size() - first);
+    results.clear();
+    for (std::size_t k = 0; k < count; ++k)
+      results.push_back(product(transfer, lights_[first + k]));
+    parallel_for({}, count, [&](std::size_t k) {
+      errors[first + k] =
+          received_error(results[k], truths_[first + k], area_, received_.reference(first + k));
+    });
+  }
   return errors;
 }
 
