@@ -8,6 +8,7 @@ A fenced block of a page is
                     installed package and run; statements go into main, in order
   python            all of a page are one program, which is run with the package that is built
   json              read as JSON
+  js                read by node as a module, where there is node; tests/runtime/web makes the calls
   cmake, text       not run: they are part of what a title or a command beside them runs
 
 HOME and the checkout are folders in WORK, so that nothing outside of it is written but demo-out. The
@@ -36,6 +37,7 @@ GUIDE = (
     "viewer",
     "bake",
     "tuning",
+    "in_the_browser",
     "python",
     "view_factors",
     "light_in_buildings",
@@ -43,7 +45,7 @@ GUIDE = (
 )
 PAGES = ("README.md", *(f"notes/guide/{name}.md" for name in GUIDE))
 IN_CHECKOUT = ("README.md", "notes/guide/install.md")
-LANGUAGES = ("sh", "cpp", "c", "python", "json", "cmake", "text")
+LANGUAGES = ("sh", "cpp", "c", "python", "json", "js", "cmake", "text")
 
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
@@ -186,6 +188,14 @@ def run_python(sandbox, page, blocks):
     sandbox.run(["env", package, "/usr/bin/python3", program], folder, f"{page}: its python snippets")
 
 
+def read_module(sandbox, code, where):
+    if shutil.which("node") is None:
+        return
+    module = sandbox.work / "block.mjs"
+    module.write_text(code, encoding="utf-8")
+    sandbox.run(["node", "--check", module], sandbox.work, where)
+
+
 def run_page(sandbox, page):
     snippets, count = {}, 0
     for language, title, code, line in blocks_of(page):
@@ -193,6 +203,8 @@ def run_page(sandbox, page):
         count += 1
         if language == "json":
             json.loads(code)
+        if language == "js":
+            read_module(sandbox, code, where)
         if title:
             (folder / title).write_text(code, encoding="utf-8")
         elif language == "sh":
