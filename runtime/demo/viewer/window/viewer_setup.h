@@ -41,7 +41,7 @@ struct ViewerSetup {
   Sky sky{};
   Camera camera;
   Show show = Show::kRadiosity;
-  std::optional<float> exposure;  ///< stops; unset: computed from a picture of the first frame
+  std::optional<float> exposure{};  ///< stops; unset: computed from a picture of the first frame
   /// How the two sides of a split screen compute their indirect light. Without a split only the
   /// first is used.
   std::array<IndirectMethod, 2> methods{};
