@@ -1,10 +1,12 @@
 #include "runtime/demo/picture/key_light.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 #include <numeric>
 #include <vector>
 
+#include "runtime/demo/picture/default_view.h"
 #include "runtime/rays/box.h"
 
 namespace rebounce {
@@ -16,6 +18,13 @@ constexpr std::size_t kReceivers = 512;  // patches that a candidate may light
 
 // A lamp is close to a surface within this fraction of the scene's diagonal.
 constexpr float kCloseness = 0.15F;
+
+// How much it counts to light a surface that sees nothing but sky, where one that sees no sky
+// counts 1: the lamp of a building belongs inside, and not above the roof.
+constexpr float kOpenAir = 0.05F;
+
+// How much it counts to light what the default camera does not see.
+constexpr float kOutOfView = 0.1F;
 
 // `count` patches, evenly distributed over the surface area.
 std::vector<std::size_t> spread_patches(const PatchTable& patches, std::size_t count) {
@@ -53,25 +62,53 @@ std::vector<Float3> candidates(const PatchTable& patches, const RayTracer& trace
   return places;
 }
 
-// The number of `receivers` that see `place`, times the distance to the nearest of them, at most
-// `reach`.
-float merit(const Float3& place, std::span<const std::size_t> receivers, const PatchTable& patches,
-            const RayTracer& tracer, float reach) {
+struct Receiver {
+  Float3 point;
+  Float3 normal;
+  float weight;
+};
+
+bool is_in_front(const Camera& camera, const glm::vec3& way) {
+  return glm::dot(way, to_glm(camera.backward)) < -std::cos(camera.vertical_fov) * glm::length(way);
+}
+
+std::vector<Receiver> key_light_receivers(const TransferData& data, const RayTracer& tracer) {
+  const PatchTable& patches = data.patches;
+  const Camera camera = default_camera(data, tracer);
+  std::vector<Receiver> receivers;
+  for (const std::size_t i : spread_patches(patches, kReceivers)) {
+    const Float3 point = above(patches, i, tracer);
+    const glm::vec3 way = to_glm(point) - to_glm(camera.position);
+    Ray ray{.origin = point, .t_near = 0, .direction = to_float3(-way), .t_far = 1};
+    tracer.occluded({&ray, 1});
+    const bool seen = is_in_front(camera, way) && !is_occluded(ray);
+    const float shelter = 1 - (1 - kOpenAir) * patches.sky_visibility[i];
+    receivers.push_back({point, patches.normal[i], shelter * (seen ? 1 : kOutOfView)});
+  }
+  return receivers;
+}
+
+// The weights of the `receivers` that see `place`, times the distance to the nearest of them, at
+// most `reach`.
+float merit(const Float3& place, std::span<const Receiver> receivers, const RayTracer& tracer,
+            float reach) {
   std::vector<Ray> rays;
-  for (const std::size_t i : receivers) {
-    const Float3 origin = above(patches, i, tracer);
-    const glm::vec3 way = to_glm(place) - to_glm(origin);
-    if (glm::dot(way, to_glm(patches.normal[i])) <= 0) continue;
-    rays.push_back({.origin = origin, .t_near = 0, .direction = to_float3(way), .t_far = 1});
+  std::vector<float> weights;
+  for (const Receiver& receiver : receivers) {
+    const glm::vec3 way = to_glm(place) - to_glm(receiver.point);
+    if (glm::dot(way, to_glm(receiver.normal)) <= 0) continue;
+    rays.push_back(
+        {.origin = receiver.point, .t_near = 0, .direction = to_float3(way), .t_far = 1});
+    weights.push_back(receiver.weight);
   }
   tracer.occluded(rays);
-  int reached = 0;
-  for (const Ray& ray : rays) {
-    if (is_occluded(ray)) continue;
-    ++reached;
-    reach = std::min(reach, glm::length(to_glm(ray.direction)));
+  float reached = 0;
+  for (std::size_t k = 0; k < rays.size(); ++k) {
+    if (is_occluded(rays[k])) continue;
+    reached += weights[k];
+    reach = std::min(reach, glm::length(to_glm(rays[k].direction)));
   }
-  return reach * static_cast<float>(reached);
+  return reach * reached;
 }
 
 }  // namespace
@@ -79,14 +116,14 @@ float merit(const Float3& place, std::span<const std::size_t> receivers, const P
 Light make_key_light(const TransferData& data, const RayTracer& tracer) {
   const PatchTable& patches = data.patches;
   const float size = glm::length(box_around(patches.centroid).extent());
-  const std::vector<std::size_t> receivers = spread_patches(patches, kReceivers);
+  const std::vector<Receiver> receivers = key_light_receivers(data, tracer);
   const double area = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
   Light light;
   light.name = "key light";
   light.intensity = static_cast<float>(kFluxPerArea * area / (4 * std::numbers::pi));
   float best = -1;
   for (const Float3& place : candidates(patches, tracer, 0.5F * size)) {
-    const float value = merit(place, receivers, patches, tracer, kCloseness * size);
+    const float value = merit(place, receivers, tracer, kCloseness * size);
     if (value <= best) continue;
     best = value;
     light.position = place;

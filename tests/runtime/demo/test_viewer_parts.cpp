@@ -128,6 +128,16 @@ TEST(KeyLight, HangsInTheOpenAndReachesTheSurface) {
   EXPECT_EQ(light.position, make_key_light(*data, tracer).position);
 }
 
+TEST(KeyLight, HangsUnderARoofAndNotAboveIt) {
+  const auto data = two_planes();
+  std::ranges::fill(data->patches.sky_visibility, 0.0F);
+  test::add_square(*data, 1.5F, 2.1F, 3, true, {0.5F, 0.5F, 0.5F});  // the larger roof
+  const RayTracer tracer = make_surface_tracer(data->mesh);
+  const float height = make_key_light(*data, tracer).position[1];
+  EXPECT_GT(height, 0);
+  EXPECT_LT(height, 2);
+}
+
 std::vector<Float3> patterned(std::size_t n, float shift) {
   std::vector<Float3> values(n);
   for (std::size_t i = 0; i < n; ++i) {
