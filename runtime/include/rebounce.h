@@ -352,6 +352,57 @@ rebounce_status rebounce_engine_probe_irradiance(const rebounce_engine* engine,
  * of an octahedral map, u fastest, +z in its middle. */
 void rebounce_octahedral_normals(size_t size, float* normals);
 
+/* ---- The graphics card ---- */
+
+/* Frames by compute shaders of OpenGL 4.3, from buffer to buffer, with nothing read back. All calls
+ * are made with the same context, or one that shares its objects, current on the calling thread;
+ * they leave the program and the buffer bindings of the context as they were. */
+typedef struct rebounce_gpu_engine rebounce_gpu_engine;
+
+/* Finds a function of OpenGL by its name, NULL if there is none: glfwGetProcAddress and
+ * eglGetProcAddress are of this type. */
+typedef void (*rebounce_gl_function)(void);
+typedef rebounce_gl_function (*rebounce_gl_get_proc_address)(const char* name);
+
+/* Compiles the shaders and takes the operator to the card; the transfer is not needed afterwards.
+ * Errors that the context holds are dropped. Fails with REBOUNCE_UNSUPPORTED if the context is not
+ * OpenGL 4.3 or newer, and with REBOUNCE_INVALID_ARGUMENT if the operator is not hierarchical, if
+ * the card has no room for it, or if its driver refuses a shader (with the compiler's log). */
+rebounce_status rebounce_gpu_engine_create(rebounce_transfer* transfer,
+                                           rebounce_gl_get_proc_address get_proc_address,
+                                           rebounce_gpu_engine** engine);
+
+/* NULL is ignored. */
+void rebounce_gpu_engine_destroy(rebounce_gpu_engine* engine);
+
+/* Bytes of memory on the card; 0 if `engine` is NULL. */
+uint64_t rebounce_gpu_engine_bytes(const rebounce_gpu_engine* engine);
+
+/* From the next frame on, what the patches emit, [patch_count][3] in lx >= 0; at first that of the
+ * scene. */
+rebounce_status rebounce_gpu_engine_set_emitted_exitance(rebounce_gpu_engine* engine,
+                                                         const float* emitted_exitance,
+                                                         size_t patch_count);
+
+/* Names of OpenGL buffers of the caller's, each of floats [entries][3] in lx; all are different. */
+typedef struct rebounce_gpu_buffers {
+  uint32_t struct_size;         /* sizeof(rebounce_gpu_buffers) */
+  uint32_t direct_irradiance;   /* [patch_count] in */
+  uint32_t indirect_irradiance; /* [patch_count] out; 0: not wanted */
+  uint32_t radiosity;           /* [patch_count] out; 0: not wanted */
+  uint32_t vertex_irradiance;   /* [vertex_count] out, indirect, at least 0; 0: not wanted */
+} rebounce_gpu_buffers;
+
+/* Writes the size, and zeros. */
+void rebounce_gpu_buffers_init(rebounce_gpu_buffers* buffers);
+
+/* Hands one frame to the card, and waits for nothing. Shaders that write the direct irradiance
+ * before and read results afterwards need no barrier. The direct irradiance is not looked at: what
+ * is negative or not finite spreads. A buffer that does not exist, is too small or is given twice
+ * is refused; nothing is done then. */
+rebounce_status rebounce_gpu_engine_relight(rebounce_gpu_engine* engine,
+                                            const rebounce_gpu_buffers* buffers);
+
 #ifdef __cplusplus
 }
 #endif

@@ -34,6 +34,7 @@ GUIDE = (
     "your_own_scene",
     "in_an_engine",
     "in_c",
+    "on_the_graphics_card",
     "viewer",
     "bake",
     "tuning",

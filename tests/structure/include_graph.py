@@ -30,6 +30,7 @@ ROOMS = {
     "runtime/lights": "Kinds of lamps, a file each; skies; what of their light arrives at a point.",
     "runtime/outputs": "Light of patches taken to vertices, texels and probes.",
     "runtime/frame": "One frame: direct light, one product, radiosity; the same for C.",
+    "runtime/gpu": "A frame on the graphics card, by compute shaders of OpenGL; the same for C.",
     "runtime/solvers": "The same light by iteration.",
     "runtime/web/module": "The runtime for WebAssembly: what a page calls, and exceptions there.",
     "runtime/demo/image": "Images, colours, exposure, tone curve, textures, PNG.",

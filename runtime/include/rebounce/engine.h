@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -108,6 +109,58 @@ class Engine {
   const Parts& parts() const { return *parts_; }
 
  private:
+  std::unique_ptr<Parts> parts_;
+};
+
+/// Finds a function of OpenGL by its name, null if there is none: glfwGetProcAddress and
+/// eglGetProcAddress are of this type.
+using GlFunction = void (*)();
+using GlGetProcAddress = GlFunction (*)(const char* name);
+
+/// Names of OpenGL buffers of the caller's, each of floats [entries][3] in lx. All are different.
+struct GpuBuffers {
+  unsigned direct_irradiance = 0;    ///< [n] in
+  unsigned indirect_irradiance = 0;  ///< [n] out; 0: not wanted
+  unsigned radiosity = 0;            ///< [n] out; 0: not wanted
+  unsigned vertex_irradiance = 0;    ///< [v] out, indirect, at least 0; 0: not wanted
+};
+
+/// Frames on the graphics card, by compute shaders of OpenGL 4.3: from a direct irradiance in a
+/// buffer to the indirect irradiance, the radiosity and the light at vertices in buffers. Nothing
+/// is read back. An Engine is the reference: results differ by rounding, a few thousandths of the
+/// mean light at most, most of it that of the Engine, which rounds light to integers. Two frames
+/// with the same light give the same bits on one card and driver.
+///
+/// All calls, destruction too, are made with the same context, or one that shares its objects,
+/// current on the calling thread. They leave the program and the buffer bindings of the context as
+/// they were.
+class GpuEngine {
+ public:
+  /// Compiles the shaders and takes the operator to the card; the data are not needed afterwards.
+  /// Errors that the context holds are dropped. Throws Error if `data` is null, if its operator is
+  /// not hierarchical, if the card has no room for it, or with the compiler's log if a shader is
+  /// refused; Unsupported if the context is not OpenGL 4.3 or newer.
+  GpuEngine(const std::shared_ptr<const TransferData>& data, GlGetProcAddress get_proc_address);
+  ~GpuEngine();
+  GpuEngine(GpuEngine&& other) noexcept;
+  GpuEngine& operator=(GpuEngine&& other) noexcept;
+
+  /// Bytes of memory on the card.
+  std::size_t bytes() const;
+
+  /// From the next frame on, what the patches emit [n] in lx, that of an Engine for instance; at
+  /// first that of the scene. Throws Error if the size is wrong or a number is negative or not
+  /// finite.
+  void set_emitted_exitance(std::span<const Float3> emitted_exitance);
+
+  /// Hands one frame to the card, and waits for nothing. Shaders that write the direct irradiance
+  /// before and read results afterwards need no barrier. The direct irradiance is not looked at:
+  /// what is negative or not finite spreads. Throws Error if a buffer does not exist, is too small
+  /// or is given twice; nothing is done then.
+  void relight(const GpuBuffers& buffers);
+
+ private:
+  struct Parts;
   std::unique_ptr<Parts> parts_;
 };
 

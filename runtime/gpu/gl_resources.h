@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "runtime/gpu/gl_functions.h"
+
+namespace rebounce {
+
+/// Puts back on destruction what the frame changes: the program, and the buffers at the bindings
+/// that its shaders use.
+class GlStateGuard {
+ public:
+  static constexpr unsigned kStorageBindings = 7, kStageBinding = 8;
+
+  explicit GlStateGuard(const GlFunctions& gl);
+  ~GlStateGuard();
+  GlStateGuard(const GlStateGuard&) = delete;
+  GlStateGuard& operator=(const GlStateGuard&) = delete;
+
+ private:
+  struct Binding {
+    int buffer = 0;
+    std::int64_t begin = 0, size = 0;
+  };
+
+  Binding binding(GlFunctions::Enum buffer, GlFunctions::Enum start, GlFunctions::Enum size,
+                  unsigned index) const;
+  void put_back(GlFunctions::Enum target, unsigned index, const Binding& binding) const;
+
+  const GlFunctions& gl_;
+  int program_ = 0, storage_ = 0, uniform_ = 0;
+  std::array<Binding, kStorageBindings> storage_at_;
+  Binding uniform_at_;
+};
+
+/// A buffer object of ours. Its context is current while it is made and destroyed.
+class StorageBuffer {
+ public:
+  /// Holds `size` bytes of `data`, or zeros if that is null; at least one word. Throws Error if the
+  /// context allows no storage block of that size or has no memory for it. The generic binding of
+  /// storage buffers changes.
+  StorageBuffer(std::shared_ptr<const GlFunctions> gl, std::size_t size, const void* data);
+  ~StorageBuffer();
+  StorageBuffer(const StorageBuffer&) = delete;
+  StorageBuffer& operator=(const StorageBuffer&) = delete;
+
+  unsigned name() const { return name_; }
+  std::size_t size() const { return size_; }
+
+  /// Overwrites the first `size` bytes. The generic binding of storage buffers changes.
+  void write(std::size_t size, const void* data) const;
+
+ private:
+  std::shared_ptr<const GlFunctions> gl_;
+  unsigned name_ = 0;
+  std::size_t size_;
+};
+
+/// A program of one compute shader.
+class ComputeProgram {
+ public:
+  /// Throws Error with the compiler's log; `name` stands for the shader in it.
+  ComputeProgram(std::shared_ptr<const GlFunctions> gl, const char* name, const char* source);
+  ~ComputeProgram();
+  ComputeProgram(const ComputeProgram&) = delete;
+  ComputeProgram& operator=(const ComputeProgram&) = delete;
+
+  /// Runs `groups` work groups, in rows of at most kRow.
+  void run(std::uint32_t groups) const;
+
+ private:
+  static constexpr std::uint32_t kRow = 32768;  // OpenGL 4.3 allows at least 65,535
+
+  std::shared_ptr<const GlFunctions> gl_;
+  unsigned name_ = 0;
+};
+
+}  // namespace rebounce

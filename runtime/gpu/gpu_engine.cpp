@@ -1,0 +1,263 @@
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "rebounce/engine.h"
+#include "rebounce/error.h"
+#include "runtime/gpu/gl_resources.h"
+#include "runtime/gpu/gpu_operator.h"
+#include "runtime/gpu/shader_sources.h"
+#include "transfer/base/argument_check.h"
+#include "transfer/file/transfer_data.h"
+#include "transfer/operator/hierarchical_operator.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::uint32_t kThreads = 64;  // of a work group of the shaders
+
+// Most that a context may ask for between parts of a uniform buffer.
+constexpr std::size_t kStageBytes = 256;
+
+/// The uniform block of the shaders.
+struct StageBlock {
+  std::uint32_t items, first_item, first_output, unused = 0;
+  std::array<std::uint32_t, 4> channel_matrix;  ///< the fourth: couplings_are_floats
+};
+
+enum class Stage : std::uint8_t {
+  kInitialExitance,
+  kProjectPositions,
+  kProjectClusters,
+  kCouple,
+  kExpandClusters,
+  kExpandPositions,
+  kRadiosity,
+  kVertices,
+};
+constexpr std::size_t kStageCount = 8;
+
+const HierarchicalOperator& hierarchical(const TransferData* data) {
+  if (data == nullptr || !data->transfer) throw Error("the transfer data have no operator");
+  const auto* const found = dynamic_cast<const HierarchicalOperator*>(data->transfer.get());
+  if (found == nullptr) {
+    throw Error("the graphics card multiplies with hierarchical operators alone, and this one is " +
+                std::string(operator_name(data->transfer->kind())) +
+                "; precompute with --operator hierarchical");
+  }
+  return *found;
+}
+
+std::size_t triple_bytes(std::size_t count) {
+  return count * sizeof(Float3);
+}
+
+}  // namespace
+
+struct GpuEngine::Parts {
+  Parts(const SceneData& scene, const GpuOperator& tables,
+        std::shared_ptr<const GlFunctions> loaded)
+      : gl(std::move(loaded)),
+        patch_count(scene.patches.size()),
+        vertex_count(scene.mesh.position.size()),
+        initial_exitance_shader(gl, "initial_exitance.glsl", ShaderSources::kInitialExitance),
+        project(gl, "project.glsl", ShaderSources::kProject),
+        couple(gl, "couple.glsl", ShaderSources::kCouple),
+        expand(gl, "expand.glsl", ShaderSources::kExpand),
+        radiosity_shader(gl, "radiosity.glsl", ShaderSources::kRadiosity),
+        vertices(gl, "vertex_irradiance.glsl", ShaderSources::kVertexIrradiance),
+        reflectance(table(scene.patches.reflectance)),
+        emitted_exitance(table(scene.patches.emitted_exitance)),
+        positions(table(tables.positions)),
+        scales(table(tables.scales)),
+        bases(table(tables.bases)),
+        couplings(table(tables.couplings)),
+        projections(table(tables.projections)),
+        sides(table(tables.sides)),
+        outputs(table(tables.outputs)),
+        inputs(table(tables.inputs)),
+        strips(table(tables.strips)),
+        strip_entries(table(tables.strip_entries)),
+        vertex_begin(table(vertex_begins(scene.mesh))),
+        vertex_weights(table(weights_of(scene.mesh))),
+        initial_exitance(zeros(triple_bytes(patch_count))),
+        indirect_irradiance(zeros(triple_bytes(patch_count))),
+        radiosity(zeros(triple_bytes(patch_count))),
+        light(zeros(tables.scales.size() * 4 * sizeof(float))),
+        arriving(zeros(tables.scales.size() * 4 * sizeof(float))),
+        stages(table(stage_blocks(tables))) {}
+
+  template <typename T>
+  StorageBuffer table(const std::vector<T>& list) {
+    return {gl, counted(list.size() * sizeof(T)), list.data()};
+  }
+  StorageBuffer zeros(std::size_t size) { return {gl, counted(size), nullptr}; }
+  std::size_t counted(std::size_t size) {
+    bytes += size;
+    return size;
+  }
+
+  static std::vector<std::uint32_t> vertex_begins(const DisplayMesh& mesh) {
+    if (!mesh.weight_begin.empty()) return mesh.weight_begin;
+    return std::vector<std::uint32_t>(mesh.position.size() + 1);
+  }
+
+  static std::vector<GpuOperator::Words2> weights_of(const DisplayMesh& mesh) {
+    std::vector<GpuOperator::Words2> weights;
+    weights.reserve(mesh.weight.size());
+    for (std::size_t k = 0; k < mesh.weight.size(); ++k)
+      weights.push_back({mesh.weight_patch[k], std::bit_cast<std::uint32_t>(mesh.weight[k])});
+    return weights;
+  }
+
+  /// Fills in what the stages are to do, and returns it for the uniform buffer.
+  std::vector<unsigned char> stage_blocks(const GpuOperator& tables) {
+    const auto projections_in_all = static_cast<std::uint32_t>(tables.projections.size() / 2);
+    const std::uint32_t of_positions = tables.position_projections;
+    const std::uint32_t strip_count = tables.position_strips();
+    const auto& of_channel = tables.channel_matrix;
+    const std::uint32_t floats = tables.couplings_are_floats ? 1 : 0;
+    const auto set = [&](Stage stage, std::uint32_t items, std::uint32_t first_item = 0,
+                         std::uint32_t first_output = 0) {
+      blocks[static_cast<std::size_t>(stage)] = {
+          .items = items,
+          .first_item = first_item,
+          .first_output = first_output,
+          .channel_matrix = {of_channel[0], of_channel[1], of_channel[2], floats}};
+    };
+    set(Stage::kInitialExitance, tables.position_count);
+    set(Stage::kProjectPositions, of_positions);
+    set(Stage::kProjectClusters, projections_in_all - of_positions, of_positions);
+    set(Stage::kCouple, static_cast<std::uint32_t>(tables.outputs.size()), 0,
+        tables.first_coefficient);
+    set(Stage::kExpandClusters, tables.strip_count() - strip_count, strip_count,
+        tables.position_count);
+    set(Stage::kExpandPositions, strip_count);
+    set(Stage::kRadiosity, tables.position_count);
+    set(Stage::kVertices, static_cast<std::uint32_t>(vertex_count));
+    std::vector<unsigned char> bytes_of_blocks(kStageCount * kStageBytes);
+    for (std::size_t k = 0; k < kStageCount; ++k)
+      std::memcpy(bytes_of_blocks.data() + k * kStageBytes, &blocks[k], sizeof(StageBlock));
+    return bytes_of_blocks;
+  }
+
+  /// Throws Error unless `name` is a buffer with room for `count` triples. The generic binding of
+  /// storage buffers changes.
+  void check_buffer(const char* what, unsigned name, std::size_t count) const {
+    std::int64_t size = -1;
+    if (gl->is_buffer(name) != 0) {
+      gl->bind_buffer(Gl::kStorageBuffer, name);
+      gl->get_buffer_long(Gl::kStorageBuffer, Gl::kBufferSize, &size);
+    }
+    if (size < 0) throw Error(std::string(what) + ": " + std::to_string(name) + " is no buffer");
+    if (std::cmp_less(size, triple_bytes(count))) {
+      throw Error(std::string(what) + ": its buffer has " + std::to_string(size) +
+                  " bytes; it needs " + std::to_string(triple_bytes(count)));
+    }
+  }
+
+  void check(const GpuBuffers& buffers) const {
+    check_buffer("direct irradiance", buffers.direct_irradiance, patch_count);
+    if (buffers.indirect_irradiance != 0)
+      check_buffer("indirect irradiance", buffers.indirect_irradiance, patch_count);
+    if (buffers.radiosity != 0) check_buffer("radiosity", buffers.radiosity, patch_count);
+    if (buffers.vertex_irradiance != 0)
+      check_buffer("light at vertices", buffers.vertex_irradiance, vertex_count);
+    std::array<unsigned, 4> names{buffers.direct_irradiance, buffers.indirect_irradiance,
+                                  buffers.radiosity, buffers.vertex_irradiance};
+    std::ranges::sort(names);
+    for (std::size_t k = 1; k < names.size(); ++k) {
+      if (names[k] != 0 && names[k] == names[k - 1]) {
+        throw Error("one buffer is given for two arrays of light; give each its own");
+      }
+    }
+  }
+
+  /// Runs a stage with these buffers at the bindings 0, 1, ...; work groups of `per_group` items.
+  void run(Stage stage, const ComputeProgram& program, std::uint32_t per_group,
+           std::initializer_list<unsigned> names) const {
+    const auto k = static_cast<std::size_t>(stage);
+    if (blocks[k].items == 0) return;
+    unsigned index = 0;
+    for (const unsigned name : names) gl->bind_buffer_base(Gl::kStorageBuffer, index++, name);
+    gl->bind_buffer_range(Gl::kUniformBuffer, GlStateGuard::kStageBinding, stages.name(),
+                          static_cast<std::ptrdiff_t>(k * kStageBytes), sizeof(StageBlock));
+    program.run((blocks[k].items + per_group - 1) / per_group);
+    gl->memory_barrier(Gl::kStorageBarrier);
+  }
+
+  void relight(const GpuBuffers& buffers) const {
+    const auto or_own = [](unsigned name, const StorageBuffer& own) {
+      return name != 0 ? name : own.name();
+    };
+    const unsigned indirect = or_own(buffers.indirect_irradiance, indirect_irradiance);
+    gl->memory_barrier(Gl::kStorageBarrier);
+    run(Stage::kInitialExitance, initial_exitance_shader, kThreads,
+        {buffers.direct_irradiance, reflectance.name(), emitted_exitance.name(), positions.name(),
+         initial_exitance.name(), light.name()});
+    for (const Stage stage : {Stage::kProjectPositions, Stage::kProjectClusters}) {
+      run(stage, project, 1, {bases.name(), scales.name(), projections.name(), 0, 0, light.name()});
+    }
+    run(Stage::kCouple, couple, kThreads,
+        {couplings.name(), scales.name(), sides.name(), outputs.name(), inputs.name(), light.name(),
+         arriving.name()});
+    for (const Stage stage : {Stage::kExpandClusters, Stage::kExpandPositions}) {
+      run(stage, expand, 1,
+          {bases.name(), scales.name(), strips.name(), strip_entries.name(), couplings.name(),
+           light.name(), arriving.name()});
+    }
+    run(Stage::kRadiosity, radiosity_shader, kThreads,
+        {indirect, reflectance.name(), or_own(buffers.radiosity, radiosity), positions.name(),
+         initial_exitance.name(), 0, arriving.name()});
+    if (buffers.vertex_irradiance != 0) {
+      run(Stage::kVertices, vertices, kThreads,
+          {indirect, vertex_begin.name(), vertex_weights.name(), buffers.vertex_irradiance});
+    }
+    gl->memory_barrier(Gl::kAllBarriers);
+  }
+
+  std::size_t bytes = 0;  // counted while the buffers below are made
+  std::shared_ptr<const GlFunctions> gl;
+  std::size_t patch_count, vertex_count;
+  std::array<StageBlock, kStageCount> blocks{};
+  ComputeProgram initial_exitance_shader, project, couple, expand, radiosity_shader, vertices;
+  StorageBuffer reflectance, emitted_exitance, positions, scales, bases, couplings, projections,
+      sides, outputs, inputs, strips, strip_entries, vertex_begin, vertex_weights;
+  StorageBuffer initial_exitance, indirect_irradiance, radiosity, light, arriving;
+  StorageBuffer stages;
+};
+
+GpuEngine::GpuEngine(const std::shared_ptr<const TransferData>& data,
+                     GlGetProcAddress get_proc_address) {
+  const HierarchicalOperator& transfer = hierarchical(data.get());
+  const auto gl = std::make_shared<const GlFunctions>(get_proc_address);
+  const GlStateGuard guard(*gl);
+  parts_ = std::make_unique<Parts>(*data, make_gpu_operator(transfer.storage()), gl);
+}
+
+GpuEngine::~GpuEngine() = default;
+GpuEngine::GpuEngine(GpuEngine&& other) noexcept = default;
+GpuEngine& GpuEngine::operator=(GpuEngine&& other) noexcept = default;
+
+std::size_t GpuEngine::bytes() const {
+  return parts_->bytes;
+}
+
+void GpuEngine::set_emitted_exitance(std::span<const Float3> emitted_exitance) {
+  check_size("the emitted exitance", emitted_exitance.size(), parts_->patch_count);
+  check_light_of_patches("the emitted exitance", emitted_exitance);
+  const GlStateGuard guard(*parts_->gl);
+  parts_->emitted_exitance.write(emitted_exitance.size_bytes(), emitted_exitance.data());
+}
+
+void GpuEngine::relight(const GpuBuffers& buffers) {
+  const GlStateGuard guard(*parts_->gl);
+  parts_->check(buffers);
+  parts_->relight(buffers);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,15 @@
+#pragma once
+
+namespace rebounce {
+
+/// The text of the shaders in runtime/gpu/shaders, which the build puts into the library.
+struct ShaderSources {
+  static const char* const kInitialExitance;
+  static const char* const kProject;
+  static const char* const kCouple;
+  static const char* const kExpand;
+  static const char* const kRadiosity;
+  static const char* const kVertexIrradiance;
+};
+
+}  // namespace rebounce
