@@ -22,7 +22,20 @@ static_assert(kLightSize1 == 84 && kSettingsSize1 == 16);
 
 constexpr const char* kLightInit = "rebounce_light_init";
 
-/// Reads light k of an array whose entries have the size that the caller states.
+Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_settings& settings) {
+  const auto number = [](std::uint32_t given) {
+    constexpr std::uint32_t kMost = 1U << 20U;
+    return static_cast<int>(std::min(given, kMost));
+  };
+  return Engine(transfer.data,
+                {.direct_lighting = {.points_per_patch = number(settings.points_per_patch),
+                                     .area_light_samples = number(settings.area_light_samples),
+                                     .light_capacity = number(settings.light_capacity)},
+                 .scheduler = {settings.parallel_for, settings.user}});
+}
+
+}  // namespace
+
 void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   rebounce_light defaults;
   rebounce_light_init(&defaults);
@@ -51,20 +64,6 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
   light.tangent = triple(given.tangent);
   light.profile = given.profile == nullptr ? nullptr : given.profile->profile;
 }
-
-Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_settings& settings) {
-  const auto number = [](std::uint32_t given) {
-    constexpr std::uint32_t kMost = 1U << 20U;
-    return static_cast<int>(std::min(given, kMost));
-  };
-  return Engine(transfer.data,
-                {.direct_lighting = {.points_per_patch = number(settings.points_per_patch),
-                                     .area_light_samples = number(settings.area_light_samples),
-                                     .light_capacity = number(settings.light_capacity)},
-                 .scheduler = {settings.parallel_for, settings.user}});
-}
-
-}  // namespace
 
 extern "C" {
 

@@ -100,6 +100,9 @@ Struct take(const void* given, Struct defaults, std::size_t least_size, const ch
   return defaults;
 }
 
+/// Reads light k of an array whose entries have the size that the caller states.
+void take_light(const rebounce_light* lights, std::size_t k, Light& light);
+
 /// Copies to the caller's structure the members that its version has.
 template <typename Struct>
 void give(const Struct& filled, void* given) {

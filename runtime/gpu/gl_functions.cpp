@@ -44,6 +44,17 @@ GlFunctions::GlFunctions(GlGetProcAddress get) {
   load(get, "glBufferData", buffer_data);
   load(get, "glBufferSubData", buffer_sub_data);
   load(get, "glGetBufferParameteri64v", get_buffer_long);
+  load(get, "glActiveTexture", active_texture);
+  load(get, "glBindTexture", bind_texture);
+  load(get, "glIsTexture", is_texture);
+  load(get, "glGenSamplers", gen_samplers);
+  load(get, "glDeleteSamplers", delete_samplers);
+  load(get, "glBindSampler", bind_sampler);
+  load(get, "glSamplerParameteri", set_sampler);
+  load(get, "glGenQueries", gen_queries);
+  load(get, "glDeleteQueries", delete_queries);
+  load(get, "glQueryCounter", query_counter);
+  load(get, "glGetQueryObjectui64v", get_query);
   load(get, "glCreateShader", create_shader);
   load(get, "glShaderSource", shader_source);
   load(get, "glCompileShader", compile_shader);

@@ -36,6 +36,19 @@ struct GlFunctions {
   void (*buffer_sub_data)(Enum target, std::ptrdiff_t begin, std::ptrdiff_t size, const void* data);
   void (*get_buffer_long)(Enum target, Enum name, std::int64_t* value);
 
+  void (*active_texture)(Enum unit);
+  void (*bind_texture)(Enum target, unsigned name);
+  unsigned char (*is_texture)(unsigned name);
+  void (*gen_samplers)(int count, unsigned* names);
+  void (*delete_samplers)(int count, const unsigned* names);
+  void (*bind_sampler)(unsigned unit, unsigned name);
+  void (*set_sampler)(unsigned name, Enum parameter, int value);
+
+  void (*gen_queries)(int count, unsigned* names);
+  void (*delete_queries)(int count, const unsigned* names);
+  void (*query_counter)(unsigned name, Enum target);
+  void (*get_query)(unsigned name, Enum parameter, std::uint64_t* value);
+
   unsigned (*create_shader)(Enum type);
   void (*shader_source)(unsigned shader, int count, const char* const* text, const int* length);
   void (*compile_shader)(unsigned shader);
@@ -67,6 +80,18 @@ struct Gl {
   static constexpr GlFunctions::Enum kBufferSize = 0x8764, kStaticDraw = 0x88E4;
   static constexpr GlFunctions::Enum kComputeShader = 0x91B9, kCompileStatus = 0x8B81,
                                      kLinkStatus = 0x8B82, kInfoLogLength = 0x8B84;
+  static constexpr GlFunctions::Enum kTexture0 = 0x84C0, kActiveTexture = 0x84E0,
+                                     kSamplerBinding = 0x8919;
+  static constexpr GlFunctions::Enum kTexture2D = 0x0DE1, kTexture2DBinding = 0x8069,
+                                     kTextureArray = 0x8C1A, kTextureArrayBinding = 0x8C1D,
+                                     kTextureCube = 0x8513, kTextureCubeBinding = 0x8514;
+  static constexpr GlFunctions::Enum kMinFilter = 0x2801, kMagFilter = 0x2800, kLinear = 0x2601,
+                                     kWrapS = 0x2802, kWrapT = 0x2803, kClampToEdge = 0x812F,
+                                     kCompareMode = 0x884C, kCompareToTexture = 0x884E,
+                                     kCompareFunction = 0x884D, kLessOrEqual = 0x0203,
+                                     kGreaterOrEqual = 0x0206;
+  static constexpr GlFunctions::Enum kTimestamp = 0x8E28, kQueryResult = 0x8866;
+  static constexpr GlFunctions::Enum kStreamDraw = 0x88E0;
   static constexpr unsigned kStorageBarrier = 0x2000, kAllBarriers = 0xFFFFFFFF;
 };
 

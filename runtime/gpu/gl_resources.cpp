@@ -13,6 +13,11 @@ namespace {
 // Flags of errors that a context may hold at once; a lost one never runs out of them.
 constexpr int kMostErrors = 16;
 
+constexpr std::array<GlFunctions::Enum, GlTextureGuard::kUnits> kTextureTargets = {
+    Gl::kTexture2D, Gl::kTextureArray, Gl::kTextureCube};
+constexpr std::array<GlFunctions::Enum, GlTextureGuard::kUnits> kTextureBindings = {
+    Gl::kTexture2DBinding, Gl::kTextureArrayBinding, Gl::kTextureCubeBinding};
+
 template <typename GetLength, typename GetLog>
 std::string log_of(const GetLength& get_length, const GetLog& get_log) {
   int length = 0;
@@ -64,6 +69,24 @@ void GlStateGuard::put_back(GlFunctions::Enum target, unsigned index,
   }
 }
 
+GlTextureGuard::GlTextureGuard(const GlFunctions& gl) : gl_(gl) {
+  gl_.get_integer(Gl::kActiveTexture, &active_);
+  for (unsigned k = 0; k < kUnits; ++k) {
+    gl_.active_texture(Gl::kTexture0 + kFirstUnit + k);
+    gl_.get_integer(kTextureBindings[k], &texture_[k]);
+    gl_.get_integer(Gl::kSamplerBinding, &sampler_[k]);
+  }
+}
+
+GlTextureGuard::~GlTextureGuard() {
+  for (unsigned k = 0; k < kUnits; ++k) {
+    gl_.active_texture(Gl::kTexture0 + kFirstUnit + k);
+    gl_.bind_texture(kTextureTargets[k], static_cast<unsigned>(texture_[k]));
+    gl_.bind_sampler(kFirstUnit + k, static_cast<unsigned>(sampler_[k]));
+  }
+  gl_.active_texture(static_cast<GlFunctions::Enum>(active_));
+}
+
 StorageBuffer::StorageBuffer(std::shared_ptr<const GlFunctions> gl, std::size_t size,
                              const void* data)
     : gl_(std::move(gl)), size_(std::max(size, sizeof(std::uint32_t))) {
@@ -78,15 +101,13 @@ StorageBuffer::StorageBuffer(std::shared_ptr<const GlFunctions> gl, std::size_t 
     zeros.resize(size_);
     data = zeros.data();
   }
-  for (int k = 0; k < kMostErrors && gl_->get_error() != 0; ++k) {
-  }
   gl_->gen_buffers(1, &name_);
   gl_->bind_buffer(Gl::kStorageBuffer, name_);
-  gl_->buffer_data(Gl::kStorageBuffer, static_cast<std::ptrdiff_t>(size_), data, Gl::kStaticDraw);
-  if (gl_->get_error() == Gl::kOutOfMemory) {
+  try {
+    allocate(data, Gl::kStaticDraw);
+  } catch (const Error&) {
     gl_->delete_buffers(1, &name_);
-    throw Error("the graphics card has no memory for a table of " + std::to_string(size_) +
-                " bytes");
+    throw;
   }
 }
 
@@ -97,6 +118,68 @@ StorageBuffer::~StorageBuffer() {
 void StorageBuffer::write(std::size_t size, const void* data) const {
   gl_->bind_buffer(Gl::kStorageBuffer, name_);
   gl_->buffer_sub_data(Gl::kStorageBuffer, 0, static_cast<std::ptrdiff_t>(size), data);
+}
+
+void StorageBuffer::allocate(const void* data, GlFunctions::Enum usage) const {
+  for (int k = 0; k < kMostErrors && gl_->get_error() != 0; ++k) {
+  }
+  gl_->buffer_data(Gl::kStorageBuffer, static_cast<std::ptrdiff_t>(size_), data, usage);
+  if (gl_->get_error() == Gl::kOutOfMemory) {
+    throw Error("the graphics card has no memory for a table of " + std::to_string(size_) +
+                " bytes");
+  }
+}
+
+void StorageBuffer::replace(std::size_t size, const void* data) {
+  gl_->bind_buffer(Gl::kStorageBuffer, name_);
+  if (size > size_) {
+    size_ = size;
+    allocate(nullptr, Gl::kStreamDraw);
+  }
+  gl_->buffer_sub_data(Gl::kStorageBuffer, 0, static_cast<std::ptrdiff_t>(size), data);
+}
+
+StageTimer::StageTimer(std::shared_ptr<const GlFunctions> gl, std::size_t most_stages)
+    : gl_(std::move(gl)), most_stages_(most_stages) {
+  names_.reserve(most_stages_);
+}
+
+StageTimer::~StageTimer() {
+  switch_on(false);
+}
+
+void StageTimer::switch_on(bool on) {
+  names_.clear();
+  if (on == !queries_.empty()) return;
+  const auto count = static_cast<int>(most_stages_) + 1;
+  if (on) {
+    queries_.resize(most_stages_ + 1);
+    gl_->gen_queries(count, queries_.data());
+  } else {
+    gl_->delete_queries(count, queries_.data());
+    queries_.clear();
+  }
+}
+
+void StageTimer::begin() {
+  names_.clear();
+  if (!queries_.empty()) gl_->query_counter(queries_[0], Gl::kTimestamp);
+}
+
+void StageTimer::mark(const char* name) {
+  if (queries_.empty()) return;
+  names_.push_back(name);
+  gl_->query_counter(queries_[names_.size()], Gl::kTimestamp);
+}
+
+void StageTimer::add_to(std::vector<GpuStageTime>& times) const {
+  const auto at = [&](std::size_t k) {
+    std::uint64_t nanoseconds = 0;
+    gl_->get_query(queries_[k], Gl::kQueryResult, &nanoseconds);
+    return nanoseconds;
+  };
+  for (std::size_t k = 0; k < names_.size(); ++k)
+    times.push_back({names_[k], 1e-3 * static_cast<double>(at(k + 1) - at(k))});
 }
 
 ComputeProgram::ComputeProgram(std::shared_ptr<const GlFunctions> gl, const char* name,

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "runtime/gpu/gl_functions.h"
 
@@ -37,6 +38,22 @@ class GlStateGuard {
   Binding uniform_at_;
 };
 
+/// Puts back on destruction the textures and samplers at the units of shadow maps.
+class GlTextureGuard {
+ public:
+  static constexpr unsigned kFirstUnit = 10, kUnits = 3;
+
+  explicit GlTextureGuard(const GlFunctions& gl);
+  ~GlTextureGuard();
+  GlTextureGuard(const GlTextureGuard&) = delete;
+  GlTextureGuard& operator=(const GlTextureGuard&) = delete;
+
+ private:
+  const GlFunctions& gl_;
+  int active_ = 0;
+  std::array<int, kUnits> texture_{}, sampler_{};  ///< a plane, layers, a cube
+};
+
 /// A buffer object of ours. Its context is current while it is made and destroyed.
 class StorageBuffer {
  public:
@@ -54,10 +71,38 @@ class StorageBuffer {
   /// Overwrites the first `size` bytes. The generic binding of storage buffers changes.
   void write(std::size_t size, const void* data) const;
 
+  /// Overwrites the contents, and makes room for more if they lack it. The generic binding of
+  /// storage buffers changes.
+  void replace(std::size_t size, const void* data);
+
  private:
+  void allocate(const void* data, GlFunctions::Enum usage) const;
+
   std::shared_ptr<const GlFunctions> gl_;
   unsigned name_ = 0;
   std::size_t size_;
+};
+
+/// The time of stages on the card, by queries of time stamps; nothing until it is switched on.
+class StageTimer {
+ public:
+  explicit StageTimer(std::shared_ptr<const GlFunctions> gl, std::size_t most_stages);
+  ~StageTimer();
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+  void switch_on(bool on);
+  void begin();
+  /// Ends the stage `name`, which began where the one before ended.
+  void mark(const char* name);
+  /// Appends the stages since begin(); waits for the card.
+  void add_to(std::vector<GpuStageTime>& times) const;
+
+ private:
+  std::shared_ptr<const GlFunctions> gl_;
+  std::size_t most_stages_;
+  std::vector<unsigned> queries_;  ///< empty: off
+  std::vector<const char*> names_;
 };
 
 /// A program of one compute shader.

@@ -9,8 +9,11 @@
 #include "rebounce/engine.h"
 #include "rebounce/error.h"
 #include "runtime/gpu/gl_resources.h"
+#include "runtime/gpu/gpu_direct_light.h"
 #include "runtime/gpu/gpu_operator.h"
 #include "runtime/gpu/shader_sources.h"
+#include "runtime/lights/sky_light.h"
+#include "runtime/outputs/probe_light.h"
 #include "transfer/base/argument_check.h"
 #include "transfer/file/transfer_data.h"
 #include "transfer/operator/hierarchical_operator.h"
@@ -23,12 +26,6 @@ constexpr std::uint32_t kThreads = 64;  // of a work group of the shaders
 // Most that a context may ask for between parts of a uniform buffer.
 constexpr std::size_t kStageBytes = 256;
 
-/// The uniform block of the shaders.
-struct StageBlock {
-  std::uint32_t items, first_item, first_output, unused = 0;
-  std::array<std::uint32_t, 4> channel_matrix;  ///< the fourth: couplings_are_floats
-};
-
 enum class Stage : std::uint8_t {
   kInitialExitance,
   kProjectPositions,
@@ -38,8 +35,24 @@ enum class Stage : std::uint8_t {
   kExpandPositions,
   kRadiosity,
   kVertices,
+  kVertexValues,  // as kVertices, with negative sums
+  kTexels,
+  kProbes,
 };
-constexpr std::size_t kStageCount = 8;
+constexpr std::array<const char*, 11> kStageNames = {
+    "initial exitance",
+    "projection of positions",
+    "projection of clusters",
+    "couplings",
+    "expansion to clusters",
+    "expansion to positions, dense blocks",
+    "radiosity",
+    "vertices",
+    "vertices of texels",
+    "texels",
+    "probes",
+};
+constexpr std::size_t kStageCount = kStageNames.size();
 
 const HierarchicalOperator& hierarchical(const TransferData* data) {
   if (data == nullptr || !data->transfer) throw Error("the transfer data have no operator");
@@ -59,9 +72,17 @@ std::size_t triple_bytes(std::size_t count) {
 }  // namespace
 
 struct GpuEngine::Parts {
-  Parts(const SceneData& scene, const GpuOperator& tables,
-        std::shared_ptr<const GlFunctions> loaded)
-      : gl(std::move(loaded)),
+  /// The uniform block of the shaders.
+  struct StageBlock {
+    std::uint32_t items, first_item, first_output, keeps_negative = 0;
+    std::array<std::uint32_t, 4> channel_matrix;  ///< the fourth: couplings_are_floats
+  };
+
+  Parts(std::shared_ptr<const TransferData> kept, const GpuOperator& tables,
+        std::shared_ptr<const GlFunctions> loaded, const DirectLightingSettings& settings)
+      : data(std::move(kept)),
+        scene(*data),
+        gl(std::move(loaded)),
         patch_count(scene.patches.size()),
         vertex_count(scene.mesh.position.size()),
         initial_exitance_shader(gl, "initial_exitance.glsl", ShaderSources::kInitialExitance),
@@ -70,6 +91,8 @@ struct GpuEngine::Parts {
         expand(gl, "expand.glsl", ShaderSources::kExpand),
         radiosity_shader(gl, "radiosity.glsl", ShaderSources::kRadiosity),
         vertices(gl, "vertex_irradiance.glsl", ShaderSources::kVertexIrradiance),
+        texels(gl, "lightmap_irradiance.glsl", ShaderSources::kLightmapIrradiance),
+        probes(gl, "probe_light.glsl", ShaderSources::kProbeLight),
         reflectance(table(scene.patches.reflectance)),
         emitted_exitance(table(scene.patches.emitted_exitance)),
         positions(table(tables.positions)),
@@ -84,12 +107,23 @@ struct GpuEngine::Parts {
         strip_entries(table(tables.strip_entries)),
         vertex_begin(table(vertex_begins(scene.mesh))),
         vertex_weights(table(weights_of(scene.mesh))),
+        texel_triangles(table(scene.lightmap.triangle)),
+        texel_weights(table(scene.lightmap.weight)),
+        triangles(scene.lightmap.empty() ? zeros(0) : table(scene.mesh.triangle)),
+        probe_begin(table(scene.probes.entry_begin)),
+        probe_patches(table(scene.probes.entry_patch)),
+        probe_weights(table(scene.probes.entry_weight)),
+        probe_sky(zeros(triple_bytes(kHarmonicCount * scene.probes.size()))),
+        vertex_values(zeros(scene.lightmap.empty() ? 0 : triple_bytes(vertex_count))),
         initial_exitance(zeros(triple_bytes(patch_count))),
         indirect_irradiance(zeros(triple_bytes(patch_count))),
         radiosity(zeros(triple_bytes(patch_count))),
         light(zeros(tables.scales.size() * 4 * sizeof(float))),
         arriving(zeros(tables.scales.size() * 4 * sizeof(float))),
-        stages(table(stage_blocks(tables))) {}
+        stages(table(stage_blocks(tables))),
+        direct_light(gl, scene, settings),
+        direct_timer(gl, 1),
+        timer(gl, kStageCount) {}
 
   template <typename T>
   StorageBuffer table(const std::vector<T>& list) {
@@ -139,6 +173,10 @@ struct GpuEngine::Parts {
     set(Stage::kExpandPositions, strip_count);
     set(Stage::kRadiosity, tables.position_count);
     set(Stage::kVertices, static_cast<std::uint32_t>(vertex_count));
+    set(Stage::kVertexValues, static_cast<std::uint32_t>(vertex_count));
+    blocks[static_cast<std::size_t>(Stage::kVertexValues)].keeps_negative = 1;
+    set(Stage::kTexels, static_cast<std::uint32_t>(scene.lightmap.triangle.size()));
+    set(Stage::kProbes, static_cast<std::uint32_t>(kHarmonicCount * scene.probes.size()));
     std::vector<unsigned char> bytes_of_blocks(kStageCount * kStageBytes);
     for (std::size_t k = 0; k < kStageCount; ++k)
       std::memcpy(bytes_of_blocks.data() + k * kStageBytes, &blocks[k], sizeof(StageBlock));
@@ -167,8 +205,23 @@ struct GpuEngine::Parts {
     if (buffers.radiosity != 0) check_buffer("radiosity", buffers.radiosity, patch_count);
     if (buffers.vertex_irradiance != 0)
       check_buffer("light at vertices", buffers.vertex_irradiance, vertex_count);
-    std::array<unsigned, 4> names{buffers.direct_irradiance, buffers.indirect_irradiance,
-                                  buffers.radiosity, buffers.vertex_irradiance};
+    if (buffers.lightmap_irradiance != 0) {
+      if (scene.lightmap.empty()) {
+        throw Error("the transfer file has no lightmap; make it with --lightmap");
+      }
+      check_buffer("lightmap", buffers.lightmap_irradiance, scene.lightmap.triangle.size());
+    }
+    if (buffers.probe_light != 0) {
+      if (scene.probes.size() == 0) {
+        throw Error("the transfer file has no light probes; make it with --probes");
+      }
+      check_buffer("light of probes", buffers.probe_light, kHarmonicCount * scene.probes.size());
+    }
+    check_all_differ({buffers.direct_irradiance, buffers.indirect_irradiance, buffers.radiosity,
+                      buffers.vertex_irradiance, buffers.lightmap_irradiance, buffers.probe_light});
+  }
+
+  static void check_all_differ(std::vector<unsigned> names) {
     std::ranges::sort(names);
     for (std::size_t k = 1; k < names.size(); ++k) {
       if (names[k] != 0 && names[k] == names[k - 1]) {
@@ -179,7 +232,7 @@ struct GpuEngine::Parts {
 
   /// Runs a stage with these buffers at the bindings 0, 1, ...; work groups of `per_group` items.
   void run(Stage stage, const ComputeProgram& program, std::uint32_t per_group,
-           std::initializer_list<unsigned> names) const {
+           std::initializer_list<unsigned> names) {
     const auto k = static_cast<std::size_t>(stage);
     if (blocks[k].items == 0) return;
     unsigned index = 0;
@@ -188,9 +241,19 @@ struct GpuEngine::Parts {
                           static_cast<std::ptrdiff_t>(k * kStageBytes), sizeof(StageBlock));
     program.run((blocks[k].items + per_group - 1) / per_group);
     gl->memory_barrier(Gl::kStorageBarrier);
+    timer.mark(kStageNames[k]);
   }
 
-  void relight(const GpuBuffers& buffers) const {
+  void light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance, unsigned others) {
+    direct_timer.begin();
+    gl->memory_barrier(Gl::kAllBarriers);  // shadow maps are drawn, buffers written
+    direct_light.run(lamps, others, direct_irradiance);
+    gl->memory_barrier(Gl::kAllBarriers);
+    direct_timer.mark("direct light");
+  }
+
+  void relight(const GpuBuffers& buffers) {
+    timer.begin();
     const auto or_own = [](unsigned name, const StorageBuffer& own) {
       return name != 0 ? name : own.name();
     };
@@ -210,33 +273,52 @@ struct GpuEngine::Parts {
           {bases.name(), scales.name(), strips.name(), strip_entries.name(), couplings.name(),
            light.name(), arriving.name()});
     }
+    const unsigned all = or_own(buffers.radiosity, radiosity);
     run(Stage::kRadiosity, radiosity_shader, kThreads,
-        {indirect, reflectance.name(), or_own(buffers.radiosity, radiosity), positions.name(),
-         initial_exitance.name(), 0, arriving.name()});
+        {indirect, reflectance.name(), all, positions.name(), initial_exitance.name(), 0,
+         arriving.name()});
     if (buffers.vertex_irradiance != 0) {
       run(Stage::kVertices, vertices, kThreads,
           {indirect, vertex_begin.name(), vertex_weights.name(), buffers.vertex_irradiance});
     }
+    if (buffers.lightmap_irradiance != 0) {
+      run(Stage::kVertexValues, vertices, kThreads,
+          {indirect, vertex_begin.name(), vertex_weights.name(), vertex_values.name()});
+      run(Stage::kTexels, texels, kThreads,
+          {vertex_values.name(), texel_triangles.name(), texel_weights.name(), triangles.name(),
+           buffers.lightmap_irradiance});
+    }
+    if (buffers.probe_light != 0) {
+      run(Stage::kProbes, probes, kThreads,
+          {all, probe_sky.name(), probe_begin.name(), probe_patches.name(), probe_weights.name(),
+           buffers.probe_light});
+    }
     gl->memory_barrier(Gl::kAllBarriers);
   }
 
+  std::shared_ptr<const TransferData> data;
+  const TransferData& scene;
   std::size_t bytes = 0;  // counted while the buffers below are made
   std::shared_ptr<const GlFunctions> gl;
   std::size_t patch_count, vertex_count;
   std::array<StageBlock, kStageCount> blocks{};
-  ComputeProgram initial_exitance_shader, project, couple, expand, radiosity_shader, vertices;
+  ComputeProgram initial_exitance_shader, project, couple, expand, radiosity_shader, vertices,
+      texels, probes;
   StorageBuffer reflectance, emitted_exitance, positions, scales, bases, couplings, projections,
-      sides, outputs, inputs, strips, strip_entries, vertex_begin, vertex_weights;
+      sides, outputs, inputs, strips, strip_entries, vertex_begin, vertex_weights, texel_triangles,
+      texel_weights, triangles, probe_begin, probe_patches, probe_weights, probe_sky, vertex_values;
   StorageBuffer initial_exitance, indirect_irradiance, radiosity, light, arriving;
   StorageBuffer stages;
+  GpuDirectLight direct_light;
+  StageTimer direct_timer, timer;
 };
 
 GpuEngine::GpuEngine(const std::shared_ptr<const TransferData>& data,
-                     GlGetProcAddress get_proc_address) {
+                     GlGetProcAddress get_proc_address, const DirectLightingSettings& settings) {
   const HierarchicalOperator& transfer = hierarchical(data.get());
   const auto gl = std::make_shared<const GlFunctions>(get_proc_address);
   const GlStateGuard guard(*gl);
-  parts_ = std::make_unique<Parts>(*data, make_gpu_operator(transfer.storage()), gl);
+  parts_ = std::make_unique<Parts>(data, make_gpu_operator(transfer.storage()), gl, settings);
 }
 
 GpuEngine::~GpuEngine() = default;
@@ -244,7 +326,7 @@ GpuEngine::GpuEngine(GpuEngine&& other) noexcept = default;
 GpuEngine& GpuEngine::operator=(GpuEngine&& other) noexcept = default;
 
 std::size_t GpuEngine::bytes() const {
-  return parts_->bytes;
+  return parts_->bytes + parts_->direct_light.bytes();
 }
 
 void GpuEngine::set_emitted_exitance(std::span<const Float3> emitted_exitance) {
@@ -252,6 +334,38 @@ void GpuEngine::set_emitted_exitance(std::span<const Float3> emitted_exitance) {
   check_light_of_patches("the emitted exitance", emitted_exitance);
   const GlStateGuard guard(*parts_->gl);
   parts_->emitted_exitance.write(emitted_exitance.size_bytes(), emitted_exitance.data());
+}
+
+void GpuEngine::set_sky(const Sky& sky) {
+  const SceneData& scene = parts_->scene;
+  check_sky(sky, *parts_->data);
+  const std::vector<Float3> dark(parts_->patch_count);
+  std::vector<QuadraticProbeLight> light(scene.probes.size());
+  apply_probes(scene.probes, dark, sky, light);
+  const GlStateGuard guard(*parts_->gl);
+  parts_->probe_sky.write(light.size() * sizeof(QuadraticProbeLight), light.data());
+}
+
+void GpuEngine::light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance,
+                              unsigned others) {
+  const GlStateGuard guard(*parts_->gl);
+  const GlTextureGuard textures(*parts_->gl);
+  parts_->check_buffer("direct irradiance", direct_irradiance, parts_->patch_count);
+  if (others != 0) parts_->check_buffer("light of others", others, parts_->patch_count);
+  Parts::check_all_differ({direct_irradiance, others});
+  parts_->light_patches(lamps, direct_irradiance, others);
+}
+
+void GpuEngine::measure_stages(bool measure) {
+  parts_->direct_timer.switch_on(measure);
+  parts_->timer.switch_on(measure);
+}
+
+std::vector<GpuStageTime> GpuEngine::stage_times() const {
+  std::vector<GpuStageTime> times;
+  parts_->direct_timer.add_to(times);
+  parts_->timer.add_to(times);
+  return times;
 }
 
 void GpuEngine::relight(const GpuBuffers& buffers) {

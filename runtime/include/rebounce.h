@@ -364,7 +364,7 @@ typedef struct rebounce_gpu_engine rebounce_gpu_engine;
 typedef void (*rebounce_gl_function)(void);
 typedef rebounce_gl_function (*rebounce_gl_get_proc_address)(const char* name);
 
-/* Compiles the shaders and takes the operator to the card; the transfer is not needed afterwards.
+/* Compiles the shaders and takes the operator to the card; it keeps the transfer's data.
  * Errors that the context holds are dropped. Fails with REBOUNCE_UNSUPPORTED if the context is not
  * OpenGL 4.3 or newer, and with REBOUNCE_INVALID_ARGUMENT if the operator is not hierarchical, if
  * the card has no room for it, or if its driver refuses a shader (with the compiler's log). */
@@ -384,13 +384,64 @@ rebounce_status rebounce_gpu_engine_set_emitted_exitance(rebounce_gpu_engine* en
                                                          const float* emitted_exitance,
                                                          size_t patch_count);
 
-/* Names of OpenGL buffers of the caller's, each of floats [entries][3] in lx; all are different. */
+/* From the next frame on, the sky that probes see; at first it is dark. distribution
+ * [REBOUNCE_SKY_CELL_COUNT] >= 0 is its relative luminance in each cell; NULL: it is uniform. */
+rebounce_status rebounce_gpu_engine_set_sky(rebounce_gpu_engine* engine, const rebounce_sky* sky,
+                                            const float* distribution);
+
+/* The kind of texture that a shadow map is in. */
+typedef enum rebounce_gpu_shadow_map {
+  REBOUNCE_GPU_NO_SHADOW = 0,
+  REBOUNCE_GPU_PLANE = 1,  /* 2D */
+  REBOUNCE_GPU_LAYERS = 2, /* 2D array */
+  REBOUNCE_GPU_CUBE = 3
+} rebounce_gpu_shadow_map;
+
+/* A part of what a lamp sees, drawn with one matrix. */
+typedef struct rebounce_gpu_shadow_view {
+  /* Columns of the matrix that takes (x, y, z, 1) in metres to (u, v, depth, 1) times a positive
+   * number; inside of the view u, v and depth are from 0 to 1. Depth may grow or fall with the
+   * distance, the same way in all views of a lamp. */
+  float texture_from_world[16];
+  uint32_t layer; /* of a texture of layers */
+} rebounce_gpu_shadow_view;
+
+/* A lamp whose shadows are in a texture of depths of the caller's. */
+typedef struct rebounce_gpu_lamp {
+  uint32_t struct_size;                  /* sizeof(rebounce_gpu_lamp) */
+  uint32_t shadow_map;                   /* rebounce_gpu_shadow_map */
+  const rebounce_light* light;           /* point, spot or directional, without a profile */
+  const rebounce_gpu_shadow_view* views; /* of planes and layers: a point takes the first that has
+                                            it, and is lit if none has */
+  uint32_t view_count;                   /* 1 to 8 */
+  uint32_t texture;
+  float depth_range[2]; /* of cubes: metres at which depth is 0 and 1, along the axis of the face;
+                           either may be infinite, and the first may be the larger */
+} rebounce_gpu_lamp;
+
+/* Writes the size, and the defaults: no shadow map. */
+void rebounce_gpu_lamp_init(rebounce_gpu_lamp* lamp);
+
+/* Writes the direct irradiance [patch_count][3] in lx to the buffer of this name: what the buffer
+ * `others` has (0: nothing), lamps with a surface and skies for instance, and the light of `lamps`
+ * at rebounce_transfer_receiver_points. The shadow maps are complete; shaders that write the others
+ * and read the result need no barrier. What does not fit is refused, with the lamp's number;
+ * nothing is done then. */
+rebounce_status rebounce_gpu_engine_light_patches(rebounce_gpu_engine* engine,
+                                                  const rebounce_gpu_lamp* lamps, size_t lamp_count,
+                                                  uint32_t direct_irradiance, uint32_t others);
+
+/* Names of OpenGL buffers of the caller's, each of floats [entries][3], in lx if nothing else is
+ * said; all are different. */
 typedef struct rebounce_gpu_buffers {
   uint32_t struct_size;         /* sizeof(rebounce_gpu_buffers) */
   uint32_t direct_irradiance;   /* [patch_count] in */
   uint32_t indirect_irradiance; /* [patch_count] out; 0: not wanted */
   uint32_t radiosity;           /* [patch_count] out; 0: not wanted */
   uint32_t vertex_irradiance;   /* [vertex_count] out, indirect, at least 0; 0: not wanted */
+  uint32_t lightmap_irradiance; /* [height][width] out, likewise */
+  uint32_t probe_light;         /* [probe_count][9] out, cd/m², as rebounce_engine_probe_light
+                                   writes it; 0: not wanted */
 } rebounce_gpu_buffers;
 
 /* Writes the size, and zeros. */

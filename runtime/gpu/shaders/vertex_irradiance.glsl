@@ -1,9 +1,10 @@
 #version 430
-// The indirect irradiance at vertices, at least 0: sums of weights times those of patches.
+// The indirect irradiance at vertices: sums of weights times those of patches, at least 0 where
+// that is asked for.
 layout(local_size_x = 64) in;
 
 layout(std140, binding = 8) uniform Stage {
-  uvec4 range;           // items, first item, first output
+  uvec4 range;           // items; the last: whether negative sums stay
   uvec4 channel_matrix;  // which matrix each channel uses
 };
 layout(std430, binding = 0) readonly buffer IndirectIrradiance { float indirect_irradiance[]; };
@@ -20,5 +21,7 @@ void main() {
     vec3 value = vec3(indirect_irradiance[first], indirect_irradiance[first + 1u], indirect_irradiance[first + 2u]);
     sum += uintBitsToFloat(weights[k].y) * value;
   }
-  for (uint c = 0u; c < 3u; ++c) vertex_irradiance[3u * vertex + c] = max(sum[c], 0.0);
+  for (uint c = 0u; c < 3u; ++c) {
+    vertex_irradiance[3u * vertex + c] = range.w != 0u ? sum[c] : max(sum[c], 0.0);
+  }
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -117,30 +118,72 @@ class Engine {
 using GlFunction = void (*)();
 using GlGetProcAddress = GlFunction (*)(const char* name);
 
-/// Names of OpenGL buffers of the caller's, each of floats [entries][3] in lx. All are different.
+/// Names of OpenGL buffers of the caller's, each of floats [entries][3], in lx if nothing else is
+/// said. All are different.
 struct GpuBuffers {
   unsigned direct_irradiance = 0;    ///< [n] in
   unsigned indirect_irradiance = 0;  ///< [n] out; 0: not wanted
   unsigned radiosity = 0;            ///< [n] out; 0: not wanted
   unsigned vertex_irradiance = 0;    ///< [v] out, indirect, at least 0; 0: not wanted
+  /// [height][width] out, indirect, at least 0; 0: not wanted. Needs a file made with --lightmap.
+  unsigned lightmap_irradiance = 0;
+  /// [p][9] out, cd/m², as QuadraticProbeLight (outputs.h); 0: not wanted. Needs a file made with
+  /// --probes.
+  unsigned probe_light = 0;
 };
 
-/// Frames on the graphics card, by compute shaders of OpenGL 4.3: from a direct irradiance in a
-/// buffer to the indirect irradiance, the radiosity and the light at vertices in buffers. Nothing
-/// is read back. An Engine is the reference: results differ by rounding, a few thousandths of the
-/// mean light at most, most of it that of the Engine, which rounds light to integers. Two frames
-/// with the same light give the same bits on one card and driver.
+/// The kind of texture that a shadow map is in.
+enum class GpuShadowMap : std::uint8_t { kNoShadow, kPlane, kLayers, kCube };
+
+/// A part of what a lamp sees, drawn with one matrix.
+struct GpuShadowView {
+  /// Columns of the matrix that takes (x, y, z, 1) in metres to (u, v, depth, 1) times a positive
+  /// number; inside of the view u, v and depth are from 0 to 1. Depth may grow or fall with the
+  /// distance, the same way in all views of a lamp.
+  std::array<float, 16> texture_from_world{};
+  unsigned layer = 0;  ///< of a texture of layers
+};
+
+/// A lamp whose shadows are in a texture of depths of the caller's.
+struct GpuLamp {
+  static constexpr std::size_t kMostViews = 8;
+
+  Light light;  ///< point, spot or directional, without a profile
+  GpuShadowMap shadow_map = GpuShadowMap::kNoShadow;  ///< kNoShadow: it casts no shadows
+  unsigned texture = 0;                               ///< 2D, 2D array or cube map
+  /// Of planes and layers, from 1 to 8: a spot has one, a point six, a sun its cascades. A point
+  /// takes the first view that has it, and is lit if none has.
+  std::span<const GpuShadowView> views{};
+  /// Of cubes around the lamp, faces as those of OpenGL: metres at which depth is 0 and 1, along
+  /// the axis of the face. Either may be infinite, and the first may be the larger.
+  Float2 depth_range{0.05F, 100};
+};
+
+/// Microseconds that a stage of the last frame took on the card.
+struct GpuStageTime {
+  const char* name;
+  double microseconds;
+};
+
+/// Frames on the graphics card, by compute shaders of OpenGL 4.3: from lamps with shadow maps, or a
+/// direct irradiance in a buffer, to the indirect irradiance, the radiosity and the light at
+/// vertices, texels and probes in buffers. Nothing is read back. An Engine is the reference:
+/// results differ by rounding, a few thousandths of the mean light at most, most of it that of the
+/// Engine, which rounds light to integers. Two frames with the same light give the same bits on one
+/// card and driver.
 ///
 /// All calls, destruction too, are made with the same context, or one that shares its objects,
-/// current on the calling thread. They leave the program and the buffer bindings of the context as
-/// they were.
+/// current on the calling thread. They leave the program and all bindings of the context as they
+/// were.
 class GpuEngine {
  public:
-  /// Compiles the shaders and takes the operator to the card; the data are not needed afterwards.
-  /// Errors that the context holds are dropped. Throws Error if `data` is null, if its operator is
-  /// not hierarchical, if the card has no room for it, or with the compiler's log if a shader is
-  /// refused; Unsupported if the context is not OpenGL 4.3 or newer.
-  GpuEngine(const std::shared_ptr<const TransferData>& data, GlGetProcAddress get_proc_address);
+  /// Compiles the shaders and takes the operator and the points of patches to the card; it shares
+  /// the data. Errors that the context holds are dropped. Throws Error if `data` is null, if its
+  /// operator is not hierarchical, if the card has no room for it, if points_per_patch is below 1,
+  /// or with the compiler's log if a shader is refused; Unsupported if the context is not OpenGL
+  /// 4.3 or newer.
+  GpuEngine(const std::shared_ptr<const TransferData>& data, GlGetProcAddress get_proc_address,
+            const DirectLightingSettings& settings = {});
   ~GpuEngine();
   GpuEngine(GpuEngine&& other) noexcept;
   GpuEngine& operator=(GpuEngine&& other) noexcept;
@@ -153,11 +196,31 @@ class GpuEngine {
   /// finite.
   void set_emitted_exitance(std::span<const Float3> emitted_exitance);
 
+  /// From the next frame on, the sky that probes see, found on the processor; at first it is dark.
+  /// Throws Error as check_sky does.
+  void set_sky(const Sky& sky);
+
+  /// Writes the direct irradiance [n] in lx to the buffer of this name: what the buffer `others`
+  /// has (0: nothing), lamps with a surface and skies for instance, and the light of `lamps` at
+  /// receiver_points(). The shadow maps are complete; shaders that write the others and read the
+  /// result need no barrier. Texels of the shadow maps are taken four at a time, for points that
+  /// are two texels off their surface. Throws Error with the lamp's number if a field is out of
+  /// range, its type has no shadow map, or its texture is not what it says; if a buffer does not
+  /// exist, is too small or is given twice; nothing is done then.
+  void light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance,
+                     unsigned others = 0);
+
   /// Hands one frame to the card, and waits for nothing. Shaders that write the direct irradiance
   /// before and read results afterwards need no barrier. The direct irradiance is not looked at:
   /// what is negative or not finite spreads. Throws Error if a buffer does not exist, is too small
-  /// or is given twice; nothing is done then.
+  /// or is given twice, or if the file has not what it needs; nothing is done then.
   void relight(const GpuBuffers& buffers);
+
+  /// From now on, whether the times of stages are measured; at first they are not.
+  void measure_stages(bool measure);
+  /// Those of the last light_patches and relight, in their order, by time stamps, without those
+  /// that had nothing to do; waits for the card.
+  std::vector<GpuStageTime> stage_times() const;
 
  private:
   struct Parts;

@@ -1,14 +1,20 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <random>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "rebounce.h"
 #include "rebounce/engine.h"
 #include "runtime/frame/c_handles.h"
 #include "runtime/gpu/gl_resources.h"
+#include "runtime/lights/light_sampling.h"
 #include "tests/runtime/gpu/gpu_frame.h"
+#include "tests/runtime/gpu/shadow_maps.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/hierarchical_samples.h"
 #include "tests/support/random_light.h"
@@ -214,6 +220,8 @@ TEST_F(GpuEngineTest, RefusesBuffersThatDoNotFit) {
     refused(buffer, small.name(), "its buffer has 3876 bytes; it needs ");
   }
   refused(&GpuBuffers::radiosity, buffers.direct.name(), "given for two arrays");
+  refused(&GpuBuffers::lightmap_irradiance, small.name(), "no lightmap");
+  refused(&GpuBuffers::probe_light, small.name(), "no light probes");
 }
 
 TEST_F(GpuEngineTest, RefusesWhatItCannotRun) {
@@ -228,6 +236,190 @@ TEST_F(GpuEngineTest, RefusesWhatItCannotRun) {
   test::expect_error([&] { GpuEngine(data, nothing); }, "this context has no glGetIntegerv");
 }
 
+/// The direct irradiance of `lamps` by their formulas, without shadows.
+std::vector<Float3> unshadowed(const TransferData& data, std::span<const GpuLamp> lamps) {
+  const std::vector<ReceiverPoint> points = receiver_points(data);
+  const std::size_t of_patch = points.size() / data.patches.size();
+  std::vector<Float3> irradiance(data.patches.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const auto& [position, normal] = points[k];
+    for (const GpuLamp& lamp : lamps) {
+      const IncidentLight light = evaluate_light(lamp.light, position, {});
+      const float cosine =
+          std::max(0.0F, light.direction[0] * normal[0] + light.direction[1] * normal[1] +
+                             light.direction[2] * normal[2]);
+      for (int c = 0; c < kChannelCount; ++c) {
+        irradiance[k / of_patch][c] += light.illuminance[c] * cosine / static_cast<float>(of_patch);
+      }
+    }
+  }
+  return irradiance;
+}
+
+Light light_of_type(LightType type) {
+  Light light;
+  light.type = type;
+  light.radius = 1;
+  return light;
+}
+
+std::vector<GpuLamp> a_lamp_of_each_kind() {
+  Light point = light_of_type(LightType::kPoint);
+  point.position = {0.3F, 1.2F, 0.4F};
+  point.color = {1, 0.5F, 0.25F};
+  point.intensity = 50;
+  point.range = 9;
+  Light spot = point;
+  spot.type = LightType::kSpot;
+  spot.direction = {0, -0.6F, 0.8F};
+  spot.range = 0;
+  spot.inner_cone_angle = 0.2F;
+  spot.outer_cone_angle = 1;
+  Light sun = light_of_type(LightType::kDirectional);
+  sun.direction = {0.6F, -0.8F, 0};
+  return {{.light = point}, {.light = spot}, {.light = sun}};
+}
+
+TEST_F(GpuEngineTest, LightsPatchesByTheFormulasOfLamps) {
+  const auto data = nested_squares();
+  const std::vector<GpuLamp> lamps = a_lamp_of_each_kind();
+  const std::vector<Float3> background = test::random_light(kPatches, 20, 1);
+  const test::LightBuffer direct(test::random_light(kPatches, 21, 1)), others(background);
+  GpuEngine gpu(data, eglGetProcAddress);
+  const auto expect = [&](std::span<const GpuLamp> some, unsigned added,
+                          std::vector<Float3> wanted) {
+    gpu.light_patches(some, direct.name(), added);
+    for (std::size_t i = 0; added != 0 && i < kPatches; ++i) {
+      for (int c = 0; c < kChannelCount; ++c) wanted[i][c] += background[i][c];
+    }
+    EXPECT_LE(test::largest_difference(wanted, direct.read()), 1e-4);
+  };
+  for (std::size_t k = 0; k < lamps.size(); ++k) {
+    const std::span<const GpuLamp> one(&lamps[k], 1);
+    const std::vector<Float3> wanted = unshadowed(*data, one);
+    EXPECT_GT(std::ranges::max(wanted)[0], 0.01F) << "lamp " << k;
+    expect(one, 0, wanted);
+  }
+  expect(lamps, others.name(), unshadowed(*data, lamps));
+  const std::vector<GpuLamp> many(40, lamps[0]);
+  expect(many, 0, unshadowed(*data, many));
+  expect({}, others.name(), std::vector<Float3>(kPatches));
+  gpu.light_patches({}, direct.name());
+  EXPECT_EQ(direct.read(), std::vector<Float3>(kPatches));
+}
+
+TEST_F(GpuEngineTest, RefusesLampsItCannotLight) {
+  const auto data = nested_squares();
+  const test::LightBuffer direct(kPatches), small(kPatches - 1);
+  const test::DepthTexture plane(GL_TEXTURE_2D), cube(GL_TEXTURE_CUBE_MAP);
+  GpuEngine gpu(data, eglGetProcAddress);
+  const auto refused = [&](const GpuLamp& lamp, const char* part) {
+    const std::array<GpuLamp, 2> lamps = {GpuLamp{}, lamp};
+    test::expect_error([&] { gpu.light_patches(lamps, direct.name()); }, part);
+  };
+  refused({.light = light_of_type(LightType::kSphere)}, "lamp 1: the graphics card has");
+  Light light;
+  light.intensity = -1;
+  refused({.light = light}, "lamp 1: ");
+  light.intensity = 1;
+  light.profile = std::make_shared<const IntensityProfile>(
+      IntensityProfile{.vertical = {0}, .horizontal = {0}, .candela = {1}});
+  refused({.light = light}, "without profiles");
+  const std::vector<GpuShadowView> views(9);
+  GpuLamp lamp;
+  lamp.shadow_map = GpuShadowMap::kPlane;
+  lamp.texture = plane.name();
+  lamp.views = views;
+  refused(lamp, "has 9 views");
+  lamp.views = {};
+  refused(lamp, "has 0 views");
+  lamp.views = std::span(views).first(1);
+  lamp.texture = cube.name();
+  refused(lamp, "is no texture of the kind");
+  lamp.texture = 999999;
+  refused(lamp, "999999 is no texture of the kind");
+  lamp.shadow_map = GpuShadowMap::kCube;
+  lamp.texture = cube.name();
+  lamp.depth_range = {1, 1};
+  refused(lamp, "two distances above 0");
+  lamp.depth_range = {0, 1};
+  refused(lamp, "two distances above 0");
+  lamp.depth_range = {1, 2};
+  lamp.light.type = LightType::kDirectional;
+  refused(lamp, "a cube around a directional light");
+  test::expect_error([&] { gpu.light_patches({}, small.name()); }, "direct irradiance: its buffer");
+  test::expect_error([&] { gpu.light_patches({}, direct.name(), small.name()); },
+                     "light of others: its buffer");
+  test::expect_error([&] { gpu.light_patches({}, direct.name(), direct.name()); },
+                     "given for two arrays");
+  test::expect_error([&] { GpuEngine(data, eglGetProcAddress, {.points_per_patch = 0}); },
+                     "at least one point");
+}
+
+TEST_F(GpuEngineTest, LeavesTheTexturesOfTheContext) {
+  const auto data = nested_squares();
+  const test::LightBuffer direct(kPatches);
+  const test::DepthTexture plane(GL_TEXTURE_2D), other_plane(GL_TEXTURE_2D),
+      cube(GL_TEXTURE_CUBE_MAP);
+  GpuEngine gpu(data, eglGetProcAddress);
+  unsigned sampler = 0;
+  glGenSamplers(1, &sampler);
+  glActiveTexture(GL_TEXTURE10);
+  glBindTexture(GL_TEXTURE_2D, other_plane.name());
+  glBindSampler(10, sampler);
+  glActiveTexture(GL_TEXTURE3);
+  while (glGetError() != 0) {
+  }
+  const std::vector<GpuShadowView> views(1);
+  std::array<GpuLamp, 2> lamps;
+  lamps[0].shadow_map = GpuShadowMap::kPlane;
+  lamps[0].texture = plane.name();
+  lamps[0].views = views;
+  lamps[1].shadow_map = GpuShadowMap::kCube;
+  lamps[1].texture = cube.name();
+  for (const bool refuses : {false, true}) {
+    if (refuses) {
+      lamps[1].texture = plane.name();
+      test::expect_error([&] { gpu.light_patches(lamps, direct.name()); }, "lamp 1");
+    } else {
+      gpu.light_patches(lamps, direct.name());
+    }
+    EXPECT_EQ(glGetError(), 0U);
+    const auto value = [](GLenum name) {
+      int found = -1;
+      glGetIntegerv(name, &found);
+      return static_cast<unsigned>(found);
+    };
+    EXPECT_EQ(value(GL_ACTIVE_TEXTURE), static_cast<unsigned>(GL_TEXTURE3));
+    glActiveTexture(GL_TEXTURE10);
+    EXPECT_EQ(value(GL_TEXTURE_BINDING_2D), other_plane.name());
+    EXPECT_EQ(value(GL_SAMPLER_BINDING), sampler);
+    glActiveTexture(GL_TEXTURE12);
+    EXPECT_EQ(value(GL_TEXTURE_BINDING_CUBE_MAP), 0U);
+    EXPECT_EQ(value(GL_SAMPLER_BINDING), 0U);
+    glActiveTexture(GL_TEXTURE3);
+  }
+  glDeleteSamplers(1, &sampler);
+}
+
+TEST_F(GpuEngineTest, MeasuresItsStages) {
+  const auto data = nested_squares();
+  const test::FrameBuffers buffers(*data, test::random_light(kPatches, 22, 100));
+  GpuEngine gpu(data, eglGetProcAddress);
+  gpu.relight(buffers.names());
+  EXPECT_TRUE(gpu.stage_times().empty());
+  gpu.measure_stages(true);
+  gpu.light_patches({}, buffers.direct.name());
+  gpu.relight(buffers.names());
+  const std::vector<GpuStageTime> times = gpu.stage_times();
+  ASSERT_GE(times.size(), 6U);  // those that have nothing to do are not there
+  EXPECT_STREQ(times[0].name, "direct light");
+  EXPECT_STREQ(times.back().name, "vertices");
+  for (const GpuStageTime& time : times) EXPECT_GE(time.microseconds, 0) << time.name;
+  gpu.measure_stages(false);
+  EXPECT_TRUE(gpu.stage_times().empty());
+}
+
 TEST_F(GpuEngineTest, SaysWhatTheCompilerSays) {
   const auto gl = std::make_shared<const GlFunctions>(eglGetProcAddress);
   test::expect_error([&] { ComputeProgram(gl, "wrong.glsl", "#version 430\nvoid main() { x; }"); },
@@ -238,7 +430,9 @@ TEST_F(GpuEngineTest, SaysHowMuchMemoryItTakes) {
   const auto data = nested_squares();
   const GpuEngine gpu(data, eglGetProcAddress);
   EXPECT_GT(gpu.bytes(), data->transfer->bytes() / 2);
-  EXPECT_LT(gpu.bytes(), 10 * data->transfer->bytes());
+  const std::size_t of_points = 32 * receiver_points(*data).size();
+  EXPECT_GT(gpu.bytes(), of_points);
+  EXPECT_LT(gpu.bytes(), of_points + 10 * data->transfer->bytes());
 }
 
 TEST_F(GpuEngineTest, RunsFromC) {
@@ -255,6 +449,33 @@ TEST_F(GpuEngineTest, RunsFromC) {
   EXPECT_EQ(rebounce_gpu_engine_set_emitted_exitance(
                 gpu, data->patches.emitted_exitance.front().data(), kPatches),
             REBOUNCE_OK);
+  const std::vector<GpuLamp> lamp = a_lamp_of_each_kind();
+  const test::LightBuffer lit(kPatches);
+  rebounce_light light;
+  rebounce_light_init(&light);
+  std::ranges::copy(lamp[0].light.position, light.position);
+  std::ranges::copy(lamp[0].light.color, light.color);
+  light.intensity = lamp[0].light.intensity;
+  light.range = lamp[0].light.range;
+  std::array<rebounce_gpu_lamp, 2> lamps;
+  for (rebounce_gpu_lamp& each : lamps) {
+    rebounce_gpu_lamp_init(&each);
+    each.light = &light;
+  }
+  EXPECT_EQ(rebounce_gpu_engine_light_patches(gpu, lamps.data(), 2, lit.name(), 0), REBOUNCE_OK)
+      << rebounce_last_error();
+  EXPECT_LE(test::largest_difference(unshadowed(*data, std::array<GpuLamp, 2>{lamp[0], lamp[0]}),
+                                     lit.read()),
+            1e-4);
+  lamps[1].shadow_map = 4;
+  EXPECT_EQ(rebounce_gpu_engine_light_patches(gpu, lamps.data(), 2, lit.name(), 0),
+            REBOUNCE_INVALID_ARGUMENT);
+  lamps[1].light = nullptr;
+  EXPECT_EQ(rebounce_gpu_engine_light_patches(gpu, lamps.data(), 2, lit.name(), 0),
+            REBOUNCE_INVALID_ARGUMENT);
+  const rebounce_sky sky = {{1, 1, 1}, 5};
+  EXPECT_EQ(rebounce_gpu_engine_set_sky(gpu, &sky, nullptr), REBOUNCE_OK);
+
   rebounce_gpu_buffers names;
   rebounce_gpu_buffers_init(&names);
   EXPECT_EQ(rebounce_gpu_engine_relight(gpu, &names), REBOUNCE_INVALID_ARGUMENT);

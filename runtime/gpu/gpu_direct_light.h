@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+
+#include "rebounce/engine.h"
+#include "runtime/gpu/gl_resources.h"
+
+namespace rebounce {
+
+/// Direct light at the points of patches, with the shadow maps of the caller.
+class GpuDirectLight {
+ public:
+  /// Takes receiver_points() to the card.
+  GpuDirectLight(const std::shared_ptr<const GlFunctions>& gl, const TransferData& data,
+                 const DirectLightingSettings& settings);
+  ~GpuDirectLight();
+  GpuDirectLight(const GpuDirectLight&) = delete;
+  GpuDirectLight& operator=(const GpuDirectLight&) = delete;
+
+  std::size_t bytes() const;
+
+  /// As GpuEngine::light_patches, with buffers that fit. Program, buffers and textures at the
+  /// bindings that GlStateGuard and GlTextureGuard keep change.
+  void run(std::span<const GpuLamp> lamps, unsigned others, unsigned direct_irradiance);
+
+ private:
+  void check_texture(std::size_t number, const GpuLamp& lamp) const;
+  void bind_texture(const GpuLamp& lamp) const;
+
+  std::shared_ptr<const GlFunctions> gl_;
+  std::size_t patch_count_, points_per_patch_;
+  ComputeProgram program_;
+  StorageBuffer points_, lamps_;
+  unsigned samplers_[2] = {0, 0};  ///< for depth that grows with distance, and that falls
+};
+
+}  // namespace rebounce
