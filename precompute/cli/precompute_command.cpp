@@ -10,6 +10,7 @@
 #include "precompute/cli/commands.h"
 #include "precompute/cli/info_json.h"
 #include "precompute/cli/output_check.h"
+#include "precompute/cli/web_file.h"
 #include "precompute/patches/patch_selection.h"
 #include "rebounce/error.h"
 #include "transfer/base/precision.h"
@@ -20,7 +21,7 @@ namespace rebounce::cli {
 namespace {
 
 struct PrecomputeOptions {
-  std::string scene, output, form_factors, precision, quality = "default";
+  std::string scene, output, form_factors, precision, reader, quality = "default";
   std::string operator_kind = "hierarchical";
   std::vector<std::string> receivers, sources;  ///< each a list
   BuildSettings settings;
@@ -195,8 +196,13 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
         [&](const CostEstimate& estimate) { print_note(options, described(estimate)); });
   }
   for (const std::string& warning : report.warnings) print_note(options, "warning: " + warning);
-  save_transfer_file(chosen.output, data);
-  const std::uint64_t file_bytes = std::filesystem::file_size(chosen.output);
+  std::uint64_t file_bytes = 0;
+  if (chosen.reader == "web") {
+    file_bytes = save_web_files(chosen.output, data);
+  } else {
+    save_transfer_file(chosen.output, data);
+    file_bytes = std::filesystem::file_size(chosen.output);
+  }
   if (options.json) {
     print_json(data, report, file_bytes);
   } else if (!options.quiet) {
@@ -332,6 +338,12 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
   add_form_factor_options(*command, *chosen);
   add_operator_options(*command, *chosen);
   add_output_options(*command, *chosen);
+  command
+      ->add_option("--for", chosen->reader,
+                   "Who reads the file. web: pages do, and nobody else; it is packed, without what "
+                   "they do not show, and form factors (--compress-form-factors) go to a second "
+                   "file, NAME.form_factors.safetensors, that a page fetches when it compares")
+      ->check(CLI::IsMember({"web"}));
   command
       ->add_option(
           "--memory-limit", chosen->memory_limit_gib,

@@ -19,6 +19,7 @@
 namespace rebounce {
 
 inline constexpr char kFormatName[] = "rebounce transfer";
+inline constexpr char kFormFactorFormatName[] = "rebounce form factors";
 
 namespace key {
 inline constexpr char kFormat[] = "format";

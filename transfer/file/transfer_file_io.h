@@ -26,4 +26,13 @@ TransferData load_transfer_file(const std::filesystem::path& path);
 /// Reads a transfer file likewise; the operator and the form factors stay parts of its memory.
 TransferData read_transfer_file(const SafetensorsFile& file);
 
+/// Writes the compressed form factors of `data` alone, for those who have the rest, as
+/// save_transfer_file does. Throws Error if there are none.
+void save_form_factor_file(const std::filesystem::path& path, const TransferData& data);
+
+/// Reads what save_form_factor_file wrote. Throws Error as read_transfer_file does, and if it was
+/// not written with `data`.
+std::shared_ptr<const HierarchicalOperator> read_form_factor_file(const SafetensorsFile& file,
+                                                                  const TransferData& data);
+
 }  // namespace rebounce

@@ -45,10 +45,11 @@ Number number(const SafetensorsFile& file, const char* name) {
   return value;
 }
 
-void check_version(const SafetensorsFile& file) {
-  const auto format = file.metadata().find(key::kFormat);
-  if (format == file.metadata().end() || format->second != kFormatName) {
-    throw Error(file.name() + " is not a transfer file; give one that Rebounce wrote");
+/// `format` is the name of the format, `kind` what messages call such a file.
+void check_version(const SafetensorsFile& file, const char* format, const char* kind) {
+  const auto found = file.metadata().find(key::kFormat);
+  if (found == file.metadata().end() || found->second != format) {
+    throw Error(file.name() + " is not a " + kind + "; give one that Rebounce wrote");
   }
   const int version = number<int>(file, key::kFormatVersion);
   if (version != kFileFormatVersion) {
@@ -375,7 +376,7 @@ TransferData load_transfer_file(const std::filesystem::path& path) {
 }
 
 TransferData read_transfer_file(const SafetensorsFile& file) {
-  check_version(file);
+  check_version(file, kFormatName, "transfer file");
   check_checksum(file);
 
   TransferData data;
@@ -402,6 +403,21 @@ TransferData read_transfer_file(const SafetensorsFile& file) {
   data.transfer = read_operator(file, data);
   data.compressed_form_factors = read_compressed_form_factors(file, data.patches.area);
   return data;
+}
+
+std::shared_ptr<const HierarchicalOperator> read_form_factor_file(const SafetensorsFile& file,
+                                                                  const TransferData& data) {
+  check_version(file, kFormFactorFormatName, "file of form factors");
+  check_checksum(file);
+  visit_texts_of_build(data, [&](const char* name, const std::string& text) {
+    if (metadata(file, name) != text) {
+      throw Error(file.name() + " was not made with this transfer file (another " + name +
+                  "); make both again together");
+    }
+  });
+  auto form_factors = read_compressed_form_factors(file, data.patches.area);
+  if (form_factors == nullptr) refuse(file, "there are no form factors in it");
+  return form_factors;
 }
 
 }  // namespace rebounce

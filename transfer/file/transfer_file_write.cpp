@@ -176,14 +176,16 @@ SafetensorsMetadata make_metadata(const TransferData& data) {
   return metadata;
 }
 
-/// Replaces the placeholder by the checksum of the whole file.
-void seal(SafetensorsLayout& layout) {
+/// Lays the tensors out and replaces the placeholder by the checksum of the whole file.
+SafetensorsLayout sealed(const TensorCollector& collector, const SafetensorsMetadata& metadata) {
+  SafetensorsLayout layout = lay_out_safetensors(collector.tensors(), metadata);
   const std::size_t digits = find_checksum_digits(layout.prefix);
   FileChecksum checksum(layout.prefix, digits);
   for (const TensorView& tensor : layout.tensors) checksum.update(tensor.bytes);
   const std::string text = checksum.text();
   layout.prefix.replace(digits, ContentHash::kDigitCount,
                         text.substr(text.size() - ContentHash::kDigitCount));
+  return layout;
 }
 
 }  // namespace
@@ -210,9 +212,22 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
                                   collector);
   }
 
-  SafetensorsLayout layout = lay_out_safetensors(collector.tensors(), make_metadata(data));
-  seal(layout);
-  write_safetensors(path, layout);
+  write_safetensors(path, sealed(collector, make_metadata(data)));
+}
+
+void save_form_factor_file(const std::filesystem::path& path, const TransferData& data) {
+  if (!data.compressed_form_factors) {
+    throw Error("there are no compressed form factors to write; compress them first");
+  }
+  TensorCollector collector;
+  collect_hierarchical_operator(data.compressed_form_factors->storage(), kCompressedFormFactors,
+                                collector);
+  SafetensorsMetadata metadata{{key::kFormat, kFormFactorFormatName},
+                               {key::kFormatVersion, std::to_string(kFileFormatVersion)},
+                               {key::kChecksum, zero_checksum()}};
+  visit_texts_of_build(data,
+                       [&](const char* name, const std::string& text) { metadata[name] = text; });
+  write_safetensors(path, sealed(collector, metadata));
 }
 
 }  // namespace rebounce

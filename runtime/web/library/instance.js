@@ -56,9 +56,16 @@ export class Instance {
 
   async #start(module) {
     const failed = () => 52;  // nothing can be written: there are no files
+    const time = (clock, precision, address) => {
+      const nanoseconds = BigInt(Math.round(1e6 * performance.now()));
+      new DataView(this.#exports.memory.buffer).setBigUint64(address, nanoseconds, true);
+      return 0;
+    };
     const { exports } = await WebAssembly.instantiate(module, {
       rebounce: { now: () => performance.now() },
-      wasi_snapshot_preview1: { fd_close: failed, fd_seek: failed, fd_write: failed },
+      wasi_snapshot_preview1: {
+        fd_close: failed, fd_seek: failed, fd_write: failed, clock_time_get: time,
+      },
     });
     this.#exports = exports;
     exports._initialize();
@@ -111,6 +118,9 @@ export class Instance {
   }
   doubles(address, count) {
     return new Float64Array(this.#exports.memory.buffer, address, count);
+  }
+  bytes(address, count) {
+    return new Uint8Array(this.#exports.memory.buffer, address, count);
   }
   words(address, count) {
     return new Uint32Array(this.#exports.memory.buffer, address, count);

@@ -42,6 +42,10 @@ export interface Mesh {
   readonly color: Float32Array;
   readonly triangle: Uint32Array;
   readonly triangleMaterial: Uint32Array;
+  /** 2^32 - 1: a side that nothing sees. */
+  readonly trianglePatch: Uint32Array;
+  /** What light a vertex has comes from these weights: of vertex v, those up to that of v + 1. */
+  readonly weightBegin: Uint32Array;
   readonly surfaceCount: number;
 }
 
@@ -61,6 +65,15 @@ export interface Camera {
   readonly position: number[];
   readonly up: number[];
   readonly backward: number[];
+}
+
+/** A grid of light probes, x fastest, evenly spaced from the first to the last. */
+export interface Probes {
+  readonly grid: number[];
+  /** [probes] 0: inside of something. */
+  readonly valid: Uint8Array;
+  readonly first: number[];
+  readonly last: number[];
 }
 
 export interface LoadOptions {
@@ -87,18 +100,24 @@ export function isSupported(): boolean;
 
 /** All that a transfer file holds. */
 export class Transfer {
-  /** Loads a file. Throws RebounceError if it is missing, damaged or none of ours. */
+  /**
+   * Loads a file, packed with gzip or not. Throws RebounceError if it is missing, damaged or none of
+   * ours.
+   */
   static load(source: string | URL | ArrayBuffer, options?: LoadOptions): Promise<Transfer>;
   private constructor();
   readonly mesh: Mesh;
   readonly materials: Material[];
   readonly cameras: Camera[];
+  readonly probes: Probes | null;
   readonly patchCount: number;
   /** Whether any patch sees the sky. */
   readonly seesSky: boolean;
   /** The measured error of indirect light, relative. */
   readonly errorMean: number;
   createEngine(settings?: EngineSettings): Engine;
+  /** Loads the file of form factors that `precompute --for web` wrote beside this one. */
+  loadSolver(source: string | URL | ArrayBuffer, options?: LoadOptions): Promise<Solver>;
   dispose(): void;
 }
 
@@ -107,6 +126,7 @@ export class Engine {
   private constructor();
   readonly patchCount: number;
   readonly vertexCount: number;
+  readonly probeCount: number;
   readonly timings: Timings;
   /** One frame. Lights are known by their place: one that did not move is not traced again. */
   relight(lights: readonly Light[], sky?: Sky): Timings;
@@ -121,5 +141,30 @@ export class Engine {
   /** [vertexCount][3], lx */
   vertexIrradiance(): Float32Array;
   vertexDirectIrradiance(): Float32Array;
+  /**
+   * [vertexCount][3], lx: straight from the sky and those lights that are chosen, [lights] of 0 and
+   * 1; to be called at most once after each frame.
+   */
+  vertexDirectIrradianceOf(chosen: ArrayLike<number>): Float32Array;
+  /** [probeCount][9][3], cd/m²: spherical harmonics of degree 0 to 2. */
+  probeLight(): Float32Array;
+  dispose(): void;
+}
+
+/** What sweeps took and how far both sides are from the converged solution, relative. */
+export interface Swept {
+  milliseconds: number;
+  error: number;
+  engineError: number;
+}
+
+/** Gauss-Seidel that goes on from its last solution, for comparison. */
+export class Solver {
+  private constructor();
+  readonly vertexCount: number;
+  /** Sweeps for the light of the engine's last frame. */
+  sweep(engine: Engine, count: number): Swept;
+  /** [vertexCount][3], lx: the bounced light of the last sweeps. */
+  vertexIrradiance(): Float32Array;
   dispose(): void;
 }

@@ -7,6 +7,7 @@ import { readSafetensors } from './safetensors.js';
 export { RebounceError, isSupported };
 
 const skyCellCount = 146;
+const probeFloats = 27;  // of the light at one
 const stages = ['direct', 'exitance', 'product', 'radiosity'];
 
 /** Fetches a file whole; `onProgress(part)` is told how much of it has come, in [0, 1]. */
@@ -36,18 +37,36 @@ async function fetchWhole(url, onProgress) {
   return new Blob(parts).arrayBuffer();
 }
 
+/** The bytes of a file, without its packing; of any reason why that fails, one line. */
+async function unpacked(buffer, name) {
+  const [first, second] = new Uint8Array(buffer, 0, Math.min(2, buffer.byteLength));
+  if (first !== 0x1f || second !== 0x8b) return buffer;
+  const stream = new Blob([buffer]).stream().pipeThrough(new DecompressionStream('gzip'));
+  try {
+    return await new Response(stream).arrayBuffer();
+  } catch {
+    throw new RebounceError(`${name} is damaged or truncated; fetch it again`);
+  }
+}
+
+/** The file at a URL or in memory, and what messages call it. */
+async function bytesOf(source, { onProgress = () => {}, name } = {}) {
+  const isBuffer = source instanceof ArrayBuffer;
+  const title = name ?? (isBuffer ? 'the file' : String(source));
+  const buffer = await unpacked(isBuffer ? source : await fetchWhole(source, onProgress), title);
+  return { buffer, title };
+}
+
 /** All that a transfer file holds. */
 export class Transfer {
   #instance;
   #address;
 
   /** Loads a transfer file from a URL or from memory. */
-  static async load(source, { onProgress = () => {}, name } = {}) {
-    const isBuffer = source instanceof ArrayBuffer;
-    const [buffer, instance] = await Promise.all([
-      isBuffer ? source : fetchWhole(source, onProgress), Instance.get(),
-    ]);
-    return new Transfer(instance, buffer, name ?? (isBuffer ? 'the file' : String(source)));
+  static async load(source, options) {
+    const [{ buffer, title }, instance] =
+        await Promise.all([bytesOf(source, options), Instance.get()]);
+    return new Transfer(instance, buffer, title);
   }
 
   constructor(instance, buffer, name) {
@@ -65,6 +84,7 @@ export class Transfer {
     this.mesh = readMesh(file);
     this.materials = readMaterials(file);
     this.cameras = readCameras(file);
+    this.probes = readProbes(file);
     this.patchCount = file.tensor('patch.area').length;
     this.seesSky = file.tensor('patch.sky_visibility').some((part) => part > 0.01);
     this.errorMean = Number(file.metadata.error_mean);
@@ -73,6 +93,12 @@ export class Transfer {
   /** Makes an engine: one state of the light of this scene. */
   createEngine(settings) {
     return new Engine(this.#instance, this.#address, this, settings);
+  }
+
+  /** Loads the form factors that were written with this file, for Gauss-Seidel. */
+  async loadSolver(source, options) {
+    const { buffer, title } = await bytesOf(source, options);
+    return new Solver(this.#instance, this.#address, this, buffer, title);
   }
 
   /** Frees the file's memory, when its engines have been disposed of too. */
@@ -92,8 +118,11 @@ export class Engine {
   #sky;
   #milliseconds;
   #vertices;
+  #patches;
+  #chosen;
+  #probes;
 
-  constructor(instance, transfer, { patchCount, mesh },
+  constructor(instance, transfer, { patchCount, mesh, probes },
               { pointsPerPatch = 8, areaLightSamples = 4, lightCapacity = 16 } = {}) {
     this.#instance = instance;
     this.patchCount = patchCount;
@@ -113,15 +142,27 @@ export class Engine {
     this.#sky = instance.allocate(4 * 4);
     this.#milliseconds = instance.allocate(8 * stages.length);
     this.#vertices = instance.allocate(12 * this.vertexCount);
+    this.#patches = instance.allocate(12 * patchCount);
+    this.probeCount = probes?.valid.length ?? 0;
+    this.#probes = instance.allocate(4 * probeFloats * this.probeCount + 1);
     this.#makeRoom(lightCapacity);
+  }
+
+  /** For the solver. */
+  get address() {
+    return this.#address;
   }
 
   #makeRoom(count) {
     if (count <= this.#lights.capacity) return;
-    if (this.#lights.address) this.#instance.release(this.#lights.address);
+    if (this.#lights.address) {
+      this.#instance.release(this.#lights.address);
+      this.#instance.release(this.#chosen);
+    }
     this.#lights = {
       address: this.#instance.allocate(4 * plainLightSize * count), capacity: count,
     };
+    this.#chosen = this.#instance.allocate(count + 1);
   }
 
   /** One frame: all that follows from `lights` and `sky`. */
@@ -188,14 +229,85 @@ export class Engine {
     return this.#atVertices('rebounce_engine_vertex_direct_irradiance');
   }
 
+  /**
+   * What arrives at vertices straight from the sky and from those lights of the last frame that are
+   * chosen, [lights] of 0 and 1. Once in a frame.
+   */
+  vertexDirectIrradianceOf(chosen) {
+    this.#instance.bytes(this.#chosen, chosen.length).set(chosen);
+    this.#instance.check('rebounce_web_chosen_direct', this.#address, this.#chosen, this.#patches,
+                         this.#vertices);
+    return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
+  }
+
+  /** The light at probes: harmonics of degree 0 to 2, [probeCount][9][3], cd/m². */
+  probeLight() {
+    this.#instance.check('rebounce_engine_probe_light', this.#address, this.#probes,
+                         this.probeCount);
+    return this.#instance.floats(this.#probes, probeFloats * this.probeCount);
+  }
+
   /** Frees the engine's memory. */
   dispose() {
     if (this.#address && !this.#instance.broken) {
       this.#instance.call('rebounce_engine_destroy', this.#address);
-      for (const address of
-           [this.#lights.address, this.#sky, this.#milliseconds, this.#vertices]) {
+      for (const address of [
+        this.#lights.address, this.#chosen, this.#sky, this.#milliseconds, this.#vertices,
+        this.#patches, this.#probes,
+      ]) {
         this.#instance.release(address);
       }
+    }
+    this.#address = 0;
+  }
+}
+
+/** Gauss-Seidel on the form factors of a second file, from frame to frame, for comparison. */
+export class Solver {
+  #instance;
+  #address;
+  #result;
+  #vertices;
+
+  constructor(instance, transfer, { mesh }, buffer, name) {
+    this.#instance = instance;
+    this.vertexCount = mesh.position.length / 3;
+    const bytes = instance.put(new Uint8Array(buffer));
+    const title = instance.putText(name);
+    const result = instance.allocate(4);
+    try {
+      instance.check('rebounce_web_solver_create', transfer, bytes, buffer.byteLength, title, result);
+      this.#address = instance.words(result, 1)[0];
+    } finally {
+      for (const address of [bytes, title, result]) instance.release(address);
+    }
+    this.#result = instance.allocate(3 * 8);
+    this.#vertices = instance.allocate(12 * this.vertexCount);
+  }
+
+  /**
+   * Sweeps for the light of the engine's last frame, from where the last sweeps ended.
+   * @returns {{milliseconds: number, error: number, engineError: number}} of the sweeps alone, and
+   *   how far the indirect light of the sweeps and of the engine are from the converged solution
+   */
+  sweep(engine, count) {
+    this.#instance.check('rebounce_web_solver_sweep', this.#address, engine.address, count,
+                         this.#result);
+    const [milliseconds, error, engineError] = this.#instance.doubles(this.#result, 3);
+    return { milliseconds, error, engineError };
+  }
+
+  vertexIrradiance() {
+    this.#instance.check('rebounce_web_solver_vertex_irradiance', this.#address, this.#vertices,
+                         this.vertexCount);
+    return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
+  }
+
+  /** Frees the solver's memory. */
+  dispose() {
+    if (this.#address && !this.#instance.broken) {
+      this.#instance.call('rebounce_web_solver_destroy', this.#address);
+      for (const address of [this.#result, this.#vertices]) this.#instance.release(address);
     }
     this.#address = 0;
   }
@@ -210,7 +322,20 @@ function readMesh(file) {
     color: file.tensor('mesh.vertex_color'),
     triangle: file.tensor('mesh.triangle'),
     triangleMaterial: file.tensor('mesh.triangle_material'),
+    trianglePatch: file.tensor('mesh.triangle_patch'),
+    weightBegin: file.tensor('mesh.weight_begin'),
     surfaceCount,
+  };
+}
+
+/** The grid of probes; null where there is none. */
+function readProbes(file) {
+  const grid = file.tensor('probe.grid');
+  const position = file.tensor('probe.position');
+  if (!grid || grid.some((count) => count === 0)) return null;
+  return {
+    grid: [...grid], valid: file.tensor('probe.valid'),
+    first: [...position.subarray(0, 3)], last: [...position.subarray(-3)],
   };
 }
 

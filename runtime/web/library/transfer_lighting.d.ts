@@ -1,4 +1,4 @@
-import type { Light as ThreeLight, Material, Mesh } from 'three';
+import type { Box3, Data3DTexture, Light as ThreeLight, Material, Mesh, Vector3 } from 'three';
 import type { Engine, Light, LoadOptions, Sky, Timings, Transfer } from './rebounce.js';
 
 /** The three.js light as a light of Rebounce; null for one that is neither lamp nor sun. */
@@ -10,12 +10,22 @@ export interface LightingSky extends Sky {
   sunDirection?: readonly number[];
 }
 
+/** Bounced light in the air, in the shape of LightProbeGrid: add it to the scene. */
+export interface ProbeGrid extends ThreeLight {
+  readonly isLightProbeGrid: true;
+  readonly boundingBox: Box3;
+  readonly resolution: Vector3;
+  readonly texture: Data3DTexture;
+}
+
 /** Lights a scene of three.js from a transfer file. */
 export class TransferLighting {
   static load(url: string | URL | ArrayBuffer, options?: LoadOptions): Promise<TransferLighting>;
   private constructor();
   /** The surface of the scene, to be added to a scene of three.js. */
   readonly mesh: Mesh;
+  /** Lights what moves, with standard materials; null if the file has no grid of probes. */
+  readonly probes: ProbeGrid | null;
   readonly transfer: Transfer;
   readonly engine: Engine;
   readonly timings: Timings;
@@ -25,5 +35,7 @@ export class TransferLighting {
   patch<T extends Material>(material: T): T;
   /** One frame, to be called before the scene is drawn. */
   update(lights: Iterable<ThreeLight | Light>, sky?: LightingSky): void;
+  /** The same surface once more, for other bounced light at the vertices of the file. */
+  makeTwin(): { mesh: Mesh; write: (irradiance: Float32Array) => void };
   dispose(): void;
 }

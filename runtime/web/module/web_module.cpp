@@ -7,6 +7,7 @@
 
 #include "rebounce.h"
 #include "runtime/frame/c_handles.h"
+#include "runtime/outputs/vertex_light.h"
 
 extern "C" {
 
@@ -82,6 +83,25 @@ extern "C" {
     clock.end_stage();
     parts.compute_radiosity();
     clock.end_stage();
+    return REBOUNCE_OK;
+  });
+}
+
+/// Writes at the vertices of the display mesh what arrives straight from the sky and from those
+/// lights of the last frame that are `chosen`. Uses the light of patches [n] as workspace. To be
+/// called once after each frame: the other lights are switched off here.
+[[clang::export_name("rebounce_web_chosen_direct")]] rebounce_status rebounce_web_chosen_direct(
+    rebounce_engine* engine, const std::uint8_t* chosen, Float3* patches, Float3* vertices) {
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    for (std::size_t k = 0; k < engine->lights.size(); ++k) {
+      if (chosen[k] == 0) engine->lights[k].intensity = 0;
+    }
+    Engine::Parts& parts = engine->engine.parts();
+    const OneThread guard(parts.use);
+    const TransferData& data = *parts.data;
+    const std::span<Float3> patch_light(patches, data.patches.size());
+    parts.direct_lighting->compute(engine->lights, parts.sky, patch_light);
+    light_at_vertices(data.mesh, patch_light, {vertices, data.mesh.position.size()});
     return REBOUNCE_OK;
   });
 }

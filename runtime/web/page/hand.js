@@ -1,4 +1,4 @@
-// Lamps by mouse, finger and keys.
+// Lamps, and the ball, by mouse, finger and keys.
 
 import * as THREE from 'three';
 
@@ -17,19 +17,20 @@ export class Hand {
     const { canvas } = stage;
     // Before the camera's controls hear of it.
     canvas.addEventListener('pointerdown', (event) => {
-      const lamp = this.#lampAt(event);
-      if (!lamp) return;
+      const thing = this.#thingAt(event);
+      if (!thing) return;
       event.stopImmediatePropagation();
       canvas.setPointerCapture(event.pointerId);
       canvas.classList.add('held');
-      stage.chosen = lamp;
       stage.controls.enabled = false;
-      this.#grab(lamp, event);
+      this.#grab(thing, event);
+      if (thing === stage.ball) return;
+      stage.chosen = thing;
       onChoose();
     }, { capture: true });
     canvas.addEventListener('pointermove', (event) => {
       if (this.#held) this.#drag(event);
-      else canvas.classList.toggle('over', this.#lampAt(event) !== null);
+      else canvas.classList.toggle('over', this.#thingAt(event) !== null);
     });
     for (const end of ['pointerup', 'pointercancel']) {
       canvas.addEventListener(end, () => {
@@ -41,41 +42,50 @@ export class Hand {
     canvas.addEventListener('keydown', (event) => this.#moveByKey(event));
   }
 
+  // Where the pointer is in the view that it is in, from -1 to 1, and that view.
   #pointer(event) {
-    const { left, top, width, height } = this.#stage.canvas.getBoundingClientRect();
-    return new THREE.Vector2(
-        2 * (event.clientX - left) / width - 1, 1 - 2 * (event.clientY - top) / height);
+    const { left, top } = this.#stage.canvas.getBoundingClientRect();
+    const [x, y] = [event.clientX - left, event.clientY - top];
+    const views = this.#stage.views();
+    const view = views.find((one) => x < one.left + one.width && y < one.top + one.height) ??
+        views.at(-1);
+    const at = new THREE.Vector2(
+        2 * (x - view.left) / view.width - 1, 1 - 2 * (y - view.top) / view.height);
+    return { at, view };
   }
 
-  #lampAt(event) {
-    const { clientWidth, clientHeight } = this.#stage.canvas;
-    const pointer = this.#pointer(event);
-    let nearest = null, least = reach;
-    for (const lamp of this.#stage.lamps) {
-      const at = lamp.object.position.clone().project(this.#stage.camera);
-      const apart = Math.hypot((at.x - pointer.x) * clientWidth, (at.y - pointer.y) * clientHeight) / 2;
-      if (at.z < 1 && apart < least) [nearest, least] = [lamp, apart];
+  #thingAt(event) {
+    const { at: pointer, view } = this.#pointer(event);
+    const { camera, ball, movable, description } = this.#stage;
+    let nearest = null, least = Infinity;
+    for (const thing of movable) {
+      const place = thing.object.position;
+      const at = place.clone().project(camera);
+      const apart = Math.hypot((at.x - pointer.x) * view.width, (at.y - pointer.y) * view.height) / 2;
+      const size = thing !== ball ? 0 : view.height * description.ball.radius /
+          (2 * place.distanceTo(camera.position) * Math.tan(camera.fov * Math.PI / 360));
+      if (at.z < 1 && apart < Math.max(reach, size) && apart < least) [nearest, least] = [thing, apart];
     }
     return nearest;
   }
 
   #onPlane(event) {
-    this.#ray.setFromCamera(this.#pointer(event), this.#stage.camera);
+    this.#ray.setFromCamera(this.#pointer(event).at, this.#stage.camera);
     return this.#ray.ray.intersectPlane(this.#plane, new THREE.Vector3());
   }
 
-  // A lamp moves in the plane through it that faces the camera.
-  #grab(lamp, event) {
-    this.#held = lamp;
+  // A thing moves in the plane through it that faces the camera.
+  #grab(thing, event) {
+    this.#held = thing;
     const towards = this.#stage.camera.getWorldDirection(new THREE.Vector3());
-    this.#plane.setFromNormalAndCoplanarPoint(towards, lamp.object.position);
+    this.#plane.setFromNormalAndCoplanarPoint(towards, thing.object.position);
     const at = this.#onPlane(event);
-    this.#offset.copy(lamp.object.position).sub(at ?? lamp.object.position);
+    this.#offset.copy(thing.object.position).sub(at ?? thing.object.position);
   }
 
   #drag(event) {
     const at = this.#onPlane(event);
-    if (at) this.#stage.moveLamp(this.#held, at.add(this.#offset));
+    if (at) this.#stage.move(this.#held, at.add(this.#offset));
   }
 
   #moveByKey(event) {
@@ -87,6 +97,6 @@ export class Hand {
     if (!chosen || !axes[event.key]) return;
     event.preventDefault();
     const step = new THREE.Vector3(...axes[event.key]).applyQuaternion(camera.quaternion);
-    this.#stage.moveLamp(chosen, chosen.home.clone().addScaledVector(step, size / 40));
+    this.#stage.move(chosen, chosen.home.clone().addScaledVector(step, size / 40));
   }
 }

@@ -86,10 +86,32 @@ async function open(id) {
   }
 }
 
+/** Shows Gauss-Seidel beside, whose form factors are fetched now, or closes it. */
+async function compare(wanted) {
+  try {
+    if (wanted) {
+      progress(0.02);
+      const name = stage.description.id;
+      await stage.openComparison(`scenes/${name}.form_factors.safetensors`, progress);
+    } else {
+      stage.closeComparison();
+    }
+    message.hidden = true;
+    panel.showComparison();
+  } catch (error) {
+    say('The comparison cannot be shown', error.message,
+        { title: 'Try again', run: () => compare(wanted).catch(() => {}) });
+    throw error;
+  } finally {
+    progress(1);
+  }
+}
+
 function start() {
-  panel = new Panel(stage, scenes, (id) => open(id).catch(() => {}));
+  panel = new Panel(stage, scenes, (id) => open(id).catch(() => {}),
+                    (wanted) => compare(wanted).catch(() => {}));
   new Hand(stage, () => panel.showLamps());
-  addEventListener('resize', () => stage.resize());
+  addEventListener('resize', () => panel.showComparison());
   stage.canvas.addEventListener('webglcontextlost', (event) => {
     event.preventDefault();
     running = false;
@@ -112,13 +134,14 @@ window.rebounce = {
     running = false;
     stage.lighting.update(lights, sky);
     lastTimings = { ...stage.lighting.timings };
-    stage.renderer.render(stage.scene, stage.camera);
+    stage.draw();
   },
   resume() {
     if (running) return;
     running = true;
     requestAnimationFrame(frame);
   },
+  compare,
   indirectIrradiance: () => stage.lighting.engine.indirectIrradiance().slice(),
   get timings() {
     return lastTimings;

@@ -1,5 +1,6 @@
 // The controls around the canvas.
 
+import { lampKinds } from './lamp.js';
 import { clockText } from './sun.js';
 import { mostLamps } from './stage.js';
 
@@ -11,19 +12,49 @@ const element = (name, attributes = {}, ...children) => {
 };
 const byId = (id) => document.getElementById(id);
 
+/** A part of the light, as a percentage. */
+const percent = (part) => `${(100 * part).toFixed(part < 0.1 ? 1 : 0)} %`;
+
+function sideText({ error, lag }, more) {
+  const state = lag.frames > 0 ? `${lag.frames} frames behind`
+      : lag.settled > 0 ? `right, after ${lag.settled} frames` : 'right in the same frame';
+  return `error ${Number.isFinite(error) ? percent(error) : '-'} \u00B7 ${state}${more}`;
+}
+
+function press(button, on) {
+  button.setAttribute('aria-pressed', on);
+}
+
 export class Panel {
   #stage;
+  #onCompare;
   #part = 'all';
   #times = new Map();
 
-  constructor(stage, scenes, onScene) {
+  /** Calls onScene(id) and onCompare(open) when asked for another scene, or for the other half. */
+  constructor(stage, scenes, onScene, onCompare) {
     this.#stage = stage;
+    this.#onCompare = onCompare;
     for (const scene of scenes) {
       const button = element('button', { 'data-scene': scene.id }, scene.title);
       button.addEventListener('click', () => onScene(scene.id));
       byId('scenes').append(button);
     }
-    byId('add').addEventListener('click', () => this.addLamp());
+    for (const { kind, title } of lampKinds) {
+      const button = element('button', { 'data-kind': kind, title: `Add a lamp: ${title}` },
+                             `+ ${title}`);
+      button.addEventListener('click', () => this.addLamp(kind));
+      byId('add').append(button);
+    }
+    byId('compare').addEventListener('click', () => onCompare(!stage.comparison));
+    byId('sweeps').addEventListener('input', () => this.#setSweeps());
+    for (const [id, part] of [['sun-on', 'sunIsOn'], ['sky-on', 'skyIsOn']]) {
+      byId(id).addEventListener('click', () => {
+        stage[part] = !stage[part];
+        press(byId(id), stage[part]);
+        this.#setHour(stage.hour);
+      });
+    }
     byId('swing').addEventListener('click', () => this.toggleSwing());
     byId('hour').addEventListener('input', (event) => this.#setHour(Number(event.target.value)));
     for (const button of byId('parts').children) {
@@ -39,17 +70,20 @@ export class Panel {
     const parts = { 1: 'all', 2: 'bounced', 3: 'direct' };
     if (parts[event.key]) this.show(parts[event.key]);
     else if (event.key === ' ') this.toggleSwing();
-    else if (event.key === 'a') this.addLamp();
+    else if (event.key === 'a') this.addLamp('point');
+    else if (event.key === 'c') this.#onCompare(!this.#stage.comparison);
     else return;
     event.preventDefault();
   }
 
-  addLamp() {
+  addLamp(kind) {
     const { bounds, description } = this.#stage;
-    const middle = bounds.min.clone().lerp(bounds.max, 0.5).toArray();
+    // High in the middle: furniture stands below.
+    const { x, z } = bounds.min.clone().lerp(bounds.max, 0.5);
+    const middle = [x, bounds.min.y + 0.78 * (bounds.max.y - bounds.min.y), z];
     const colors = ['#ffd2a1', '#9cc4ff', '#ff9c8f', '#b8ffb0'];
     this.#stage.addLamp({
-      position: middle, color: colors[this.#stage.lamps.length % colors.length],
+      kind, position: middle, color: colors[this.#stage.lamps.length % colors.length],
       intensity: 0.6 * description.lamps[0].intensity,
     });
     this.showLamps();
@@ -57,7 +91,7 @@ export class Panel {
 
   toggleSwing() {
     this.#stage.toggleSwing();
-    byId('swing').setAttribute('aria-pressed', this.#stage.swinging);
+    press(byId('swing'), this.#stage.swinging);
   }
 
   show(part) {
@@ -75,8 +109,44 @@ export class Panel {
     byId('clock').textContent = clockText(hour);
   }
 
+  #setSweeps() {
+    const { comparison } = this.#stage;
+    if (!comparison) return;
+    comparison.sweeps = Number(byId('sweeps').value);
+    byId('sweep-count').textContent =
+        `${comparison.sweeps} ${comparison.sweeps === 1 ? 'sweep' : 'sweeps'} a frame`;
+  }
+
+  /** To be called when the other half was opened or closed. */
+  showComparison() {
+    const open = this.#stage.comparison !== null;
+    press(byId('compare'), open);
+    for (const id of ['sweeps', 'sweep-count', 'halves']) byId(id).hidden = !open;
+    document.body.classList.toggle('split', open);
+    this.#setSweeps();
+    // On a narrow page the controls cover the lower end.
+    const { top, width } = document.querySelector('aside').getBoundingClientRect();
+    this.#stage.covered = width >= innerWidth ? innerHeight - top : 0;
+    this.#stage.resize();
+    this.#stage.views().forEach(({ left, top: above }, k) => {
+      const half = byId('halves').children[k];
+      half.style.left = `${left}px`;
+      half.style.top = `${above}px`;
+    });
+  }
+
+  #showErrors() {
+    const { comparison } = this.#stage;
+    if (!comparison) return;
+    const { ours, theirs, milliseconds } = comparison;
+    const [left, right] = [...byId('halves').children].map((half) => half.lastElementChild);
+    left.textContent = sideText(ours, '');
+    right.textContent = sideText(theirs, ` \u00B7 ${milliseconds.toFixed(1)} ms`);
+  }
+
   /** To be called when another scene is there. */
   showScene() {
+    this.showComparison();
     const { description, hour } = this.#stage;
     for (const button of byId('scenes').children) {
       button.setAttribute('aria-current', button.dataset.scene === description.id);
@@ -93,7 +163,9 @@ export class Panel {
   /** To be called when lamps were added, taken away or chosen. */
   showLamps() {
     byId('lamps').replaceChildren(...this.#stage.lamps.map((lamp) => this.#lampItem(lamp)));
-    byId('add').disabled = this.#stage.lamps.length >= mostLamps;
+    for (const button of byId('add').children) {
+      button.disabled = this.#stage.lamps.length >= mostLamps;
+    }
   }
 
   #lampItem(lamp) {
@@ -149,6 +221,7 @@ export class Panel {
 
   /** Shows the milliseconds of the stages, smoothed. */
   showTimes(timings, patchCount) {
+    this.#showErrors();
     for (const [name, { value, mean }] of this.#times) {
       if (name === 'patches') continue;
       const smooth = mean + 0.1 * (timings[name] - mean);

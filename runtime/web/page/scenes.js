@@ -9,6 +9,7 @@ export const scenes = [
     darkEmitters: true,
     lampRadius: 0.012,
     lamps: [{ position: [0.2, 0.42, 0.2], color: warm, intensity: 4 }],
+    ball: { position: [0.42, 0.33, 0.2], radius: 0.04 },
     target: [0.278, 0.27, 0.28],
     camera: [0.278, 0.275, -0.78],
     fov: 40,
@@ -21,6 +22,7 @@ export const scenes = [
       { position: [1.2, 1.9, 1.2], color: warm, intensity: 160 },
       { position: [1.1, 0.95, 2.75], color: blue, intensity: 40 },
     ],
+    ball: { position: [2.3, 1.2, 1.6], radius: 0.17 },
   },
   {
     id: 'pavilion',
@@ -28,5 +30,6 @@ export const scenes = [
     lampRadius: 0.1,
     hour: 18.6,
     lamps: [{ position: [1, 1.5, 0.5], color: warm, intensity: 2500 }],
+    ball: { position: [2, 0.75, 1.6], radius: 0.35 },
   },
 ];

@@ -2,7 +2,10 @@
 
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
+import { RectAreaLightUniformsLib } from 'three/addons/lights/RectAreaLightUniformsLib.js';
 import { TransferLighting } from '../library/transfer_lighting.js';
+import { Ball } from './ball.js';
+import { Comparison } from './comparison.js';
 import { Lamp } from './lamp.js';
 import { sunAndSky } from './sun.js';
 
@@ -11,8 +14,13 @@ export const mostLamps = 4;
 export class Stage {
   lamps = [];
   chosen = null;
+  ball = null;
+  comparison = null;
   swinging = false;
   hour = null;
+  sunIsOn = true;
+  skyIsOn = true;
+  covered = 0;  // pixels at the lower end of the canvas
   #turn = 0;
 
   constructor(canvas) {
@@ -20,6 +28,7 @@ export class Stage {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.toneMapping = THREE.AgXToneMapping;
     this.renderer.shadowMap.enabled = true;
+    RectAreaLightUniformsLib.init();
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera();
     this.controls = new OrbitControls(this.camera, canvas);
@@ -27,7 +36,7 @@ export class Stage {
     this.sun = new THREE.DirectionalLight();
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(2048, 2048);
-    this.sun.shadow.bias = -0.001;
+    this.sun.shadow.bias = -0.0002;
     this.begun = performance.now();
   }
 
@@ -54,7 +63,9 @@ export class Stage {
     this.size = lighting.mesh.geometry.boundingSphere.radius;
     this.#placeCamera();
     this.#placeSun();
+    this.floor = this.bounds.getCenter(new THREE.Vector3()).setY(this.bounds.min.y);
     for (const lamp of description.lamps) this.addLamp(lamp);
+    this.#placeProbes();
     this.setHour(this.hour);
     this.relight();
     this.expose();
@@ -63,6 +74,12 @@ export class Stage {
 
   #clear() {
     for (const lamp of [...this.lamps]) this.removeLamp(lamp);
+    this.closeComparison();
+    if (this.ball) {
+      this.scene.remove(this.ball.object, this.lighting.probes);
+      this.ball.dispose();
+      this.ball = null;
+    }
     if (this.lighting) {
       this.scene.remove(this.lighting.mesh);
       this.lighting.dispose();
@@ -76,6 +93,13 @@ export class Stage {
       this.lighting.engine.setEmissionScale(k, [0, 0, 0]);
       material.emissive.set(0);
     });
+  }
+
+  /** A ball among the probes, where the file has some. */
+  #placeProbes() {
+    if (!this.lighting.probes) return;
+    this.ball = new Ball(this.description.ball);
+    this.scene.add(this.ball.object, this.lighting.probes);
   }
 
   #placeCamera() {
@@ -113,7 +137,8 @@ export class Stage {
     const { clientWidth, clientHeight } = this.canvas;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
-    this.camera.aspect = clientWidth / clientHeight;
+    const [{ width, height }] = this.views();
+    this.camera.aspect = width / height;
     // A narrow picture shows as much from side to side as a square one.
     const half = Math.tan(THREE.MathUtils.degToRad((this.fov ?? 50) / 2));
     const wider = Math.max(1, 1 / this.camera.aspect);
@@ -121,49 +146,94 @@ export class Stage {
     this.camera.updateProjectionMatrix();
   }
 
+  /** The parts of the canvas that show the scene, in pixels from its upper left: one, or two. */
+  views() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (!this.comparison) return [{ left: 0, top: 0, width, height }];
+    const half = width > height ? [width / 2, height] : [width, (height - this.covered) / 2];
+    const [across, down] = width > height ? [half[0], 0] : [0, half[1]];
+    return [
+      { left: 0, top: 0, width: half[0], height: half[1] },
+      { left: across, top: down, width: half[0], height: half[1] },
+    ];
+  }
+
+  /** Shows Gauss-Seidel beside; its form factors are another file. */
+  async openComparison(url, onProgress) {
+    const { lighting } = this;
+    const solver = await lighting.transfer.loadSolver(url, { onProgress });
+    if (lighting !== this.lighting || this.comparison) {
+      solver.dispose();
+      return false;
+    }
+    this.comparison = new Comparison(lighting, solver);
+    this.scene.add(this.comparison.twin.mesh);
+    this.resize();
+    return true;
+  }
+
+  closeComparison() {
+    if (!this.comparison) return;
+    this.scene.remove(this.comparison.twin.mesh);
+    this.comparison.dispose();
+    this.comparison = null;
+    this.resize();
+  }
+
   addLamp(description) {
     if (this.lamps.length >= mostLamps) return;
-    const lamp = new Lamp(description, this.description.lampRadius, 4 * this.size);
+    const { size, floor } = this;
+    const lamp = new Lamp(description, { lampRadius: this.description.lampRadius, size, floor });
     this.lamps.push(lamp);
     this.scene.add(lamp.object);
+    if (lamp.target) this.scene.add(lamp.target);
     this.chosen = lamp;
   }
 
   removeLamp(lamp) {
     this.lamps.splice(this.lamps.indexOf(lamp), 1);
     this.scene.remove(lamp.object);
+    if (lamp.target) this.scene.remove(lamp.target);
     lamp.dispose();
     if (this.chosen === lamp) this.chosen = this.lamps.at(-1) ?? null;
   }
 
-  /** Moves a lamp to `position`, or as near to it as the scene reaches. */
-  moveLamp(lamp, position) {
-    const margin = 1.5 * this.description.lampRadius;
-    lamp.home.copy(position).clamp(
+  /** What can be dragged. */
+  get movable() {
+    return this.ball ? [...this.lamps, this.ball] : this.lamps;
+  }
+
+  /** Moves a lamp or the ball to `position`, or as near to it as the scene reaches. */
+  move(thing, position) {
+    const margin = thing === this.ball
+        ? this.description.ball.radius : 1.5 * this.description.lampRadius;
+    thing.home.copy(position).clamp(
         this.bounds.min.clone().addScalar(margin), this.bounds.max.clone().subScalar(margin));
-    lamp.object.position.copy(lamp.home);
+    thing.object.position.copy(thing.home);
   }
 
   /** Lets lamps swing around where they are, or leaves them where they have come to. */
   toggleSwing() {
     this.swinging = !this.swinging;
-    for (const lamp of this.lamps) lamp.home.copy(lamp.object.position);
+    for (const { home, object } of this.movable) home.copy(object.position);
   }
 
   /** Sets sun and sky; null: neither. */
   setHour(hour) {
     this.hour = hour;
     this.sky = {};
-    if (hour === null) {
-      this.scene.background = new THREE.Color('#101114');
-      return;
-    }
+    this.sun.intensity = 0;
+    this.sun.castShadow = false;
+    this.scene.background = new THREE.Color('#101114');
+    if (hour === null) return;
     const { sun, sky, shown } = sunAndSky(hour);
-    this.sky = sky;
-    this.scene.background = new THREE.Color(...shown);
-    this.sun.intensity = sun?.intensity ?? 0;
-    this.sun.castShadow = sun !== null;
-    if (!sun) return;
+    if (this.skyIsOn) {
+      this.sky = sky;
+      this.scene.background.setRGB(...shown);
+    }
+    if (!sun || !this.sunIsOn) return;
+    this.sun.intensity = sun.intensity;
+    this.sun.castShadow = true;
     this.sun.color.setRGB(...sun.color);
     this.sun.position.copy(this.sun.target.position)
         .addScaledVector(new THREE.Vector3(...sun.direction).normalize(), -2 * this.size);
@@ -194,16 +264,33 @@ export class Stage {
   frame() {
     if (this.swinging) {
       const seconds = (performance.now() - this.begun) / 1000;
-      this.lamps.forEach((lamp, k) => lamp.swing(seconds + 1.3 * k, 0.16 * this.size));
+      this.movable.forEach((thing, k) => thing.swing(seconds + 1.3 * k, 0.16 * this.size));
     }
     this.controls.update();
     this.relight();
-    for (const lamp of this.lamps) {
-      lamp.ring.quaternion.copy(this.camera.quaternion);
-      lamp.ring.visible = lamp === this.chosen;
-    }
+    this.comparison?.update();
     const begin = performance.now();
-    this.renderer.render(this.scene, this.camera);
+    this.draw();
     return performance.now() - begin;
+  }
+
+  /** Draws what the last frame has lit, in one view or in two. */
+  draw() {
+    for (const lamp of this.lamps) lamp.face(this.camera, lamp === this.chosen);
+    const views = this.views();
+    const { renderer, scene, camera, canvas, comparison } = this;
+    renderer.setScissorTest(views.length > 1);
+    if (this.ball) this.ball.object.visible = views.length === 1;  // probes hold our light alone
+    views.forEach(({ left, top, width, height }, k) => {
+      const bottom = canvas.clientHeight - top - height;
+      renderer.setViewport(left, bottom, width, height);
+      renderer.setScissor(left, bottom, width, height);
+      this.lighting.mesh.visible = k === 0;
+      if (comparison) comparison.twin.mesh.visible = k === 1;
+      renderer.shadowMap.autoUpdate = k === 0;
+      renderer.render(scene, camera);
+    });
+    renderer.shadowMap.autoUpdate = true;
+    this.lighting.mesh.visible = true;
   }
 }

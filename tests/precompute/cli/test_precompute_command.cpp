@@ -353,5 +353,18 @@ TEST_F(PrecomputeCommand, RefusesReceiversAndSourcesThatAreNotThere) {
   attempt({"--receivers", "floor", "--operator", "low-rank"}, "hierarchical operators alone");
 }
 
+TEST_F(PrecomputeCommand, WritesForPagesPackedFilesAndFormFactorsApart) {
+  const std::string whole = precompute("whole.safetensors", {"--compress-form-factors", "0.01"});
+  const std::string page =
+      precompute("page.safetensors", {"--compress-form-factors", "0.01", "--for", "web"});
+  const std::string apart = test::read_bytes(folder_ / "page.form_factors.safetensors");
+  const std::string packed = test::read_bytes(page);
+  for (const std::string& file : {packed, apart}) {
+    EXPECT_EQ(file.substr(0, 2), "\x1f\x8b");
+  }
+  EXPECT_LT(packed.size() + apart.size(), test::read_bytes(whole).size() * 3 / 4);
+  expect_refused({"precompute", kScene, "-o", path("x"), "--for", "print"}, "web");
+}
+
 }  // namespace
 }  // namespace rebounce::test_precompute_command

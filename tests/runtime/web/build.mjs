@@ -1,9 +1,9 @@
 // Builds the module and the page, with a small scene. Usage: node build.mjs PROGRAM FOLDER
 
 import { execFileSync } from 'node:child_process';
-import { copyFileSync, writeFileSync } from 'node:fs';
+import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { lights, root, sky, skipWithout, web } from './support.mjs';
+import { lights, roomExposure, roomLights, root, sky, skipWithout, web } from './support.mjs';
 
 const [, , program, folder] = process.argv;
 skipWithout('/usr/bin/clang++-19', 'clang++-19');
@@ -21,9 +21,18 @@ run('node', join(web, 'pack_module.mjs'), join(module, 'rebounce.wasm'));
 const page = join(folder, 'page');
 run('node', join(web, 'build_page.mjs'), page);
 const scene = join(folder, 'cornell_box.safetensors');
-run(program, 'precompute', 'tests/scenes/cornell_box.gltf', '--patches', '500', '--quiet', '-o',
-    scene);
-copyFileSync(scene, join(page, 'scenes/cornell_box.safetensors'));
+const precompute = (name, file, ...options) => run(
+    program, 'precompute', `tests/scenes/${name}.gltf`, '--patches', '500', '--quiet', '-o', file,
+    ...options);
+precompute('cornell_box', scene);
+precompute('cornell_box', join(page, 'scenes/cornell_box.safetensors'), '--for', 'web',
+           '--compress-form-factors', '0.001', '--probes', '4,4,4', '--probe-rays', '96');
+precompute('furnished_room', join(folder, 'room.safetensors'));
+precompute('furnished_room', join(page, 'scenes/furnished_room.safetensors'), '--for', 'web');
+writeFileSync(join(folder, 'room_lights.json'), JSON.stringify({ lights: roomLights }));
+run(program, 'render', join(folder, 'room.safetensors'), '--lights', join(folder, 'room_lights.json'),
+    '--show', 'indirect', '--exposure', String(roomExposure), '--size', '320x240', '--quiet', '-o',
+    join(page, 'indirect.png'));
 writeFileSync(join(folder, 'lights.json'), JSON.stringify({ lights, sky }));
 run(program, 'solve', scene, '--lights', join(folder, 'lights.json'), '--quiet', '-o',
     join(folder, 'native.csv'));

@@ -36,3 +36,9 @@ export const lights = [
   { type: 'directional', direction: [0.2, -0.4, 1], intensity: 30 },
 ];
 export const sky = { color: [0.6, 0.8, 1], luminance: 20 };
+
+/** A lamp in the furnished room, and the stops at which what it bounces is well seen. */
+export const roomLights = [
+  { type: 'point', position: [1.2, 1.9, 1.2], color: [1, 0.8, 0.6], intensity: 160 },
+];
+export const roomExposure = -5.5;

@@ -13,6 +13,10 @@ skipWithout(join(folder, 'native.csv'), 'module; see the test WebBuild');
 const { RebounceError, Transfer } = await import(join(web, 'library/rebounce.js'));
 const { Instance } = await import(join(web, 'library/instance.js'));
 const bytes = new Uint8Array(readFileSync(scene));
+const ofPage = (name) => {
+  const { buffer } = new Uint8Array(readFileSync(join(folder, 'page/scenes', name)));
+  return buffer;
+};
 const load = (changed = bytes) => Transfer.load(changed.slice().buffer, { name: 'box' });
 
 /** The columns of a table whose names begin with `name`, row by row. */
@@ -39,6 +43,70 @@ test('its light is that of the native library', async () => {
     const largest = expected.reduce((most, x, k) => Math.max(most, Math.abs(x - light[k])), 0);
     assert.ok(largest < 1e-4 * mean, `${name}: ${largest} of a mean of ${mean}`);
   }
+  engine.dispose();
+  transfer.dispose();
+});
+
+test('the file for pages, packed and with shorter weights, gives the same light', async () => {
+  const whole = await load();
+  const packed = await Transfer.load(ofPage('cornell_box.safetensors'));
+  const [one, other] = [whole, packed].map((transfer) => transfer.createEngine());
+  one.relight(lights, sky);
+  other.relight(lights, sky);
+  assert.deepEqual(other.indirectIrradiance(), one.indirectIrradiance());
+  const [exact, shorter] = [one, other].map((engine) => engine.vertexIrradiance().slice());
+  const mean = exact.reduce((a, b) => a + b) / exact.length;
+  exact.forEach((x, k) => assert.ok(Math.abs(x - shorter[k]) < 1e-2 * mean));
+  for (const engine of [one, other]) engine.dispose();
+  for (const transfer of [whole, packed]) transfer.dispose();
+});
+
+test('direct light can be split by lamps', async () => {
+  const transfer = await load();
+  const engine = transfer.createEngine();
+  engine.relight(lights, sky);
+  const all = engine.vertexDirectIrradiance().slice();
+  const every = engine.vertexDirectIrradianceOf(lights.map(() => 1)).slice();
+  assert.deepEqual(every, all);
+  const some = engine.vertexDirectIrradianceOf([0, 1, 0, 0]).slice();
+  engine.relight([lights[1]], sky);
+  assert.deepEqual(engine.vertexDirectIrradiance(), some);
+  assert.ok(some.some((x, k) => x < all[k]));
+  engine.dispose();
+  transfer.dispose();
+});
+
+test('light at probes is that of the patches around', async () => {
+  const transfer = await Transfer.load(ofPage('cornell_box.safetensors'));
+  assert.deepEqual(transfer.probes.grid, [4, 4, 4]);
+  const engine = transfer.createEngine();
+  assert.equal(engine.probeCount, 64);
+  engine.relight(lights, sky);
+  const light = engine.probeLight();
+  const { valid } = transfer.probes;
+  assert.ok(valid.includes(1));
+  valid.forEach((is, k) => assert.equal(light[27 * k + 1] > 0, is === 1, `probe ${k}`));
+  engine.dispose();
+  transfer.dispose();
+});
+
+test('Gauss-Seidel converges to the light of the engine, and follows it from frame to frame', async () => {
+  const transfer = await Transfer.load(ofPage('cornell_box.safetensors'));
+  const engine = transfer.createEngine();
+  await assert.rejects(transfer.loadSolver(ofPage('cornell_box.safetensors')), /not a file of form/);
+  const solver = await transfer.loadSolver(ofPage('cornell_box.form_factors.safetensors'));
+  engine.relight([lights[0]]);
+  assert.ok(solver.sweep(engine, 100).error < 1e-4);
+  engine.relight([lights[1], lights[2]]);
+  const first = solver.sweep(engine, 1), second = solver.sweep(engine, 1);
+  assert.ok(first.error > 0.05 && second.error < 0.7 * first.error, `${first.error}, ${second.error}`);
+  assert.ok(second.engineError < 0.01, `${second.engineError}`);
+  solver.sweep(engine, 100);
+  const [swept, ours] =
+      [solver.vertexIrradiance().slice(), engine.vertexIrradiance()];
+  const mean = ours.reduce((a, b) => a + b) / ours.length;
+  swept.forEach((x, k) => assert.ok(Math.abs(x - ours[k]) < 0.2 * mean));
+  solver.dispose();
   engine.dispose();
   transfer.dispose();
 });

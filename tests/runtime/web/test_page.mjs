@@ -4,7 +4,7 @@ import assert from 'node:assert/strict';
 import { copyFileSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, afterEach, before, test } from 'node:test';
-import { chromiumPath, launchArguments, lights, skipWithout, web } from './support.mjs';
+import { chromiumPath, launchArguments, lights, roomExposure, roomLights, skipWithout, web } from './support.mjs';
 
 const folder = process.argv[2];
 skipWithout(join(folder, 'native.csv'), 'page; see the test WebBuild');
@@ -100,8 +100,11 @@ test('its controls do what they say', async () => {
     await frames(page);
     return (await sum(page)) !== light;
   };
-  assert.ok(await changes(() => page.click('#add')), 'another lamp');
-  assert.equal(await page.locator('#lamps li').count(), 2);
+  for (const kind of ['spot', 'area', 'point']) {
+    assert.ok(await changes(() => page.click(`#add [data-kind=${kind}]`)), kind);
+  }
+  assert.equal(await page.locator('#lamps li').count(), 4);
+  assert.ok(await page.locator('#add button').first().isDisabled(), 'there is room for four');
   assert.ok(await changes(() => page.locator('#lamps .power').first().click()), 'off');
   assert.ok(await changes(() => page.locator('#lamps .power').first().click()), 'on');
   assert.ok(await changes(() => page.locator('#lamps input[type=range]').first().fill('1')), 'more');
@@ -140,6 +143,106 @@ test('its light is that of the native library', async () => {
   transfer.materials.forEach((material, k) => engine.setEmissionScale(k, [0, 0, 0]));
   engine.relight(lights);
   assert.deepEqual(light, [...engine.indirectIrradiance()]);
+});
+
+test('bounced light looks as `rebounce render` draws it', async () => {
+  const { page } = await openReady({ width: 320, height: 240 });
+  await page.click('#scenes [data-scene=furnished_room]');
+  await page.waitForFunction(() => window.rebounce.stage.description.id === 'furnished_room');
+  const { compared, off } = await page.evaluate(async ({ given, exposure }) => {
+    const { stage, setLights } = window.rebounce;
+    while (stage.lamps.length > 0) stage.removeLamp(stage.lamps[0]);
+    stage.renderer.toneMapping = 1;  // linear
+    stage.renderer.toneMappingExposure = 2 ** exposure;
+    for (const material of stage.lighting.mesh.material) material.needsUpdate = true;
+    stage.show('bounced');
+    setLights(given);
+    const drawn = new Uint8Array(4 * 320 * 240);
+    const gl = stage.renderer.getContext();
+    gl.readPixels(0, 0, 320, 240, gl.RGBA, gl.UNSIGNED_BYTE, drawn);
+
+    const image = await createImageBitmap(await (await fetch('indirect.png')).blob());
+    const canvas = new OffscreenCanvas(320, 240).getContext('2d');
+    canvas.drawImage(image, 0, 0);
+    const native = canvas.getImageData(0, 0, 320, 240).data;
+    const theirs = (x, y, c) => native[4 * (320 * y + x) + c];
+    const ours = (x, y, c) => drawn[4 * (320 * (239 - y) + x) + c];
+    let compared = 0, off = 0;
+    for (let y = 2; y < 238; ++y) {
+      for (let x = 2; x < 318; ++x) {
+        let edge = 0, most = 0;
+        for (let c = 0; c < 3; ++c) {
+          for (const [i, j] of [[2, 0], [0, 2], [1, 1], [1, -1], [1, 0], [0, 1]]) {
+            for (const at of [theirs, ours]) {
+              edge = Math.max(edge, Math.abs(at(x + i, y + j, c) - at(x - i, y - j, c)));
+            }
+          }
+          most = Math.max(most, Math.abs(theirs(x, y, c) - ours(x, y, c)));
+        }
+        if (edge > 4) continue;
+        ++compared;
+        if (most > 2) ++off;
+      }
+    }
+    return { compared, off };
+  }, { given: roomLights, exposure: roomExposure });
+  assert.ok(compared > 0.6 * 320 * 240, `${compared} pixels lie within surfaces`);
+  // Silhouettes before what is nearly as bright are taken for surfaces: one in a few thousand.
+  assert.ok(off < compared / 2000, `of ${compared} pixels ${off} are off by more than 2 of 255`);
+});
+
+test('Gauss-Seidel beside falls behind a switched lamp, and catches up', async () => {
+  const { page, faults } = await openReady();
+  await page.click('#compare');
+  await page.waitForSelector('#halves .half');
+  const errors = () => page.evaluate(() => {
+    const { stage } = window.rebounce;
+    stage.frame();
+    const { ours, theirs } = stage.comparison;
+    return { ours: ours.error, theirs: theirs.error, behind: theirs.lag.frames };
+  });
+  const settle = () => page.waitForFunction(() => {
+    const { theirs } = window.rebounce.stage.comparison;
+    return theirs.lag.frames === 0 && theirs.error < 0.01;
+  });
+  await settle();
+  await page.evaluate(() => window.rebounce.stage.move(
+      window.rebounce.stage.lamps[0], window.rebounce.stage.bounds.max));
+  const { ours, theirs, behind } = await errors();
+  assert.ok(theirs > 0.03 && behind > 0, `theirs: ${theirs}`);
+  assert.ok(ours < 0.02, `ours: ${ours}`);
+  await settle();
+  assert.match(await page.textContent('#halves .half:last-child'), /after \d+ frames/);
+  await page.locator('#sweeps').fill('4');
+  assert.match(await page.textContent('#sweep-count'), /4 sweeps/);
+  await page.click('#compare');
+  assert.ok(await page.locator('#halves .half').first().isHidden());
+  assert.deepEqual(faults, []);
+});
+
+test('the ball is lit by probes, and can be dragged', async () => {
+  const { page, faults } = await openReady();
+  await page.click('#parts [data-part=bounced]');
+  const pixel = () => page.evaluate(() => {
+    const { stage } = window.rebounce;
+    for (const lamp of stage.lamps) lamp.object.children[0].intensity = 0;  // for three.js alone
+    stage.draw();
+    const at = stage.ball.object.position.clone().project(stage.camera);
+    const gl = stage.renderer.getContext();
+    const value = new Uint8Array(4);
+    gl.readPixels((at.x + 1) / 2 * gl.drawingBufferWidth, (at.y + 1) / 2 * gl.drawingBufferHeight,
+                  1, 1, gl.RGBA, gl.UNSIGNED_BYTE, value);
+    return [...value];
+  });
+  const [red, green] = await pixel();
+  assert.ok(red > 20 && green > 10, `${red}, ${green}`);
+  const to = await page.evaluate(() => {
+    const { stage } = window.rebounce;
+    stage.move(stage.ball, stage.bounds.min.clone().setY(stage.ball.home.y));
+    return stage.ball.object.position.x - stage.bounds.min.x;
+  });
+  assert.ok(to > 0 && to < 0.1, 'within the scene');
+  assert.deepEqual(faults, []);
 });
 
 test('600 frames take no further memory', async () => {

@@ -347,5 +347,41 @@ TEST(HierarchicalFile, SurvivesRandomMutationsUnderAGoodChecksum) {
   }
 }
 
+TEST(FormFactorFile, IsReadByTheTransferFileThatItWasWrittenWith) {
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data(Precision::kQ8);
+  data.settings_json = R"({"seed":1})";
+  expect_error([&] { save_form_factor_file(folder / "none", data); }, "no compressed form factors");
+  data.compressed_form_factors = sample_form_factors(1);
+  save_form_factor_file(folder / "form_factors", data);
+  const SafetensorsFile file(folder / "form_factors");
+
+  TransferData rest = sample_data(Precision::kQ8);
+  rest.settings_json = data.settings_json;
+  const auto read = read_form_factor_file(file, rest);
+  std::vector<float> expected(kPatchCount * kPatchCount), found(expected);
+  data.compressed_form_factors->expand(0, expected);
+  read->expand(0, found);
+  EXPECT_EQ(found, expected);
+
+  rest.settings_json = R"({"seed":2})";
+  expect_error([&] { read_form_factor_file(file, rest); }, "another settings");
+  expect_error([&] { read_transfer_file(file); }, "not a transfer file");
+  save_transfer_file(folder / "transfer", rest);
+  expect_error([&] { read_form_factor_file(SafetensorsFile(folder / "transfer"), rest); },
+               "not a file of form factors");
+}
+
+TEST(FormFactorFile, IsRefusedWhenItIsDamaged) {
+  const test::TemporaryFolder folder;
+  TransferData data = sample_data(Precision::kQ8);
+  data.compressed_form_factors = sample_form_factors(1);
+  save_form_factor_file(folder / "file", data);
+  std::string bytes = test::read_bytes(folder / "file");
+  bytes.back() = static_cast<char>(bytes.back() ^ 1);
+  test::write_bytes(folder / "file", bytes);
+  expect_error([&] { read_form_factor_file(SafetensorsFile(folder / "file"), data); }, "checksum");
+}
+
 }  // namespace
 }  // namespace rebounce::test_hierarchical_file

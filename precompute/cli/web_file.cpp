@@ -1,0 +1,93 @@
+#include "precompute/cli/web_file.h"
+
+#include <zlib.h>
+
+#include <bit>
+#include <cstddef>
+#include <fstream>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "rebounce/error.h"
+#include "transfer/file/atomic_file.h"
+#include "transfer/file/transfer_file_io.h"
+
+namespace rebounce::cli {
+namespace {
+
+// Of the 23 bits behind the point of a float, 12 stay: a weight is off by 1.2e-4 of itself at most,
+// and what is cut off packs to nothing.
+constexpr std::uint32_t kDroppedBits = 11;
+
+void shorten(float& value) {
+  constexpr std::uint32_t half = 1U << (kDroppedBits - 1), kept = ~((1U << kDroppedBits) - 1);
+  value = std::bit_cast<float>((std::bit_cast<std::uint32_t>(value) + half) & kept);
+}
+
+std::vector<std::byte> read_whole(const std::filesystem::path& path) {
+  std::vector<std::byte> bytes(std::filesystem::file_size(path));
+  std::ifstream file(path, std::ios::binary);
+  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  if (!file) throw Error(path.string() + " cannot be read back");
+  return bytes;
+}
+
+std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
+  constexpr int kGzipWindow = 15 + 16;  // 16: with the header of gzip
+  z_stream stream{};
+  if (deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzipWindow, 9, Z_DEFAULT_STRATEGY) !=
+      Z_OK) {
+    throw Error("out of memory while a file is packed");
+  }
+  std::vector<std::byte> packed(deflateBound(&stream, bytes.size()));
+  // It only reads there.
+  stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  const int result = deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  if (result != Z_STREAM_END) throw Error("a file of more than 4 GiB cannot be packed");
+  return packed;
+}
+
+/// Packs what `save` writes to a path.
+std::uint64_t save_packed(const std::filesystem::path& path, const auto& save) {
+  save(path);
+  const std::vector<std::byte> packed = gzip(read_whole(path));
+  AtomicFile file(path);
+  file.write(packed);
+  file.commit();
+  return packed.size();
+}
+
+}  // namespace
+
+std::filesystem::path form_factor_file_beside(const std::filesystem::path& path) {
+  return std::filesystem::path(path).replace_extension(".form_factors.safetensors");
+}
+
+std::uint64_t save_web_files(const std::filesystem::path& path, TransferData data) {
+  const auto form_factors = std::exchange(data.compressed_form_factors, nullptr);
+  data.emitted_irradiance = {};
+  data.exchange = {};
+  data.links = {};
+  data.lightmap = {};
+  data.surface_harmonics = {};
+  for (float& weight : data.mesh.weight) shorten(weight);
+  for (Harmonics& weights : data.probes.entry_weight) {
+    for (float& weight : weights) shorten(weight);
+  }
+  std::uint64_t size =
+      save_packed(path, [&](const std::filesystem::path& to) { save_transfer_file(to, data); });
+  if (form_factors != nullptr) {
+    data.compressed_form_factors = form_factors;
+    size += save_packed(form_factor_file_beside(path),
+                        [&](const std::filesystem::path& to) { save_form_factor_file(to, data); });
+  }
+  return size;
+}
+
+}  // namespace rebounce::cli
