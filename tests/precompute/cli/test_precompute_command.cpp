@@ -363,7 +363,6 @@ TEST_F(PrecomputeCommand, WritesForPagesPackedFilesAndFormFactorsApart) {
     EXPECT_EQ(file.substr(0, 2), "\x1f\x8b");
   }
   EXPECT_LT(packed.size() + apart.size(), test::read_bytes(whole).size() * 3 / 4);
-  expect_refused({"precompute", kScene, "-o", path("x"), "--for", "print"}, "web");
 }
 
 }  // namespace
