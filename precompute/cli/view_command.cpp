@@ -33,10 +33,20 @@ struct ViewOptions {
   int frames = 1;
 };
 
+/// The product and direct light on the graphics card, of the viewer alone.
+constexpr const char* kCardMethod = "graphics-card";
+
+std::vector<std::string> viewer_method_names() {
+  std::vector<std::string> names = method_names();
+  names.emplace_back(kCardMethod);
+  return names;
+}
+
 IndirectMethod method_of(const std::string& name, const ViewOptions& chosen) {
   IndirectMethod method{.sweeps = chosen.sweeps, .warm = !chosen.cold};
   method.on_links = name == kHierarchicalMethod;
-  if (name != kTransferMethod && !method.on_links) {
+  method.on_card = name == kCardMethod;
+  if (name != kTransferMethod && !method.on_links && !method.on_card) {
     method.iteration = std::ranges::find(kSolveMethods, name, &NamedSolveMethod::name)->method;
   }
   return method;
@@ -94,6 +104,8 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
 
 void report(const StageTimes& times, int frames, const ChosenCamera& camera,
             const CommonOptions& options) {
+  nlohmann::json card = nlohmann::json::object();
+  for (const GpuStageTime& stage : times.card) card[stage.name] = stage.microseconds;
   const nlohmann::json summary = {{"frames", frames},
                                   {"camera", as_json(camera)},
                                   {"microseconds",
@@ -102,7 +114,8 @@ void report(const StageTimes& times, int frames, const ChosenCamera& camera,
                                     {"solve_right", times.solve[1]},
                                     {"upload", times.upload},
                                     {"shadows", times.shadows},
-                                    {"draw", times.draw}}}};
+                                    {"draw", times.draw},
+                                    {"card", card}}}};
   if (options.json) {
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
@@ -191,10 +204,10 @@ void add_view_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--exposure", chosen->exposure,
                       "Stops; by default found from what the first picture shows, as render does");
   command->add_option("--method", chosen->method, "How to find the indirect light")
-      ->check(CLI::IsMember(method_names()))
+      ->check(CLI::IsMember(viewer_method_names()))
       ->capture_default_str();
   command->add_option("--against", chosen->against, "Split the screen; this method on the right")
-      ->check(CLI::IsMember(method_names()));
+      ->check(CLI::IsMember(viewer_method_names()));
   command->add_option("--sweeps", chosen->sweeps, "Sweeps a frame, for iterative methods")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();

@@ -240,16 +240,16 @@ struct GpuEngine::Parts {
     gl->bind_buffer_range(Gl::kUniformBuffer, GlStateGuard::kStageBinding, stages.name(),
                           static_cast<std::ptrdiff_t>(k * kStageBytes), sizeof(StageBlock));
     program.run((blocks[k].items + per_group - 1) / per_group);
-    gl->memory_barrier(Gl::kStorageBarrier);
     timer.mark(kStageNames[k]);
+    gl->memory_barrier(Gl::kStorageBarrier);
   }
 
   void light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance, unsigned others) {
     direct_timer.begin();
     gl->memory_barrier(Gl::kAllBarriers);  // shadow maps are drawn, buffers written
     direct_light.run(lamps, others, direct_irradiance);
-    gl->memory_barrier(Gl::kAllBarriers);
     direct_timer.mark("direct light");
+    gl->memory_barrier(Gl::kAllBarriers);
   }
 
   void relight(const GpuBuffers& buffers) {

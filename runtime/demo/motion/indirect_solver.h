@@ -17,6 +17,9 @@ struct IndirectMethod {
   bool on_links = false;  ///< hierarchical radiosity over the file's links instead of either
   int sweeps = 1;         ///< sweeps of an iteration, at least 1
   bool warm = true;       ///< an iteration starts from the frame before
+  /// The product on the graphics card, with direct light from the viewer's shadow maps; where that
+  /// is not asked for the light, the product on the processor.
+  bool on_card = false;
 
   bool iterates() const { return iteration || on_links; }
   bool operator==(const IndirectMethod&) const = default;

@@ -150,6 +150,28 @@ TEST_F(ViewCommand, LampsWithASurfaceLookAsRenderDrawsThem) {
   }
 }
 
+TEST_F(ViewCommand, TheGraphicsCardShowsThePictureOfTheProcessor) {
+  const Outcome tried = run({"view", file_, "--size", "16x16", "--method", "graphics-card",
+                             "--screenshot", path("try.png")});
+  if (tried.err.find("OpenGL 4.3 is needed") != std::string::npos) GTEST_SKIP() << tried.err;
+  // A point, which the card lights itself; a sphere and a sky, which the processor gives it.
+  const std::string mixed = write("mixed.lights.json", R"({"lights": [
+      {"type": "point", "position": [0.2, 0.4, 0.1], "intensity": 20, "color": [1, 0.6, 0.3]},
+      {"type": "sphere", "radius": 0.015, "intensity": 30000, "position": [0.278, 0.53, 0.28]}],
+      "sky": {"luminance": 100}})");
+  for (const std::string& lights : {std::string(kLights), mixed}) {
+    const Words light = {"--lights", lights, "--exposure", "-6", "--show", "indirect"};
+    Words on_card = light;
+    on_card.insert(on_card.end(), {"--method", "graphics-card"});
+    const Image drawn = screenshot(light);
+    EXPECT_GT(drawn.mean(0), 5) << lights;
+    // Borders of shadows from a map and from eight rays differ a little.
+    const Difference apart = difference(screenshot(on_card, "card.png"), drawn);
+    EXPECT_LT(apart.mean, 1.0) << lights;
+    EXPECT_LT(apart.largest, 12) << lights;
+  }
+}
+
 TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {
   const std::string lights = write("sky.lights.json", R"({"sky":
       {"luminance": 300, "cie": 12, "sunDirection": [-1, -0.3, 0.4], "groundReflectance": 0.6}})");

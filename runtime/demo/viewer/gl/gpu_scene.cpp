@@ -201,6 +201,15 @@ void GpuScene::upload_bounced(Side side, std::span<const glm::vec3> value) {
   fill(GL_ARRAY_BUFFER, bounced_[static_cast<std::size_t>(side)], value, GL_STREAM_DRAW);
 }
 
+GLuint GpuScene::bounced_buffer(Side side) {
+  const GlBuffer& buffer = bounced_[static_cast<std::size_t>(side)];
+  glBindBuffer(GL_ARRAY_BUFFER, buffer.name());
+  glBufferData(GL_ARRAY_BUFFER,
+               static_cast<GLsizeiptr>(data_.mesh.position.size() * sizeof(glm::vec3)), nullptr,
+               GL_STREAM_DRAW);
+  return buffer.name();
+}
+
 void GpuScene::upload_patch_colors(Side side, std::span<const glm::vec3> color) {
   // Buffer textures with three floats need OpenGL 4.
   std::vector<glm::vec4> padded;

@@ -26,6 +26,9 @@ class GpuScene {
   void upload_first_flight(std::span<const glm::vec3> value);
   /// Uploads the bounced light at the vertices [v], lx.
   void upload_bounced(Side side, std::span<const glm::vec3> value);
+  /// A buffer for the bounced light at the vertices [v] that the graphics card writes, three floats
+  /// each, lx.
+  GLuint bounced_buffer(Side side);
   /// Uploads a linear colour for each patch [n].
   void upload_patch_colors(Side side, std::span<const glm::vec3> color);
 

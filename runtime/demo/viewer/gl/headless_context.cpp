@@ -23,18 +23,21 @@ EGLDisplay surfaceless_display() {
 }  // namespace
 
 HeadlessContext::HeadlessContext() {
-  static constexpr std::array<EGLint, 7> kWanted = {EGL_CONTEXT_MAJOR_VERSION,
-                                                    3,
-                                                    EGL_CONTEXT_MINOR_VERSION,
-                                                    3,
-                                                    EGL_CONTEXT_OPENGL_PROFILE_MASK,
-                                                    EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                                    EGL_NONE};
   display_ = surfaceless_display();
   bool good = display_ != EGL_NO_DISPLAY && eglInitialize(display_, nullptr, nullptr) == EGL_TRUE;
   good = good && eglBindAPI(EGL_OPENGL_API) == EGL_TRUE;
   if (good) {
-    context_ = eglCreateContext(display_, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, kWanted.data());
+    for (const EGLint major : {4, 3}) {  // compute shaders, or what pictures need
+      const std::array<EGLint, 7> wanted = {EGL_CONTEXT_MAJOR_VERSION,
+                                            major,
+                                            EGL_CONTEXT_MINOR_VERSION,
+                                            3,
+                                            EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                            EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                            EGL_NONE};
+      context_ = eglCreateContext(display_, EGL_NO_CONFIG_KHR, EGL_NO_CONTEXT, wanted.data());
+      if (context_ != EGL_NO_CONTEXT) break;
+    }
     good = context_ != EGL_NO_CONTEXT &&
            eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context_) == EGL_TRUE;
   }

@@ -2,8 +2,8 @@
 
 namespace rebounce {
 
-/// An OpenGL 3.3 context without a window or display, current while the object lives. It uses EGL,
-/// with the graphics card or else Mesa's software renderer.
+/// A context of OpenGL 4.3, or else 3.3, without a window or display, current while the object
+/// lives. It uses EGL, with the graphics card or else Mesa's software renderer.
 class HeadlessContext {
  public:
   /// Throws Error if this machine has no such OpenGL.

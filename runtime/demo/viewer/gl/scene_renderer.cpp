@@ -21,6 +21,10 @@ namespace {
 
 constexpr float kNearPart = 2e-4F;  // fraction of the scene's diagonal
 
+// Cubes of many lamps are smaller: 64 take 100 MiB.
+constexpr std::size_t kFewLamps = 8;
+constexpr int kSideOfFew = 1024, kSideOfMany = 256;  // texels
+
 glm::vec3 background(const FrameSettings& frame) {
   if (frame.show == Show::kPatches || frame.show == Show::kError) return glm::vec3(0.02F);
   if (frame.show == Show::kIndirect) return glm::vec3(0);
@@ -75,9 +79,10 @@ void SceneRenderer::update_shadows(std::span<const Light> lights) {
     shadow_maps_.push_back(std::make_unique<ShadowMap>());
   }
   shadow_maps_.resize(lights.size());
+  const int side = lights.size() > kFewLamps ? kSideOfMany : kSideOfFew;
   const ShadowCasters casters{scene_, spheres_, bounds_, spheres_version_};
   for (std::size_t k = 0; k < lights.size(); ++k) {
-    shadow_maps_[k]->update(lights[k], casters, shadow_);
+    shadow_maps_[k]->update(lights[k], casters, shadow_, side);
   }
 }
 

@@ -43,6 +43,9 @@ class SceneRenderer {
   /// Updates the shadow maps, one for each light.
   void update_shadows(std::span<const Light> lights);
 
+  /// The map of light k of the last update_shadows.
+  const ShadowMap& shadow_map(std::size_t k) const { return *shadow_maps_[k]; }
+
   const SceneBounds& bounds() const { return bounds_; }
 
   /// Draws into `framebuffer` (0: the window). Call update_shadows with the same lights first.

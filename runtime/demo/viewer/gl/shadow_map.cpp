@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/type_ptr.hpp>
 #include <limits>
 
 #include "runtime/demo/viewer/gl/lamp_shader.h"
@@ -14,7 +15,7 @@ namespace rebounce {
 namespace {
 
 // Texels per side.
-constexpr int kCubeSide = 1024, kPlaneSide = 4096, kPlaceSide = 512;
+constexpr int kPlaneSide = 4096, kPlaceSide = 512;
 
 // Fraction of the scene's diagonal: nearer objects, such as a lamp's own housing, cast no shadow.
 constexpr float kShadowNearPart = 1e-3F;
@@ -100,8 +101,11 @@ ShadowMap::ShadowMap() {
   glSamplerParameteri(depth_sampler_.name(), GL_TEXTURE_MAG_FILTER, GL_NEAREST);
 }
 
-void ShadowMap::update(const Light& light, const ShadowCasters& casters, const GlProgram& program) {
-  if (drawn_ && casters.version == drawn_version_ && casts_alike(light, drawn_for_)) return;
+void ShadowMap::update(const Light& light, const ShadowCasters& casters, const GlProgram& program,
+                       int cube_side) {
+  const bool has_side = kind_of(light) != MapKind::kCube || cube_side == cube_side_;
+  if (drawn_ && has_side && casters.version == drawn_version_ && casts_alike(light, drawn_for_))
+    return;
   smallest_offset_ = kOffsetPart * casters.bounds.diagonal();
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
   glDrawBuffer(GL_NONE);
@@ -118,7 +122,7 @@ void ShadowMap::update(const Light& light, const ShadowCasters& casters, const G
       draw_plane(light, casters, program);
       break;
     case MapKind::kCube:
-      draw_cube(light, casters, program);
+      draw_cube(light, casters, program, cube_side);
       break;
     case MapKind::kPlaces:
       draw_places(light, casters, program);
@@ -153,14 +157,15 @@ void ShadowMap::set_reach(const glm::vec3& eye, const SceneBounds& bounds) {
 }
 
 void ShadowMap::draw_cube(const Light& light, const ShadowCasters& casters,
-                          const GlProgram& program) {
+                          const GlProgram& program, int side) {
   glBindTexture(GL_TEXTURE_CUBE_MAP, cube_.name());
-  if (!drawn_ || kind_of(drawn_for_) != MapKind::kCube) {
-    for (const CubeFace& face : kFaces) allocate(face.target, kCubeSide);
+  if (side != cube_side_) {
+    for (const CubeFace& face : kFaces) allocate(face.target, side);
+    cube_side_ = side;
   }
   const glm::vec3 eye = to_glm(light.position);
   set_reach(eye, casters.bounds);
-  draw_faces(eye, kCubeSide, casters, program, [&](const CubeFace& face) {
+  draw_faces(eye, side, casters, program, [&](const CubeFace& face) {
     glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, face.target, cube_.name(), 0);
   });
 }
@@ -199,6 +204,10 @@ void ShadowMap::draw_plane(const Light& light, const ShadowCasters& casters,
   plane_from_world_ = glm::ortho(low.x - margin, high.x + margin, low.y - margin, high.y + margin,
                                  -high.z - margin, -low.z + margin) *
                       glm::mat4(plane_axes);
+  const glm::mat4 texture_from_world = glm::translate(glm::mat4(1), glm::vec3(0.5F)) *
+                                       glm::scale(glm::mat4(1), glm::vec3(0.5F)) *
+                                       plane_from_world_;
+  std::copy_n(glm::value_ptr(texture_from_world), 16, plane_view_.texture_from_world.begin());
   texel_ = (std::max(high.x - low.x, high.y - low.y) + 2 * margin) / static_cast<float>(kPlaneSide);
   glViewport(0, 0, kPlaneSide, kPlaneSide);
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_TEXTURE_2D, plane_.name(), 0);
@@ -207,6 +216,19 @@ void ShadowMap::draw_plane(const Light& light, const ShadowCasters& casters,
   program.set("from_eye", 0);
   program.set("clip_from_world", plane_from_world_);
   casters.draw(program);
+}
+
+GpuLamp ShadowMap::for_card(const Light& light) const {
+  if (kind_of(light) == MapKind::kPlane) {
+    return {.light = light,
+            .shadow_map = GpuShadowMap::kPlane,
+            .texture = plane_.name(),
+            .views = {&plane_view_, 1}};
+  }
+  return {.light = light,
+          .shadow_map = GpuShadowMap::kCube,
+          .texture = cube_.name(),
+          .depth_range = {near_far_.x, near_far_.y}};
 }
 
 void ShadowMap::bind(const GlProgram& program) const {

@@ -2,6 +2,7 @@
 
 #include <glm/glm.hpp>
 
+#include "rebounce/engine.h"
 #include "rebounce/lights.h"
 #include "runtime/demo/viewer/gl/gl_objects.h"
 #include "runtime/demo/viewer/gl/gl_program.h"
@@ -40,8 +41,13 @@ struct ShadowCasters {
 /// if the lamp or a caster has moved.
 class ShadowMap {
  public:
-  /// Makes the map fit `light`; `program` draws depths.
-  void update(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+  /// Makes the map fit `light`; `program` draws depths. Cubes around points have `cube_side` texels
+  /// on each side.
+  void update(const Light& light, const ShadowCasters& casters, const GlProgram& program,
+              int cube_side);
+
+  /// The map as GpuEngine reads it, of a lamp without a surface; valid until the next update.
+  GpuLamp for_card(const Light& light) const;
 
   /// Binds the map to texture units 2 (cube), 3 (plane), 4 and 5 (cubes on a surface), and sets the
   /// uniforms that lamp_fragment() uses to read it.
@@ -56,7 +62,8 @@ class ShadowMap {
   void draw_faces(const glm::vec3& eye, int side, const ShadowCasters& casters,
                   const GlProgram& program, const Attach& attach);
   void set_reach(const glm::vec3& eye, const SceneBounds& bounds);
-  void draw_cube(const Light& light, const ShadowCasters& casters, const GlProgram& program);
+  void draw_cube(const Light& light, const ShadowCasters& casters, const GlProgram& program,
+                 int side);
   void draw_plane(const Light& light, const ShadowCasters& casters, const GlProgram& program);
 
   GlTexture cube_, plane_, places_;
@@ -65,6 +72,8 @@ class ShadowMap {
   bool drawn_ = false;
   Light drawn_for_;
   int drawn_version_ = 0;  // of the casters
+  int cube_side_ = 0;      // texels; 0: not drawn
+  GpuShadowView plane_view_;
   glm::mat4 plane_from_world_{1};
   glm::vec2 near_far_{0.01F, 1};
   float texel_ = 0, smallest_offset_ = 0;

@@ -27,6 +27,19 @@ std::vector<Light> without_profiles(std::vector<Light> lights) {
   return lights;
 }
 
+// How many sides of the screen are shown.
+std::size_t side_count(const ViewerState& state) {
+  return state.is_split ? kSideCount : 1;
+}
+
+// Those that the card does not light; the others are dark.
+std::vector<Light> dark_where_on_card(std::vector<Light> lights) {
+  for (Light& light : lights) {
+    if (CardLight::can_light(light)) light.intensity = 0;
+  }
+  return lights;
+}
+
 bool has_same_place(const ViewerSphere& a, const ViewerSphere& b) {
   return a.position == b.position && a.radius == b.radius;
 }
@@ -34,11 +47,29 @@ bool has_same_place(const ViewerSphere& a, const ViewerSphere& b) {
 }  // namespace
 
 FrameDrawer::FrameDrawer(const std::shared_ptr<const TransferData>& data, const ViewerSetup& setup)
-    : lit_(data, setup.reference, setup.make_probes), gpu_(*data), renderer_(gpu_, data->mesh) {}
+    : data_(data),
+      lit_(data, setup.reference, setup.make_probes),
+      gpu_(*data),
+      renderer_(gpu_, data->mesh),
+      has_card_(CardLight::is_possible(*data)) {}
 
 void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebuffer) {
   const std::vector<Light> lights = state.lights_now();
-  lit_.relight(lights, state.sky, state.methods, state.is_split, times_);
+  times_.direct = 0;
+  const std::span<const IndirectMethod> methods = std::span(state.methods).first(side_count(state));
+  const auto is_on_card = [](const IndirectMethod& method) { return method.on_card; };
+  const bool any_on_card = std::ranges::any_of(methods, is_on_card);
+  if (any_on_card) {
+    const auto direct = lit_.direct_light(dark_where_on_card(lights), state.sky, times_);
+    others_.assign(direct.begin(), direct.end());
+  }
+  // What is not the light at vertices needs that of patches on the processor.
+  const bool patches_of_card =
+      state.wants_exposure || state.show == Show::kError || !state.spheres_now().empty();
+  times_.solve = {};
+  if (patches_of_card || !std::ranges::all_of(methods, is_on_card)) {
+    lit_.relight(lights, state.sky, state.methods, state.is_split, patches_of_card, times_);
+  }
   if (state.wants_exposure) {
     state.exposure = lit_.find_exposure(lights, state.sky, state.camera.camera(), state.show);
     state.wants_exposure = false;
@@ -53,6 +84,8 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
     spheres_ = std::move(spheres);
   });
   times_.shadows = microseconds_of([&] { renderer_.update_shadows(lamps); });
+  times_.card.clear();
+  if (any_on_card) relight_on_card(state, lights);
   FrameSettings frame{.width = width,
                       .height = height,
                       .camera = state.camera.camera(),
@@ -77,8 +110,25 @@ void FrameDrawer::upload(const ViewerState& state) {
     return;
   }
   gpu_.upload_first_flight(lit_.first_flight_at_vertices(state.sky));
-  gpu_.upload_bounced(Side::kFirst, lit_.bounced_at_vertices(Side::kFirst));
-  if (state.is_split) gpu_.upload_bounced(Side::kSecond, lit_.bounced_at_vertices(Side::kSecond));
+  for (std::size_t k = 0; k < side_count(state); ++k) {
+    const auto side = static_cast<Side>(k);
+    if (!state.methods[k].on_card) gpu_.upload_bounced(side, lit_.bounced_at_vertices(side));
+  }
+}
+
+void FrameDrawer::relight_on_card(const ViewerState& state, std::span<const Light> lights) {
+  if (!card_) card_ = std::make_unique<CardLight>(data_, lit_.emitted_at_vertices());
+  std::vector<GpuLamp> lamps;
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    if (CardLight::can_light(lights[k])) {
+      lamps.push_back(renderer_.shadow_map(k).for_card(lights[k]));
+    }
+  }
+  for (std::size_t k = 0; k < side_count(state); ++k) {
+    if (!state.methods[k].on_card) continue;
+    card_->relight(lamps, others_, gpu_.bounced_buffer(static_cast<Side>(k)));
+  }
+  times_.card = card_->stage_times();
 }
 
 BodyMesh FrameDrawer::make_spheres(std::span<const ViewerSphere> spheres,

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "runtime/demo/viewer/gl/card_light.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
 #include "runtime/demo/viewer/gl/scene_renderer.h"
 #include "runtime/demo/viewer/window/lit_scene.h"
@@ -22,6 +23,8 @@ class FrameDrawer {
 
   const StageTimes& times() const { return times_; }
   const LitScene& scene() const { return lit_; }
+  /// Whether frames may be on the graphics card.
+  bool has_card() const { return has_card_; }
   const SceneBounds& bounds() const { return renderer_.bounds(); }
 
   /// The largest shown error of a patch (LitScene::patch_errors); 0 without errors.
@@ -29,13 +32,19 @@ class FrameDrawer {
 
  private:
   void upload(const ViewerState& state);
+  /// Lights the sides that are on the card.
+  void relight_on_card(const ViewerState& state, std::span<const Light> lights);
   void compare(const ViewerState& state);
   BodyMesh make_spheres(std::span<const ViewerSphere> spheres, const ViewerState& state);
   void upload_errors();
 
+  std::shared_ptr<const TransferData> data_;
   LitScene lit_;
   GpuScene gpu_;
   SceneRenderer renderer_;
+  std::unique_ptr<CardLight> card_;  // made when it is first asked for
+  bool has_card_;
+  std::vector<Float3> others_;  // direct light of the processor for the card
   StageTimes times_;
   std::vector<ViewerSphere> spheres_;                       // of the last frame
   std::array<std::vector<float>, kSideCount> patch_error_;  // empty: not shown

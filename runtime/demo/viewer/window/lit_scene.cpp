@@ -32,13 +32,12 @@ LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference
 
 void LitScene::relight(std::span<const Light> lights, const Sky& sky,
                        std::span<const IndirectMethod, kSideCount> methods, bool both,
-                       StageTimes& times) {
-  const auto begin = std::chrono::steady_clock::now();
-  engine_.parts().compute_direct(lights, sky);
+                       bool patches_of_card, StageTimes& times) {
+  direct_light(lights, sky, times);
   engine_.parts().compute_initial_exitance();
-  const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
-  times.direct = time.count();
   for (std::size_t side = 0; side < (both ? kSideCount : 1); ++side) {
+    times.solve[side] = 0;
+    if (methods[side].on_card && !patches_of_card) continue;
     IndirectSolver& solver = solver_[side];
     if (solver.method() != methods[side]) solver.choose(methods[side]);
     std::ranges::copy(solver.solve(engine_.initial_exitance()), indirect_[side].begin());
@@ -49,6 +48,22 @@ void LitScene::relight(std::span<const Light> lights, const Sky& sky,
       reflected_[side][i] = to_float3(to_glm(data_->patches.reflectance[i]) * irradiance);
     }
   }
+}
+
+std::span<const Float3> LitScene::direct_light(std::span<const Light> lights, const Sky& sky,
+                                               StageTimes& times) {
+  const auto begin = std::chrono::steady_clock::now();
+  engine_.parts().compute_direct(lights, sky);
+  const std::chrono::duration<double, std::micro> time = std::chrono::steady_clock::now() - begin;
+  times.direct += time.count();
+  return engine_.direct_irradiance();
+}
+
+std::vector<glm::vec3> LitScene::emitted_at_vertices() const {
+  if (emitted_.empty()) return {};
+  std::vector<glm::vec3> value;
+  for (const Float3& irradiance : emitted_) value.push_back(to_glm(irradiance));
+  return reconstruct_at_vertices(data_->mesh, value);
 }
 
 const LightProbes& LitScene::probes() {

@@ -32,10 +32,20 @@ class LitScene {
   /// `data` must have an operator. `reference` and `make_probes` may be empty.
   LitScene(std::shared_ptr<const TransferData> data, Reference reference, MakeProbes make_probes);
 
-  /// Computes direct light, and indirect light by `methods`, the second only if `both`. Sets
-  /// `times.direct` and `times.solve`.
+  /// Computes direct light, and indirect light by `methods`, the second only if `both`; those that
+  /// are on the graphics card only if `patches_of_card`. Adds to `times.direct` and sets
+  /// `times.solve`.
   void relight(std::span<const Light> lights, const Sky& sky,
-               std::span<const IndirectMethod, kSideCount> methods, bool both, StageTimes& times);
+               std::span<const IndirectMethod, kSideCount> methods, bool both, bool patches_of_card,
+               StageTimes& times);
+
+  /// The direct irradiance [n] in lx of `lights` and `sky` by shadow rays; valid until the next
+  /// call. Lamps of intensity 0 cost nothing. Adds to `times.direct`.
+  std::span<const Float3> direct_light(std::span<const Light> lights, const Sky& sky,
+                                       StageTimes& times);
+
+  /// The light of emitters at the vertices [v], lx; nothing if there are none.
+  std::vector<glm::vec3> emitted_at_vertices() const;
 
   /// H [n] in lx of the last frame.
   std::span<const Float3> indirect(Side side) const { return indirect_[index(side)]; }

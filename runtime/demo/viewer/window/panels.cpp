@@ -20,6 +20,7 @@ constexpr float kDegree = std::numbers::pi_v<float> / 180;
 constexpr float kStepPart = 0.005F;  // fraction of the scene's size per pixel of dragging
 constexpr const char* kTransferName = "transfer (one product)";
 constexpr const char* kHierarchicalName = "hierarchical (links)";
+constexpr const char* kCardName = "transfer on the graphics card";
 
 struct NamedShow {
   const char* name;
@@ -32,6 +33,7 @@ constexpr std::array<NamedShow, 5> kShows = {{{"all light", Show::kRadiosity},
                                               {"error", Show::kError}}};
 
 std::string name_of(const IndirectMethod& method) {
+  if (method.on_card) return kCardName;
   if (method.on_links) return kHierarchicalName;
   if (!method.iteration) return kTransferName;
   const auto* named =
@@ -39,19 +41,23 @@ std::string name_of(const IndirectMethod& method) {
   return std::string(named->name);
 }
 
-/// Offers the methods that `data` allow.
-void choose_method(const char* label, const TransferData& data, IndirectMethod& method) {
+/// Offers the methods that `data` and the graphics card allow.
+void choose_method(const char* label, const TransferData& data, bool has_card,
+                   IndirectMethod& method) {
   const auto choice = [&](const std::string& name, std::optional<SolveMethod> iteration,
-                          bool on_links) {
-    const bool is_chosen = method.iteration == iteration && method.on_links == on_links;
+                          bool on_links, bool on_card = false) {
+    const bool is_chosen =
+        method.iteration == iteration && method.on_links == on_links && method.on_card == on_card;
     if (!ImGui::Selectable(name.c_str(), is_chosen)) return;
     method.iteration = iteration;
     method.on_links = on_links;
+    method.on_card = on_card;
   };
   ImGui::PushID(label);
   ImGui::SetNextItemWidth(-70);
   if (ImGui::BeginCombo(label, name_of(method).c_str())) {
     choice(kTransferName, std::nullopt, false);
+    if (has_card) choice(kCardName, std::nullopt, false, true);
     const bool serves_all = data.transfer->roles().all_are_both();
     for (const NamedSolveMethod& named : kSolveMethods) {
       if (!has_form_factors(data) || (needs_operator(named.method) && !serves_all)) continue;
@@ -244,6 +250,11 @@ void Panels::smooth(const StageTimes& times) {
   blend(smoothed_.upload, times.upload);
   blend(smoothed_.shadows, times.shadows);
   blend(smoothed_.draw, times.draw);
+  if (smoothed_.card.size() != times.card.size()) smoothed_.card = times.card;
+  for (std::size_t k = 0; k < times.card.size(); ++k) {
+    smoothed_.card[k].name = times.card[k].name;
+    blend(smoothed_.card[k].microseconds, times.card[k].microseconds);
+  }
 }
 
 void Panels::draw(ViewerState& state, const FrameDrawer& frame) {
@@ -289,11 +300,11 @@ void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
 void Panels::draw_methods(ViewerState& state, const FrameDrawer& frame) const {
   if (!ImGui::CollapsingHeader("Indirect light", ImGuiTreeNodeFlags_DefaultOpen)) return;
   const TransferData& data = frame.scene().data();
-  choose_method(state.is_split ? "left" : "method", data, state.methods[0]);
+  choose_method(state.is_split ? "left" : "method", data, frame.has_card(), state.methods[0]);
   ImGui::Checkbox("split the screen", &state.is_split);
   if (!state.is_split) return;
   ImGui::SliderFloat("at", &state.split, 0, 1, "%.2f");
-  choose_method("right", data, state.methods[1]);
+  choose_method("right", data, frame.has_card(), state.methods[1]);
 }
 
 void Panels::draw_times(const ViewerState& state) const {
@@ -306,8 +317,13 @@ void Panels::draw_times(const ViewerState& state) const {
   time_row("vertices and upload", t.upload);
   time_row("shadow maps", t.shadows);
   time_row("drawing", t.draw);
+  double on_card = 0;
+  for (const GpuStageTime& stage : t.card) {
+    time_row((std::string("card: ") + stage.name).c_str(), stage.microseconds);
+    on_card += stage.microseconds;
+  }
   const double solve = t.solve[0] + (state.is_split ? t.solve[1] : 0);
-  time_row("all", t.direct + solve + t.upload + t.shadows + t.draw);
+  time_row("all", t.direct + solve + t.upload + t.shadows + on_card + t.draw);
   ImGui::EndTable();
 }
 
@@ -322,6 +338,8 @@ void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
     const glm::vec3 ahead = state.camera.forward();
     state.add_lamp(state.camera.position() + 0.3F * size * ahead, ahead, size);
   }
+  ImGui::SameLine();
+  if (ImGui::Button("Add 64")) state.add_many_lamps(frame.bounds().low, frame.bounds().high);
   if (state.selected < state.lights.size()) {
     ImGui::SameLine();
     const bool remove = ImGui::Button("Remove");

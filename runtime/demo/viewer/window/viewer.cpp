@@ -65,6 +65,11 @@ StageTimes median(const std::vector<StageTimes>& times) {
   middle.upload = of([](const StageTimes& t) { return t.upload; });
   middle.shadows = of([](const StageTimes& t) { return t.shadows; });
   middle.draw = of([](const StageTimes& t) { return t.draw; });
+  middle.card = times.back().card;
+  for (std::size_t k = 0; k < middle.card.size(); ++k) {
+    middle.card[k].microseconds =
+        of([k](const StageTimes& t) { return k < t.card.size() ? t.card[k].microseconds : 0; });
+  }
   return middle;
 }
 

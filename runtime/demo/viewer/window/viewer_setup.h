@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "rebounce/engine.h"
 #include "runtime/demo/motion/indirect_solver.h"
 #include "runtime/demo/motion/light_motion.h"
 #include "runtime/demo/picture/picture.h"
@@ -62,6 +63,7 @@ struct StageTimes {
   double upload = 0;                 ///< to the vertices, and to the graphics card
   double shadows = 0;                ///< shadow maps
   double draw = 0;                   ///< the picture
+  std::vector<GpuStageTime> card{};  ///< a frame on the graphics card, by its own clock
 };
 
 }  // namespace rebounce

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "rebounce/sky.h"
 #include "runtime/demo/motion/fly_camera.h"
 #include "runtime/demo/viewer/window/viewer_setup.h"
@@ -48,6 +51,26 @@ struct ViewerState {
     lamp.light.intensity = 4 * size * size;  // some lux at the other end of the scene
     lights.push_back(lamp);
     selected = lights.size() - 1;
+  }
+
+  /// Adds 64 coloured points that circle all over the box from `low` to `high`.
+  void add_many_lamps(const glm::vec3& low, const glm::vec3& high) {
+    constexpr int kAcross = 4, kCount = kAcross * kAcross * kAcross;
+    const glm::vec3 size = high - low;
+    for (int k = 0; k < kCount; ++k) {
+      const glm::vec3 cell(k % kAcross, k / kAcross % kAcross, k / kAcross / kAcross);
+      const glm::vec3 place = low + size * (cell + 0.5F) / static_cast<float>(kAcross);
+      add_lamp(place, {0, -1, 0}, glm::length(size) / std::sqrt(static_cast<float>(kCount)));
+      ViewerLight& lamp = lights.back();
+      for (std::size_t c = 0; c < 3; ++c) {
+        lamp.light.color[c] =
+            0.5F + 0.5F * std::cos(2.4F * static_cast<float>(k) + 2.1F * static_cast<float>(c));
+      }
+      lamp.motion.kind = LightMotion::Kind::kCircle;
+      lamp.motion.center = to_float3(place);
+      lamp.motion.radius = 0.1F * std::min(size.x, size.z);
+      lamp.motion.period = 4 + static_cast<float>(k % 5);
+    }
   }
 
   /// Adds a sphere that suits a scene of `size` metres, and selects it.

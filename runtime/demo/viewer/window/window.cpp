@@ -26,10 +26,13 @@ namespace {
 
 Window::Window(int width, int height, const std::string& title) {
   if (glfwInit() != GLFW_TRUE) fail();
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
-  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-  window_ = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
+  for (const int major : {4, 3}) {  // compute shaders, or what pictures need
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, major);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
+    glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+    window_ = glfwCreateWindow(width, height, title.c_str(), nullptr, nullptr);
+    if (window_ != nullptr) break;
+  }
   if (window_ == nullptr) fail();
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(1);
