@@ -62,6 +62,23 @@ void add_lightmap(TransferData& data) {
   }
 }
 
+/// What a texture has that takes the light from its buffer on the card, as engines do.
+std::vector<Float3> texture_from(const test::LightBuffer& light, const Lightmap& lightmap) {
+  const auto width = static_cast<GLsizei>(lightmap.width),
+             height = static_cast<GLsizei>(lightmap.height);
+  GLuint texture = 0;
+  glGenTextures(1, &texture);
+  glBindTexture(GL_TEXTURE_2D, texture);
+  glTexStorage2D(GL_TEXTURE_2D, 1, GL_RGB32F, width, height);
+  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, light.name());
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width, height, GL_RGB, GL_FLOAT, nullptr);
+  glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+  std::vector<Float3> texels(lightmap.triangle.size());
+  glGetTexImage(GL_TEXTURE_2D, 0, GL_RGB, GL_FLOAT, texels.data());
+  glDeleteTextures(1, &texture);
+  return texels;
+}
+
 /// A scene of few patches with a lightmap and probes; made once for all tests of this program.
 std::shared_ptr<const TransferData> scene(const std::string& name) {
   static std::map<std::string, std::shared_ptr<const TransferData>> made;
@@ -107,10 +124,13 @@ TEST_P(GpuScenes, GiveTheLightOfTheStoredOperator) {
   names.probe_light = probes.name();
   gpu.relight(names);
 
+  const std::vector<Float3> at_texels = lightmap.read();
+  EXPECT_EQ(at_texels, texture_from(lightmap, data->lightmap));
+
   // The card has the stored values, and rounds sums of floats alone.
   constexpr double kOfFloats = 1e-4;
   const std::vector<Float3> exact = exact_irradiance(engine), indirect = buffers.indirect.read(),
-                            radiosity = buffers.radiosity.read(), at_texels = lightmap.read();
+                            radiosity = buffers.radiosity.read();
   std::vector<Float3> exact_radiosity(exact.size()), exact_vertices(data->mesh.position.size()),
       exact_values(exact_vertices.size()), exact_texels(at_texels.size()),
       exact_probes(kHarmonicCount * data->probes.size());

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <glm/glm.hpp>
 #include <memory>
 #include <span>
 #include <vector>
@@ -14,11 +13,8 @@ namespace rebounce {
 /// vertices. Needs a current context of OpenGL 4.3.
 class CardLight {
  public:
-  /// `emitted_at_vertices` [v] in lx or none: what arrives there directly from emitters, which the
-  /// viewer shows as direct light. Throws Error as GpuEngine does.
-  CardLight(const std::shared_ptr<const TransferData>& data,
-            std::span<const glm::vec3> emitted_at_vertices);
-  ~CardLight();
+  /// Throws Error as GpuEngine does.
+  explicit CardLight(const std::shared_ptr<const TransferData>& data);
   CardLight(const CardLight&) = delete;
   CardLight& operator=(const CardLight&) = delete;
 
@@ -27,8 +23,9 @@ class CardLight {
   /// Whether the card finds the direct light of `light` itself.
   static bool can_light(const Light& light);
 
-  /// Writes the bounced light at the vertices [v] in lx, without that of emitters, to the buffer
-  /// `bounced`: of `lamps`, and of `others`, a direct irradiance [n] in lx.
+  /// Writes the light at the vertices [v] in lx that `lamps` and `others` make the patches reflect
+  /// to the buffer `bounced`. Others are a direct irradiance [n] in lx, that of emitters too: what
+  /// these give directly is shown as direct light.
   void relight(std::span<const GpuLamp> lamps, std::span<const Float3> others, GLuint bounced);
 
   /// Microseconds of the last frame by stage.
@@ -37,9 +34,7 @@ class CardLight {
 
  private:
   GpuEngine engine_;
-  std::size_t value_count_ = 0;  ///< three for each vertex; 0: nothing emits
-  GlBuffer others_, direct_, emitted_;
-  GLuint subtract_ = 0;
+  GlBuffer others_, direct_;
 };
 
 }  // namespace rebounce

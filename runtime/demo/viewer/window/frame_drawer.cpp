@@ -62,6 +62,11 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
   if (any_on_card) {
     const auto direct = lit_.direct_light(dark_where_on_card(lights), state.sky, times_);
     others_.assign(direct.begin(), direct.end());
+    // H - F M_e = Y rho (E + F M_e): the light of emitters is direct light of what they bounce.
+    for (std::size_t i = 0; i < lit_.emitted_irradiance().size(); ++i) {
+      for (std::size_t c = 0; c < kChannelCount; ++c)
+        others_[i][c] += lit_.emitted_irradiance()[i][c];
+    }
   }
   // What is not the light at vertices needs that of patches on the processor.
   const bool patches_of_card =
@@ -117,7 +122,7 @@ void FrameDrawer::upload(const ViewerState& state) {
 }
 
 void FrameDrawer::relight_on_card(const ViewerState& state, std::span<const Light> lights) {
-  if (!card_) card_ = std::make_unique<CardLight>(data_, lit_.emitted_at_vertices());
+  if (!card_) card_ = std::make_unique<CardLight>(data_);
   std::vector<GpuLamp> lamps;
   for (std::size_t k = 0; k < lights.size(); ++k) {
     if (CardLight::can_light(lights[k])) {

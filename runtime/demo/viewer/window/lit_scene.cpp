@@ -59,13 +59,6 @@ std::span<const Float3> LitScene::direct_light(std::span<const Light> lights, co
   return engine_.direct_irradiance();
 }
 
-std::vector<glm::vec3> LitScene::emitted_at_vertices() const {
-  if (emitted_.empty()) return {};
-  std::vector<glm::vec3> value;
-  for (const Float3& irradiance : emitted_) value.push_back(to_glm(irradiance));
-  return reconstruct_at_vertices(data_->mesh, value);
-}
-
 const LightProbes& LitScene::probes() {
   if (data_->probes.size() > 0 || !make_probes_) return data_->probes;
   if (!own_probes_) own_probes_ = make_probes_();

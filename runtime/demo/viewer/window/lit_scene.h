@@ -44,8 +44,8 @@ class LitScene {
   std::span<const Float3> direct_light(std::span<const Light> lights, const Sky& sky,
                                        StageTimes& times);
 
-  /// The light of emitters at the vertices [v], lx; nothing if there are none.
-  std::vector<glm::vec3> emitted_at_vertices() const;
+  /// F M_e [n] in lx, what arrives directly from emitters; empty if there are none.
+  std::span<const Float3> emitted_irradiance() const { return emitted_; }
 
   /// H [n] in lx of the last frame.
   std::span<const Float3> indirect(Side side) const { return indirect_[index(side)]; }
