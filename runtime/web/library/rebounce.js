@@ -12,22 +12,18 @@ const stages = ['direct', 'exitance', 'product', 'radiosity'];
 
 /** Fetches a file whole; `onProgress(part)` is told how much of it has come, in [0, 1]. */
 async function fetchWhole(url, onProgress) {
-  let response;
-  try {
-    response = await fetch(url);
-  } catch (error) {
-    throw new RebounceError(`${url} cannot be fetched (${error.message})`);
-  }
-  if (!response.ok) {
-    throw new RebounceError(`${url} cannot be fetched: the server says ${response.status}`);
-  }
+  const refuse = (reason) => {
+    throw new RebounceError(`${url} cannot be fetched: ${reason}`);
+  };
+  const response = await fetch(url).catch((error) => refuse(error.message));
+  if (!response.ok) refuse(`the server says ${response.status}`);
   const length = Number(response.headers.get('content-length'));
   const packed = response.headers.has('content-encoding');  // then the length is of other bytes
   const parts = [];
   let size = 0;
   const reader = response.body.getReader();
   for (;;) {
-    const { done, value } = await reader.read();
+    const { done, value } = await reader.read().catch((error) => refuse(error.message));
     if (done) break;
     parts.push(value);
     size += value.byteLength;
