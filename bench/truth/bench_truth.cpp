@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "bench/reference/compare.h"
+#include "bench/reference/compare_receivers.h"
 #include "bench/reference/scene_key_light.h"
 #include "bench/support/input.h"
 #include "bench/support/named_quality.h"
@@ -26,7 +27,7 @@ namespace {
 
 struct Options {
   std::string scene, lights, patch_csv, point_csv, error_picture;
-  bool causes = false;
+  bool causes = false, receivers = false;
   std::string quality = "default";  ///< of the form factors
   std::vector<std::size_t> patch_counts{1000, 4000};
   bool key_light = false;
@@ -45,6 +46,7 @@ FormFactorQuality quality_named(const std::string& name) {
 struct Row {
   std::size_t patch_count = 0;
   reference::RelativeError patch_means, reconstruction;
+  reference::ReceiverErrors receivers;  ///< if they are asked for
 };
 
 /// The scene, its light, and the path tracer's truth at points of it: the same for every number of
@@ -88,7 +90,13 @@ class TruthBench {
     if (last && !options_.point_csv.empty()) {
       reference::write_point_table(options_.point_csv, solution.data, points_, truth_, shown);
     }
-    return {solution.data.patches.size(), patches.relative, shown.relative};
+    Row row{solution.data.patches.size(), patches.relative, shown.relative, {}};
+    if (options_.receivers) {
+      row.receivers = reference::compare_receivers(
+          {solution.data, solution.tracer, solution.indirect_irradiance, setup_.lights, setup_.sky},
+          shown, points_, truth_, settings.seed);
+    }
+    return row;
   }
 
  private:
@@ -143,17 +151,43 @@ class TruthBench {
 };
 
 void run(const Options& options) {
-  bench::Table table({"scene", "patches", "patch_mean_error", "patch_mean_noise",
-                      "patches_compared", "reconstruction_error", "reconstruction_noise",
-                      "points_compared", "points_left_out"});
+  std::vector<std::string> columns{"scene",
+                                   "patches",
+                                   "patch_mean_error",
+                                   "patch_mean_noise",
+                                   "patches_compared",
+                                   "reconstruction_error",
+                                   "reconstruction_noise",
+                                   "points_compared",
+                                   "points_left_out"};
+  if (options.receivers) {
+    columns.insert(columns.end(), {"patch_value_error", "row_error", "vertex_row_error",
+                                   "smooth_light_error", "exact_lamp_error", "exact_both_error"});
+  }
+  bench::Table table(std::move(columns));
   {
     cli::ProgressBar bar(true);
     TruthBench bench(options, bar);
     for (const std::size_t patch_count : options.patch_counts) {
       const Row row = bench.run(patch_count, patch_count == options.patch_counts.back());
       const reference::RelativeError &means = row.patch_means, &shown = row.reconstruction;
-      table.add({bench::scene_name(options.scene), row.patch_count, means.error, means.noise,
-                 means.count, shown.error, shown.noise, shown.count, shown.left_out_count});
+      std::vector<bench::Table::Cell> cells{bench::scene_name(options.scene),
+                                            row.patch_count,
+                                            means.error,
+                                            means.noise,
+                                            means.count,
+                                            shown.error,
+                                            shown.noise,
+                                            shown.count,
+                                            shown.left_out_count};
+      if (options.receivers) {
+        const reference::ReceiverErrors& of = row.receivers;
+        for (const auto& e : {of.patch_value, of.rows, of.vertex_rows, of.smooth_light,
+                              of.exact_lamps, of.exact_both}) {
+          cells.push_back(e.error);
+        }
+      }
+      table.add(std::move(cells));
       bench::save("bench_truth", table, options.common);
     }
   }
@@ -197,6 +231,9 @@ void add_options(CLI::App& app, Options& options) {
   app.add_flag("--causes", options.causes,
                "Compare all patches and add to their table what one bounce of the truth's light "
                "brings them, along rays and by the form factors");
+  app.add_flag("--receivers", options.receivers,
+               "Add the errors that points would have with rows of their own, and with light of "
+               "patches that varies on them");
   app.add_option("--point-csv", options.point_csv,
                  "Table to write of the compared points, for the last number of patches");
   app.add_option("--error-picture", options.error_picture,

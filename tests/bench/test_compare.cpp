@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "bench/reference/compare.h"
+#include "bench/reference/compare_receivers.h"
 #include "precompute/outputs/reconstruction_weights.h"
 #include "precompute/patches/lit_sides.h"
 #include "rebounce/error.h"
@@ -156,6 +157,60 @@ TEST(Reconstruction, PointsThatSeeOnlyBackFacesAreLeftOut) {
   EXPECT_LT(error.left_out_count, 13U);
   EXPECT_EQ(error.count + error.left_out_count, 500U);
   EXPECT_LT(error.error, 0.02);
+}
+
+TEST(Receivers, SeeTheSameInAFurnace) {
+  const Furnace furnace;
+  const FurnacePoints f(furnace.scene);
+  const RayTracer tracer = furnace.mesh_tracer();
+  const std::vector<Float3> h = furnace.uniform(2);
+  const ReconstructionComparison shown =
+      compare_reconstruction(furnace.data, tracer, h, f.points, f.truth);
+  const ReceiverErrors error =
+      compare_receivers({furnace.data, tracer, h, {}, {}}, shown, f.points, f.truth, 1);
+  for (const RelativeError& e : {error.patch_value, error.rows, error.vertex_rows,
+                                 error.smooth_light, error.exact_lamps, error.exact_both}) {
+    EXPECT_EQ(e.count, 500U);
+    EXPECT_LT(e.error, 1e-5);
+  }
+}
+
+TEST(Receivers, LampsLookedAtAnewAreCloserToTheTruthThanEvenPatches) {
+  // A lamp half a metre below the ceiling, in patches of about a square metre.
+  Scene scene = test::empty_scene({0.5F, 0.5F, 0.5F});
+  test::add_box(scene, {0, 0, 0}, {3, 2, 2}, true);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 30});
+  TransferData data = test::data_of(model);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh);
+  Light lamp;
+  lamp.type = LightType::kPoint;
+  lamp.position = {1.2F, 1.5F, 0.9F};
+  lamp.intensity = 100;
+  const RayTracer scene_tracer = make_scene_tracer(scene);
+  const LitScene lit_scene{scene, scene_tracer, {&lamp, 1}, {}};
+  const auto points = sample_surface(scene, find_lit_sides(scene, scene_tracer), 300, 1);
+  const IrradianceEstimate truth = indirect_irradiance(lit_scene, points, 512, 1);
+  const std::vector<Float3> h =
+      compare_patch_means(data, std::vector<Float3>(data.patches.size()), lit_scene,
+                          {.patch_count = 0, .points_per_patch = 64, .samples_per_point = 64})
+          .truth;
+  ASSERT_EQ(h.size(), data.patches.size());
+  const ReconstructionComparison shown = compare_reconstruction(data, tracer, h, points, truth);
+  const ReceiverErrors error =
+      compare_receivers({data, tracer, h, {&lamp, 1}, {}}, shown, points, truth, 1);
+  EXPECT_GT(error.patch_value.error, 0.05);
+  EXPECT_LT(error.exact_lamps.error, 0.5 * error.rows.error);
+  // What is left is the noise of 1,024 rays and of the truth, and patches in second bounces.
+  EXPECT_LT(error.exact_both.error, 0.04);
+}
+
+TEST(Receivers, SizesAreChecked) {
+  const Furnace furnace;
+  const FurnacePoints f(furnace.scene);
+  const RayTracer tracer = furnace.mesh_tracer();
+  EXPECT_THROW(compare_receivers({furnace.data, tracer, {}, {}, {}}, {}, f.points, f.truth, 1),
+               Error);
 }
 
 }  // namespace
