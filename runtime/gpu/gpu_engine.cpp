@@ -40,16 +40,8 @@ enum class Stage : std::uint8_t {
   kProbes,
 };
 constexpr std::array<const char*, 11> kStageNames = {
-    "initial exitance",
-    "projection of positions",
-    "projection of clusters",
-    "couplings",
-    "expansion to clusters",
-    "expansion to positions, dense blocks",
-    "radiosity",
-    "vertices",
-    "vertices of texels",
-    "texels",
+    "initial exitance", "project positions", "project clusters", "couplings",     "expand clusters",
+    "expand positions", "radiosity",         "vertices",         "texel corners", "texels",
     "probes",
 };
 constexpr std::size_t kStageCount = kStageNames.size();

@@ -310,6 +310,9 @@ void Panels::draw_methods(ViewerState& state, const FrameDrawer& frame) const {
 void Panels::draw_times(const ViewerState& state) const {
   if (!ImGui::CollapsingHeader("Time of a frame", ImGuiTreeNodeFlags_DefaultOpen)) return;
   if (!ImGui::BeginTable("times", 2)) return;
+  constexpr float kNumbers = 90;  // pixels
+  ImGui::TableSetupColumn("stage", ImGuiTableColumnFlags_WidthStretch);
+  ImGui::TableSetupColumn("time", ImGuiTableColumnFlags_WidthFixed, kNumbers);
   const StageTimes& t = smoothed_;
   time_row("direct light, patches", t.direct);
   time_row(state.is_split ? "indirect light, left" : "indirect light", t.solve[0]);
