@@ -36,26 +36,30 @@ export class ProbeGrid extends THREE.Light {
   isLightProbeGrid = true;
   type = 'ProbeGrid';
   priority = 0;
+  #grid;
   #standIns;
   #light;
 
   /** @param {{grid: number[], valid: Uint8Array, first: number[], last: number[]}} probes */
   constructor({ grid, valid, first, last }) {
     super(0xffffff, 1);
-    const [nx, ny, nz] = grid;
-    // A cell around each probe.
-    const half = grid.map((count, c) => (count > 1 ? (last[c] - first[c]) / (count - 1) / 2 : 1));
+    // A cell around each probe, and cells beyond the outermost that repeat them: three.js looks half
+    // a cell off a surface, and finds no light beyond the grid.
+    const size = grid.map((count) => count + 2);
+    const cell = grid.map((count, c) => (count > 1 ? (last[c] - first[c]) / (count - 1) : 2));
     this.boundingBox = new THREE.Box3(
-        new THREE.Vector3(...first.map((x, c) => x - half[c])),
-        new THREE.Vector3(...last.map((x, c) => x + half[c])));
-    this.resolution = new THREE.Vector3(nx, ny, nz);
-    const depth = subVolumes * (nz + 2);
-    this.texture = new THREE.Data3DTexture(new Uint16Array(4 * nx * ny * depth), nx, ny, depth);
+        new THREE.Vector3(...first.map((x, c) => x - 1.5 * cell[c])),
+        new THREE.Vector3(...last.map((x, c) => x + 1.5 * cell[c])));
+    this.resolution = new THREE.Vector3(...size);
+    this.#grid = grid;
+    const depth = subVolumes * (size[2] + 2);
+    this.texture = new THREE.Data3DTexture(
+        new Uint16Array(4 * size[0] * size[1] * depth), size[0], size[1], depth);
     this.texture.format = THREE.RGBAFormat;
     this.texture.type = THREE.HalfFloatType;
     this.texture.minFilter = this.texture.magFilter = THREE.LinearFilter;
     this.#standIns = findStandIns(grid, valid);
-    this.#light = new Float32Array(floats * nx * ny * nz);
+    this.#light = new Float32Array(floats * valid.length);
   }
 
   /** @param {Float32Array} light [probes][9][3], cd/m² */
@@ -69,18 +73,20 @@ export class ProbeGrid extends THREE.Light {
         own[floats * probe + k] = sum / around.length;
       }
     }
-    const { x: nx, y: ny, z: nz } = this.resolution;
-    const layer = nx * ny;
-    const { data } = this.texture.image;
-    for (let part = 0; part < subVolumes; ++part) {
-      for (let slice = 0; slice < nz + 2; ++slice) {  // the first and the last are there twice
-        const from = layer * Math.min(Math.max(slice - 1, 0), nz - 1);
-        const to = layer * (part * (nz + 2) + slice);
-        for (let k = 0; k < layer; ++k) {
-          for (let c = 0; c < 4; ++c) {
-            const number = 4 * part + c;
-            data[4 * (to + k) + c] = number < floats
-                ? THREE.DataUtils.toHalfFloat(own[floats * (from + k) + number]) : 0;
+    const [nx, ny, nz] = this.#grid;
+    const within = (k, count) => Math.min(Math.max(k - 1, 0), count - 1);
+    const { data, width, height } = this.texture.image;
+    for (let part = 0, to = 0; part < subVolumes; ++part) {
+      for (let z = 0; z < nz + 4; ++z) {  // one more at both ends, as three.js wants it
+        for (let y = 0; y < height; ++y) {
+          for (let x = 0; x < width; ++x, to += 4) {
+            const probe =
+                within(x, nx) + nx * (within(y, ny) + ny * within(z - 1, nz));
+            for (let c = 0; c < 4; ++c) {
+              const number = 4 * part + c;
+              data[to + c] = number < floats
+                  ? THREE.DataUtils.toHalfFloat(own[floats * probe + number]) : 0;
+            }
           }
         }
       }

@@ -44,8 +44,8 @@ export interface Mesh {
   readonly triangleMaterial: Uint32Array;
   /** 2^32 - 1: a side that nothing sees. */
   readonly trianglePatch: Uint32Array;
-  /** What light a vertex has comes from these weights: of vertex v, those up to that of v + 1. */
-  readonly weightBegin: Uint32Array;
+  /** Of each patch, the part of its view that is inside of solids. */
+  readonly absorbed: Float32Array;
   readonly surfaceCount: number;
 }
 

@@ -319,7 +319,7 @@ function readMesh(file) {
     triangle: file.tensor('mesh.triangle'),
     triangleMaterial: file.tensor('mesh.triangle_material'),
     trianglePatch: file.tensor('mesh.triangle_patch'),
-    weightBegin: file.tensor('mesh.weight_begin'),
+    absorbed: file.tensor('patch.absorbed'),
     surfaceCount,
   };
 }

@@ -256,11 +256,9 @@ function fromHemisphere(light) {
  * The surface without cracks, and without sides that nothing sees: where two solids meet, these
  * would show as dots along the seam.
  */
-function seenSurface({ position, triangle, trianglePatch, weightBegin }) {
+function seenSurface({ position, triangle, trianglePatch, absorbed }) {
   const surface = closeCracks(position, triangle);
-  const isLit = (v) => weightBegin[v] < weightBegin[v + 1];
-  const seen = (t) =>
-      trianglePatch[t] !== none && triangle.subarray(3 * t, 3 * t + 3).some(isLit);
+  const seen = (t) => trianglePatch[t] !== none && absorbed[trianglePatch[t]] < 0.98;
   const kept = surface.from.flatMap((t, k) => (seen(t) ? [k] : []));
   return {
     added: surface.added, from: kept.map((k) => surface.from[k]),

@@ -30,6 +30,6 @@ export const scenes = [
     lampRadius: 0.1,
     hour: 18.6,
     lamps: [{ position: [1, 1.5, 0.5], color: warm, intensity: 2500 }],
-    ball: { position: [2, 0.75, 1.6], radius: 0.35 },
+    ball: { position: [2, 1, 1.6], radius: 0.35 },
   },
 ];
