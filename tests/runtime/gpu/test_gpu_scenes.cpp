@@ -1,20 +1,19 @@
 #include <gtest/gtest.h>
 
-#include <map>
+#include <array>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "rebounce/build_settings.h"
-#include "runtime/outputs/probe_light.h"
-#include "runtime/outputs/texel_light.h"
-#include "runtime/outputs/vertex_light.h"
 #include "tests/runtime/gpu/gpu_frame.h"
 #include "tests/runtime/gpu/shadow_maps.h"
 #include "tests/support/built_scene.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/reflection.h"
+#include "transfer/format/hierarchical_encoding.h"
+#include "transfer/format/hierarchical_values.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::test_gpu_scenes {
 namespace {
@@ -79,20 +78,24 @@ std::vector<Float3> texture_from(const test::LightBuffer& light, const Lightmap&
   return texels;
 }
 
-/// A scene of few patches with a lightmap and probes; made once for all tests of this program.
+/// A scene of few patches with a lightmap and probes.
 std::shared_ptr<const TransferData> scene(const std::string& name) {
-  static std::map<std::string, std::shared_ptr<const TransferData>> made;
-  std::shared_ptr<const TransferData>& data = made[name];
-  if (!data) {
-    BuildSettings settings;
-    settings.subdivision.patch_count = 600;
-    settings.probes.grid = {3, 2, 3};
-    settings.probes.ray_count = 512;
-    TransferData built = test::built_scene(name + ".gltf", settings);
-    add_lightmap(built);
-    data = std::make_shared<const TransferData>(std::move(built));
-  }
-  return data;
+  BuildSettings settings;
+  settings.subdivision.patch_count = 600;
+  settings.probes.grid = {3, 2, 3};
+  settings.probes.ray_count = 512;
+  TransferData built = test::built_scene(name + ".gltf", settings);
+  add_lightmap(built);
+  return std::make_shared<const TransferData>(std::move(built));
+}
+
+/// The same with the values of the operator in floats, so that the processor rounds no light.
+std::shared_ptr<const TransferData> in_floats(const TransferData& data) {
+  auto floats = std::make_shared<TransferData>(data);
+  const auto& stored = dynamic_cast<const HierarchicalOperator&>(*data.transfer);
+  floats->transfer = std::make_shared<const HierarchicalOperator>(
+      encode_values(decode(stored.storage()), Precision::kF32));
+  return floats;
 }
 
 Light lamp_in_the_middle(const TransferData& data) {
@@ -106,11 +109,34 @@ Light lamp_in_the_middle(const TransferData& data) {
   return lamp;
 }
 
+/// What a frame of the processor or the card writes.
+struct FrameLight {
+  std::vector<Float3> indirect, radiosity, vertices, texels, probes;
+
+  explicit FrameLight(Engine& engine)
+      : indirect(engine.indirect_irradiance().begin(), engine.indirect_irradiance().end()),
+        radiosity(engine.radiosity().begin(), engine.radiosity().end()),
+        vertices(engine.data().mesh.position.size()),
+        texels(engine.data().lightmap.triangle.size()),
+        probes(kHarmonicCount * engine.data().probes.size()) {
+    vertex_irradiance(engine, vertices);
+    lightmap_irradiance(engine, texels);
+    probe_light(engine, as_probes(probes));
+  }
+  FrameLight() = default;
+
+  /// The largest difference of each.
+  std::array<double, 5> differences(const FrameLight& other) const {
+    return {test::largest_difference(indirect, other.indirect),
+            test::largest_difference(radiosity, other.radiosity),
+            test::largest_difference(vertices, other.vertices),
+            test::largest_difference(texels, other.texels),
+            test::largest_difference(probes, other.probes)};
+  }
+};
+
 // A lamp in the middle of the scene, and a dim sky: patches of full light beside dark ones.
-TEST_P(GpuScenes, GiveTheLightOfTheStoredOperator) {
-  const test::GlContext context;
-  if (!context.is_current()) GTEST_SKIP() << "there is no OpenGL 4.3 on this machine";
-  const auto data = scene(GetParam());
+void expect_light_of_the_processor(const std::shared_ptr<const TransferData>& data) {
   const Light lamp = lamp_in_the_middle(*data);
   Engine engine(data);
   engine.relight({&lamp, 1}, {.luminance = 1});
@@ -124,41 +150,28 @@ TEST_P(GpuScenes, GiveTheLightOfTheStoredOperator) {
   names.probe_light = probes.name();
   gpu.relight(names);
 
-  const std::vector<Float3> at_texels = lightmap.read();
-  EXPECT_EQ(at_texels, texture_from(lightmap, data->lightmap));
+  FrameLight found;
+  found.indirect = buffers.indirect.read();
+  found.radiosity = buffers.radiosity.read();
+  found.vertices = buffers.vertices.read();
+  found.texels = lightmap.read();
+  found.probes = probes.read();
+  EXPECT_EQ(found.texels, texture_from(lightmap, data->lightmap));
 
   // The card has the stored values, and rounds sums of floats alone.
-  constexpr double kOfFloats = 1e-4;
-  const std::vector<Float3> exact = exact_irradiance(engine), indirect = buffers.indirect.read(),
-                            radiosity = buffers.radiosity.read();
-  std::vector<Float3> exact_radiosity(exact.size()), exact_vertices(data->mesh.position.size()),
-      exact_values(exact_vertices.size()), exact_texels(at_texels.size()),
-      exact_probes(kHarmonicCount * data->probes.size());
-  add_reflected(engine.initial_exitance(), data->patches.reflectance, exact, exact_radiosity);
-  light_at_vertices(data->mesh, exact, exact_vertices);
-  reconstruct_at_vertices(data->mesh, exact, exact_values);
-  interpolate_at_texels(data->lightmap, data->mesh, exact_values, exact_texels);
-  apply_probes(data->probes, exact_radiosity, engine.sky(), as_probes(exact_probes));
-  EXPECT_LE(test::largest_difference(exact, indirect), kOfFloats);
-  EXPECT_LE(test::largest_difference(exact_radiosity, radiosity), kOfFloats);
-  EXPECT_LE(test::largest_difference(exact_vertices, buffers.vertices.read()), kOfFloats);
-  EXPECT_LE(test::largest_difference(exact_texels, at_texels), kOfFloats);
-  EXPECT_LE(test::largest_difference(exact_probes, probes.read()), kOfFloats);
+  EXPECT_LE(test::largest_difference(exact_irradiance(engine), found.indirect), 1e-4);
+  Engine floats(in_floats(*data));
+  floats.relight({&lamp, 1}, engine.sky());
+  for (const double difference : FrameLight(floats).differences(found)) EXPECT_LE(difference, 1e-4);
 
-  // The processor rounds the light to integers too.
-  constexpr double kOfLight = 1e-3;
-  EXPECT_LE(test::largest_difference(engine.indirect_irradiance(), indirect), kOfLight);
-  EXPECT_LE(test::largest_difference(engine.radiosity(), radiosity), kOfLight);
-  std::vector<Float3> of_vertices(exact_vertices.size()), of_texels(exact_texels.size()),
-      of_probes(exact_probes.size());
-  vertex_irradiance(engine, of_vertices);
-  lightmap_irradiance(engine, of_texels);
-  probe_light(engine, as_probes(of_probes));
-  EXPECT_LE(test::largest_difference(of_probes, probes.read()), kOfLight);
-  // Weights of both signs, and the mean of few lit vertices: 4.3e-3 at texels of the pavilion.
-  constexpr double kOfWeights = 6e-3;
-  EXPECT_LE(test::largest_difference(of_vertices, buffers.vertices.read()), kOfWeights);
-  EXPECT_LE(test::largest_difference(of_texels, at_texels), kOfWeights);
+  // The processor rounds the light to integers too, and weights of vertices have both signs.
+  const auto [indirect, radiosity, vertices, texels, at_probes] =
+      FrameLight(engine).differences(found);
+  EXPECT_LE(indirect, 1e-3);
+  EXPECT_LE(radiosity, 1e-3);
+  EXPECT_LE(at_probes, 1e-3);
+  EXPECT_LE(vertices, 6e-3);
+  EXPECT_LE(texels, 6e-3);
 }
 
 /// Expects the light of `lamp` with its shadow map to be that of shadow rays, to a part of it in
@@ -175,10 +188,7 @@ void expect_direct_light(const TransferData& data, Engine& engine, GpuEngine& gp
   testing::Test::RecordProperty(what, std::to_string(difference));
 }
 
-TEST_P(GpuScenes, GiveTheDirectLightOfShadowRaysWithShadowMaps) {
-  const test::GlContext context;
-  if (!context.is_current()) GTEST_SKIP() << "there is no OpenGL 4.3 on this machine";
-  const auto data = scene(GetParam());
+void expect_light_of_shadow_rays(const std::shared_ptr<const TransferData>& data) {
   Engine engine(data);
   GpuEngine gpu(data, eglGetProcAddress);
   test::ShadowMaps maps(*data);
@@ -203,6 +213,14 @@ TEST_P(GpuScenes, GiveTheDirectLightOfShadowRaysWithShadowMaps) {
   if (comes_in) {
     expect_direct_light(*data, engine, gpu, maps.plane(sun, 2 * kSide, true), kTolerance, "sun");
   }
+}
+
+TEST_P(GpuScenes, AreLitAsByTheProcessor) {
+  const test::GlContext context;
+  if (!context.is_current()) GTEST_SKIP() << "there is no OpenGL 4.3 on this machine";
+  const auto data = scene(GetParam());
+  expect_light_of_the_processor(data);
+  expect_light_of_shadow_rays(data);
 }
 
 }  // namespace
