@@ -15,7 +15,6 @@
 #include "runtime/lights/sky_light.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/cumulative_choice.h"
-#include "runtime/rays/patch_points.h"
 #include "runtime/rays/triangle.h"
 #include "transfer/base/grouped.h"
 #include "transfer/base/reflection.h"

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "bench/reference/compare.h"
 #include "bench/reference/compare_receivers.h"
 #include "bench/reference/scene_key_light.h"
 #include "bench/support/input.h"
