@@ -137,8 +137,8 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
     this.#writeDirect(known, sky);
     this.#write(this.#attribute.array, this.#engine.vertexIrradiance());
     this.#attribute.needsUpdate = true;
-    this.#engine.timings.vertices = performance.now() - begin;
     this.probes?.write(this.#engine.probeLight());
+    this.#engine.timings.vertices = performance.now() - begin;
   }
 
   #changeSky(sky) {

@@ -202,7 +202,7 @@ export class Panel {
 
   #makeTimes() {
     const stages = [
-      ['direct', 'Direct light'], ['product', 'All bounces'], ['vertices', 'Vertices'],
+      ['direct', 'Direct light'], ['product', 'All bounces'], ['vertices', 'Vertices, probes'],
       ['draw', 'Drawing'],
     ];
     for (const [name, title] of stages) {
