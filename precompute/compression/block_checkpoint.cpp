@@ -13,7 +13,7 @@ namespace rebounce {
 namespace {
 
 static_assert(std::is_trivially_copyable_v<TransferBlock> &&
-              sizeof(TransferBlock) == 9 * sizeof(std::uint32_t));
+              sizeof(TransferBlock) == 10 * sizeof(std::uint32_t));
 
 /// "xxh3:", the digits, and zeros.
 using HashText = std::array<char, 8 + ContentHash::kDigitCount>;

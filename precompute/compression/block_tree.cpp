@@ -200,8 +200,9 @@ class PieceCompressor {
     place.row_rank = static_cast<std::uint32_t>(block.row_basis.cols());
     place.column_rank = place.on_diagonal() ? place.row_rank
                                             : static_cast<std::uint32_t>(block.column_basis.cols());
-    const ResidualRanks ranks =
-        find_residual_ranks(block, {weight_of(row, column), weight_of(column, row)}, cost);
+    const BlockWeights weights{weight_of(row, column), weight_of(column, row)};
+    const ResidualRanks ranks = find_residual_ranks(block, weights, cost);
+    place.coupling_step = static_cast<float>(coupling_step(block, weights, cost));
     place.row_residual_rank = static_cast<std::uint32_t>(ranks.row);
     place.column_residual_rank = static_cast<std::uint32_t>(ranks.column);
     BlockPart part{{place}, {}, 0};

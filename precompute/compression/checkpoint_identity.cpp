@@ -33,6 +33,8 @@ std::string identity_of_panels(const HierarchicalOperator& form_factors, const P
   update(hash, f.values_f32.span());
   update(hash, f.values_f16.span());
   update(hash, f.bases_q8.span());
+  update(hash, f.packed_couplings.span());
+  update<std::uint8_t>(hash, f.row_format);
   update<std::uint32_t>(hash, f.patch);
   update<float>(hash, patches.area);
   update<Float3>(hash, patches.centroid);

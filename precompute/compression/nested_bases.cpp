@@ -485,7 +485,8 @@ class Nesting {
                              .row_rank = row.rank,
                              .column_rank = column.rank,
                              .row_residual_rank = row.residual_rank,
-                             .column_residual_rank = column.residual_rank});
+                             .column_residual_rank = column.residual_rank,
+                             .coupling_step = storage_.blocks[b].coupling_step});
     const auto add = [&](const RowMajor& matrix) {
       values.insert(values.end(), matrix.data(), matrix.data() + matrix.size());
     };

@@ -1,5 +1,8 @@
 #include "precompute/compression/residual_ranks.h"
 
+#include <cmath>
+#include <numbers>
+
 namespace rebounce {
 namespace {
 
@@ -41,6 +44,12 @@ Index residual_rank_of(const BasisEnd& end, const BasisEnd& other,
   });
 }
 
+/// The mean squared norm of the vectors of a basis under its weight; 0 without one.
+double weighted_size(const BasisEnd& end) {
+  if (end.weight == nullptr || end.basis.cols() == 0) return 0;
+  return weighted_gram(end).trace() / static_cast<double>(end.basis.cols());
+}
+
 }  // namespace
 
 Index worthwhile_residual_rank(const MatrixXd& vectors, double multiplier,
@@ -68,6 +77,21 @@ ResidualRanks find_residual_ranks(const LowRankBlock& block, const BlockWeights&
   for (const MatrixXd& coupling : block.couplings) transposed.push_back(coupling.transpose());
   ranks.column = residual_rank_of(column, row, transposed, cost);
   return ranks;
+}
+
+double coupling_step(const LowRankBlock& block, const BlockWeights& weights,
+                     const CompressionCost& cost) {
+  // Rounding to a step is an error of step² / 12 in the mean, and a bit less makes it four times
+  // as large. A unit of size has the bits of a half. Widths are multiples of four bits, and a row
+  // has that of its largest entry: an operator is smallest at a fourth of the step of this price
+  // (lab/079).
+  constexpr double kBitsOfUnit = 16, kPart = 0.25;
+  const bool on_diagonal = block.column_basis.cols() == 0;
+  const double effect =
+      weighted_size({block.row_basis, weights.row}) +
+      weighted_size({on_diagonal ? block.row_basis : block.column_basis, weights.column});
+  if (effect == 0) return 0;
+  return kPart * std::sqrt(12 * cost.multiplier / (kBitsOfUnit * 2 * std::numbers::ln2 * effect));
 }
 
 }  // namespace rebounce

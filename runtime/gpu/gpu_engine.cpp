@@ -67,7 +67,7 @@ struct GpuEngine::Parts {
   /// The uniform block of the shaders.
   struct StageBlock {
     std::uint32_t items, first_item, first_output, keeps_negative = 0;
-    std::array<std::uint32_t, 4> channel_matrix;  ///< the fourth: couplings_are_floats
+    std::array<std::uint32_t, 4> channel_matrix;  ///< the fourth is unused
   };
 
   Parts(std::shared_ptr<const TransferData> kept, const GpuOperator& tables,
@@ -146,14 +146,13 @@ struct GpuEngine::Parts {
     const std::uint32_t of_positions = tables.position_projections;
     const std::uint32_t strip_count = tables.position_strips();
     const auto& of_channel = tables.channel_matrix;
-    const std::uint32_t floats = tables.couplings_are_floats ? 1 : 0;
     const auto set = [&](Stage stage, std::uint32_t items, std::uint32_t first_item = 0,
                          std::uint32_t first_output = 0) {
       blocks[static_cast<std::size_t>(stage)] = {
           .items = items,
           .first_item = first_item,
           .first_output = first_output,
-          .channel_matrix = {of_channel[0], of_channel[1], of_channel[2], floats}};
+          .channel_matrix = {of_channel[0], of_channel[1], of_channel[2], 0}};
     };
     set(Stage::kInitialExitance, tables.position_count);
     set(Stage::kProjectPositions, of_positions);

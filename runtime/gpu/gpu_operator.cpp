@@ -12,6 +12,7 @@
 #include "transfer/base/half_float.h"
 #include "transfer/format/hierarchical_layout.h"
 #include "transfer/format/hierarchical_values.h"
+#include "transfer/format/row_format.h"
 
 namespace rebounce {
 namespace {
@@ -88,8 +89,11 @@ double wide_scale(std::span<const float> values) {
 class Tables {
  public:
   explicit Tables(const HierarchicalStorage& storage)
-      : storage_(decode(storage)), layout_(storage_), end_slots_(storage_.blocks.size()) {
-    result_.couplings_are_floats = storage.precision.couplings == CouplingPrecision::kF32;
+      : storage_(decode(storage)),
+        layout_(storage_),
+        are_floats_(storage.precision.couplings == CouplingPrecision::kF32),
+        row_format_(storage.row_format),
+        end_slots_(storage_.blocks.size()) {
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       end_slots_[b][0].resize(storage_.blocks[b].row_rank);
       end_slots_[b][1].resize(storage_.blocks[b].column_rank);
@@ -282,27 +286,73 @@ class Tables {
     add(set.wide_count, set.count, set.word + set.wide_groups() * kWideWords, kNarrowWords, false);
   }
 
-  /// Appends the entries of a block, [matrix][count], and returns the index of the first and the
-  /// scale.
-  std::pair<std::uint32_t, float> add_entries(std::uint64_t values, std::uint64_t count) {
-    const std::uint32_t matrices = storage_.matrix_count;
-    const std::uint32_t first = entry_count_;
-    entry_count_ = checked_index(first + count * matrices);
-    const bool floats = result_.couplings_are_floats;
-    result_.couplings.resize(floats ? entry_count_ : (entry_count_ + 1) / 2);
-    const int exponent = floats ? 0 : half_exponent(values, count * matrices);
+  /// The entries of a block among all.
+  struct Entries {
+    std::uint32_t first;
+    GpuOperator::EntryFormat format;
+    float scale = 1;
+
+    Words4 strides(std::uint32_t output, std::uint32_t input) const {
+      return {output, input, std::bit_cast<std::uint32_t>(scale),
+              static_cast<std::uint32_t>(format)};
+    }
+  };
+
+  /// Appends the entries of a block, [matrix][count]: value_of(k, matrix) is entry k.
+  template <typename ValueOf>
+  std::uint32_t add_values(GpuOperator::EntryFormat format, std::uint64_t count,
+                           const ValueOf& value_of) {
+    const std::uint64_t per_word = format == GpuOperator::EntryFormat::kFloat ? 1 : 2;
+    const std::uint64_t first = result_.couplings.size() * per_word;
+    const std::uint64_t last = checked_index(first + count * storage_.matrix_count);
+    result_.couplings.resize((last + per_word - 1) / per_word);
     for (std::uint64_t k = 0; k < count; ++k) {
-      for (std::uint32_t m = 0; m < matrices; ++m) {
+      for (std::uint32_t m = 0; m < storage_.matrix_count; ++m) {
         const std::uint64_t entry = first + m * count + k;
-        const float value = std::ldexp(coupling(values + k * matrices + m), exponent);
-        if (floats) {
-          result_.couplings[entry] = std::bit_cast<std::uint32_t>(value);
-        } else {
-          result_.couplings[entry / 2] |= std::uint32_t{float_to_half(value)} << (entry % 2 * 16);
+        const float value = value_of(k, m);
+        std::uint32_t& word = result_.couplings[entry / per_word];
+        switch (format) {
+          case GpuOperator::EntryFormat::kHalf:
+            word |= std::uint32_t{float_to_half(value)} << (entry % 2 * 16);
+            break;
+          case GpuOperator::EntryFormat::kInteger:
+            word |= (static_cast<std::uint32_t>(std::lround(value)) & 0xFFFFU) << (entry % 2 * 16);
+            break;
+          case GpuOperator::EntryFormat::kFloat:
+            word = std::bit_cast<std::uint32_t>(value);
+            break;
         }
       }
     }
-    return {first, std::ldexp(1.0F, -exponent)};
+    return static_cast<std::uint32_t>(first);
+  }
+
+  /// Appends the entries of a block as floats or halves.
+  Entries add_entries(std::uint64_t values, std::uint64_t count, bool as_floats) {
+    const int exponent = as_floats ? 0 : half_exponent(values, count * storage_.matrix_count);
+    const auto format =
+        as_floats ? GpuOperator::EntryFormat::kFloat : GpuOperator::EntryFormat::kHalf;
+    const auto value_of = [&](std::uint64_t k, std::uint32_t m) {
+      return std::ldexp(coupling(values + k * storage_.matrix_count + m), exponent);
+    };
+    return {add_values(format, count, value_of), format, std::ldexp(1.0F, -exponent)};
+  }
+
+  /// Appends the integers of a packed coupling matrix. The slots of its rows take their steps.
+  Entries add_packed(std::uint64_t values, const TransferBlock& block,
+                     std::span<const std::uint8_t> formats,
+                     std::span<const std::uint32_t> row_slots) {
+    std::vector<float> step;
+    for (const std::uint8_t format : formats) {
+      step.push_back(RowFormat{format}.step() / HierarchicalFormat::kHalfScale);
+      result_.scales[row_slots[step.size() - 1]] *= step.back();
+    }
+    const auto value_of = [&](std::uint64_t k, std::uint32_t m) {
+      return coupling(values + k * storage_.matrix_count + m) / step[k / block.column_rank];
+    };
+    constexpr auto kFormat = GpuOperator::EntryFormat::kInteger;
+    return {add_values(kFormat, std::uint64_t{block.row_rank} * block.column_rank, value_of),
+            kFormat};
   }
 
   /// The power of two that takes the largest of these entries to the upper end of the range of
@@ -318,21 +368,27 @@ class Tables {
   void add_couplings() {
     const auto coefficients = result_.scales.size() - kGroup - result_.first_coefficient;
     result_.outputs.resize(coefficients);
+    std::size_t first_row = 0;  // of packed ones
     for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
       const TransferBlock& block = storage_.blocks[b];
       if (block.kind != TransferBlock::Kind::kLowRank || !has_values(block)) continue;
       const std::uint32_t rows = block.row_rank, columns = block.column_rank;
-      const auto [values, scale] =
-          add_entries(layout_.block_layouts[b].values, std::uint64_t{rows} * columns);
-      const Words4 by_row{columns, 1, std::bit_cast<std::uint32_t>(scale), 0};
-      const Words4 by_column{1, columns, std::bit_cast<std::uint32_t>(scale), 0};
       const auto& [row_slots, column_slots] = end_slots_[b];
+      const std::uint64_t values = layout_.block_layouts[b].values;
+      const bool is_packed = !row_format_.empty();
+      const std::size_t row = std::exchange(first_row, first_row + (is_packed ? rows : 0));
+      // On the diagonal, rows and columns have the same slots, but not the same steps.
+      const Entries entries =
+          is_packed && !block.on_diagonal()
+              ? add_packed(values, block, row_format_.subspan(row, rows), row_slots)
+              : add_entries(values, std::uint64_t{rows} * columns, are_floats_ || is_packed);
+      const Words4 by_row = entries.strides(columns, 1);
       if (block.on_diagonal()) {
-        add_side(row_slots, row_slots, values, rows * columns, by_row);
+        add_side(row_slots, row_slots, entries.first, rows * columns, by_row);
         continue;
       }
-      add_side(row_slots, column_slots, values, rows * columns, by_row);
-      add_side(column_slots, row_slots, values, rows * columns, by_column);
+      add_side(row_slots, column_slots, entries.first, rows * columns, by_row);
+      add_side(column_slots, row_slots, entries.first, rows * columns, entries.strides(1, columns));
     }
   }
 
@@ -352,19 +408,19 @@ class Tables {
       const TransferBlock& block = storage_.blocks[b];
       if (block.kind != TransferBlock::Kind::kDense) continue;
       const std::uint32_t columns = block.column_count, size = block.row_count * columns;
-      const auto [values, scale] =
-          add_entries(layout_.block_layouts[b].values, std::uint64_t{block.row_count} * columns);
-      const std::uint32_t scale_bits = std::bit_cast<std::uint32_t>(scale);
+      const Entries entries = add_entries(layout_.block_layouts[b].values,
+                                          std::uint64_t{block.row_count} * columns, are_floats_);
+      const std::uint32_t values = entries.first;
       for (std::uint32_t s = 0; s < block.row_count / kStrip; ++s) {
         auto& list = strip_blocks_[block.row_begin / kStrip + s];
         list.push_back({values + s * kStrip * columns, block.column_begin, columns, size});
-        list.push_back({columns, 1, scale_bits, 0});
+        list.push_back(entries.strides(columns, 1));
       }
       if (block.on_diagonal()) continue;
       for (std::uint32_t s = 0; s < columns / kStrip; ++s) {
         auto& list = strip_blocks_[block.column_begin / kStrip + s];
         list.push_back({values + s * kStrip, block.row_begin, block.row_count, size});
-        list.push_back({1, columns, scale_bits, 0});
+        list.push_back(entries.strides(1, columns));
       }
     }
   }
@@ -382,10 +438,11 @@ class Tables {
 
   HierarchicalStorage storage_;  // in f32
   HierarchicalLayout layout_;
-  std::vector<EndSlots> end_slots_;  // of the vectors of each block
+  bool are_floats_;                           // coupling matrices and dense entries, as stored
+  std::span<const std::uint8_t> row_format_;  // as stored
+  std::vector<EndSlots> end_slots_;           // of the vectors of each block
   std::vector<PlacedSet> sets_;
   std::vector<std::vector<Words4>> strip_bases_, strip_blocks_;
-  std::uint32_t entry_count_ = 0;
   GpuOperator result_;
 };
 

@@ -23,16 +23,18 @@ struct GpuOperator {
   static constexpr std::uint32_t kStrip = HierarchicalFormat::kAlignment;
   static constexpr std::uint32_t kNoPatch = 0xFFFFFFFF;
 
+  /// How the entries of a block are stored. The shaders have these numbers too.
+  enum class EntryFormat : std::uint32_t { kHalf, kFloat, kInteger };
+
   std::array<std::uint32_t, kChannelCount> channel_matrix{};
   std::uint32_t position_count = 0;     ///< a multiple of kStrip
   std::uint32_t first_coefficient = 0;  ///< the slot of the first coefficient in a basis
   std::vector<Words2> positions;        ///< patch or kNoPatch, bits of the weight of its light
   std::vector<float> scales;            ///< [slots]
   std::vector<std::uint32_t> bases;
-  /// Entries of coupling matrices and dense blocks: floats if they are stored as such, else pairs
-  /// of halves.
+  /// Entries of coupling matrices and dense blocks, as they are stored: floats, or pairs of halves
+  /// or of the integers of packed rows, whose steps are in the scales of the rows' slots.
   std::vector<std::uint32_t> couplings;
-  bool couplings_are_floats = false;
   /// Items of two entries; those over positions first.
   std::vector<Words4> projections;
   std::uint32_t position_projections = 0;  ///< items

@@ -12,8 +12,9 @@ namespace rebounce {
 /// of 8 bits.
 enum class BasisPrecision : std::uint8_t { kF16, kF32, kQ8 };
 
-/// How the coupling matrices and dense entries of a HierarchicalOperator are stored.
-enum class CouplingPrecision : std::uint8_t { kF16, kF32 };
+/// How the coupling matrices and dense entries of a HierarchicalOperator are stored: IEEE numbers
+/// of 16 or 32 bits, or rows of integers (RowFormat) beside dense entries in 16 bits.
+enum class CouplingPrecision : std::uint8_t { kF16, kF32, kPacked };
 
 struct HierarchicalPrecision {
   BasisPrecision bases = BasisPrecision::kF32;
@@ -31,7 +32,7 @@ struct OfferedPrecision {
 inline constexpr std::array<OfferedPrecision, 3> kOfferedPrecisions{{
     {Precision::kF16, "f16", {BasisPrecision::kF16, CouplingPrecision::kF16}},
     {Precision::kF32, "f32", {BasisPrecision::kF32, CouplingPrecision::kF32}},
-    {Precision::kQ8, "q8", {BasisPrecision::kQ8, CouplingPrecision::kF16}},
+    {Precision::kQ8, "q8", {BasisPrecision::kQ8, CouplingPrecision::kPacked}},
 }};
 
 /// Whether bases of this precision are integers. Integers have an order of their own.

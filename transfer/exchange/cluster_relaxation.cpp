@@ -207,7 +207,7 @@ class ClusterRelaxation final : public Relaxation {
   }
 
   void project(std::span<const BasisPart> bases) {
-    bases_.project(bases, radiosity_.from(0), sent_.to(0));
+    bases_.project(bases, radiosity_.from(0), nullptr, sent_.to(0));
   }
 
   void expand(std::span<const BasisPart> bases, Planes& arrived) {
@@ -259,7 +259,8 @@ class ClusterRelaxation final : public Relaxation {
             .columns = columns,
             .row = step.coefficient,
             .column = step.coefficient,
-            .direction = CouplingBlock::Direction::kToRows};
+            .direction = CouplingBlock::Direction::kToRows,
+            .first_row = step.first_row};
   }
 
   /// Relaxes positions independently of each other.

@@ -64,6 +64,7 @@ class Planner {
       plan_.steps.push_back({.diagonal = blocks_[b],
                              .basis = basis_of(blocks_[b], block_layout.row, blocks_[b].row_rank),
                              .values = block_layout.values,
+                             .first_row = block_layout.first_row,
                              .coefficient = block_layout.row.coefficient,
                              .residual_rank = block_layout.row.residual_rank});
     }
@@ -177,15 +178,15 @@ class Planner {
                                       .column_out = 0,
                                       .direction = products.direction});
     } else {
-      products.couplings[step].push_back(
-          {.values = block_layout.values,
-           .rows = block.row_rank,
-           .columns = block.column_rank,
-           .row = block_layout.row.coefficient,
-           .column = block_layout.column.coefficient,
-           .direction = products.direction,
-           .row_residual_rank = block_layout.row.residual_rank,
-           .column_residual_rank = block_layout.column.residual_rank});
+      products.couplings[step].push_back({.values = block_layout.values,
+                                          .rows = block.row_rank,
+                                          .columns = block.column_rank,
+                                          .row = block_layout.row.coefficient,
+                                          .column = block_layout.column.coefficient,
+                                          .direction = products.direction,
+                                          .row_residual_rank = block_layout.row.residual_rank,
+                                          .column_residual_rank = block_layout.column.residual_rank,
+                                          .first_row = block_layout.first_row});
     }
   }
 

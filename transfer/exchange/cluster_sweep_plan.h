@@ -17,8 +17,9 @@ struct ClusterSweepPlan {
   /// A diagonal block.
   struct Step {
     TransferBlock diagonal;
-    BasisPart basis{};         ///< U^T
-    std::uint64_t values = 0;  ///< index of S or of the entries
+    BasisPart basis{};                     ///< U^T
+    std::uint64_t values = 0;              ///< index of S or of the entries
+    std::uint32_t first_row = kNotPacked;  ///< as in CouplingBlock
     std::uint32_t coefficient = 0;
     std::uint32_t residual_rank = 0;
   };

@@ -50,19 +50,22 @@ inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 
 /// The tensors of a hierarchical operator. Without `role` every patch has both roles.
 struct HierarchicalTensors {
-  const char *patch, *blocks, *bases, *values, *channel_matrix, *role, *coefficient_scale,
-      *scale_exponent;
+  const char *patch, *blocks, *bases, *couplings, *row_format, *values, *channel_matrix, *role,
+      *coefficient_scale, *scale_exponent;
 };
 
 inline constexpr HierarchicalTensors kHierarchicalTransfer = {
     "transfer.hierarchical.patch",          "transfer.hierarchical.blocks",
-    "transfer.hierarchical.bases",          "transfer.hierarchical.values",
+    "transfer.hierarchical.bases",          "transfer.hierarchical.couplings",
+    "transfer.hierarchical.row_format",     "transfer.hierarchical.values",
     "transfer.hierarchical.channel_matrix", "transfer.hierarchical.role",
     "transfer.hierarchical.moment_scale",   "transfer.hierarchical.scale_exponent"};
 inline constexpr HierarchicalTensors kCompressedFormFactors = {
     "form_factor.hierarchical.patch",
     "form_factor.hierarchical.blocks",
     "form_factor.hierarchical.bases",
+    "form_factor.hierarchical.couplings",
+    "form_factor.hierarchical.row_format",
     "form_factor.hierarchical.values",
     "form_factor.hierarchical.channel_matrix",
     nullptr,

@@ -12,7 +12,7 @@
 namespace rebounce {
 
 /// Raised whenever a file of the previous version can no longer be read or means something else.
-inline constexpr int kFileFormatVersion = 7;
+inline constexpr int kFileFormatVersion = 8;
 
 /// Writes `data` whole or not at all: into a temporary file beside `path`, flushed to disk and then
 /// renamed over it. Throws Error when the folder is missing, not writable or full.

@@ -295,8 +295,10 @@ std::shared_ptr<const HierarchicalOperator> read_hierarchical_operator(
     storage.values_f32 = file.tensor<float>(names.values, {kAnySize});
   }
   if (file.tensors().contains(names.bases)) {
-    storage.precision.bases = BasisPrecision::kQ8;
+    storage.precision = hierarchical_precision(Precision::kQ8);
     storage.bases_q8 = file.tensor<std::int8_t>(names.bases, {kAnySize}, TensorType::kI8);
+    storage.packed_couplings = file.tensor<std::uint8_t>(names.couplings, {kAnySize});
+    TensorReader{file}(names.row_format, storage.row_format);
   }
   try {
     return std::make_shared<const HierarchicalOperator>(std::move(storage));

@@ -88,6 +88,7 @@ template <typename Value>
 constexpr TensorType value_type() {
   if constexpr (std::same_as<Value, std::uint16_t>) return TensorType::kF16;
   if constexpr (std::same_as<Value, std::int8_t>) return TensorType::kI8;
+  if constexpr (std::same_as<Value, std::uint8_t>) return TensorType::kU8;
   if constexpr (std::same_as<Value, float>) return TensorType::kF32;
 }
 
@@ -117,6 +118,9 @@ void collect_hierarchical_operator(const HierarchicalStorage& storage,
   };
   if (!storage.one_array()) with_bases(storage, add(names.bases));
   with_couplings(storage, add(names.values));
+  if (!storage.has_packed_couplings()) return;
+  add(names.couplings)(storage.packed_couplings);
+  collector(names.row_format, storage.row_format);
 }
 
 void collect_operator(const TransferOperator* transfer, TensorCollector& collector) {

@@ -182,6 +182,9 @@ bool sizes_fit(const Storage& storage) {
     with_bases(storage, expect(HierarchicalLayout::padded(bases)));
     with_couplings(storage, expect(HierarchicalLayout::padded(couplings)));
   }
+  if (storage.has_packed_couplings()) {
+    expect(HierarchicalLayout::padded_packed(layout.packed_bytes))(storage.packed_couplings);
+  }
   bool fit = true;
   for_each_array(storage, [&](const auto& array) { fit &= array.size() == expected[&array]; });
   return fit;

@@ -11,6 +11,7 @@
 #include "transfer/base/half_float.h"
 #include "transfer/format/hierarchical_check.h"
 #include "transfer/format/hierarchical_layout.h"
+#include "transfer/format/row_packing.h"
 #include "transfer/format/stored_values.h"
 
 namespace rebounce {
@@ -45,10 +46,12 @@ void copy_block(const HierarchicalLayout& layout, const TransferBlock& block,
   }
 }
 
+/// `streamed` has the blocks of `storage` as they are in the order kStreamed.
 template <typename Value>
-SharedArray<Value> stream_array(const Storage& storage, const std::vector<TransferBlock>& blocks,
+SharedArray<Value> stream_array(const Storage& storage, const Storage& in_order,
                                 const SharedArray<Value>& values) {
-  const HierarchicalLayout layout(blocks, storage.matrix_count, storage.precision.bases);
+  const HierarchicalLayout layout(in_order);
+  const std::vector<TransferBlock>& blocks = in_order.blocks;
   std::vector<Value> streamed(
       HierarchicalLayout::padded(layout.basis_value_count + layout.coupling_value_count));
   const Value* from = values.data();
@@ -99,19 +102,24 @@ Storage stream_exact(const Storage& storage) {
 constexpr float kLargestByte = 127;
 
 /// Writes an operator in f32 in another precision. Where bases become integers, the scales of their
-/// vectors are multiplied into the coupling matrices.
+/// vectors are multiplied into the coupling matrices, and these are packed.
 template <typename Basis, typename Coupling>
 class Encoder {
  public:
-  /// `bases` and `couplings` have room for all values and hold zeros.
-  Encoder(const Storage& exact, const Storage& rounded, Basis* bases, Coupling* couplings)
+  /// `bases` and `couplings` have room for all values and hold zeros; `rows` for packed coupling
+  /// matrices.
+  Encoder(const Storage& exact, const Storage& rounded, Basis* bases, Coupling* couplings,
+          RowPacking& rows)
       : exact_(exact.values_f32.data()),
         matrix_count_(exact.matrix_count),
         from_(exact),
         to_(rounded),
+        position_count_(HierarchicalFormat::position_count(exact.area.size())),
+        exact_coefficient_scale_(exact.coefficient_scale),
         coefficient_scale_(exact.coefficient_scale),
         bases_(bases),
-        couplings_(couplings) {
+        couplings_(couplings),
+        rows_(rows) {
     for (std::size_t b = 0; b < exact.blocks.size(); ++b) encode(exact.blocks[b], b);
   }
 
@@ -129,38 +137,85 @@ class Encoder {
         store_coupling(coupling[k], encoded[k]);
       }
     } else if (has_values(block)) {
-      const std::vector<float> rows =
-          encode_basis(from.row, to.row, block.row_rank, block.row_count);
+      const EndScales rows =
+          encode_basis(from.row, to.row, block.row_rank, {block.row_begin, block.row_count});
       if (is_cluster_basis(block)) {
-        for (const float row : rows) coefficient_scale_[next_coefficient_++] *= row;
+        for (const float row : rows.scale) coefficient_scale_[next_coefficient_++] *= row;
         return;
       }
-      const std::vector<float> columns =
-          encode_basis(from.column, to.column, block.column_rank, block.column_count);
-      for (const float row : rows) {
-        for (const float column : columns) {
-          for (std::uint32_t matrix = 0; matrix < matrix_count_; ++matrix) {
-            store_coupling(*coupling++ * row * column, *encoded++);
-          }
+      const EndScales columns = encode_basis(from.column, to.column, block.column_rank,
+                                             {block.column_begin, block.column_count});
+      const std::size_t row_size = block.column_rank * matrix_count_;
+      for (std::uint32_t r = 0; r < block.row_rank; ++r, coupling += row_size) {
+        if constexpr (kIntegers) {
+          pack({coupling, row_size}, rows.scale[r], columns.scale,
+               block.coupling_step * rows.relative[r] * common_factor(columns.relative));
+        } else {
+          for (std::size_t k = 0; k < row_size; ++k) store_coupling(coupling[k], *encoded++);
         }
       }
     }
   }
 
-  /// Returns, for each vector, its step times the integer that stands for 1.
-  std::vector<float> encode_basis(const Layout::End& from, const Layout::End& to, std::size_t rank,
-                                  std::size_t size) {
-    std::vector<float> scales(rank, 1.0F);
-    std::vector<float> vector(size);
+  /// Packs a row of a coupling matrix times the scales of its vectors.
+  void pack(std::span<const float> coupling, float row, std::span<const float> columns,
+            double step) {
+    std::vector<float> scaled;
+    for (std::size_t k = 0; k < coupling.size(); ++k) {
+      scaled.push_back(coupling[k] * row * columns[k / matrix_count_] * kCouplingScale<Coupling>);
+    }
+    rows_.append(scaled, step * kCouplingScale<Coupling>);
+  }
+
+  /// The scales of the vectors of one end.
+  struct EndScales {
+    std::vector<float> scale;      ///< step times the integer that stands for 1
+    std::vector<double> relative;  ///< to the norms of the vectors over positions
+  };
+
+  /// One factor for all columns, with which the sum of their squared errors is that of own ones.
+  static double common_factor(std::span<const double> relative) {
+    double sum = 0;
+    for (const double factor : relative) {
+      if (factor > 0) sum += 1 / (factor * factor);
+    }
+    return sum > 0 ? std::sqrt(static_cast<double>(relative.size()) / sum) : 0;
+  }
+
+  /// A range of positions or of cluster coefficients.
+  struct Range {
+    std::uint32_t begin, count;
+  };
+
+  EndScales encode_basis(const Layout::End& from, const Layout::End& to, std::size_t rank,
+                         const Range& range) {
+    EndScales scales{std::vector<float>(rank, 1.0F), std::vector<double>(rank, 1.0)};
+    std::vector<float> vector(range.count);
     for (std::size_t r = 0; r < rank; ++r) {
-      std::copy_n(exact_ + from_.basis_index(from, r, 0), size, vector.begin());
+      std::copy_n(exact_ + from_.basis_index(from, r, 0), range.count, vector.begin());
       if constexpr (kIntegers) {
-        scales[r] = put_integers(vector, to, rank, r);
+        const double norm = norm_over_positions(vector, range.begin);
+        scales.scale[r] = put_integers(vector, to, rank, r);
+        scales.relative[r] = norm > 0 ? scales.scale[r] / norm : 0;
       } else {
-        for (std::size_t k = 0; k < size; ++k) put(vector[k], bases_[to_.basis_index(to, r, k)]);
+        for (std::size_t k = 0; k < range.count; ++k) {
+          put(vector[k], bases_[to_.basis_index(to, r, k)]);
+        }
       }
     }
     return scales;
+  }
+
+  /// The norm of a vector, which begins at a position or at a cluster coefficient. The vectors of
+  /// cluster bases have norm 1.
+  double norm_over_positions(std::span<const float> vector, std::uint32_t begin) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < vector.size(); ++k) {
+      const double scale =
+          begin < position_count_ ? 1 : exact_coefficient_scale_[begin - position_count_ + k];
+      sum += std::pow(scale * vector[k], 2);
+    }
+    return std::sqrt(sum);
   }
 
   static void put(float value, float& stored) { stored = value; }
@@ -191,11 +246,23 @@ class Encoder {
   const float* exact_;
   std::uint32_t matrix_count_;
   Layout from_, to_;
+  std::size_t position_count_;
+  std::span<const float> exact_coefficient_scale_;
   std::vector<float> coefficient_scale_;
   std::size_t next_coefficient_ = 0;  ///< index of the next cluster coefficient
   Basis* bases_;
   Coupling* couplings_;
+  RowPacking& rows_;
 };
+
+/// A format, not yet known, for each row of the coupling matrices.
+std::vector<std::uint8_t> rows_to_pack(const Storage& storage) {
+  std::size_t count = 0;
+  for (const TransferBlock& block : storage.blocks) {
+    if (block.kind == TransferBlock::Kind::kLowRank) count += block.row_rank;
+  }
+  return std::vector<std::uint8_t>(count);
+}
 
 /// Rounds `exact`, in f32 and in the order kStreamed, to `precision`.
 Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact) {
@@ -206,6 +273,8 @@ Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact)
     for (TransferBlock& block : rounded.blocks)
       block.row_residual_rank = block.column_residual_rank = 0;
   }
+  if (rounded.has_packed_couplings()) rounded.row_format = rows_to_pack(rounded);
+  RowPacking rows;
   const Layout layout(rounded);
   with_bases(rounded, [&]<typename Basis>(SharedArray<Basis>& bases) {
     with_couplings(rounded, [&]<typename Coupling>(SharedArray<Coupling>& couplings) {
@@ -213,7 +282,8 @@ Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact)
       std::vector<Basis> basis_values(
           Layout::padded(basis_count + (rounded.one_array() ? layout.coupling_value_count : 0)));
       const auto encode_into = [&](Coupling* coupling_values) {
-        Encoder<Basis, Coupling> encoder(exact, rounded, basis_values.data(), coupling_values);
+        Encoder<Basis, Coupling> encoder(exact, rounded, basis_values.data(), coupling_values,
+                                         rows);
         rounded.coefficient_scale = encoder.release_coefficient_scale();
       };
       if constexpr (std::is_same_v<Basis, Coupling>) {
@@ -226,6 +296,10 @@ Storage rounded_to(const HierarchicalPrecision& precision, const Storage& exact)
       bases = SharedArray(std::move(basis_values));
     });
   });
+  if (rounded.has_packed_couplings()) {
+    rounded.row_format = rows.formats();
+    rounded.packed_couplings = SharedArray(rows.release_bytes());
+  }
   return rounded;
 }
 
@@ -240,7 +314,7 @@ Storage stream_values(Storage storage) {
     if (is_cluster_basis(block)) continue;
     if (block.row_rank == 0 || block.column_rank == 0) block.row_rank = block.column_rank = 0;
   }
-  with_bases(streamed, [&](auto& array) { array = stream_array(storage, streamed.blocks, array); });
+  with_bases(streamed, [&](auto& array) { array = stream_array(storage, streamed, array); });
   return streamed;
 }
 

@@ -58,13 +58,12 @@ bool has_values(const TransferBlock& block) {
   return block.kind == TransferBlock::Kind::kDense || block.row_rank > 0;
 }
 
-HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
-                                       std::uint32_t matrix_count, BasisPrecision precision)
-    : block_layouts(blocks.size()),
-      rank_group(are_integers(precision) ? HierarchicalFormat::kRankGroup : 1) {
+HierarchicalLayout::HierarchicalLayout(const HierarchicalStorage& storage)
+    : block_layouts(storage.blocks.size()),
+      rank_group(are_integers(storage.precision.bases) ? HierarchicalFormat::kRankGroup : 1) {
   std::uint64_t total = 0;
-  for (const TransferBlock& block : blocks) {
-    total += block.value_count(matrix_count);
+  for (const TransferBlock& block : storage.blocks) {
+    total += block.value_count(storage.matrix_count);
     if (is_cluster_basis(block))
       cluster_coefficient_count =
           checked_count(std::uint64_t{cluster_coefficient_count} + block.column_count);
@@ -72,9 +71,9 @@ HierarchicalLayout::HierarchicalLayout(std::span<const TransferBlock> blocks,
       throw Error("hierarchical operator: its blocks are larger than any memory");
     }
   }
-  find_clusters(blocks);
-  place_bases(blocks, precision);
-  place_couplings(blocks, matrix_count);
+  find_clusters(storage.blocks);
+  place_bases(storage.blocks, storage.precision.bases);
+  place_couplings(storage);
 }
 
 std::uint64_t HierarchicalLayout::filled_rank(const Cluster& cluster) const {
@@ -86,11 +85,13 @@ std::uint64_t HierarchicalLayout::basis_index(const End& end, std::uint64_t rank
   const Cluster& cluster = clusters[end.cluster];
   const std::uint64_t r = end.coefficient - cluster.coefficient + rank;
   if (rank_group == 1) return cluster.values + r * cluster.size + position;
+  constexpr std::uint64_t kGroup = HierarchicalFormat::kPositionGroup;
   const std::uint64_t begin = position / kStrip * kStrip;
   const std::uint64_t width = std::min(kStrip, cluster.size - begin);
-  const std::uint64_t pair = (position - begin) / 2;
+  const std::uint64_t group = (position - begin) / kGroup;
   return cluster.values + begin * filled_rank(cluster) +
-         (r / rank_group * width + 2 * pair) * rank_group + r % rank_group * 2 + position % 2;
+         (r / rank_group * width + kGroup * group) * rank_group + r % rank_group * kGroup +
+         position % kGroup;
 }
 
 void HierarchicalLayout::find_clusters(std::span<const TransferBlock> blocks) {
@@ -135,34 +136,59 @@ void HierarchicalLayout::place_bases(std::span<const TransferBlock> blocks,
              });
 }
 
-void HierarchicalLayout::place_couplings(std::span<const TransferBlock> blocks,
-                                         std::uint32_t matrix_count) {
+void HierarchicalLayout::place_couplings(const HierarchicalStorage& storage) {
+  const std::uint64_t matrix_count = storage.matrix_count;
   const auto add_coefficients = [&](End& end, std::uint32_t count) {
     end.coefficient = coefficient_count;
     coefficient_count = checked_count(std::uint64_t{coefficient_count} + count);
   };
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const TransferBlock& block = blocks[b];
+  for (std::size_t b = 0; b < storage.blocks.size(); ++b) {
+    const TransferBlock& block = storage.blocks[b];
     BlockLayout& block_layout = block_layouts[b];
     block_layout.values = coupling_value_count;
     if (block.kind == TransferBlock::Kind::kDense) {
-      coupling_value_count += block.value_count(matrix_count);
+      coupling_value_count += block.value_count(storage.matrix_count);
       add_coefficients(block_layout.row, block.row_count);
       block_layout.column = block_layout.row;
       if (!block.on_diagonal()) add_coefficients(block_layout.column, block.column_count);
       largest_scratch =
           std::max(largest_scratch, scratch_size(block.row_count, block.column_count));
-    } else {
-      largest_scratch = std::max(largest_scratch, scratch_size(block.row_rank, block.column_rank));
-      coupling_value_count +=
-          std::uint64_t{matrix_count} * block.row_rank * std::uint64_t{block.column_rank};
+      continue;
     }
+    largest_scratch = std::max(largest_scratch, scratch_size(block.row_rank, block.column_rank));
+    if (storage.has_packed_couplings()) {
+      place_packed(storage, block, block_layout);
+    } else {
+      coupling_value_count += matrix_count * block.row_rank * block.column_rank;
+    }
+  }
+  if (packed_row_count != storage.row_format.size()) {
+    throw Error("hierarchical operator: there is not one format for each row of coupling matrices");
+  }
+}
+
+void HierarchicalLayout::place_packed(const HierarchicalStorage& storage,
+                                      const TransferBlock& block, BlockLayout& block_layout) {
+  if (is_cluster_basis(block) || !has_values(block)) return;
+  block_layout.values = packed_bytes;
+  block_layout.first_row = packed_row_count;
+  const std::uint64_t row_size = std::uint64_t{storage.matrix_count} * block.column_rank;
+  packed_row_count = checked_count(std::uint64_t{packed_row_count} + block.row_rank);
+  // Too few formats are found at the end.
+  const std::size_t last = std::min<std::size_t>(packed_row_count, storage.row_format.size());
+  for (std::size_t r = block_layout.first_row; r < last; ++r) {
+    packed_bytes += RowFormat{storage.row_format[r]}.row_bytes(row_size);
   }
 }
 
 std::uint64_t HierarchicalLayout::padded(std::uint64_t value_count) {
   constexpr std::uint64_t kMultiple = 64;
   return (value_count + HierarchicalFormat::kPadding + kMultiple - 1) / kMultiple * kMultiple;
+}
+
+std::uint64_t HierarchicalLayout::padded_packed(std::uint64_t bytes) {
+  constexpr std::uint64_t kMostRead = 32;
+  return padded(bytes + kMostRead - HierarchicalFormat::kPadding);
 }
 
 }  // namespace rebounce

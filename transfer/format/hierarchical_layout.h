@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "transfer/format/hierarchical_storage.h"
+#include "transfer/format/row_format.h"
 
 namespace rebounce {
 
@@ -30,17 +31,15 @@ struct HierarchicalLayout {
   };
   struct BlockLayout {
     End row, column;           ///< equal for blocks on the diagonal
-    std::uint64_t values = 0;  ///< index of S or of the entries, counted from the end of the bases
+    std::uint64_t values = 0;  ///< index of S or of the entries, counted from the end of the bases;
+                               ///< of a packed S the index of its first byte
+    std::uint32_t first_row = kNotPacked;  ///< index of the RowFormat of the first row of S
   };
 
-  /// The blocks must be valid (check_hierarchical_storage). Throws Error if they hold more values
-  /// than any memory.
-  HierarchicalLayout(std::span<const TransferBlock> blocks, std::uint32_t matrix_count,
-                     BasisPrecision precision);
-
-  /// The layout of the blocks of `storage`.
-  explicit HierarchicalLayout(const HierarchicalStorage& storage)
-      : HierarchicalLayout(storage.blocks, storage.matrix_count, storage.precision.bases) {}
+  /// The layout of the blocks of `storage`, which must be valid (check_hierarchical_storage).
+  /// Throws Error if they hold more values than any memory, or if there is not one format for each
+  /// row of packed coupling matrices.
+  explicit HierarchicalLayout(const HierarchicalStorage& storage);
 
   /// The index of one basis value: vector `rank` of one end of a low-rank block, at `position`
   /// counted from the beginning of its cluster.
@@ -49,7 +48,10 @@ struct HierarchicalLayout {
   std::vector<Cluster> clusters;           ///< by begin, then by descending size
   std::vector<BlockLayout> block_layouts;  ///< one for each block
   std::uint64_t basis_value_count = 0;
-  std::uint64_t coupling_value_count = 0;  ///< of coupling matrices and dense blocks
+  std::uint64_t coupling_value_count = 0;  ///< of coupling matrices and dense blocks; without
+                                           ///< packed ones
+  std::uint64_t packed_bytes = 0;          ///< of packed coupling matrices
+  std::uint32_t packed_row_count = 0;
   std::uint32_t coefficient_count = 0;
   std::size_t largest_scratch = 0;  ///< the largest scratch_size() of all coupling matrices
   std::uint32_t rank_group;  ///< ranks that are interleaved: kRankGroup for integers, otherwise 1
@@ -57,13 +59,17 @@ struct HierarchicalLayout {
 
   /// The size of an array of `value_count` values with its padding.
   static std::uint64_t padded(std::uint64_t value_count);
+  /// The size of the array of packed coupling matrices. Kernels read up to 32 bytes at once.
+  static std::uint64_t padded_packed(std::uint64_t bytes);
 
  private:
   std::uint64_t filled_rank(const Cluster& cluster) const;
   void find_clusters(std::span<const TransferBlock> blocks);
   std::uint32_t cluster_at(std::uint32_t begin, std::uint32_t size) const;
   void place_bases(std::span<const TransferBlock> blocks, BasisPrecision precision);
-  void place_couplings(std::span<const TransferBlock> blocks, std::uint32_t matrix_count);
+  void place_couplings(const HierarchicalStorage& storage);
+  void place_packed(const HierarchicalStorage& storage, const TransferBlock& block,
+                    BlockLayout& block_layout);
 };
 
 /// Whether a block has values: it is dense or its rank is above zero.

@@ -21,6 +21,7 @@ namespace rebounce {
 ///                  S [matrix][row_rank][column_rank]; no V^T on the diagonal
 ///   cluster basis  W^T [row_rank][row_count]
 ///
+/// Beside integer bases, S has integers of 4 to 16 bits by row, [row_rank][column_rank][matrix].
 /// In 8 bits U^T, V^T and W^T have row_residual_rank or column_residual_rank more rows. The
 /// constants are in HierarchicalFormat.
 struct HierarchicalStorage {
@@ -32,8 +33,9 @@ struct HierarchicalStorage {
     /// entries, block by block, with the values of all matrices for one entry next to each other.
     /// Zeros fill the array up to a multiple of 64 values, with at least kPadding of them. Bases in
     /// an array of their own are padded in the same way. Integers are [strip][rank /
-    /// kRankGroup][position / 2][kRankGroup][2 positions] in each cluster. A strip has kStrip
-    /// positions, the last one fewer; the last group of ranks is filled up with zeros.
+    /// kRankGroup][position / kPositionGroup][kRankGroup][kPositionGroup] in each cluster. A strip
+    /// has kStrip positions, the last one fewer; the last group of ranks is filled up with zeros.
+    /// Packed coupling matrices follow each other block by block, row by row.
     kStreamed,
   };
 
@@ -46,17 +48,24 @@ struct HierarchicalStorage {
                                          ///< x is this times W^T x
   /// [n] by position: R = 2^this, within +-kLargestExponent. Empty: R = 1.
   std::vector<std::int8_t> scale_exponent;
+  /// [rows of all low-rank blocks with values] RowFormat of each row of a coupling matrix, block by
+  /// block; empty unless coupling matrices are packed.
+  std::vector<std::uint8_t> row_format;
   PatchRoles roles;  ///< by patch; entries that no receiver and source share are arbitrary
   Order order = Order::kByBlock;  ///< of the values
   HierarchicalPrecision precision;
   /// Bases are in the array of their type, and so are coupling matrices and dense entries. If both
-  /// have the same type, the bases come first in one array. The other arrays are empty.
+  /// have the same type, the bases come first in one array. Packed coupling matrices have an array
+  /// of their own; values_f16 then holds the dense entries. The other arrays are empty.
   SharedArray<float> values_f32;
   SharedArray<std::uint16_t> values_f16;  ///< bits of IEEE half-precision numbers
   SharedArray<std::int8_t> bases_q8;
+  SharedArray<std::uint8_t> packed_couplings;
 
   /// Whether bases and coupling matrices share one array.
   bool one_array() const;
+
+  bool has_packed_couplings() const { return precision.couplings == CouplingPrecision::kPacked; }
 
   /// The index of the first coupling value in its array; `basis_value_count`: number of basis
   /// values.
@@ -84,11 +93,13 @@ decltype(auto) with_bases(Storage& storage, const Work& work) {
   return work(storage.values_f32);
 }
 
-/// Returns work(array), where `array` is the one that holds coupling matrices and dense entries.
+/// Returns work(array), where `array` is the one that holds dense entries, and coupling matrices
+/// unless they are packed.
 template <typename Storage, typename Work>
 decltype(auto) with_couplings(Storage& storage, const Work& work) {
   switch (storage.precision.couplings) {
     case CouplingPrecision::kF16:
+    case CouplingPrecision::kPacked:
       return work(storage.values_f16);
     case CouplingPrecision::kF32:
       break;
@@ -102,6 +113,7 @@ void for_each_array(Storage& storage, const Work& work) {
   work(storage.values_f32);
   work(storage.values_f16);
   work(storage.bases_q8);
+  work(storage.packed_couplings);
 }
 
 inline bool HierarchicalStorage::one_array() const {

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "transfer/format/hierarchical_encoding.h"
+#include "transfer/format/row_format.h"
 #include "transfer/format/stored_values.h"
 
 namespace rebounce {
@@ -28,17 +29,37 @@ class ValueReader {
     return value + stored_basis(layout_.basis_index(end, rank + vector, position)) /
                        double{HierarchicalFormat::kResidualScale};
   }
-  /// An entry of a coupling matrix or of a dense block.
-  double coupling(std::uint64_t index) const {
-    return with_couplings(storage_, [&](const auto& array) {
-      return coupling_value(array[first_coupling_ + index]);
-    });
+  /// Entry `index` of a dense block.
+  double dense(const HierarchicalLayout::BlockLayout& block, std::uint64_t index) const {
+    return stored_coupling(block.values + index);
+  }
+  /// An entry of the coupling matrix of a block with this layout and column rank.
+  double coupling(const HierarchicalLayout::BlockLayout& block, std::uint64_t row,
+                  std::uint64_t column_rank, std::uint64_t column, std::uint32_t matrix) const {
+    const std::uint64_t matrices = storage_.matrix_count, row_size = column_rank * matrices;
+    const std::uint64_t index = column * matrices + matrix;
+    if (!storage_.has_packed_couplings())
+      return stored_coupling(block.values + row * row_size + index);
+    std::uint64_t begin = block.values;
+    for (std::uint64_t r = 0; r < row; ++r) begin += format(block, r).row_bytes(row_size);
+    const RowFormat of_row = format(block, row);
+    const double integer =
+        unpacked(storage_.packed_couplings.data() + begin, index * of_row.half_bytes(), of_row);
+    return integer * of_row.step() / double{kCouplingScale<std::uint16_t>};
   }
 
   const Storage& storage() const { return storage_; }
   const HierarchicalLayout& layout() const { return layout_; }
 
  private:
+  RowFormat format(const HierarchicalLayout::BlockLayout& block, std::uint64_t row) const {
+    return {storage_.row_format[block.first_row + row]};
+  }
+  double stored_coupling(std::uint64_t index) const {
+    return with_couplings(storage_, [&](const auto& array) {
+      return coupling_value(array[first_coupling_ + index]);
+    });
+  }
   double stored_basis(std::uint64_t index) const {
     return with_bases(storage_, [&](const auto& array) { return basis_value(array[index]); });
   }
@@ -57,7 +78,7 @@ std::vector<double> block_entries(const ValueReader& read,
   std::vector<double> entries(rows * columns, 0.0);
   if (block.kind == TransferBlock::Kind::kDense) {
     for (std::size_t k = 0; k < entries.size(); ++k) {
-      entries[k] = read.coupling(block_layout.values + k * matrices + matrix);
+      entries[k] = read.dense(block_layout, k * matrices + matrix);
     }
     return entries;
   }
@@ -66,8 +87,7 @@ std::vector<double> block_entries(const ValueReader& read,
   for (std::size_t r = 0; r < row_rank; ++r) {
     std::ranges::fill(right, 0.0);
     for (std::size_t k = 0; k < column_rank; ++k) {
-      const std::uint64_t entry = r * column_rank + k;
-      const double coupling = read.coupling(block_layout.values + entry * matrices + matrix);
+      const double coupling = read.coupling(block_layout, r, column_rank, k, matrix);
       for (std::size_t j = 0; j < columns; ++j)
         right[j] += coupling * read.basis(block_layout.column, column_rank, k, j);
     }
@@ -77,6 +97,26 @@ std::vector<double> block_entries(const ValueReader& read,
     }
   }
   return entries;
+}
+
+/// Copies the coupling matrices or the entries of a block to `to`.
+void copy_couplings(const ValueReader& read, const TransferBlock& block, std::size_t index,
+                    float* to) {
+  const HierarchicalLayout::BlockLayout& from = read.layout().block_layouts[index];
+  const std::uint32_t matrices = read.storage().matrix_count;
+  if (block.kind == TransferBlock::Kind::kDense) {
+    for (std::uint64_t k = 0; k < block.value_count(matrices); ++k) {
+      *to++ = static_cast<float>(read.dense(from, k));
+    }
+  } else if (!is_cluster_basis(block)) {
+    for (std::uint32_t r = 0; r < block.row_rank; ++r) {
+      for (std::uint32_t c = 0; c < block.column_rank; ++c) {
+        for (std::uint32_t m = 0; m < matrices; ++m) {
+          *to++ = static_cast<float>(read.coupling(from, r, block.column_rank, c, m));
+        }
+      }
+    }
+  }
 }
 
 /// The transpose of `entries` [rows][columns].
@@ -137,6 +177,7 @@ Storage decode(const Storage& storage) {
   if (streamed.precision == exact) return streamed;
   Storage decoded = streamed;
   decoded.precision = exact;
+  decoded.row_format.clear();
   for_each_array(decoded, [](auto& array) { array = {}; });
   const HierarchicalLayout from(streamed), to(decoded);
   const ValueReader read(streamed, from);
@@ -159,8 +200,9 @@ Storage decode(const Storage& storage) {
     copy_basis(from.block_layouts[b].column, to.block_layouts[b].column, block.column_rank,
                block.column_count);
   }
-  for (std::uint64_t k = 0; k < to.coupling_value_count; ++k) {
-    values[to.basis_value_count + k] = static_cast<float>(read.coupling(k));
+  for (std::size_t b = 0; b < streamed.blocks.size(); ++b) {
+    copy_couplings(read, streamed.blocks[b], b,
+                   values.data() + to.basis_value_count + to.block_layouts[b].values);
   }
   decoded.values_f32 = SharedArray(std::move(values));
   return decoded;

@@ -32,8 +32,12 @@ struct HierarchicalFormat {
   /// Bound of the exponents of position scales.
   static constexpr int kLargestExponent = 24;
 
-  /// Ranks and positions that integer bases interleave (lab/038).
-  static constexpr std::uint32_t kRankGroup = 4, kStrip = 64;
+  /// Ranks and positions that integer bases interleave (lab/038). A group of ranks by a group of
+  /// positions is what one instruction multiplies.
+  static constexpr std::uint32_t kRankGroup = 4, kPositionGroup = 4, kStrip = 64;
+
+  /// The size of a stored TransferBlock.
+  static constexpr std::size_t kBlockBytes = 36;
 
   /// The number of positions: n rounded up to kAlignment.
   static constexpr std::size_t position_count(std::size_t patch_count) {
@@ -62,6 +66,9 @@ struct TransferBlock {
   /// The number of leading basis vectors that have a residual in 8 bits (kResidualScale). In f32
   /// the numbers are kept but not used; in f16 they are 0.
   std::uint32_t row_residual_rank = 0, column_residual_rank = 0;
+  /// The step to which entries of the coupling matrix between orthonormal bases may be rounded
+  /// beside integer bases; 0: as fine as 16 bits allow. It guides encode_values and is in no file.
+  float coupling_step = 0;
 
   bool on_diagonal() const { return row_begin == column_begin; }
 

@@ -104,7 +104,7 @@ REBOUNCE_INLINE inline void project_rows(const Value* basis, std::size_t size, c
 
 template <typename V, typename Value>
 void project(const Value* values, std::span<const BasisPart> parts, PlanarVectors<const float> x,
-             Coefficients<float> coefficient) {
+             const LightRun* /*runs*/, Coefficients<float> coefficient) {
   for (const BasisPart& part : parts) {
     const Value* const basis = values + part.values + std::size_t{part.first_rank} * part.size;
     const float* const from = x.data + part.position;

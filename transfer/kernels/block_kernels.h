@@ -7,6 +7,8 @@
 
 #include "rebounce/types.h"
 #include "transfer/format/channel_lanes.h"
+#include "transfer/format/operator_format.h"
+#include "transfer/format/row_format.h"
 
 namespace rebounce {
 
@@ -26,6 +28,15 @@ struct Coefficients {
   std::size_t stride;
 };
 
+/// What is known of the light at a run of positions, to round it and to see where there is none.
+struct LightRun {
+  static constexpr std::size_t kPositions = HierarchicalFormat::kAlignment;
+
+  /// By channel the largest magnitude; then the largest magnitude of what is negative.
+  std::array<float, kChannelLanes> largest;
+  std::array<float, kChannelLanes> sum;  ///< of the magnitudes, by channel
+};
+
 /// A range of ranks and positions of the bases over one cluster. Floats are [rank][size], integers
 /// in the order of integer_kernels_impl.h. Sizes and positions are multiples of
 /// HierarchicalFormat::kAlignment.
@@ -36,8 +47,8 @@ struct BasisPart {
   std::uint32_t first_rank, last_rank;  ///< the ranks [first, last)
   /// The positions [first, last), counted from the cluster's first.
   std::uint32_t first_offset, last_offset;
-  /// Whether the bases are over cluster coefficients instead of positions. These are never uneven
-  /// in the sense of the integer kernels.
+  /// Whether the bases are over cluster coefficients instead of positions. The integer kernels
+  /// round these to 16 bits, whatever they are.
   bool over_cluster_coefficients = false;
 };
 
@@ -48,8 +59,11 @@ struct BasisKernels {
   /// coefficient[r] = sum over k of basis[r][k] x[k], for the lights of x and the ranks of each
   /// part, over all positions of its cluster. With integers, first_rank is a multiple of
   /// HierarchicalFormat::kRankGroup, and coefficients are written up to the next multiple.
+  /// `runs` [lights][x.stride / LightRun::kPositions], from BlockKernels::measure_light, or null:
+  /// then integer kernels measure the light themselves. Others do not look at it.
   void (*project)(const Value* values, std::span<const BasisPart> parts,
-                  PlanarVectors<const float> x, Coefficients<float> coefficient);
+                  PlanarVectors<const float> x, const LightRun* runs,
+                  Coefficients<float> coefficient);
 
   /// y[k] += sum over r of basis[r][k] coefficient[r], for the lights of y, part by part, with the
   /// ranks and positions of each part.
@@ -61,13 +75,23 @@ struct BasisKernels {
 struct CouplingBlock {
   enum class Direction : std::uint8_t { kBoth, kToRows, kToColumns };
 
-  std::uint64_t values;
+  std::uint64_t values;  ///< index of the first value; of a packed matrix, of the first byte
   std::uint32_t rows, columns;
   std::uint32_t row, column;  ///< first coefficients of its rows and columns
   Direction direction;
   /// Residual coefficients of its rows and columns. They follow the coefficients themselves
   /// (HierarchicalFormat::kResidualScale).
   std::uint32_t row_residual_rank = 0, column_residual_rank = 0;
+  std::uint32_t first_row = kNotPacked;  ///< index of the RowFormat of the first row
+};
+
+/// The values of coupling matrices and dense blocks. Only operators with integer bases have packed
+/// rows; their other values are in half precision.
+template <typename Value>
+struct CouplingValues {
+  const Value* values;
+  const std::uint8_t* packed = nullptr;      ///< readable up to 32 bytes beyond the last row
+  const std::uint8_t* row_format = nullptr;  ///< RowFormat of each packed row
 };
 
 /// For each lane of a vector of four entries, which of the entry's values belongs to the lane's
@@ -88,10 +112,10 @@ struct ChannelLanes {
 /// entry, so the array must be padded. `scratch` has room for scratch_size() of each coupling
 /// matrix.
 template <typename Value>
-using CouplingKernel = void (*)(const Value* values, std::span<const CouplingBlock> couplings,
-                                const ChannelLanes& lanes, std::size_t light_count,
-                                Coefficients<const float> in, Coefficients<float> out,
-                                float* scratch);
+using CouplingKernel = void (*)(const CouplingValues<Value>& values,
+                                std::span<const CouplingBlock> couplings, const ChannelLanes& lanes,
+                                std::size_t light_count, Coefficients<const float> in,
+                                Coefficients<float> out, float* scratch);
 
 /// A dense block of an operator with one matrix: [rows][columns], both multiples of
 /// HierarchicalFormat::kAlignment.
@@ -140,6 +164,8 @@ struct BlockKernels {
   BasisKernels<std::int8_t> bases_q8;
   CouplingKernels<float> couplings_f32;
   CouplingKernels<std::uint16_t> couplings_f16;
+  /// Measures the runs of `count` positions of one light: three planes, `stride` floats apart.
+  void (*measure_light)(const float* x, std::size_t stride, std::size_t count, LightRun* runs);
 };
 
 }  // namespace rebounce

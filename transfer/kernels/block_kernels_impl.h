@@ -27,7 +27,8 @@ constexpr BlockKernels make_block_kernels() {
           {multiply_couplings<V, float>, multiply_dense<V, float>, add_products<V>,
            add_dense<V, float>},
           {multiply_couplings<V, std::uint16_t>, multiply_dense<V, std::uint16_t>, add_products<V>,
-           add_dense<V, std::uint16_t>}};
+           add_dense<V, std::uint16_t>},
+          measure_light<N>};
 }
 
 }  // namespace

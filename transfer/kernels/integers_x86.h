@@ -9,15 +9,20 @@
 namespace rebounce {
 namespace {
 
+inline __m128 sum_of_halves(__m256 v) {
+  return _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+}
+
+inline __m128 largest_of_halves(__m256 v) {
+  return _mm_max_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps(v, 1));
+}
+
 /// Magnitudes of every fourth lane.
 struct FourMagnitudes {
   __m128 largest, sum;
 
   FourMagnitudes(__m256 largest_of_eight, __m256 sum_of_eight)
-      : largest(_mm_max_ps(_mm256_castps256_ps128(largest_of_eight),
-                           _mm256_extractf128_ps(largest_of_eight, 1))),
-        sum(_mm_add_ps(_mm256_castps256_ps128(sum_of_eight),
-                       _mm256_extractf128_ps(sum_of_eight, 1))) {}
+      : largest(largest_of_halves(largest_of_eight)), sum(sum_of_halves(sum_of_eight)) {}
 
   Magnitudes magnitudes() const {
     Magnitudes result;
@@ -26,19 +31,6 @@ struct FourMagnitudes {
     return result;
   }
 };
-
-/// Sums up the lanes of three planes.
-inline Magnitudes magnitudes_of_planes(const FourMagnitudes& red, const FourMagnitudes& green,
-                                       const FourMagnitudes& blue) {
-  __m128 m[] = {red.largest, green.largest, blue.largest, _mm_setzero_ps()};
-  __m128 s[] = {red.sum, green.sum, blue.sum, _mm_setzero_ps()};
-  _MM_TRANSPOSE4_PS(m[0], m[1], m[2], m[3]);
-  _MM_TRANSPOSE4_PS(s[0], s[1], s[2], s[3]);
-  Magnitudes result;
-  _mm_storeu_ps(result.largest.data(), _mm_max_ps(_mm_max_ps(m[0], m[1]), _mm_max_ps(m[2], m[3])));
-  _mm_storeu_ps(result.sum.data(), _mm_add_ps(_mm_add_ps(s[0], s[1]), _mm_add_ps(s[2], s[3])));
-  return result;
-}
 
 }  // namespace
 }  // namespace rebounce

@@ -10,6 +10,6 @@ namespace rebounce {
 constinit const GatherKernels kGatherKernelsAvx2 = make_gather_kernels<Vector8>();
 
 constinit const KernelSet kKernelsAvx2 =
-    make_kernels<Vector8, Shorts16>("avx2", kGatherKernelsAvx2, gather_avx2);
+    make_kernels<Vector8, Integers256>("avx2", kGatherKernelsAvx2, gather_avx2);
 
 }  // namespace rebounce

@@ -8,6 +8,6 @@
 namespace rebounce {
 
 constinit const KernelSet kKernelsAvx512 =
-    make_kernels<Vector16, Shorts32>("avx512", kGatherKernelsAvx2, gather_avx512);
+    make_kernels<Vector16, Integers512>("avx512", kGatherKernelsAvx2, gather_avx512);
 
 }  // namespace rebounce

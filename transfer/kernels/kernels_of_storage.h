@@ -44,9 +44,17 @@ class BasisProducts {
     });
   }
 
-  void project(std::span<const BasisPart> parts, PlanarVectors<const float> x,
+  /// `runs`: of x, as in BasisKernels::project.
+  void project(std::span<const BasisPart> parts, PlanarVectors<const float> x, const LightRun* runs,
                Coefficients<float> coefficient) const {
-    std::visit([&](const auto& on) { on.kernels->project(on.values, parts, x, coefficient); }, on_);
+    std::visit([&](const auto& on) { on.kernels->project(on.values, parts, x, runs, coefficient); },
+               on_);
+  }
+  /// Measures `count` positions of one light, three planes `stride` floats apart, for `project`.
+  /// Bases that are no integers need no measures; for these it does nothing.
+  void measure(const float* x, std::size_t stride, std::size_t count, LightRun* runs) const {
+    if (std::holds_alternative<On<std::int8_t>>(on_))
+      kernels().blocks.measure_light(x, stride, count, runs);
   }
   void expand(std::span<const BasisPart> parts, Coefficients<const float> coefficient,
               PlanarVectors<float> y) const {
@@ -73,6 +81,9 @@ class CouplingProducts {
       on_ = On<Value>{&coupling_kernels<Value>(kernels().blocks), array.data() + first};
       scale_ = kCouplingScale<Value>;
     });
+    if (!storage.has_packed_couplings()) return;
+    packed_ = storage.packed_couplings.data();
+    row_format_ = storage.row_format.data();
   }
 
   void multiply(std::span<const CouplingBlock> couplings, const ChannelLanes& lanes,
@@ -80,7 +91,8 @@ class CouplingProducts {
                 float* scratch) const {
     std::visit(
         [&](const auto& on) {
-          on.kernels->multiply(on.values, couplings, lanes, light_count, in, out, scratch);
+          on.kernels->multiply({on.values, packed_, row_format_}, couplings, lanes, light_count, in,
+                               out, scratch);
         },
         on_);
   }
@@ -104,6 +116,7 @@ class CouplingProducts {
   template <typename Value>
   using On = KernelsOn<CouplingKernels<Value>, Value>;
   std::variant<On<float>, On<std::uint16_t>> on_;
+  const std::uint8_t *packed_ = nullptr, *row_format_ = nullptr;
   float scale_ = 1;
 };
 

@@ -10,6 +10,6 @@ constexpr GatherKernels kGatherKernels = make_gather_kernels<Vector4>();
 }  // namespace
 
 constinit const KernelSet kKernelsPortable =
-    make_kernels<Vector4, Shorts8>("portable", kGatherKernels, gather_along_links<ColorLanes>);
+    make_kernels<Vector4, Integers128>("portable", kGatherKernels, gather_along_links<ColorLanes>);
 
 }  // namespace rebounce

@@ -34,6 +34,15 @@ struct Vector8 {
   static Vector8 broadcast(float x) { return {_mm256_set1_ps(x)}; }
   void store(float* p) const { _mm256_storeu_ps(p, v); }
   void store_some(float* p, std::size_t count) const { _mm256_maskstore_ps(p, first(count), v); }
+  /// A vector whose lanes are zero where those of both are.
+  friend Vector8 any_of(Vector8 a, Vector8 b) { return {_mm256_or_ps(a.v, b.v)}; }
+  /// Whether any lane that any_of made of coefficients of channels is not zero. The fourth lane of
+  /// each is unused.
+  bool any_coefficient() const {
+    constexpr int kUsedLanes = 0x77;
+    const __m256 is_light = _mm256_cmp_ps(v, _mm256_setzero_ps(), _CMP_NEQ_UQ);
+    return (_mm256_movemask_ps(is_light) & kUsedLanes) != 0;
+  }
   /// The sums over the lanes of four vectors.
   static FourSums sums(Vector8 a, Vector8 b, Vector8 c, Vector8 d) {
     const __m256 four = _mm256_hadd_ps(_mm256_hadd_ps(a.v, b.v), _mm256_hadd_ps(c.v, d.v));
@@ -57,6 +66,56 @@ struct Vector8 {
 
   template <typename Value>
   class EntryLanes;
+
+  /// Loads the entries of packed rows (RowFormat), like EntryLanes.
+  class PackedLanes {
+   public:
+    explicit PackedLanes(const ChannelLanes& lanes) {
+      const __m256i value = _mm256_cvtepu16_epi32(
+          _mm_load_si128(reinterpret_cast<const __m128i*>(lanes.value.data())));
+      for (int k = 0; k < 4; ++k) {
+        const int bits = 4 * k + 4;
+        const __m256i bit = _mm256_mullo_epi32(value, _mm256_set1_epi32(bits));
+        const __m256i byte =
+            _mm256_mullo_epi32(_mm256_srli_epi32(bit, 3), _mm256_set1_epi32(0x01010101));
+        bytes_[k] = _mm256_add_epi32(byte, _mm256_set1_epi32(0x03020100));
+        left_[k] = _mm256_sub_epi32(_mm256_set1_epi32(32 - bits),
+                                    _mm256_and_si256(bit, _mm256_set1_epi32(7)));
+        used_[k] = _mm256_set1_epi32(-1 << (32 - bits));
+        vector_bytes_[k] =
+            kWidth / kChannelLanes * lanes.matrix_count * static_cast<unsigned>(bits) / 8;
+      }
+    }
+
+    /// A row in one format. An entry is the four bytes that begin with it, shifted to the left.
+    class Row {
+     public:
+      Row(const PackedLanes& lanes, RowFormat format)
+          : bytes_(lanes.bytes_[format.width()]),
+            left_(lanes.left_[format.width()]),
+            used_(lanes.used_[format.width()]),
+            vector_bytes_(lanes.vector_bytes_[format.width()]),
+            step_(_mm256_set1_ps(kStepsOfHighestBits.of[format.stored])) {}
+      /// Loads the two columns of a vector; reads 16 bytes.
+      Vector8 load(const std::uint8_t* row, std::size_t vector) const {
+        const __m256i bytes = _mm256_broadcastsi128_si256(
+            _mm_loadu_si128(reinterpret_cast<const __m128i*>(row + vector * vector_bytes_)));
+        const __m256i high = _mm256_sllv_epi32(_mm256_shuffle_epi8(bytes, bytes_), left_);
+        return {_mm256_cvtepi32_ps(_mm256_and_si256(high, used_))};
+      }
+      /// What the loaded entries are multiplied with.
+      Vector8 step() const { return {step_}; }
+
+     private:
+      __m256i bytes_, left_, used_;
+      std::size_t vector_bytes_;
+      __m256 step_;
+    };
+
+   private:
+    __m256i bytes_[4], left_[4], used_[4];  // by width
+    std::size_t vector_bytes_[4];
+  };
 
  private:
   static __m256i first(std::size_t count) {

@@ -37,6 +37,16 @@ struct Vector16 {
   }
   void store_some(float* p, std::size_t count) const { _mm512_mask_storeu_ps(p, first(count), v); }
   float sum() const { return _mm512_reduce_add_ps(v); }
+  /// A vector whose lanes are zero where those of both are.
+  friend Vector16 any_of(Vector16 a, Vector16 b) {
+    return {
+        _mm512_castsi512_ps(_mm512_or_si512(_mm512_castps_si512(a.v), _mm512_castps_si512(b.v)))};
+  }
+  /// Whether any lane that any_of made of coefficients of channels is not zero. The fourth lane of
+  /// each is unused.
+  bool any_coefficient() const {
+    return _mm512_mask_cmp_ps_mask(0x7777, v, _mm512_setzero_ps(), _CMP_NEQ_UQ) != 0;
+  }
   /// The sums over the lanes of four vectors.
   static FourSums sums(Vector16 a, Vector16 b, Vector16 c, Vector16 d) {
     const __m512 ab = _mm512_add_ps(_mm512_unpacklo_ps(a.v, b.v), _mm512_unpackhi_ps(a.v, b.v));
@@ -90,6 +100,55 @@ struct Vector16 {
   template <typename Value>
   class EntryLanes;
   class OneMatrixEntries;
+
+  /// Loads the entries of packed rows (RowFormat), like EntryLanes.
+  class PackedLanes {
+   public:
+    explicit PackedLanes(const ChannelLanes& lanes) {
+      const __m512i value = _mm512_cvtepu16_epi32(
+          _mm256_load_si256(reinterpret_cast<const __m256i*>(lanes.value.data())));
+      for (int k = 0; k < 4; ++k) {
+        const int bits = 4 * k + 4;
+        const __m512i bit = _mm512_mullo_epi32(value, _mm512_set1_epi32(bits));
+        const __m512i word = _mm512_srli_epi32(bit, 4);
+        const __m512i next = _mm512_add_epi32(word, _mm512_set1_epi32(1));
+        words_[k] = _mm512_or_si512(word, _mm512_slli_epi32(next, 16));
+        left_[k] = _mm512_sub_epi32(_mm512_set1_epi32(32 - bits),
+                                    _mm512_and_si512(bit, _mm512_set1_epi32(15)));
+        used_[k] = _mm512_set1_epi32(-1 << (32 - bits));
+        bytes_[k] = kWidth / kChannelLanes * lanes.matrix_count * static_cast<unsigned>(bits) / 8;
+      }
+    }
+
+    /// A row in one format. An entry is the two words that hold it, shifted to the left.
+    class Row {
+     public:
+      Row(const PackedLanes& lanes, RowFormat format)
+          : words_(lanes.words_[format.width()]),
+            left_(lanes.left_[format.width()]),
+            used_(lanes.used_[format.width()]),
+            bytes_(lanes.bytes_[format.width()]),
+            step_(_mm512_set1_ps(kStepsOfHighestBits.of[format.stored])) {}
+      /// Loads the four columns of a vector; reads 32 bytes.
+      Vector16 load(const std::uint8_t* row, std::size_t vector) const {
+        const __m512i words = _mm512_castsi256_si512(
+            _mm256_loadu_si256(reinterpret_cast<const __m256i*>(row + vector * bytes_)));
+        const __m512i high = _mm512_sllv_epi32(_mm512_permutexvar_epi16(words_, words), left_);
+        return {_mm512_cvtepi32_ps(_mm512_and_si512(high, used_))};
+      }
+      /// What the loaded entries are multiplied with.
+      Vector16 step() const { return {step_}; }
+
+     private:
+      __m512i words_, left_, used_;
+      std::size_t bytes_;
+      __m512 step_;
+    };
+
+   private:
+    __m512i words_[4], left_[4], used_[4];  // by width
+    std::size_t bytes_[4];                  // of a vector
+  };
 
  private:
   static __mmask16 first(std::size_t count) { return static_cast<__mmask16>((1U << count) - 1); }

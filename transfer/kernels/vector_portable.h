@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "transfer/format/row_format.h"
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/vector_load.h"
 
@@ -18,6 +19,7 @@ namespace {
 struct Vector4 {
   using Floats = float __attribute__((vector_size(16)));
   using Bits = std::uint32_t __attribute__((vector_size(16)));
+  using Integers = std::int32_t __attribute__((vector_size(16)));
   static constexpr std::size_t kWidth = 4;
   static constexpr std::size_t kStrip = 16;
   static constexpr std::size_t kLights = 1;
@@ -49,6 +51,13 @@ struct Vector4 {
   void store_some(float* p, std::size_t count) const {
     for (std::size_t k = 0; k < count; ++k) p[k] = v[k];
   }
+  /// A vector whose lanes are zero where those of both are.
+  friend Vector4 any_of(const Vector4& a, const Vector4& b) {
+    return {std::bit_cast<Floats>(std::bit_cast<Bits>(a.v) | std::bit_cast<Bits>(b.v))};
+  }
+  /// Whether any lane that any_of made of coefficients of channels is not zero. The fourth lane is
+  /// unused.
+  bool any_coefficient() const { return v[0] != 0 || v[1] != 0 || v[2] != 0; }
   /// The sums over the lanes of four vectors.
   static Vector4 sums(const Vector4& a, const Vector4& b, const Vector4& c, const Vector4& d) {
     return {Floats{a.sum(), b.sum(), c.sum(), d.sum()}};
@@ -73,6 +82,36 @@ struct Vector4 {
       for (std::size_t k = 0; k < kWidth; ++k) four[k] = p[lanes_.value[k]];
       return load_values<Vector4>(four);
     }
+
+   private:
+    const ChannelLanes& lanes_;
+  };
+
+  /// Loads the entries of packed rows (RowFormat), like EntryLanes.
+  class PackedLanes {
+   public:
+    explicit PackedLanes(const ChannelLanes& lanes) : lanes_(lanes) {}
+
+    /// A row in one format.
+    class Row {
+     public:
+      Row(const PackedLanes& lanes, RowFormat format) : lanes_(lanes.lanes_), format_(format) {}
+      /// Loads the column of a vector.
+      Vector4 load(const std::uint8_t* row, std::size_t vector) const {
+        const std::size_t first = vector * lanes_.matrix_count;
+        Integers integer;
+        for (std::size_t k = 0; k < kWidth; ++k) {
+          integer[k] = unpacked(row, (first + lanes_.value[k]) * format_.half_bytes(), format_);
+        }
+        return {__builtin_convertvector(integer, Floats)};
+      }
+      /// What the loaded entries are multiplied with.
+      Vector4 step() const { return broadcast(format_.step()); }
+
+     private:
+      const ChannelLanes& lanes_;
+      RowFormat format_;
+    };
 
    private:
     const ChannelLanes& lanes_;

@@ -5,6 +5,9 @@
 #include <immintrin.h>
 
 #include <cstddef>
+#include <cstdint>
+
+#include "transfer/format/row_format.h"
 
 namespace rebounce {
 namespace {
@@ -16,6 +19,20 @@ struct FourSums {
     _mm_storeu_ps(p, _mm_add_ps(_mm_mul_ps(_mm_set1_ps(scale), v), _mm_loadu_ps(p)));
   }
 };
+
+/// By RowFormat::stored, what an integer of a packed row in the highest bits of 32 is multiplied
+/// with.
+struct StepsOfHighestBits {
+  float of[256];
+
+  constexpr StepsOfHighestBits() : of{} {
+    for (unsigned stored = 0; stored < 256; ++stored) {
+      const RowFormat format{static_cast<std::uint8_t>(stored)};
+      of[stored] = format.step() / static_cast<float>(1U << (32 - format.bits()));
+    }
+  }
+};
+constexpr StepsOfHighestBits kStepsOfHighestBits;
 
 /// Stores the first kCount sums of three channels; the channels of a lane are neighbours among four
 /// floats.

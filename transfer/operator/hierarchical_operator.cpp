@@ -42,6 +42,7 @@ struct WorkVectors {
   Coefficients<float> coefficient;  ///< of x in the bases, later of y
   PlanarVectors<float> scratch;     ///< input copies of the coupling matrices, for each part
   PlanarVectors<float> y;           ///< [positions] what arrives
+  LightRun* runs;                   ///< [lights][run_count] measures of x
 
   WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
               float* buffer)
@@ -53,11 +54,18 @@ struct WorkVectors {
     coefficient = {take(light_count * coefficients), coefficients};
     scratch = {take(kParts * layout.largest_scratch), layout.largest_scratch, kParts};
     y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
+    runs = reinterpret_cast<LightRun*>(take(light_count * runs_size(vector)));
+  }
+
+  /// The measures of a light from a position on.
+  LightRun* runs_at(std::size_t light, std::size_t position) const {
+    return runs + (light * x.stride + position) / LightRun::kPositions;
   }
 
   static std::size_t size(std::size_t positions, const HierarchicalLayout& layout,
                           std::size_t light_count) {
-    return (2 * kChannelCount * vector_size(positions, layout) + coefficients_size(layout)) *
+    const std::size_t vector = vector_size(positions, layout);
+    return (2 * kChannelCount * vector + coefficients_size(layout) + runs_size(vector)) *
                light_count +
            kParts * layout.largest_scratch;
   }
@@ -67,6 +75,10 @@ struct WorkVectors {
 
   static std::size_t vector_size(std::size_t positions, const HierarchicalLayout& layout) {
     return round_up(positions + layout.cluster_coefficient_count, kLine);
+  }
+  /// In floats, for a vector of this size.
+  static std::size_t runs_size(std::size_t vector) {
+    return vector / LightRun::kPositions * (sizeof(LightRun) / sizeof(float));
   }
   static std::size_t coefficients_size(const HierarchicalLayout& layout) {
     return round_up(layout.coefficient_count * kChannelLanes, kLine);
@@ -99,8 +111,21 @@ class Phases {
         coefficient_scale_(coefficient_scale),
         work_(work) {}
 
+  /// Measures the light at positions.
+  void measure(std::size_t begin, std::size_t end) const {
+    for (std::size_t light = 0; light < work_.light_count; ++light) {
+      bases_.measure(work_.x.data + light * kChannelCount * work_.x.stride + begin, work_.x.stride,
+                     end - begin, work_.runs_at(light, begin));
+    }
+  }
+
+  /// Projects the light at positions, which is measured.
   void project(std::span<const BasisPart> parts) const {
-    bases_.project(parts, constant(work_.x), work_.coefficient);
+    bases_.project(parts, constant(work_.x), work_.runs, work_.coefficient);
+  }
+
+  void project_cluster_coefficients(std::span<const BasisPart> parts) const {
+    bases_.project(parts, constant(work_.x), nullptr, work_.coefficient);
   }
 
   void copy_dense_input(const DenseEnd& end) const {
@@ -269,7 +294,9 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
   const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
   const auto gather = [&](std::size_t k) {
     const std::size_t begin = k * kPositionsPerTask;
-    exchange.gather(initial_exitance, begin, std::min(begin + kPositionsPerTask, positions));
+    const std::size_t end = std::min(begin + kPositionsPerTask, positions);
+    exchange.gather(initial_exitance, begin, end);
+    phases.measure(begin, end);
   };
   // Dense blocks of several matrices get their input in the same loop as the projections.
   const std::size_t dense_ends = piece_count(plan.dense_in.size(), kDenseEndsPerTask);
@@ -288,7 +315,8 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
     phases.gather_cluster_coefficients(plan.cluster_bases_in[k]);
   };
   const auto project_cluster_coefficients = [&](std::size_t k) {
-    phases.project(of_part(plan.cluster_projections, plan.cluster_projection_parts, k));
+    phases.project_cluster_coefficients(
+        of_part(plan.cluster_projections, plan.cluster_projection_parts, k));
   };
   const std::size_t dense_parts = plan.dense_parts.size() - 1;
   const auto multiply = [&](std::size_t k) {
@@ -379,9 +407,10 @@ const PatchRoles& HierarchicalOperator::roles() const {
 std::size_t HierarchicalOperator::bytes() const {
   std::size_t values = 0;
   for_each_array(*storage_, [&](const auto& array) { values += array.size_bytes(); });
-  return values + storage_->blocks.size() * sizeof(TransferBlock) +
-         storage_->coefficient_scale.size() * sizeof(float) + storage_->scale_exponent.size() +
-         storage_->patch.size() * sizeof(std::uint32_t) + storage_->roles.role.size();
+  return values + storage_->blocks.size() * HierarchicalFormat::kBlockBytes +
+         storage_->row_format.size() + storage_->coefficient_scale.size() * sizeof(float) +
+         storage_->scale_exponent.size() + storage_->patch.size() * sizeof(std::uint32_t) +
+         storage_->roles.role.size();
 }
 
 std::size_t HierarchicalOperator::bytes_per_apply() const {

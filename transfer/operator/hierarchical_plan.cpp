@@ -146,7 +146,8 @@ class Planner {
                                               : !to_rows  ? Direction::kToColumns
                                                           : Direction::kBoth,
                                  .row_residual_rank = block_layout.row.residual_rank,
-                                 .column_residual_rank = block_layout.column.residual_rank};
+                                 .column_residual_rank = block_layout.column.residual_rank,
+                                 .first_row = block_layout.first_row};
     if (dense && storage_.matrix_count == 1) {
       plan_.dense.push_back({.values = coupling.values,
                              .rows = coupling.rows,

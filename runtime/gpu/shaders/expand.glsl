@@ -6,7 +6,7 @@ layout(local_size_x = 64) in;
 
 layout(std140, binding = 8) uniform Stage {
   uvec4 range;           // items, first item, first output
-  uvec4 channel_matrix;  // which matrix each channel uses; whether couplings are floats
+  uvec4 channel_matrix;  // which matrix each channel uses
 };
 // [strip][group of 4 vectors][16 positions][4 vectors], as integers of 16 bits (two words) or 8.
 layout(std430, binding = 0) readonly buffer Bases { uint bases[]; };
@@ -15,9 +15,9 @@ layout(std430, binding = 1) readonly buffer Scales { float scales[]; };
 layout(std430, binding = 2) readonly buffer Strips { uvec4 strips[]; };
 // Bases: first word, first slot, groups of 16 bits, groups of 8 bits. Dense blocks have two: first
 // value, first input, inputs, values of one matrix; values from output to output, values from input
-// to input, bits of the block's scale.
+// to input, bits of the block's scale, format.
 layout(std430, binding = 3) readonly buffer Entries { uvec4 entries[]; };
-layout(std430, binding = 4) readonly buffer Couplings { uint couplings[]; };  // floats, or pairs of halves
+layout(std430, binding = 4) readonly buffer Couplings { uint couplings[]; };  // floats, or pairs of 16 bits
 layout(std430, binding = 5) readonly buffer Light { vec4 light[]; };
 layout(std430, binding = 6) buffer Arriving { vec4 arriving[]; };
 
@@ -33,9 +33,12 @@ vec4 wide(uint low, uint high) {
               bitfieldExtract(int(high), 0, 16), bitfieldExtract(int(high), 16, 16));
 }
 
-float coupling(uint index) {
-  if (channel_matrix.w != 0u) return uintBitsToFloat(couplings[index]);
-  return unpackHalf2x16(couplings[index >> 1])[index & 1u];
+// An entry in a format of GpuOperator: half, float or integer.
+float coupling(uint index, uint format) {
+  if (format == 1u) return uintBitsToFloat(couplings[index]);
+  uint pair = couplings[index >> 1];
+  if (format == 2u) return float(bitfieldExtract(int(pair), 16 * int(index & 1u), 16));
+  return unpackHalf2x16(pair)[index & 1u];
 }
 
 // The product of four vectors at one position with their coefficients.
@@ -61,7 +64,8 @@ vec3 of_dense_block(uvec4 block, uvec4 strides, uint position, uint lane) {
   vec3 sum = vec3(0.0);
   for (uint k = lane; k < block.z; k += 4u) {
     uvec3 value = block.x + channel_matrix.xyz * block.w + position * strides.x + k * strides.y;
-    sum += vec3(coupling(value.x), coupling(value.y), coupling(value.z)) * light[block.y + k].xyz;
+    sum += vec3(coupling(value.x, strides.w), coupling(value.y, strides.w),
+                     coupling(value.z, strides.w)) * light[block.y + k].xyz;
   }
   return uintBitsToFloat(strides.z) * sum;
 }

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
@@ -24,6 +25,8 @@
 #include "tests/support/temporary_folder.h"
 #include "transfer/file/transfer_file_io.h"
 #include "transfer/format/hierarchical_encoding.h"
+#include "transfer/format/hierarchical_values.h"
+#include "transfer/format/row_format.h"
 #include "transfer/operator/hierarchical_operator.h"
 #include "transfer/operator/transfer_operator.h"
 
@@ -32,11 +35,19 @@ namespace {
 
 constexpr std::size_t kPatchCount = 100;
 
+// The step of the coupling matrices that have most bits.
+constexpr float kFinestStep = 0x1p-20F;
+
 /// Blocks of all kinds with residuals and scales, bases in bytes; form factors in 16 bits, and a
 /// few of pairs.
 TransferData sample() {
-  const HierarchicalStorage nested =
+  HierarchicalStorage nested =
       test::equilibrated(test::random_nested_storage(kPatchCount, 2, 5), 6);
+  // Coupling matrices of all widths.
+  for (std::size_t k = 0; TransferBlock & block : nested.blocks) {
+    if (block.kind == TransferBlock::Kind::kLowRank)
+      block.coupling_step = std::ldexp(kFinestStep, 4 * static_cast<int>(k++ % 4));
+  }
   TransferData data = test::plain_data(nested.area);
   data.transfer =
       std::make_shared<const HierarchicalOperator>(encode_values(nested, Precision::kQ8));
@@ -84,10 +95,12 @@ struct Expected {
   std::array<double, 3> weighted_sum;
 };
 
-/// The product with `light()`, which the values of the file give in double precision. Sets of
-/// instructions add in an order of their own, and integer bases take light that is rounded to
-/// integers: 3e-6 of the largest in all. Values in another order change it by a hundredth or more.
-void expect_product(const TransferOperator& op, const Expected& expected) {
+/// The product with `light()`, which the values of the file give in double precision. It is
+/// computed with these values in single precision: integer bases take light that is rounded to
+/// integers. Sets of instructions add in an order of their own, 3e-6 of the largest in all. Values
+/// in another order change it by a hundredth or more.
+void expect_product(const HierarchicalOperator& stored, const Expected& expected) {
+  const HierarchicalOperator op(decode(stored.storage()));
   const std::vector<Float3> h = product(op, light());
   float most = 0;
   std::array<double, 3> sum = {}, magnitude = {};
@@ -117,16 +130,22 @@ TEST(GoldenFile, HoldsBlocksOfAllKinds) {
     EXPECT_GT(std::ranges::count(storage.blocks, kind, &TransferBlock::kind), 0);
   }
   EXPECT_TRUE(std::ranges::any_of(storage.blocks, &TransferBlock::row_residual_rank));
+  for (const unsigned bits : {4U, 8U, 12U, 16U}) {
+    EXPECT_TRUE(std::ranges::any_of(storage.row_format, [bits](std::uint8_t format) {
+      return RowFormat{format}.bits() == bits;
+    })) << bits;
+  }
   EXPECT_EQ(storage.scale_exponent.size(), kPatchCount);
 }
 
 TEST(GoldenFile, GivesTheProductThatItGaveWhenItWasMade) {
   const TransferData data = load_transfer_file(golden_file());
-  expect_product(*data.transfer, {.of_patches = {{{1.715475F, 1.937844F, 1.182871F},
-                                                  {7.377541F, 6.468701F, 4.606727F},
-                                                  {0.7122565F, 0.5882013F, 0.396231F},
-                                                  {0.2714929F, 0.2115119F, 0.1245058F}}},
-                                  .weighted_sum = {2554.27615, 2109.00113, 1275.53735}});
+  expect_product(dynamic_cast<const HierarchicalOperator&>(*data.transfer),
+                 {.of_patches = {{{1.71621F, 1.940063F, 1.184446F},
+                                  {7.378204F, 6.468764F, 4.606769F},
+                                  {0.713775F, 0.5880924F, 0.3961883F},
+                                  {0.2719044F, 0.2118148F, 0.1247208F}}},
+                  .weighted_sum = {2559.25202, 2110.32843, 1276.33787}});
   expect_product(*data.compressed_form_factors,
                  {.of_patches = {{{10.75447F, 8.699661F, 5.52881F},
                                   {11.54727F, 8.915014F, 5.999148F},

@@ -178,5 +178,26 @@ TEST(HierarchicalOperator, RefusesHalfPrecisionBeyondItsRange) {
   expect_error([&] { encode_values(storage, Precision::kF16); }, "too large for f16");
 }
 
+TEST(HierarchicalOperator, RefusesPackedRowsThatDoNotFit) {
+  expect_refused(encode_values(random_hierarchical_storage(100, 3, 1), Precision::kQ8),
+                 {{"one format for each row", [](Storage& s) { s.row_format.pop_back(); }},
+                  {"one format for each row", [](Storage& s) { s.row_format.push_back(0); }},
+                  {"one format for each row", [](Storage& s) { s.row_format.clear(); }},
+                  {"number of values",
+                   [](Storage& s) {
+                     for (std::uint8_t& format : s.row_format) format &= 0xFCU;  // rows of 4 bits
+                   }},
+                  {"number of values", [](Storage& s) { s.packed_couplings = {}; }},
+                  {"number of values", [](Storage& s) {
+                     s.packed_couplings = SharedArray(std::vector<std::uint8_t>(
+                         s.packed_couplings.begin(), s.packed_couplings.end() - 1));
+                   }}});
+  expect_refused(random_hierarchical_storage(100, 3, 1),
+                 {{"one format for each row", [](Storage& s) { s.row_format = {3}; }},
+                  {"number of values", [](Storage& s) {
+                     s.packed_couplings = SharedArray(std::vector<std::uint8_t>(64));
+                   }}});
+}
+
 }  // namespace
 }  // namespace rebounce::test_hierarchical_refusals
