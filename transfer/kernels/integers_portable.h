@@ -12,6 +12,8 @@
 
 #if defined(__SSE2__)
 #include <emmintrin.h>
+#elif defined(__wasm_simd128__)
+#include <wasm_simd128.h>
 #endif
 
 #include "transfer/kernels/integer_kernels_impl.h"
@@ -200,6 +202,9 @@ struct Integers128 {
 #if defined(__SSE2__)
     return std::bit_cast<Sums>(
         _mm_madd_epi16(std::bit_cast<__m128i>(a), std::bit_cast<__m128i>(b)));
+#elif defined(__wasm_simd128__)
+    return std::bit_cast<Sums>(
+        wasm_i32x4_dot_i16x8(std::bit_cast<v128_t>(a), std::bit_cast<v128_t>(b)));
 #else
     const auto x = std::bit_cast<Sums>(a), y = std::bit_cast<Sums>(b);
     const Sums low = ((x << 16) >> 16) * ((y << 16) >> 16);
@@ -208,7 +213,11 @@ struct Integers128 {
   }
   /// Rounds to the nearest integer, ties to even.
   static std::int32_t rounded(float x) {
+#if defined(__wasm_simd128__)
+    return static_cast<std::int32_t>(std::nearbyint(x));  // lrint is a call there
+#else
     return static_cast<std::int32_t>(std::lrint(x));
+#endif
   }
 };
 
