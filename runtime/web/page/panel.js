@@ -124,9 +124,13 @@ export class Panel {
     for (const id of ['sweeps', 'sweep-count', 'halves']) byId(id).hidden = !open;
     document.body.classList.toggle('split', open);
     this.#setSweeps();
-    // On a narrow page the controls cover the lower end.
+    // On a narrow page the controls cover both ends.
     const { top, width } = document.querySelector('aside').getBoundingClientRect();
-    this.#stage.covered = width >= innerWidth ? innerHeight - top : 0;
+    const isNarrow = width >= innerWidth;
+    this.#stage.covered = {
+      above: isNarrow ? byId('scenes').getBoundingClientRect().bottom : 0,
+      below: isNarrow ? innerHeight - top : 0,
+    };
     this.#stage.resize();
     this.#stage.views().forEach(({ left, top: above }, k) => {
       const half = byId('halves').children[k];

@@ -20,7 +20,7 @@ export class Stage {
   hour = null;
   sunIsOn = true;
   skyIsOn = true;
-  covered = 0;  // pixels at the lower end of the canvas
+  covered = { above: 0, below: 0 };  // pixels of the canvas
   #turn = 0;
 
   constructor(canvas) {
@@ -138,19 +138,23 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
     const [{ width, height }] = this.views();
-    this.camera.aspect = width / height;
+    const covers = !this.comparison && height - this.covered.above - this.covered.below > height / 3;
+    const above = covers ? this.covered.above : 0;
+    const open = covers ? height - above - this.covered.below : height;
+    this.camera.aspect = width / open;
     // A narrow picture shows as much from side to side as a square one.
     const half = Math.tan(THREE.MathUtils.degToRad((this.fov ?? 50) / 2));
     const wider = Math.max(1, 1 / this.camera.aspect);
     this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(half * wider));
-    this.camera.updateProjectionMatrix();
+    // What the camera is pointed at is in the middle of what is not covered.
+    this.camera.setViewOffset(width, open, 0, -above, width, height);
   }
 
   /** The parts of the canvas that show the scene, in pixels from its upper left: one, or two. */
   views() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (!this.comparison) return [{ left: 0, top: 0, width, height }];
-    const half = width > height ? [width / 2, height] : [width, (height - this.covered) / 2];
+    const half = width > height ? [width / 2, height] : [width, (height - this.covered.below) / 2];
     const [across, down] = width > height ? [half[0], 0] : [0, half[1]];
     return [
       { left: 0, top: 0, width: half[0], height: half[1] },

@@ -152,6 +152,8 @@ test('bounced light looks as `rebounce render` draws it', async () => {
   const { compared, off } = await page.evaluate(async ({ given, exposure }) => {
     const { stage, setLights } = window.rebounce;
     while (stage.lamps.length > 0) stage.removeLamp(stage.lamps[0]);
+    stage.covered = { above: 0, below: 0 };
+    stage.resize();
     stage.renderer.toneMapping = 1;  // linear
     stage.renderer.toneMappingExposure = 2 ** exposure;
     for (const material of stage.lighting.mesh.material) material.needsUpdate = true;
