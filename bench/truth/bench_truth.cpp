@@ -15,7 +15,7 @@
 #include "bench/truth/pipeline_solution.h"
 #include "precompute/build/transfer_build.h"
 #include "precompute/cli/console.h"
-#include "precompute/cli/light_file.h"
+#include "precompute/import/light_file.h"
 #include "precompute/patches/lit_sides.h"
 #include "precompute/patches/winding.h"
 #include "rebounce/error.h"
@@ -107,7 +107,7 @@ class TruthBench {
 
   void choose_lights() {
     if (!options_.lights.empty()) {
-      setup_ = cli::read_lights(options_.lights);
+      setup_ = read_lights(options_.lights);
     } else if (options_.key_light) {
       setup_.lights = {reference::make_key_light(scene_, tracer_, sides_)};
       print_as_file(setup_.lights.front());
@@ -144,7 +144,7 @@ class TruthBench {
   Scene scene_;
   RayTracer tracer_;
   std::vector<TriangleSides> sides_;
-  cli::LightSetup setup_;
+  LightSetup setup_;
   std::vector<reference::SurfacePoint> points_;
   reference::IrradianceEstimate truth_;
 };

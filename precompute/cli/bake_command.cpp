@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "precompute/cli/chosen_lights.h"
 #include "precompute/cli/commands.h"
-#include "precompute/cli/light_file.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/picture_options.h"
 #include "runtime/demo/bake/glb_file.h"

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "precompute/cli/json_fields.h"
+#include "precompute/import/json_fields.h"
 #include "rebounce/error.h"
 
 namespace rebounce::cli {

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "precompute/cli/chosen_lights.h"
 #include "precompute/cli/commands.h"
 #include "precompute/cli/frame_cost.h"
-#include "precompute/cli/light_file.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/picture_options.h"
 #include "precompute/lights/reference_solution.h"

@@ -7,9 +7,9 @@
 
 #include "precompute/base/csv_writer.h"
 #include "precompute/base/npz_writer.h"
+#include "precompute/cli/chosen_lights.h"
 #include "precompute/cli/commands.h"
 #include "precompute/cli/frame_cost.h"
-#include "precompute/cli/light_file.h"
 #include "precompute/cli/method_names.h"
 #include "rebounce/error.h"
 #include "runtime/frame/engine_parts.h"

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "precompute/cli/chosen_lights.h"
 #include "precompute/cli/commands.h"
-#include "precompute/cli/light_file.h"
 #include "precompute/cli/light_path_file.h"
 #include "precompute/cli/method_names.h"
 #include "precompute/cli/moving_sphere.h"

@@ -42,7 +42,7 @@ ROOMS = {
     "runtime/demo/viewer/window": "The viewer: window, panels, controls.",
     "precompute/base": "BLAS, sets, tables, progress, and files of numbers.",
     "precompute/sampling": "Points and rays on triangles and hemispheres, and boxes to find them.",
-    "precompute/import": "A glTF file to a scene.",
+    "precompute/import": "Files to scenes and lights: glTF, light files.",
     "precompute/patches": "A scene to patches: cuts, clusters, sides that are seen, selections.",
     "precompute/exchange/pairs": "Form factors between all pairs of patches, and their closure.",
     "precompute/exchange/links": "Form factors between sets of patches.",

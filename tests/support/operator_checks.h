@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "rebounce/error.h"
@@ -15,6 +16,7 @@
 #include "tests/support/random_light.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
+#include "transfer/format/hierarchical_storage.h"
 #include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::test {
@@ -60,6 +62,44 @@ inline void check_batch(const HierarchicalOperator& op, std::size_t lights) {
     const std::vector<Float3> one(m0.begin() + at, m0.begin() + end);
     const std::vector<Float3> part(batch.begin() + at, batch.begin() + end);
     EXPECT_LT(relative_difference(part, unaided_product(op, one), op.storage().area), 1e-6);
+  }
+}
+
+/// Plane `channel` of [lights][3][n], or all of them, in the order of the lights.
+inline std::vector<float> planes_of(const std::vector<Float3>& light, std::size_t n,
+                                    std::optional<int> channel) {
+  std::vector<float> planes;
+  for (std::size_t at = 0; at < light.size(); at += n) {
+    for (int c = channel.value_or(0); c < (channel ? *channel + 1 : kChannelCount); ++c) {
+      for (std::size_t i = 0; i < n; ++i) planes.push_back(light[at + i][c]);
+    }
+  }
+  return planes;
+}
+
+/// Planes of light, of all channels and of each alone, get what applies give their lights, but for
+/// rounding: `allowed` of the largest.
+inline void check_planes(const TransferOperator& op, std::size_t lights, float allowed) {
+  const std::size_t n = op.patch_count();
+  const std::vector<Float3> m0 = random_light(lights * n, lights, 100);
+  std::vector<Float3> applied;
+  for (std::size_t light = 0; light < lights; ++light) {
+    const auto first = m0.begin() + static_cast<std::ptrdiff_t>(light * n);
+    const std::vector<Float3> h =
+        unaided_product(op, {first, first + static_cast<std::ptrdiff_t>(n)});
+    applied.insert(applied.end(), h.begin(), h.end());
+  }
+  for (const std::optional<int> channel : {std::optional<int>(), {0}, {1}, {2}}) {
+    const std::vector<float> in = planes_of(m0, n, channel),
+                             wanted = planes_of(applied, n, channel);
+    std::vector<float> out(in.size(), -1);
+    std::vector<float> workspace(op.batch_workspace_size(lights), std::nanf(""));
+    op.apply_planes(channel, in, out, workspace);
+    const float most = std::abs(
+        *std::ranges::max_element(wanted, {}, [](float value) { return std::abs(value); }));
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      ASSERT_NEAR(out[k], wanted[k], allowed * most) << "channel " << channel.value_or(-1);
+    }
   }
 }
 

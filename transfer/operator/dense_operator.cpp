@@ -25,6 +25,11 @@ std::size_t padded_size(std::size_t patch_count) {
   return tiles_per_side(patch_count) * kTile;
 }
 
+/// Which matrix each of three vectors is multiplied with.
+using ChannelMatrices = std::array<std::uint32_t, kChannelCount>;
+
+constexpr std::uint32_t kNoMatrix = UINT32_MAX;
+
 /// Row and column of tile number `index` in the order (0,0) (1,0) (1,1) (2,0) ...
 struct TilePosition {
   std::size_t row, column;
@@ -47,8 +52,8 @@ struct TilePosition {
 /// channels that use matrix `matrix`.
 template <typename Value>
 void apply_tile(const TileKernels<Value>& kernels, const Value* tile, const TilePosition& at,
-                const std::array<std::uint32_t, kChannelCount>& channel_matrix,
-                std::uint32_t matrix, const float* x, float* y, std::size_t stride) {
+                const ChannelMatrices& channel_matrix, std::uint32_t matrix, const float* x,
+                float* y, std::size_t stride) {
   for (int channel = 0; channel < kChannelCount; ++channel) {
     if (channel_matrix[channel] != matrix) continue;
     const float* xc = x + channel * stride;
@@ -81,8 +86,8 @@ struct SlotPart {
 
 template <typename Value>
 void apply_tiles(const TileKernels<Value>& kernels, const Value* tiles,
-                 const DenseOperator::Storage& storage, const float* x, float* slots,
-                 std::size_t stride, const Scheduler& scheduler) {
+                 const DenseOperator::Storage& storage, const ChannelMatrices& channel_matrix,
+                 const float* x, float* slots, std::size_t stride, const Scheduler& scheduler) {
   const std::size_t per_matrix = DenseOperator::tile_count(storage.area.size());
   parallel_for(scheduler, kSlotCount, [&](std::size_t slot) {
     float* y = slots + slot * kChannelCount * stride;
@@ -90,27 +95,27 @@ void apply_tiles(const TileKernels<Value>& kernels, const Value* tiles,
       const SlotPart part(slot, matrix, per_matrix, storage.matrix_count);
       if (part.begin == part.end) continue;
       for (int channel = 0; channel < kChannelCount; ++channel) {
-        if (storage.channel_matrix[channel] == matrix) {
+        if (channel_matrix[channel] == matrix) {
           std::fill_n(y + channel * stride, part.extent(), 0.0F);
         }
       }
       const Value* tile = tiles + (matrix * per_matrix + part.begin) * kTileSize;
       TilePosition at(part.begin);
       for (std::size_t k = part.begin; k < part.end; ++k, at.advance(), tile += kTileSize) {
-        apply_tile(kernels, tile, at, storage.channel_matrix, matrix, x, y, stride);
+        apply_tile(kernels, tile, at, channel_matrix, matrix, x, y, stride);
       }
     }
   });
 }
 
-/// Adds up the slots of one channel, in order, into sum [stride].
-void add_slots(const DenseOperator::Storage& storage, int channel, const float* slots,
-               std::size_t stride, float* sum) {
+/// Adds up the slots of one of three vectors, in order, into sum [stride].
+void add_slots(const DenseOperator::Storage& storage, int vector, std::uint32_t matrix,
+               const float* slots, std::size_t stride, float* sum) {
   const std::size_t per_matrix = DenseOperator::tile_count(storage.area.size());
   std::fill_n(sum, stride, 0.0F);
   for (std::size_t slot = 0; slot < kSlotCount; ++slot) {
-    const SlotPart part(slot, storage.channel_matrix[channel], per_matrix, storage.matrix_count);
-    const float* y = slots + (slot * kChannelCount + channel) * stride;
+    const SlotPart part(slot, matrix, per_matrix, storage.matrix_count);
+    const float* y = slots + (slot * kChannelCount + vector) * stride;
     const std::size_t extent = part.extent();
     for (std::size_t i = 0; i < extent; ++i) sum[i] += y[i];
   }
@@ -152,32 +157,62 @@ void DenseOperator::do_apply(std::span<const Float3> initial_exitance,
                              std::span<Float3> indirect_irradiance, std::span<float> workspace,
                              const Scheduler& scheduler) const {
   const std::size_t n = patch_count(), stride = padded_size(n);
-
-  float* x = workspace.data();
-  float* slots = x + kChannelCount * stride;
+  float* const x = workspace.data();
   std::fill_n(x, kChannelCount * stride, 0.0F);
   for (std::size_t i = 0; i < n; ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
       x[c * stride + i] = sqrt_area_[i] * initial_exitance[i][c];
     }
   }
+  multiply(storage_.channel_matrix, workspace, scheduler);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (int c = 0; c < kChannelCount; ++c) indirect_irradiance[i][c] = x[c * stride + i];
+  }
+}
 
+void DenseOperator::do_apply_planes(std::optional<int> channel,
+                                    std::span<const float> initial_exitance,
+                                    std::span<float> indirect_irradiance,
+                                    std::span<float> workspace, const Scheduler& scheduler) const {
+  const std::size_t n = patch_count(), stride = padded_size(n);
+  float* const x = workspace.data();
+  for (std::size_t first = 0; first < initial_exitance.size(); first += kChannelCount * n) {
+    const std::size_t planes =
+        std::min(static_cast<std::size_t>(kChannelCount), (initial_exitance.size() - first) / n);
+    std::fill_n(x, kChannelCount * stride, 0.0F);
+    ChannelMatrices matrix;
+    matrix.fill(kNoMatrix);
+    for (std::size_t v = 0; v < planes; ++v) {
+      matrix[v] = storage_.channel_matrix[channel ? *channel : v];
+      const float* const plane = initial_exitance.data() + first + v * n;
+      for (std::size_t i = 0; i < n; ++i) x[v * stride + i] = sqrt_area_[i] * plane[i];
+    }
+    multiply(matrix, workspace, scheduler);
+    for (std::size_t v = 0; v < planes; ++v) {
+      std::copy_n(x + v * stride, n, indirect_irradiance.data() + first + v * n);
+    }
+  }
+}
+
+void DenseOperator::multiply(const std::array<std::uint32_t, kChannelCount>& matrix,
+                             std::span<float> workspace, const Scheduler& scheduler) const {
+  const std::size_t n = patch_count(), stride = padded_size(n);
+  float* const x = workspace.data();
+  float* const slots = x + kChannelCount * stride;
   const bool half = storage_.precision == Precision::kF16;
   if (half) {
-    apply_tiles(kernels().dense.f16, storage_.tiles_f16.data(), storage_, x, slots, stride,
+    apply_tiles(kernels().dense.f16, storage_.tiles_f16.data(), storage_, matrix, x, slots, stride,
                 scheduler);
   } else {
-    apply_tiles(kernels().dense.f32, storage_.tiles_f32.data(), storage_, x, slots, stride,
+    apply_tiles(kernels().dense.f32, storage_.tiles_f32.data(), storage_, matrix, x, slots, stride,
                 scheduler);
   }
-
   const float scale = half ? 1.0F / kHalfScale : 1.0F;
-  for (int c = 0; c < kChannelCount; ++c) {
-    float* const sum = x + c * stride;  // x is no longer needed
-    add_slots(storage_, c, slots, stride, sum);
-    for (std::size_t i = 0; i < n; ++i) {
-      indirect_irradiance[i][c] = sum[i] * scale / sqrt_area_[i];
-    }
+  for (int v = 0; v < kChannelCount; ++v) {
+    if (matrix[v] == kNoMatrix) continue;
+    float* const sum = x + v * stride;  // x is no longer needed
+    add_slots(storage_, v, matrix[v], slots, stride, sum);
+    for (std::size_t i = 0; i < n; ++i) sum[i] = sum[i] * scale / sqrt_area_[i];
   }
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -68,7 +69,15 @@ class DenseOperator final : public TransferOperator {
  private:
   void do_apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
                 std::span<float> workspace, const Scheduler& scheduler) const override;
+  void do_apply_planes(std::optional<int> channel, std::span<const float> initial_exitance,
+                       std::span<float> indirect_irradiance, std::span<float> workspace,
+                       const Scheduler& scheduler) const override;
   void do_expand(int channel, std::span<float> transfer) const override;
+
+  /// Overwrites the three vectors at the begin of the workspace, light times the root of the area,
+  /// with what arrives; vector v with `matrix`[v].
+  void multiply(const std::array<std::uint32_t, kChannelCount>& matrix, std::span<float> workspace,
+                const Scheduler& scheduler) const;
 
   Storage storage_;
   std::vector<float> sqrt_area_;

@@ -1,6 +1,7 @@
 #include "transfer/operator/hierarchical_operator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -232,6 +233,14 @@ void clear(const PlanarVectors<float>& vectors, std::size_t begin, std::size_t e
   }
 }
 
+/// Light of patches in planes of one channel each, [count][n]. Each light of an apply takes three
+/// of them; those that the last one lacks are dark.
+template <typename T>
+struct Planes {
+  T* data;
+  std::size_t count;
+};
+
 /// Copies the light of the patches to x, and what arrives from y to the patches.
 struct Exchange {
   std::span<const std::uint32_t> patch;                ///< [n] patch at each position
@@ -255,6 +264,20 @@ struct Exchange {
     clear(work.x, std::max(begin, last), end);
   }
 
+  void gather(const Planes<const float>& light, std::size_t begin, std::size_t end) const {
+    const std::size_t n = patch.size(), last = std::min(end, n);
+    for (std::size_t v = 0; v < work.x.count; ++v) {
+      float* const x = work.x.data + v * work.x.stride;
+      if (v >= light.count) {
+        std::fill(x + begin, x + last, 0.0F);
+        continue;
+      }
+      const float* const plane = light.data + v * n;
+      for (std::size_t k = begin; k < last; ++k) x[k] = gather_scale[k] * plane[patch[k]];
+    }
+    clear(work.x, std::max(begin, last), end);
+  }
+
   /// Writes the light at the positions `targets`.
   void scatter(std::span<const std::uint32_t> targets, std::span<Float3> light) const {
     const std::size_t n = patch.size(), stride = work.y.stride;
@@ -269,6 +292,27 @@ struct Exchange {
         const float weight = scatter_scale[k];
         for (int c = 0; c < kChannelCount; ++c) h[c] = weight * y[c * stride + k];
       }
+    }
+  }
+
+  void scatter(std::span<const std::uint32_t> targets, const Planes<float>& light) const {
+    for (std::size_t v = 0; v < light.count; ++v) {
+      float* const plane = light.data + v * patch.size();
+      const float* const y = work.y.data + v * work.y.stride;
+      for (const std::uint32_t k : targets) plane[patch[k]] = scatter_scale[k] * y[k];
+    }
+  }
+
+  /// Nothing arrives at the patches `dark`.
+  void darken(std::span<const std::uint32_t> dark, std::span<Float3> light) const {
+    for (std::size_t l = 0; l < work.light_count; ++l) {
+      for (const std::uint32_t p : dark) light[l * patch.size() + p] = {0, 0, 0};
+    }
+  }
+
+  void darken(std::span<const std::uint32_t> dark, const Planes<float>& light) const {
+    for (std::size_t v = 0; v < light.count; ++v) {
+      for (const std::uint32_t p : dark) light.data[v * patch.size() + p] = 0;
     }
   }
 };
@@ -288,9 +332,12 @@ std::span<const Entry> of_part(const std::vector<Entry>& entries,
   return between(entries, parts[part], parts[part + 1]);
 }
 
+/// `From` and `To`: the light of patches as Exchange takes it.
+template <typename From, typename To>
 void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange& exchange,
-              const WorkVectors& work, std::span<const Float3> initial_exitance,
-              std::span<Float3> indirect_irradiance, const Scheduler& scheduler) {
+              const WorkVectors& work, const From& initial_exitance, const To& indirect_irradiance,
+              const Scheduler& scheduler) {
+  exchange.darken(plan.dark, indirect_irradiance);
   const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
   const auto gather = [&](std::size_t k) {
     const std::size_t begin = k * kPositionsPerTask;
@@ -419,15 +466,20 @@ std::size_t HierarchicalOperator::bytes_per_apply() const {
          });
 }
 
+ChannelLanes HierarchicalOperator::all_lanes() const {
+  return {storage_->channel_matrix, storage_->matrix_count};
+}
+
 std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
   return WorkVectors::size(HierarchicalFormat::position_count(patch_count()), *layout_,
                            light_count) +
          kLine;
 }
 
+template <typename From, typename To>
 void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_count,
-                               std::span<const Float3> initial_exitance,
-                               std::span<Float3> indirect_irradiance, std::span<float> workspace,
+                               const ChannelLanes& lanes, const From& initial_exitance,
+                               const To& indirect_irradiance, std::span<float> workspace,
                                const Scheduler& scheduler) const {
   // The workspace has room for one cache line more than its vectors, so that they can begin with
   // one.
@@ -436,12 +488,6 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   const WorkVectors work(HierarchicalFormat::position_count(patch_count()), *layout_, light_count,
                          aligned);
   const Exchange exchange{storage_->patch, gather_scale_, scatter_scale_, work};
-  const ChannelLanes lanes(storage_->channel_matrix, storage_->matrix_count);
-  for (std::size_t light = 0; light < light_count; ++light) {
-    for (const std::uint32_t p : plan.dark) {
-      indirect_irradiance[light * patch_count() + p] = {0, 0, 0};
-    }
-  }
   const BasisProducts bases(*storage_);
   const CouplingProducts couplings(*storage_, layout_->basis_value_count);
   const Phases phases(bases, couplings, lanes, storage_->coefficient_scale, work);
@@ -451,7 +497,7 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
 void HierarchicalOperator::do_apply(std::span<const Float3> initial_exitance,
                                     std::span<Float3> indirect_irradiance,
                                     std::span<float> workspace, const Scheduler& scheduler) const {
-  run(*plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
+  run(*plan_, 1, all_lanes(), initial_exitance, indirect_irradiance, workspace, scheduler);
 }
 
 void HierarchicalOperator::do_apply_batch(std::size_t light_count,
@@ -459,7 +505,22 @@ void HierarchicalOperator::do_apply_batch(std::size_t light_count,
                                           std::span<Float3> indirect_irradiance,
                                           std::span<float> workspace,
                                           const Scheduler& scheduler) const {
-  run(*plan_, light_count, initial_exitance, indirect_irradiance, workspace, scheduler);
+  run(*plan_, light_count, all_lanes(), initial_exitance, indirect_irradiance, workspace,
+      scheduler);
+}
+
+void HierarchicalOperator::do_apply_planes(std::optional<int> channel,
+                                           std::span<const float> initial_exitance,
+                                           std::span<float> indirect_irradiance,
+                                           std::span<float> workspace,
+                                           const Scheduler& scheduler) const {
+  // The bases serve all channels, so a light may have three planes of one channel.
+  std::array<std::uint32_t, kChannelCount> matrix = storage_->channel_matrix;
+  if (channel) matrix.fill(matrix[*channel]);
+  const std::size_t planes = initial_exitance.size() / patch_count();
+  run(*plan_, piece_count(planes, kChannelCount), ChannelLanes(matrix, storage_->matrix_count),
+      Planes<const float>{initial_exitance.data(), planes},
+      Planes<float>{indirect_irradiance.data(), planes}, workspace, scheduler);
 }
 
 HierarchicalOperator::Receivers HierarchicalOperator::receivers(
@@ -482,7 +543,8 @@ void HierarchicalOperator::apply_to(const Receivers& receivers,
   check_size("operator: initial exitance", initial_exitance.size(), patch_count());
   check_size("operator: indirect irradiance", indirect_irradiance.size(), patch_count());
   check_workspace("operator: workspace", workspace.size(), workspace_size());
-  run(*receivers.plan_, 1, initial_exitance, indirect_irradiance, workspace, scheduler);
+  run(*receivers.plan_, 1, all_lanes(), initial_exitance, indirect_irradiance, workspace,
+      scheduler);
 }
 
 void HierarchicalOperator::do_expand(int channel, std::span<float> transfer) const {

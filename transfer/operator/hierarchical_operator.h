@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,7 @@
 namespace rebounce {
 
 class HierarchicalPlan;
+struct ChannelLanes;
 struct HierarchicalLayout;
 struct HierarchicalStorage;
 
@@ -85,12 +87,17 @@ class HierarchicalOperator final : public TransferOperator {
   void do_apply_batch(std::size_t light_count, std::span<const Float3> initial_exitance,
                       std::span<Float3> indirect_irradiance, std::span<float> workspace,
                       const Scheduler& scheduler) const override;
+  void do_apply_planes(std::optional<int> channel, std::span<const float> initial_exitance,
+                       std::span<float> indirect_irradiance, std::span<float> workspace,
+                       const Scheduler& scheduler) const override;
   void do_expand(int channel, std::span<float> transfer) const override;
 
   std::shared_ptr<const HierarchicalPlan> plan_to(const std::vector<bool>& wanted) const;
-  void run(const HierarchicalPlan& plan, std::size_t light_count,
-           std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-           std::span<float> workspace, const Scheduler& scheduler) const;
+  ChannelLanes all_lanes() const;
+  template <typename From, typename To>
+  void run(const HierarchicalPlan& plan, std::size_t light_count, const ChannelLanes& lanes,
+           const From& initial_exitance, const To& indirect_irradiance, std::span<float> workspace,
+           const Scheduler& scheduler) const;
 
   std::shared_ptr<const HierarchicalStorage> storage_;
   /// [n] by position: R A^1/2, or 0 for patches that are no sources; and R A^-1/2 times the scale

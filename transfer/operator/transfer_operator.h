@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -56,11 +57,24 @@ class TransferOperator {
                    std::span<Float3> indirect_irradiance, std::span<float> workspace,
                    const Scheduler& scheduler = {}) const;
 
+  /// Applies the operator to planes of light, each of one channel: [plane_count][n] in both arrays.
+  /// Plane v is channel v mod 3 of light v / 3; with `channel`, 0 to 2, all planes are of that
+  /// channel, and three take about as long as one light. `workspace` has
+  /// batch_workspace_size(lights) floats, with three planes or fewer to a light. The result equals
+  /// that of `apply` up to rounding. May allocate. Throws Error as above, if a light lacks a plane
+  /// and no channel is given, and if there is no such channel.
+  void apply_planes(std::optional<int> channel, std::span<const float> initial_exitance,
+                    std::span<float> indirect_irradiance, std::span<float> workspace,
+                    const Scheduler& scheduler = {}) const;
+
   /// Writes Y for one channel, dense, unscaled and row-major [n][n], for export and tests. The
   /// default multiplies with n unit vectors.
   void expand(int channel, std::span<float> transfer) const;
 
  private:
+  // Small products stay on the calling thread.
+  Scheduler scheduler_for(std::size_t light_count, const Scheduler& scheduler) const;
+
   // What the functions above do once they have looked at the sizes.
   virtual void do_apply(std::span<const Float3> initial_exitance,
                         std::span<Float3> indirect_irradiance, std::span<float> workspace,
@@ -69,6 +83,9 @@ class TransferOperator {
                               std::span<Float3> indirect_irradiance, std::span<float> workspace,
                               const Scheduler& scheduler) const;
   virtual void do_expand(int channel, std::span<float> transfer) const;
+  virtual void do_apply_planes(std::optional<int> channel, std::span<const float> initial_exitance,
+                               std::span<float> indirect_irradiance, std::span<float> workspace,
+                               const Scheduler& scheduler) const;
 };
 
 /// Returns the indirect irradiance [n] in lx that follows from `initial_exitance` [n] in lx.

@@ -8,93 +8,12 @@
 #include "rebounce/error.h"
 #include "runtime/python/core/arrays.h"
 #include "runtime/python/core/module.h"
+#include "runtime/python/core/product.h"
 #include "runtime/solvers/solve_radiosity.h"
 #include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::python {
 namespace {
-
-// Lights of one pass over the operator, and columns that are brought into the order of lights at a
-// time: so many that a row of them fills cache lines.
-constexpr std::size_t kPassLights = 4, kColumns = 16;
-
-// Patches whose columns are turned at a time: what they read stays in the first cache.
-constexpr std::size_t kTurnedPatches = 16;
-
-/// Where the entries of a block [3 n][columns] lie.
-struct BlockOrder {
-  std::size_t row_stride, column_stride;
-};
-
-/// Calls move(place of an entry of the block, entry of light, patch) for every patch, channel and
-/// one of `count` columns from `begin` on.
-template <typename Move>
-void turn(std::size_t n, const BlockOrder& order, std::size_t begin, std::size_t count,
-          std::vector<Float3>& light, const Move& move) {
-  for (std::size_t first = 0; first < n; first += kTurnedPatches) {
-    const std::size_t end = std::min(n, first + kTurnedPatches);
-    for (std::size_t k = 0; k < count; ++k) {
-      for (std::size_t i = first; i < end; ++i) {
-        for (std::size_t c = 0; c < kChannelCount; ++c) {
-          move((c * n + i) * order.row_stride + (begin + k) * order.column_stride,
-               light[k * n + i][c], i);
-        }
-      }
-    }
-  }
-}
-
-/// Takes light [3 n][columns] in this order, channel by channel, through Y; the adjoint of Y is A Y
-/// / A.
-template <typename Number>
-void apply(const TransferData& data, const Number* in, Number* out, std::size_t columns,
-           const BlockOrder& order, bool adjoint, ProductScratch& scratch) {
-  const TransferOperator& transfer = *data.transfer;
-  const std::size_t n = transfer.patch_count();
-  const std::size_t most = std::min(columns, order.row_stride == 1 ? kPassLights : kColumns);
-  const std::size_t pass = std::min(most, kPassLights);
-  auto& [light, result, workspace] = scratch;
-  light.resize(most * n);
-  result.resize(most * n);
-  workspace.resize(transfer.batch_workspace_size(pass));
-  const std::vector<float>& area = data.patches.area;
-  for (std::size_t begin = 0; begin < columns; begin += most) {
-    const std::size_t count = std::min(most, columns - begin);
-    turn(n, order, begin, count, light, [&](std::size_t at, float& value, std::size_t i) {
-      value = static_cast<float>(in[at]);
-      if (adjoint) value /= area[i];
-    });
-    for (std::size_t k = 0; k < count; k += pass) {
-      const std::size_t together = std::min(pass, count - k);
-      transfer.apply_batch(together, std::span(light).subspan(k * n, together * n),
-                           std::span(result).subspan(k * n, together * n), workspace);
-    }
-    turn(n, order, begin, count, result, [&](std::size_t at, float& value, std::size_t i) {
-      out[at] = static_cast<Number>(adjoint ? value * area[i] : value);
-    });
-  }
-}
-
-template <typename Number>
-py::array apply_to(const Data& data, const Array<Number>& light, bool adjoint, bool by_column) {
-  if (!data->transfer) throw Error("the transfer data have no operator");
-  if (adjoint && !data->transfer->roles().all_are_both()) {
-    throw Error("an operator with receivers and sources has no adjoint");
-  }
-  const auto rows = static_cast<py::ssize_t>(kChannelCount * data->patches.size());
-  check_shape(light, {by_column ? -1 : rows, by_column ? rows : -1}, "light");
-  py::array_t<Number> result({light.shape(0), light.shape(1)});
-  const Number* in = light.data();
-  Number* out = result.mutable_data();
-  const auto columns = static_cast<std::size_t>(light.shape(by_column ? 0 : 1));
-  const BlockOrder order =
-      by_column ? BlockOrder{1, static_cast<std::size_t>(rows)} : BlockOrder{columns, 1};
-  const py::gil_scoped_release unlocked;
-  std::unique_ptr<ProductScratch> scratch = data.memory->take();
-  apply(*data, in, out, columns, order, adjoint, *scratch);
-  data.memory->give(std::move(scratch));
-  return result;
-}
 
 /// F of a file, in the form that gathers fastest.
 class FormFactors {
@@ -223,9 +142,7 @@ void add_data(py::module_& module) {
       .def("mesh", &mesh_of_data)
       .def("record", &record_of_data)
       .def("exchange", &exchange_of_pairs)
-      .def("apply", &apply_to<float>, py::arg("light").noconvert(), py::arg("adjoint"),
-           py::arg("by_column"))
-      .def("apply", &apply_to<double>, py::arg("light"), py::arg("adjoint"), py::arg("by_column"));
+      .def("apply", &apply_to_array, py::arg("light"), py::arg("adjoint"), py::arg("channel"));
   py::class_<FormFactors>(module, "FormFactors")
       .def(py::init<const Data&>())
       .def("gather", &gather_with<float>, py::arg("light").noconvert(), py::arg("adjoint"))

@@ -1,14 +1,18 @@
 #include "runtime/python/core/lamps.h"
 
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 
+#include "precompute/import/light_file.h"
 #include "runtime/python/core/arrays.h"
+#include "runtime/python/core/module.h"
 
 namespace rebounce::python {
 namespace {
@@ -44,10 +48,47 @@ Light light_from(const py::handle& fields) {
   light.radius = fields.attr("radius").cast<float>();
   light.size = fields.attr("size").cast<Float2>();
   light.tangent = fields.attr("tangent").cast<Float3>();
+  const py::object profile = fields.attr("profile");
+  if (!profile.is_none()) light.profile = profile.cast<std::shared_ptr<IntensityProfile>>();
   return light;
 }
 
+py::tuple read_light_file(const std::filesystem::path& path) {
+  const LightSetup setup = read_lights(path);
+  py::dict emitters;
+  for (const EmitterScale& emitter : setup.emitters) {
+    emitters[py::str(emitter.material)] = emitter.scale;
+  }
+  py::object cells = py::none();
+  if (setup.sky.distribution) {
+    cells = array_of(
+        std::vector<float>(setup.sky.distribution->begin(), setup.sky.distribution->end()));
+  }
+  return py::make_tuple(lights_of(setup.lights), setup.sky.luminance, setup.sky.color, cells,
+                        emitters);
+}
+
+std::shared_ptr<IntensityProfile> parse_profile(const std::string& text, const std::string& name) {
+  return std::const_pointer_cast<IntensityProfile>(parse_ies_profile(text, name));
+}
+
 }  // namespace
+
+void add_lamps(py::module_& module) {
+  using Profile = IntensityProfile;
+  const auto view = [](std::vector<float> Profile::*angles) {
+    return [angles](const py::object& self) {
+      return view_of(std::span<const float>(self.cast<const Profile&>().*angles), self);
+    };
+  };
+  py::class_<Profile, std::shared_ptr<Profile>>(module, "Profile")
+      .def_property_readonly("vertical", view(&Profile::vertical))
+      .def_property_readonly("horizontal", view(&Profile::horizontal))
+      .def("intensity", &Profile::intensity, py::arg("vertical_angle"),
+           py::arg("horizontal_angle") = 0.0F);
+  module.def("parse_profile", &parse_profile, py::arg("text"), py::arg("name"));
+  module.def("read_lights", &read_light_file, py::arg("path"));
+}
 
 std::vector<Light> lights_from(const py::sequence& lights) {
   std::vector<Light> result;
@@ -80,6 +121,7 @@ py::list lights_of(std::span<const Light> lights) {
     fields["radius"] = light.radius;
     fields["size"] = light.size;
     fields["tangent"] = light.tangent;
+    fields["profile"] = std::const_pointer_cast<IntensityProfile>(light.profile);
     result.append(fields);
   }
   return result;

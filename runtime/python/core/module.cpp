@@ -17,6 +17,7 @@ PYBIND11_MODULE(_core, module) {
   });
   rebounce::python::add_data(module);
   rebounce::python::add_build(module);
+  rebounce::python::add_lamps(module);
   rebounce::python::add_frame(module);
   rebounce::python::add_facets(module);
   rebounce::python::add_sensors(module);

@@ -14,7 +14,7 @@ namespace rebounce::python {
 
 /// Memory of a product.
 struct ProductScratch {
-  std::vector<Float3> light, result;
+  std::vector<float> light, result;
   std::vector<float> workspace;
 };
 
@@ -52,6 +52,7 @@ struct Data {
 
 void add_data(pybind11::module_& module);     // loading, saving, arrays, the product
 void add_build(pybind11::module_& module);    // the offline stage
+void add_lamps(pybind11::module_& module);    // profiles of luminaires, light files
 void add_frame(pybind11::module_& module);    // engines, skies, solvers
 void add_facets(pybind11::module_& module);   // view factors of given facets
 void add_sensors(pybind11::module_& module);  // light meters

@@ -14,7 +14,18 @@ three bands. Long work shows its progress, stops on Ctrl-C and runs without Pyth
 
 from ._core import Error, __version__, set_threads
 from .facets import ViewFactors, exchange_factors, read_facets, view_factors, view_factors_report
-from .frame import Engine, Light, Sky, Solution, cie_sky, load_lights, sky_cell_directions, solve
+from .frame import (
+    Engine,
+    Light,
+    Sky,
+    Solution,
+    cie_sky,
+    load_emitters,
+    load_lights,
+    load_profile,
+    sky_cell_directions,
+    solve,
+)
 from .scene import Scene, load_scene
 from .sensors import Sensors
 from .transfer import FormFactorOperator, TransferData, TransferOperator, load, precompute, save
@@ -35,7 +46,9 @@ __all__ = [
     "cie_sky",
     "exchange_factors",
     "load",
+    "load_emitters",
     "load_lights",
+    "load_profile",
     "load_scene",
     "precompute",
     "read_facets",

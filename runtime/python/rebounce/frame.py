@@ -1,7 +1,6 @@
 """Light: lamps, skies, frames and solutions by iteration."""
 
 import dataclasses
-import json
 import math
 import os
 from typing import TYPE_CHECKING, Any, Dict, List, Optional, Sequence, Tuple, Union
@@ -26,6 +25,8 @@ class Light:
     position: metres. direction: the way the light travels, of unit length.
     color: linear Rec.709. intensity: candela (point, spot), lux (directional), cd/m² (surfaces).
     range: metres, 0 for none. Cone angles in radians. radius, size: metres, of surfaces.
+    profile: of a luminaire, from load_profile; `intensity` is then a factor of its candelas, and
+    `tangent` the way of its horizontal angle 0.
     """
 
     type: str = "point"
@@ -40,6 +41,7 @@ class Light:
     radius: float = 0.0
     size: Sequence[float] = (0.0, 0.0)
     tangent: Triple = (1.0, 0.0, 0.0)
+    profile: Optional["_core.Profile"] = None
 
 
 @dataclasses.dataclass
@@ -74,30 +76,29 @@ def sky_cell_directions(per_side: int = 4) -> Tuple[Floats, npt.NDArray[np.uint3
     return np.array(points, np.float32), cells
 
 
-def load_lights(path: Union[str, "os.PathLike[str]"]) -> Tuple[List[Light], Sky]:
-    """The lamps and the sky of a light file (.json), as `rebounce solve --lights` takes it.
+def load_profile(path: Union[str, "os.PathLike[str]"]) -> "_core.Profile":
+    """The light distribution of a luminaire from an IES file (LM-63, type C), for Light.profile.
 
-    Lamps of IES profiles and skies of the CIE are left to the command line: raises ValueError.
+    Raises Error if the file is no such file.
     """
-    with open(path, encoding="utf-8") as file:
-        document = json.load(file)
-    names = {field.name for field in dataclasses.fields(Light)}
-    lights = []
-    for number, fields in enumerate(document.get("lights", [])):
-        fields = dict(fields)
-        spot = fields.pop("spot", {})
-        for theirs, ours in (("innerConeAngle", "inner_cone_angle"), ("outerConeAngle", "outer_cone_angle")):
-            if theirs in spot:
-                fields[ours] = spot[theirs]
-        unknown = fields.keys() - names
-        if unknown:
-            raise ValueError(f"{os.fspath(path)}: light {number} has the field {sorted(unknown)[0]!r}")
-        lights.append(Light(**fields))
-    sky = document.get("sky", {})
-    unknown = sky.keys() - {"color", "luminance"}
-    if unknown:
-        raise ValueError(f"{os.fspath(path)}: the sky has the field {sorted(unknown)[0]!r}")
-    return lights, Sky(sky.get("luminance", 0.0), sky.get("color", (1.0, 1.0, 1.0)))
+    with open(path, encoding="latin-1") as file:
+        return _core.parse_profile(file.read(), os.fspath(path))
+
+
+def load_lights(path: Union[str, "os.PathLike[str]"]) -> Tuple[List[Light], Sky]:
+    """The lamps and the sky of a light file (.json), or the lamps of a .glb or .gltf.
+
+    It takes what `rebounce solve --lights` takes: profiles of luminaires and CIE skies too. Raises
+    Error with the light and the field if one is wrong.
+    """
+    lights, luminance, color, cells, _ = _core.read_lights(os.fspath(path))
+    return [Light(**fields) for fields in lights], Sky(luminance, color, cells)
+
+
+def load_emitters(path: Union[str, "os.PathLike[str]"]) -> Dict[str, Triple]:
+    """What a light file says of surfaces that emit: factors [3] for Engine.set_emission_scale, by
+    the name of the material. Raises Error as load_lights does."""
+    return dict(_core.read_lights(os.fspath(path))[4])
 
 
 class Engine:
@@ -111,6 +112,7 @@ class Engine:
         self, data: "TransferData", points_per_patch: int = 8, area_light_samples: int = 4
     ) -> None:
         self._core = _core.Engine(data._core, points_per_patch, area_light_samples)
+        self._materials: List[str] = data.record["materials"]
 
     def relight(self, lights: Sequence[Light] = (), sky: Optional[Sky] = None) -> None:
         """One frame. Raises Error, with the number of the light, if a field is out of range."""
@@ -120,9 +122,19 @@ class Engine:
         """One frame with the direct irradiance [n, 3] in lx of the caller."""
         self._core.relight_by_direct(np.ascontiguousarray(direct_irradiance, dtype=np.float32))
 
-    def set_emission_scale(self, material: int, scale: Union[float, Triple]) -> None:
-        """From the next frame on, material `material` emits `scale` times what the scene says."""
-        self._core.set_emission_scale(material, [float(x) for x in np.broadcast_to(scale, 3)])
+    def set_emission_scale(self, material: Union[int, str], scale: Union[float, Triple]) -> None:
+        """From the next frame on, a material emits `scale` times what the scene says.
+
+        material: its number, or its name. Raises ValueError if there is no such name.
+        """
+        if isinstance(material, str):
+            named = [m for m, name in enumerate(self._materials) if name == material]
+            if not named:
+                raise ValueError(f"the scene has no material {material!r}")
+        else:
+            named = [material]
+        for m in named:
+            self._core.set_emission_scale(m, [float(x) for x in np.broadcast_to(scale, 3)])
 
     @property
     def direct_irradiance(self) -> Floats:

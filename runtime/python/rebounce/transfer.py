@@ -23,19 +23,42 @@ def _block(x: Array, rows: int, dtype: Any) -> Array:
     return np.ascontiguousarray(block, dtype=dtype)
 
 
-class TransferOperator(LinearOperator):  # type: ignore[misc]
+class ProductOperator(LinearOperator):  # type: ignore[misc]
+    """Y, or one channel of it, as TransferOperator says."""
+
+    def __init__(self, data: "TransferData", channel: Optional[int], dtype: npt.DTypeLike) -> None:
+        size = data.patch_count * (3 if channel is None else 1)
+        self._data = data
+        self._channel = channel
+        super().__init__(np.dtype(dtype), (size, size))
+
+    def __matmul__(self, x: Any) -> Any:
+        # Without the checks of LinearOperator, which take longer than a small product.
+        if type(x) is np.ndarray and 1 <= x.ndim <= 2 and x.shape[0] == self.shape[1]:
+            return self._data._core.apply(x, False, self._channel)
+        return super().__matmul__(x)
+
+    def _matmat(self, x: Array) -> Array:
+        return self._data._core.apply(x, False, self._channel)
+
+    def _rmatmat(self, x: Array) -> Array:
+        return self._data._core.apply(x, True, self._channel)
+
+    _matvec = _matmat
+    _rmatvec = _rmatmat
+
+
+class TransferOperator(ProductOperator):
     """Y = F (I - rho F)^-1: takes initial exitance in lx to indirect irradiance in lx.
 
     Shape [3n, 3n], channel by channel: entry c n + i is channel c of patch i. `op @ x` for x [3n] or
-    [3n, k]; float32 stays float32. Columns (hours, lamps) go through together without copies of x,
-    fastest where they lie one after the other in memory (order="F"); the result lies as x does.
+    [3n, k]; float32 stays float32. Columns (hours, lamps) go through together, without copies of x
+    where they lie one after the other in memory (order="F"); the result lies as x does.
     `op.H` is the adjoint, A Y A^-1 with the areas A. `op.channel(c)` is one channel, [n, n].
     """
 
     def __init__(self, data: "TransferData", dtype: npt.DTypeLike = np.float32) -> None:
-        n = data.patch_count
-        self._data = data
-        super().__init__(np.dtype(dtype), (3 * n, 3 * n))
+        super().__init__(data, None, dtype)
 
     @property
     def bound(self) -> float:
@@ -52,58 +75,19 @@ class TransferOperator(LinearOperator):  # type: ignore[misc]
         """The error that was asked for."""
         return float(self._data.record["tolerance"])
 
-    def _apply(self, x: Array, adjoint: bool) -> Array:
-        dtype = np.float32 if x.dtype == np.float32 else np.float64
-        if x.ndim == 2 and x.flags.f_contiguous and x.dtype == dtype:
-            return self._data._core.apply(x.T, adjoint, True).T
-        return self._data._core.apply(_block(x, self.shape[0], dtype), adjoint, False)
-
-    def _matvec(self, x: Array) -> Array:
-        return self._apply(x, False).reshape(x.shape)
-
-    def _rmatvec(self, x: Array) -> Array:
-        return self._apply(x, True).reshape(x.shape)
-
-    def _matmat(self, x: Array) -> Array:
-        return self._apply(x, False)
-
-    def _rmatmat(self, x: Array) -> Array:
-        return self._apply(x, True)
-
     def channel(self, c: int) -> "ChannelOperator":
         """One channel, 0 to 2, as an operator of shape [n, n]."""
-        return ChannelOperator(self, c)
-
-
-class ChannelOperator(LinearOperator):  # type: ignore[misc]
-    """One channel of Y, of shape [n, n]. It costs as much as all three."""
-
-    def __init__(self, whole: TransferOperator, c: int) -> None:
         if c not in (0, 1, 2):
             raise ValueError(f"channels are 0, 1 and 2, not {c}")
-        n = whole.shape[0] // 3
-        self._whole = whole
-        self._rows = slice(c * n, (c + 1) * n)
-        super().__init__(whole.dtype, (n, n))
+        return ChannelOperator(self._data, c, self.dtype)
 
-    def _apply(self, x: Array, adjoint: bool) -> Array:
-        dtype = np.float32 if x.dtype == np.float32 else np.float64
-        block = _block(x, self.shape[0], dtype)
-        light = np.zeros((self._whole.shape[0], block.shape[1]), dtype)
-        light[self._rows] = block
-        return self._whole._apply(light, adjoint)[self._rows]
 
-    def _matvec(self, x: Array) -> Array:
-        return self._apply(x, False).reshape(x.shape)
+class ChannelOperator(ProductOperator):
+    """One channel of Y, of shape [n, n].
 
-    def _rmatvec(self, x: Array) -> Array:
-        return self._apply(x, True).reshape(x.shape)
-
-    def _matmat(self, x: Array) -> Array:
-        return self._apply(x, False)
-
-    def _rmatmat(self, x: Array) -> Array:
-        return self._apply(x, True)
+    Three columns cost what one column of all channels does; so does a single one alone, since the
+    channels share most of the operator.
+    """
 
 
 class FormFactorOperator(LinearOperator):  # type: ignore[misc]

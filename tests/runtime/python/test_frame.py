@@ -69,6 +69,70 @@ def test_lights_of_a_file():
     assert sky.luminance >= 0
 
 
+# A luminaire that shines within 60 degrees of its axis.
+IES = """IESNA:LM-63-2002
+TILT=NONE
+1 -1 1 3 1 1 2 0 0 0
+1 1 10
+0 59 60
+0
+100 100 0
+"""
+
+
+def test_profiles_and_skies_of_a_light_file(tmp_path):
+    (tmp_path / "lamp.ies").write_text(IES)
+    path = tmp_path / "lights.json"
+    path.write_text(
+        '{"lights": [{"position": [1, 1.6, 1.1], "ies": "lamp.ies", "intensity": 0.5}],'
+        ' "emitters": [{"material": "screen", "scale": 0.5, "color": [0.6, 0.8, 1]}],'
+        ' "sky": {"luminance": 3000, "cie": 12, "sunDirection": [1, -2, 0]}}'
+    )
+    lights, sky = rebounce.load_lights(path)
+    profile = lights[0].profile
+    assert profile.intensity(0.5) == pytest.approx(100) and profile.intensity(1.2) == 0
+    assert profile.vertical == pytest.approx(np.radians([0, 59, 60]))
+    assert rebounce.load_profile(tmp_path / "lamp.ies").intensity(0.5) == pytest.approx(100)
+    assert sky.luminance == 3000
+    assert np.allclose(sky.distribution, rebounce.cie_sky(12, (1, -2, 0)), rtol=1e-5)
+    assert rebounce.load_emitters(path)["screen"] == pytest.approx([0.3, 0.4, 0.5])
+    path.write_text('{"lights": [{"ies": "none.ies"}]}')
+    with pytest.raises(rebounce.Error, match="light 0.*none.ies"):
+        rebounce.load_lights(path)
+    path.write_text('{"lights": [{"colour": [1, 1, 1]}]}')
+    with pytest.raises(rebounce.Error, match="colour"):
+        rebounce.load_lights(path)
+
+
+def test_profiles_shine_as_spots_do(small_room, tmp_path):
+    (tmp_path / "lamp.ies").write_text(IES)
+    profile = rebounce.load_profile(tmp_path / "lamp.ies")
+    engine = rebounce.Engine(small_room)
+    place = {"position": (1.0, 1.6, 1.1), "direction": (0, -1, 0)}
+    engine.relight([rebounce.Light(profile=profile, intensity=0.5, **place)])
+    by_profile = engine.direct_irradiance.copy()
+    cone = {"inner_cone_angle": np.radians(59), "outer_cone_angle": np.radians(60)}
+    engine.relight([rebounce.Light("spot", intensity=50, **cone, **place)])
+    # From 59 to 60 degrees a spot fades in another way than numbers between two of a profile.
+    assert np.allclose(by_profile, engine.direct_irradiance, atol=0.1 * by_profile.max())
+    assert np.median(abs(by_profile - engine.direct_irradiance)) < 1e-3 * by_profile.max()
+
+
+def test_emission_by_the_name_of_a_material(cornell):
+    engine = rebounce.Engine(cornell)
+    names = cornell.record["materials"]
+    shining = names[cornell.mesh["triangle_material"][
+        np.argmax(cornell.emitted_exitance[
+            np.minimum(cornell.mesh["triangle_patch"], cornell.patch_count - 1), 0])]]
+    engine.relight([])
+    before = engine.initial_exitance.copy()
+    engine.set_emission_scale(shining, 0.5)
+    engine.relight([])
+    assert before.max() > 0 and np.allclose(engine.initial_exitance, 0.5 * before, rtol=1e-5)
+    with pytest.raises(ValueError, match="no material"):
+        engine.set_emission_scale("nothing", 1)
+
+
 def open_box():
     from conftest import box, triangles_of
 

@@ -104,6 +104,36 @@ def test_operators_are_linear_with_an_adjoint(cornell, dtype):
         assert relative(op @ (2 * x), 2 * (op @ x)) < 1e-5
 
 
+def test_products_of_every_layout(cornell):
+    """Any order, type and number of columns, of all channels and of one: the same light."""
+    random = np.random.default_rng(5)
+    n = cornell.patch_count
+    area = np.tile(cornell.area, 3)[:, None]
+    whole = cornell.transfer
+    Y = whole @ np.eye(3 * n, dtype=np.float32)
+    for op, part in [(whole, slice(None))] + [
+        (whole.channel(c), slice(c * n, (c + 1) * n)) for c in range(3)
+    ]:
+        for columns in (0, 1, 2, 3, 5, 12, 16, 17, 70):
+            x = random.random((op.shape[1], columns), np.float32)
+            wanted = Y[part, part].astype(float) @ x
+            for same in (x, np.asfortranarray(x), x.astype(float), x[::-1].copy()[::-1],
+                         np.repeat(x, 2, axis=1)[:, ::2]):  # fmt: skip
+                product = op @ same
+                assert product.shape == x.shape and product.dtype == same.dtype
+                if columns > 0:
+                    assert relative(product, wanted) < 1e-3
+                if columns > 1 and (same.flags.c_contiguous or same.flags.f_contiguous):
+                    assert product.flags.c_contiguous == same.flags.c_contiguous
+            if columns > 0:
+                adjoint = area[part] * (Y[part, part].astype(float) @ (x / area[part]))
+                assert relative(op.H @ x, adjoint) < 1e-3
+    assert relative(whole @ np.ones(3 * n, int), whole @ np.ones(3 * n)) == 0
+    for wrong in (np.ones(n), np.ones((n, 2)), np.ones((1, 3 * n)), np.array(["light"] * 3 * n)):
+        with pytest.raises(ValueError):
+            whole @ wrong
+
+
 def test_operators_work_in_solvers(small_room):
     """(I - rho F) B = M0 by gmres, and lamps found from light by lsqr."""
     n = small_room.patch_count

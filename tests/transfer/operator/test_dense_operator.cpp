@@ -8,6 +8,7 @@
 
 #include "rebounce/error.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/operator_checks.h"
 #include "tests/support/random_light.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
@@ -192,6 +193,29 @@ TEST(HalfFloat, ConvertsThereAndBack) {
   EXPECT_EQ(half_to_float(float_to_half(65504.0F)), 65504.0F);
   EXPECT_TRUE(std::isinf(half_to_float(float_to_half(65520.0F))));
   EXPECT_EQ(half_to_float(float_to_half(1.0F + 0x1p-12F)), 1.0F);  // below half a step
+}
+
+TEST(DenseOperator, PlanesAreTheChannelsOfLights) {
+  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+    const DenseOperator dense(RandomOperator(150, matrices, 20 + matrices).storage);
+    for (const std::size_t lights : {1U, 4U}) test::check_planes(dense, lights, 1e-6F);
+  }
+}
+
+TEST(DenseOperator, WrongPlanesAreRefused) {
+  constexpr std::size_t kPatches = 70;
+  const DenseOperator dense(RandomOperator(kPatches, 1, 3).storage);
+  std::vector<float> in(6 * kPatches), out(6 * kPatches), workspace(dense.workspace_size());
+  const auto apply = [&](std::optional<int> channel, std::size_t from, std::size_t to) {
+    dense.apply_planes(channel, std::span(in).first(from), std::span(out).first(to), workspace);
+  };
+  EXPECT_NO_THROW(apply({}, 6 * kPatches, 6 * kPatches));
+  EXPECT_NO_THROW(apply(2, 2 * kPatches, 2 * kPatches));
+  EXPECT_NO_THROW(apply({}, 0, 0));
+  EXPECT_THROW(apply({}, 2 * kPatches, 2 * kPatches), Error);
+  EXPECT_THROW(apply(1, kPatches + 1, kPatches + 1), Error);
+  EXPECT_THROW(apply(1, kPatches, 2 * kPatches), Error);
+  test::expect_error([&] { apply(3, kPatches, kPatches); }, "channel 3");
 }
 
 TEST(DenseOperator, WrongSizesAreRefused) {

@@ -83,6 +83,17 @@ TEST_P(EveryOperator, ABatchIsAsManyApplies) {
   }
 }
 
+TEST_P(EveryOperator, PlanesAreTheChannelsOfLights) {
+  for (const std::uint32_t matrices : {1U, 2U, 3U}) {
+    for (const Precision precision : test::kPrecisions) {
+      const HierarchicalOperator op = make(333, matrices, 60 + matrices, precision);
+      // Coefficients of bytes are rounded together with those of the same light.
+      const float allowed = precision == Precision::kQ8 ? 5e-4F : 1e-6F;
+      for (const std::size_t lights : {1U, 2U, 4U}) test::check_planes(op, lights, allowed);
+    }
+  }
+}
+
 TEST_P(EveryOperator, AllocatesNothing) {
   test::expect_no_allocations(make(500, 3, 8));
 }

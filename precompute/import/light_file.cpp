@@ -1,4 +1,4 @@
-#include "precompute/cli/light_file.h"
+#include "precompute/import/light_file.h"
 
 #include <fmt/format.h>
 
@@ -8,17 +8,14 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "precompute/cli/json_fields.h"
 #include "precompute/import/import_gltf.h"
+#include "precompute/import/json_fields.h"
 #include "rebounce/error.h"
 #include "rebounce/lights.h"
 #include "rebounce/sky.h"
-#include "runtime/frame/lamp_warnings.h"
-#include "runtime/lights/emitting_material.h"
 #include "runtime/lights/lamp_kind.h"
-#include "transfer/file/transfer_file_io.h"
 
-namespace rebounce::cli {
+namespace rebounce {
 namespace {
 
 using nlohmann::json;
@@ -205,26 +202,6 @@ std::vector<EmitterScale> read_emitters(const Field& root) {
   return emitters;
 }
 
-/// Scales the emission of a material. Throws Error if the scene has no material of that name.
-void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> patch_material,
-                   TransferData& data) {
-  bool found = false;
-  for (std::uint32_t m = 0; m < data.materials.size(); ++m) {
-    if (data.materials[m].name != emitter.material) continue;
-    found = true;
-    for (int c = 0; c < kChannelCount; ++c) {
-      data.materials[m].emitted_luminance[c] *= emitter.scale[c];
-      for (std::size_t i = 0; i < patch_material.size(); ++i) {
-        if (patch_material[i] == m) data.patches.emitted_exitance[i][c] *= emitter.scale[c];
-      }
-    }
-  }
-  if (!found) {
-    throw Error(fmt::format("the scene has no material \"{}\" to scale; check \"emitters\"",
-                            emitter.material));
-  }
-}
-
 SkyDistribution read_cie_sky(const Field& field) {
   const float type = field.number("cie", 1, 1);
   if (type != std::floor(type) || type > kCieSkyCount) field.fail("cie", "a whole number, 1 to 15");
@@ -297,46 +274,4 @@ LightSetup read_lights(const std::filesystem::path& path) {
   return setup;
 }
 
-LightSetup choose_lights(const std::filesystem::path& path, const TransferData& data) {
-  LightSetup setup;
-  if (path.empty()) {
-    setup.lights = data.lights;
-  } else {
-    setup = read_lights(path);
-  }
-  const bool emits = std::ranges::any_of(data.patches.emitted_exitance, [](const Float3& m) {
-    return m[0] > 0 || m[1] > 0 || m[2] > 0;
-  });
-  if (setup.lights.empty() && setup.sky.luminance == 0 && !emits) {
-    throw Error("there is no light: " +
-                (path.empty()
-                     ? "the scene has no lights of its own and nothing in it emits; name a file "
-                       "with --lights"
-                     : path.string() + " has no lights and no sky, and nothing in the scene emits; "
-                                       "add one") +
-                ", or see the scene with render --key-light");
-  }
-  return setup;
-}
-
-std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& file,
-                                                   const std::filesystem::path& lights,
-                                                   LightSetup& setup) {
-  TransferData data = load_transfer_file(file);
-  setup = choose_lights(lights, data);
-  const std::vector<std::uint32_t> patch_material = find_emitting_material(data);
-  for (const EmitterScale& emitter : setup.emitters) {
-    scale_emitter(emitter, patch_material, data);
-  }
-  return std::make_shared<const TransferData>(std::move(data));
-}
-
-void warn_of_lamps(const Engine& engine, std::span<const Light> lights,
-                   const CommonOptions& options) {
-  if (options.quiet) return;
-  for (const std::string& line : lamp_warnings(engine, lights)) {
-    print_note(options, "warning: " + line);
-  }
-}
-
-}  // namespace rebounce::cli
+}  // namespace rebounce

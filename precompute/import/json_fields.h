@@ -9,7 +9,7 @@
 
 #include "rebounce/types.h"
 
-namespace rebounce::cli {
+namespace rebounce {
 
 inline constexpr float kAnyNumber = std::numeric_limits<float>::lowest();
 
@@ -36,4 +36,4 @@ struct Field {
 /// Parses a file that must hold a JSON object. `content` describes it in messages.
 nlohmann::json read_json_object(const std::filesystem::path& path, const std::string& content);
 
-}  // namespace rebounce::cli
+}  // namespace rebounce

@@ -2,32 +2,14 @@
 
 #include <filesystem>
 #include <memory>
-#include <string>
-#include <vector>
+#include <span>
 
 #include "precompute/cli/console.h"
+#include "precompute/import/light_file.h"
 #include "rebounce/engine.h"
-#include "rebounce/lights.h"
-#include "rebounce/sky.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce::cli {
-
-/// The factor on the emission of a material.
-struct EmitterScale {
-  std::string material;
-  Float3 scale{1, 1, 1};
-};
-
-struct LightSetup {
-  std::vector<Light> lights;
-  Sky sky;
-  std::vector<EmitterScale> emitters;
-};
-
-/// Reads lights from a .json file (notes/reference/light_file.md), or from a .glb or .gltf with
-/// KHR_lights_punctual. Throws Error naming the file, the light and the field that is wrong.
-LightSetup read_lights(const std::filesystem::path& path);
 
 /// The lights of `path`, or those stored in the transfer file if `path` is empty. Throws Error if
 /// there is no light at all: no lamp, no sky and no patch that emits.

@@ -1,4 +1,4 @@
-#include "precompute/cli/json_fields.h"
+#include "precompute/import/json_fields.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "precompute/base/json_problem.h"
 #include "rebounce/error.h"
 
-namespace rebounce::cli {
+namespace rebounce {
 namespace {
 
 using nlohmann::json;
@@ -113,4 +113,4 @@ json read_json_object(const std::filesystem::path& path, const std::string& cont
   return document;
 }
 
-}  // namespace rebounce::cli
+}  // namespace rebounce
