@@ -32,7 +32,8 @@ namespace {
 constexpr std::size_t kPatches = 324;  // not a multiple of the alignment
 
 /// Two squares with an operator of random values and random weights of their vertices.
-std::shared_ptr<const TransferData> squares_with(const HierarchicalStorage& storage, Precision precision) {
+std::shared_ptr<const TransferData> squares_with(const HierarchicalStorage& storage,
+                                                 Precision precision) {
   auto data = std::make_shared<TransferData>();
   test::add_square(*data, 1, 0, 9, true, {0.5F, 0.4F, 0.3F});
   test::add_square(*data, 1, 2, 9, false, {0.2F, 0.7F, 0.9F});
