@@ -155,7 +155,7 @@ void write_npz(const std::filesystem::path& path, std::span<const NumpyArray> ar
     headers.push_back(npy_header(array));
   }
   AtomicFile file(path);
-  ZipWriter zip(path, file.temporary_path());
+  ZipWriter zip(path, file.path_for_library());
   for (std::size_t i = 0; i < arrays.size(); ++i) {
     zip.add(arrays[i].name + ".npy", headers[i], arrays[i].bytes);
   }

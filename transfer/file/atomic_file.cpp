@@ -1,6 +1,8 @@
 #include "transfer/file/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +10,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include "rebounce/error.h"
@@ -52,13 +55,56 @@ fs::path resolve(const fs::path& target) {
   return resolved;
 }
 
+// A temporary file is called .NAME.PROCESS-NUMBER.tmp, and what a library writes in its place has a
+// name that begins with that.
+constexpr std::string_view kEnding = ".tmp";
+constexpr std::string_view kLibraryEnding = ".library";
+
+std::string temporary_beginning(const fs::path& target) {
+  return "." + target.filename().string() + ".";
+}
+
 fs::path temporary_name(const fs::path& target) {
   static std::atomic<std::uint64_t> counter{0};
-  fs::path name(".");
-  name += target.filename();
-  name += '.';
-  name += std::to_string(::getpid()) + "-" + std::to_string(++counter) + ".tmp";
-  return target.parent_path() / name;
+  return target.parent_path() / (temporary_beginning(target) + std::to_string(::getpid()) + "-" +
+                                 std::to_string(++counter) + std::string(kEnding));
+}
+
+/// The name of the temporary file for `target` that a file called `name` belongs to; empty if to
+/// none.
+std::string temporary_of(const fs::path& target, const std::string& name) {
+  const std::string beginning = temporary_beginning(target);
+  if (!name.starts_with(beginning)) return {};
+  const std::size_t ending = name.find_first_not_of("0123456789-", beginning.size());
+  if (ending == std::string::npos || ending == beginning.size()) return {};
+  const bool is_temporary = std::string_view(name).substr(ending).starts_with(kEnding);
+  return is_temporary ? name.substr(0, ending + kEnding.size()) : std::string();
+}
+
+/// True if a process that lives writes to `temporary`, or if that cannot be known.
+bool is_in_use(const fs::path& temporary) {
+  const int descriptor = ::open(temporary.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+  if (descriptor < 0) return errno != ENOENT;
+  const bool locked = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0;
+  ::close(descriptor);
+  return locked;
+}
+
+/// Removes what killed processes have left beside `target`. What cannot be removed stays.
+void remove_left_over(const fs::path& target) {
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    const std::string temporary = temporary_of(target, name);
+    if (!temporary.empty() && !is_in_use(folder / temporary)) ::unlink(entry->path().c_str());
+  }
+}
+
+bool is_linked(int descriptor) {
+  struct stat status {};
+  return ::fstat(descriptor, &status) == 0 && status.st_nlink > 0;
 }
 
 /// Waits until `path` is on disk. Returns 0 or the error number.
@@ -79,16 +125,35 @@ AtomicFile::AtomicFile(const fs::path& target) : target_(resolve(target)) {
     throw Error("cannot write " + target.string() +
                 ": it is not a regular file; choose a file name");
   }
-  do {
-    temporary_ = temporary_name(target_);
-    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  } while (descriptor_ < 0 && errno == EEXIST);
-  if (descriptor_ < 0) fail(target_, errno);
+  remove_left_over(target_);
+  open_and_lock();
 }
 
 AtomicFile::~AtomicFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
-  if (!committed_) ::unlink(temporary_.c_str());
+  std::error_code error;
+  fs::remove(path_for_library(), error);
+  ::unlink(temporary_.c_str());  // after commit() there is none
+  ::close(descriptor_);
+}
+
+void AtomicFile::open_and_lock() {
+  for (;;) {
+    temporary_ = temporary_name(target_);
+    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor_ < 0 && errno == EEXIST) continue;
+    if (descriptor_ < 0) fail(target_, errno);
+    // File systems without locks do without. Before it was locked another process may have taken
+    // the file for one that was left over.
+    ::flock(descriptor_, LOCK_EX);
+    if (is_linked(descriptor_)) return;
+    ::close(descriptor_);
+  }
+}
+
+fs::path AtomicFile::path_for_library() const {
+  fs::path path = temporary_;
+  path += kLibraryEnding;
+  return path;
 }
 
 void AtomicFile::write(std::span<const std::byte> bytes) {
@@ -101,18 +166,12 @@ void AtomicFile::write(std::span<const std::byte> bytes) {
   }
 }
 
-void AtomicFile::close() {
-  const int descriptor = descriptor_;
-  descriptor_ = -1;
-  if (::close(descriptor) != 0) fail(target_, errno);
-}
-
 void AtomicFile::commit() {
-  close();
-  // By name: a library that wrote to temporary_path() may have replaced the file.
-  if (const int error = sync(temporary_, 0)) fail(target_, error);
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, errno);
-  committed_ = true;
+  std::error_code none;
+  const bool by_library = fs::exists(path_for_library(), none);
+  const fs::path written = by_library ? path_for_library() : temporary_;
+  if (const int error = sync(written, 0)) fail(target_, error);
+  if (::rename(written.c_str(), target_.c_str()) != 0) fail(target_, errno);
   const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
   if (const int error = sync(folder, O_DIRECTORY)) fail(target_, error);
 }

@@ -10,19 +10,22 @@ namespace rebounce {
 ///
 /// Bytes go into a temporary file beside the target. commit() flushes it to disk and renames it
 /// over the target. Without commit(), for example after an exception, the destructor removes the
-/// temporary file and the target is unchanged.
+/// temporary file and the target is unchanged. A process that is killed leaves it behind; the next
+/// AtomicFile for the same target removes it. The writer holds a lock on its temporary file while
+/// it lives, so that those of others who write to the same target are left alone.
 class AtomicFile {
  public:
   /// Creates the temporary file. If the target is a symbolic link, the file it points to is
   /// replaced. Throws Error if the folder is missing or not writable, or if the target exists and
-  /// is not a regular file.
+  /// is not a regular file. Removes what killed processes left of earlier files for this target.
   explicit AtomicFile(const std::filesystem::path& target);
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// The path of the bytes until commit(), for libraries that open the file themselves.
-  const std::filesystem::path& temporary_path() const { return temporary_; }
+  /// A path for a library that writes the file itself, in place of write(). It does not exist at
+  /// first. A library may make further files whose names begin with it; it removes them itself.
+  std::filesystem::path path_for_library() const;
 
   /// Appends `bytes`. Throws Error if the disk is full or fails.
   void write(std::span<const std::byte> bytes);
@@ -32,12 +35,11 @@ class AtomicFile {
   void commit();
 
  private:
-  void close();
+  void open_and_lock();
 
   std::filesystem::path target_;
   std::filesystem::path temporary_;
-  int descriptor_ = -1;
-  bool committed_ = false;
+  int descriptor_ = -1;  ///< holds the lock
 };
 
 }  // namespace rebounce

@@ -27,7 +27,7 @@ TEST(AtomicFile, AppearsOnCommitAndReplacesWhatWasThere) {
     file.write({});
     file.write(bytes_of("bytes"));
     EXPECT_EQ(test::read_bytes(folder / "file"), "old and longer");
-    EXPECT_EQ(file.temporary_path().parent_path(), (folder / "file").parent_path());
+    EXPECT_EQ(file.path_for_library().parent_path(), (folder / "file").parent_path());
     file.commit();
   }
   EXPECT_EQ(test::read_bytes(folder / "file"), "new bytes");
@@ -98,6 +98,46 @@ TEST(AtomicFile, TwoAtOnceDoNotMeet) {
   second.commit();
   first.commit();
   EXPECT_EQ(test::read_bytes(folder / "file"), "first");
+}
+
+TEST(AtomicFile, RemovesWhatKilledProcessesLeft) {
+  const test::TemporaryFolder folder;
+  for (const char* name :
+       {".file.123-1.tmp", ".file.123-2.tmp.library", ".file.45-6.tmp.library.aB3"})
+    test::write_bytes(folder / name, "half");
+  const Names others{".file.tmp", ".file.other-1.tmp", ".file2.123-1.tmp", "file.123-1.tmp"};
+  for (const std::string& name : others) test::write_bytes(folder / name, "mine");
+  { const AtomicFile never_committed(folder / "file"); }
+  for (const std::string& name : others) {
+    EXPECT_TRUE(std::filesystem::exists(folder / name)) << name;
+  }
+  EXPECT_EQ(folder.names().size(), others.size());
+}
+
+TEST(AtomicFile, LeavesWhatOthersWriteAlone) {
+  const test::TemporaryFolder folder;
+  AtomicFile first(folder / "file");
+  test::write_bytes(first.path_for_library(), "of a library");
+  { const AtomicFile never_committed(folder / "file"); }
+  EXPECT_TRUE(std::filesystem::exists(first.path_for_library()));
+  first.commit();
+  EXPECT_EQ(test::read_bytes(folder / "file"), "of a library");
+}
+
+TEST(AtomicFile, TakesWhatALibraryWrote) {
+  const test::TemporaryFolder folder;
+  {
+    AtomicFile file(folder / "file");
+    test::write_bytes(file.path_for_library(), "of a library");
+    file.commit();
+  }
+  EXPECT_EQ(test::read_bytes(folder / "file"), "of a library");
+  EXPECT_EQ(folder.names(), Names{"file"});
+  {
+    AtomicFile given_up(folder / "file");
+    test::write_bytes(given_up.path_for_library(), "half");
+  }
+  EXPECT_EQ(folder.names(), Names{"file"});
 }
 
 TEST(AtomicFile, HasTheRightsOfAnOrdinaryFile) {
