@@ -4,7 +4,6 @@
 
 #include <bit>
 #include <cstddef>
-#include <fstream>
 #include <span>
 #include <utility>
 #include <vector>
@@ -23,14 +22,6 @@ constexpr std::uint32_t kDroppedBits = 11;
 void shorten(float& value) {
   constexpr std::uint32_t half = 1U << (kDroppedBits - 1), kept = ~((1U << kDroppedBits) - 1);
   value = std::bit_cast<float>((std::bit_cast<std::uint32_t>(value) + half) & kept);
-}
-
-std::vector<std::byte> read_whole(const std::filesystem::path& path) {
-  std::vector<std::byte> bytes(std::filesystem::file_size(path));
-  std::ifstream file(path, std::ios::binary);
-  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!file) throw Error(path.string() + " cannot be read back");
-  return bytes;
 }
 
 std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
@@ -53,10 +44,13 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
   return packed;
 }
 
-/// Packs what `save` writes to a path.
-std::uint64_t save_packed(const std::filesystem::path& path, const auto& save) {
-  save(path);
-  const std::vector<std::byte> packed = gzip(read_whole(path));
+/// Packs what `write` gives to a sink.
+std::uint64_t save_packed(const std::filesystem::path& path, const auto& write) {
+  std::vector<std::byte> bytes;
+  write([&](std::span<const std::byte> piece) {
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
+  });
+  const std::vector<std::byte> packed = gzip(bytes);
   AtomicFile file(path);
   file.write(packed);
   file.commit();
@@ -81,11 +75,11 @@ std::uint64_t save_web_files(const std::filesystem::path& path, TransferData dat
     for (float& weight : weights) shorten(weight);
   }
   std::uint64_t size =
-      save_packed(path, [&](const std::filesystem::path& to) { save_transfer_file(to, data); });
+      save_packed(path, [&](const ByteSink& sink) { write_transfer_file(sink, data); });
   if (form_factors != nullptr) {
     data.compressed_form_factors = form_factors;
     size += save_packed(form_factor_file_beside(path),
-                        [&](const std::filesystem::path& to) { save_form_factor_file(to, data); });
+                        [&](const ByteSink& sink) { write_form_factor_file(sink, data); });
   }
   return size;
 }

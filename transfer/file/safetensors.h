@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -82,6 +83,12 @@ struct SafetensorsLayout {
 /// are not UTF-8 become U+FFFD. Throws Error if two tensors have the same name.
 SafetensorsLayout lay_out_safetensors(std::vector<TensorView> tensors,
                                       const SafetensorsMetadata& metadata);
+
+/// Takes the bytes of a file, piece by piece.
+using ByteSink = std::function<void(std::span<const std::byte>)>;
+
+/// Gives the bytes of a planned file to `sink`.
+void write_safetensors(const ByteSink& sink, const SafetensorsLayout& layout);
 
 /// Writes a planned file completely or not at all (AtomicFile). Throws Error if it cannot.
 void write_safetensors(const std::filesystem::path& path, const SafetensorsLayout& layout);

@@ -77,10 +77,14 @@ SafetensorsLayout lay_out_safetensors(std::vector<TensorView> tensors,
   return {std::move(prefix), std::move(tensors)};
 }
 
+void write_safetensors(const ByteSink& sink, const SafetensorsLayout& layout) {
+  sink(std::as_bytes(std::span(layout.prefix)));
+  for (const TensorView& tensor : layout.tensors) sink(tensor.bytes);
+}
+
 void write_safetensors(const std::filesystem::path& path, const SafetensorsLayout& layout) {
   AtomicFile file(path);
-  file.write(std::as_bytes(std::span(layout.prefix)));
-  for (const TensorView& tensor : layout.tensors) file.write(tensor.bytes);
+  write_safetensors([&](std::span<const std::byte> bytes) { file.write(bytes); }, layout);
   file.commit();
 }
 

@@ -192,9 +192,8 @@ SafetensorsLayout sealed(const TensorCollector& collector, const SafetensorsMeta
   return layout;
 }
 
-}  // namespace
-
-void save_transfer_file(const std::filesystem::path& path, const TransferData& data) {
+/// Calls take(layout) with the file of `data`.
+void with_transfer_file(const TransferData& data, const auto& take) {
   TensorCollector collector;
   visit_tensors_of_patches(data.patches, collector);
   if (!data.emitted_irradiance.empty()) {
@@ -216,10 +215,11 @@ void save_transfer_file(const std::filesystem::path& path, const TransferData& d
                                   collector);
   }
 
-  write_safetensors(path, sealed(collector, make_metadata(data)));
+  take(sealed(collector, make_metadata(data)));
 }
 
-void save_form_factor_file(const std::filesystem::path& path, const TransferData& data) {
+/// Calls take(layout) with the file of the compressed form factors of `data`.
+void with_form_factor_file(const TransferData& data, const auto& take) {
   if (!data.compressed_form_factors) {
     throw Error("there are no compressed form factors to write; compress them first");
   }
@@ -231,7 +231,25 @@ void save_form_factor_file(const std::filesystem::path& path, const TransferData
                                {key::kChecksum, zero_checksum()}};
   visit_texts_of_build(data,
                        [&](const char* name, const std::string& text) { metadata[name] = text; });
-  write_safetensors(path, sealed(collector, metadata));
+  take(sealed(collector, metadata));
+}
+
+}  // namespace
+
+void write_transfer_file(const ByteSink& sink, const TransferData& data) {
+  with_transfer_file(data, [&](const auto& layout) { write_safetensors(sink, layout); });
+}
+
+void save_transfer_file(const std::filesystem::path& path, const TransferData& data) {
+  with_transfer_file(data, [&](const auto& layout) { write_safetensors(path, layout); });
+}
+
+void write_form_factor_file(const ByteSink& sink, const TransferData& data) {
+  with_form_factor_file(data, [&](const auto& layout) { write_safetensors(sink, layout); });
+}
+
+void save_form_factor_file(const std::filesystem::path& path, const TransferData& data) {
+  with_form_factor_file(data, [&](const auto& layout) { write_safetensors(path, layout); });
 }
 
 }  // namespace rebounce
