@@ -3,6 +3,10 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include <algorithm>
+#include <array>
+#include <initializer_list>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -125,25 +129,43 @@ std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco_sources(json& r
   return sources;
 }
 
-// The JSON that tinygltf reads the structure from. It leaves out the data, which is read before,
-// and all that a static diffuse scene does not use. It also leaves out the Draco extension, which
-// is read separately: the decoder of tinygltf (in builds with it) would look for the data, and its
-// check of indices refuses indices that are nowhere else.
+// What a static diffuse scene uses of a document, buffers and images apart, whose data are read
+// before. All of it is checked.
+constexpr std::array kStructure{"accessors",  "asset",     "bufferViews", "cameras",
+                                "extensions", "materials", "meshes",      "nodes",
+                                "samplers",   "scene",     "scenes",      "textures"};
+
+void keep_structure(json& root) {
+  for (auto member = root.begin(); member != root.end();) {
+    const bool keeps = std::ranges::find(kStructure, member.key()) != kStructure.end();
+    member = keeps ? std::next(member) : root.erase(member);
+  }
+}
+
+void erase_all(json& object, std::initializer_list<const char*> keys) {
+  for (const char* key : keys) object.erase(key);
+}
+
+// The JSON that tinygltf reads the structure from. It leaves out what is not used, and with it is
+// not checked. It also leaves out the Draco extension, which is read separately: the decoder of
+// tinygltf (in builds with it) would look for the data, and its check of indices refuses indices
+// that are nowhere else.
 std::string structure_text(json root) {
-  for (const char* key : {"buffers", "images", "animations", "skins", "extras"}) root.erase(key);
+  keep_structure(root);
   for (json& material : elements(root, "materials")) {
-    material.erase("normalTexture");
-    material.erase("occlusionTexture");
+    erase_all(material, {"normalTexture", "occlusionTexture", "extras"});
     if (material.contains("pbrMetallicRoughness")) {
       material["pbrMetallicRoughness"].erase("metallicRoughnessTexture");
     }
   }
+  for (json& node : elements(root, "nodes")) erase_all(node, {"skin", "weights", "extras"});
   for (json& mesh : elements(root, "meshes")) {
+    erase_all(mesh, {"weights", "extensions", "extras"});
     for (json& primitive : elements(mesh, "primitives")) {
       if (draco_extension(primitive) && lacks_data(accessor_of(root, primitive, "indices"))) {
         primitive.erase("indices");
       }
-      primitive.erase("extensions");
+      erase_all(primitive, {"targets", "extensions", "extras"});
     }
   }
   return root.dump();

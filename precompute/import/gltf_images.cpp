@@ -37,26 +37,56 @@ bool is_webp(Bytes encoded) {
          starts_with(encoded.subspan(kFormOffset), kWebp);
 }
 
-// Width and height; empty for data that is not PNG, JPEG or WebP. glTF and its extension allow only
-// these; stb would accept many more formats, each with its own ways of being damaged.
-std::optional<std::array<std::uint64_t, 2>> pixel_size(Bytes encoded) {
-  constexpr std::array<std::uint8_t, 4> kPng{0x89, 'P', 'N', 'G'};
-  constexpr std::array<std::uint8_t, 3> kJpeg{0xFF, 0xD8, 0xFF};
-  constexpr std::size_t kPngWidth = 16;  // the header chunk comes first
-  if (starts_with(encoded, kPng) && encoded.size() >= kPngWidth + 8) {
-    return {{big_endian_u32(encoded, kPngWidth), big_endian_u32(encoded, kPngWidth + 4)}};
-  }
-  int width = 0;
-  int height = 0;
-  int channels = 0;
-  if (is_webp(encoded)) {
-    if (!WebPGetInfo(encoded.data(), encoded.size(), &width, &height)) return {};
-  } else if (!starts_with(encoded, kJpeg) ||
-             !stbi_info_from_memory(encoded.data(), static_cast<int>(encoded.size()), &width,
-                                    &height, &channels)) {
+struct PixelSize {
+  std::uint64_t columns = 0, rows = 0;
+  std::uint64_t least_bytes = 0;  ///< that the format can hold so many pixels in
+};
+
+constexpr std::array<std::uint8_t, 4> kPng{0x89, 'P', 'N', 'G'};
+constexpr std::array<std::uint8_t, 3> kJpeg{0xFF, 0xD8, 0xFF};
+
+// What the first chunk of a PNG says; empty if it is not a header. stb takes other chunks before
+// it, and makes room for all pixels before it looks at their data.
+std::optional<PixelSize> png_size(Bytes encoded) {
+  constexpr std::array<std::uint8_t, 4> kHeaderChunk{'I', 'H', 'D', 'R'};
+  constexpr std::size_t kType = 12, kWidth = 16, kHeight = 20, kDepth = 24, kColour = 25;
+  constexpr std::array<std::uint64_t, 7> kChannels{1, 0, 3, 1, 2, 0, 4};  // by colour type
+  constexpr std::uint64_t kMaxDeflation = 1032;                           // of the format
+  constexpr std::uint64_t kMaxSide = std::uint64_t{1} << 24;              // of stb
+  if (encoded.size() <= kColour || !starts_with(encoded.subspan(kType), kHeaderChunk)) return {};
+  PixelSize size{big_endian_u32(encoded, kWidth), big_endian_u32(encoded, kHeight)};
+  const std::uint8_t colour = encoded[kColour];
+  if (colour >= kChannels.size()) return {};
+  if (size.columns > kMaxSide || size.rows > kMaxSide) return size;
+  const std::uint64_t row = size.columns * encoded[kDepth] * kChannels[colour] / 8 + 1;
+  size.least_bytes = size.rows * row / kMaxDeflation;
+  return size;
+}
+
+std::optional<PixelSize> jpeg_size(Bytes encoded) {
+  constexpr std::uint64_t kMaxPixelsPerByte = 512;  // a bit for a block of 8 x 8
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(encoded.data(), static_cast<int>(encoded.size()), &width, &height,
+                             &channels)) {
     return {};
   }
-  return {{static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height)}};
+  PixelSize size{static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height)};
+  size.least_bytes = size.columns * size.rows / kMaxPixelsPerByte;
+  return size;
+}
+
+std::optional<PixelSize> webp_size(Bytes encoded) {
+  int width = 0, height = 0;
+  if (!WebPGetInfo(encoded.data(), encoded.size(), &width, &height)) return {};
+  return PixelSize{static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height)};
+}
+
+// Empty for data that is not PNG, JPEG or WebP. glTF and its extension allow only these; stb would
+// accept many more formats, each with its own ways of being damaged.
+std::optional<PixelSize> pixel_size(Bytes encoded) {
+  if (starts_with(encoded, kPng)) return png_size(encoded);
+  if (starts_with(encoded, kJpeg)) return jpeg_size(encoded);
+  return is_webp(encoded) ? webp_size(encoded) : std::nullopt;
 }
 
 struct Deleter {
@@ -99,11 +129,12 @@ std::optional<DecodedImage> decode_image(Bytes encoded) {
   if (encoded.size() > std::numeric_limits<int>::max()) return {};
   const auto size = pixel_size(encoded);
   if (!size) return {};
-  const auto [columns, rows] = *size;
+  const auto [columns, rows, least_bytes] = *size;
   if (rows != 0 && columns > kMaxDecodedBytes / 4 / rows) {
     throw Error(fmt::format(
         "an image of {} x {} pixels is too large (at most 1 GiB); scale it down", columns, rows));
   }
+  if (encoded.size() < least_bytes) return {};
   std::optional<Image> image = decode_pixels(encoded);
   if (!image) return {};
   auto stored = is_webp(encoded) ? encode_png(*image)

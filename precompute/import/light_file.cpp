@@ -110,15 +110,20 @@ std::shared_ptr<const IntensityProfile> read_profile(const Field& field,
   const json& name = field.object.at("ies");
   if (!name.is_string()) field.fail("ies", "the name of an IES file");
   const std::filesystem::path path = folder / name.get<std::string>();
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream)
+  std::error_code failure;
+  std::ifstream stream;
+  // Not a pipe, which would be waited for.
+  if (std::filesystem::is_regular_file(path, failure)) stream.open(path, std::ios::binary);
+  const std::uintmax_t size = std::filesystem::file_size(path, failure);
+  if (failure || !stream.is_open()) {
     throw Error(fmt::format("{}: cannot open {}; check \"ies\"", field.where, path.string()));
-  std::string text(kLargestProfileBytes + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.size() > kLargestProfileBytes) {
+  }
+  if (size > kLargestProfileBytes) {
     throw Error(fmt::format("{}: {} is too large for an IES file", field.where, path.string()));
   }
+  std::string text(size, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(size));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
   return parse_ies_profile(text, fmt::format("{}: {}", field.where, path.string()));
 }
 

@@ -211,6 +211,7 @@ TEST_F(SolveCommand, RefusesAMalformedLightFileWithTheField) {
       {R"({"lights": [{"type": "sphere", "radius": 1, "ies": "x"}]})", "\"ies\""},
       {R"({"lights": [{"ies": 1}]})", "\"ies\""},
       {R"({"lights": [{"ies": "none.ies"}]})", "none.ies"},
+      {R"({"lights": [{"ies": "/dev/zero"}]})", "cannot open /dev/zero"},
       {R"({"lights": [{"ies": "bad.lights.json"}]})", "TILT="},
       {R"({"emitters": 1})", "\"emitters\""},
       {R"({"emitters": [{"scale": 1}]})", "\"material\""},

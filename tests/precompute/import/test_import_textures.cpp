@@ -11,6 +11,7 @@
 
 #include "precompute/patches/texture_sampling.h"
 #include "tests/precompute/import/imported_triangle.h"
+#include "tests/support/expect_error.h"
 
 namespace rebounce::test_import_textures {
 namespace {
@@ -128,6 +129,32 @@ TEST_F(TexturedTriangle, SameImageAndWrapIsOneTexture) {
   EXPECT_EQ(scene.textures.size(), 2U);
   EXPECT_EQ(scene.materials[1].base_color_texture, 0U);
   EXPECT_EQ(scene.materials[2].base_color_texture, 1U);
+}
+
+// Big-endian, over the four bytes from `offset`.
+std::vector<std::uint8_t> with_number(std::vector<std::uint8_t> bytes, std::size_t offset,
+                                      std::uint32_t number) {
+  for (std::size_t k = 0; k < 4; ++k) {
+    bytes[offset + k] = static_cast<std::uint8_t>(number >> (24 - 8 * k));
+  }
+  return bytes;
+}
+
+TEST_F(TexturedTriangle, ImageOfMorePixelsThanItsBytesCanHoldIsDamaged) {
+  constexpr std::size_t kChunkType = 12, kWidth = 16;
+  for (const auto& png : {with_number(kTwoTexelPng, kWidth, 10'000'000),
+                          with_number(kTwoTexelPng, kChunkType, 0x43674249)}) {  // no header first
+    triangle_.root["images"][0] = {{"bufferView", triangle_.add_view(png)}};
+    const Scene scene = import(triangle_);
+    EXPECT_EQ(scene.materials[0].base_color_texture, kNone);
+    ASSERT_EQ(scene.warnings.size(), 1U);
+  }
+}
+
+TEST_F(TexturedTriangle, ImageOfMoreThanAGibibyteIsRefused) {
+  const auto png = with_number(kTwoTexelPng, 16, 400'000'000);
+  triangle_.root["images"][0] = {{"bufferView", triangle_.add_view(png)}};
+  test::expect_error([&] { import(triangle_); }, "400000000 x 1 pixels is too large");
 }
 
 TEST_F(TexturedTriangle, MissingOrDamagedImageIsWhiteWithAWarning) {
