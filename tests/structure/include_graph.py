@@ -65,6 +65,7 @@ ROOMS = {
     "bench/solve": "Sweeps over form factors, and operators under fresh lights against their bounds.",
     "bench/report": "Everything that ./dev report shows.",
     "bench/truth": "The offline stage and the runtime against the path tracer.",
+    "tests/fuzz": "Hostile input for what reads files and for the C interface.",
     "tests": "A folder for each room of the libraries; files of every format in golden.",
 }
 ROOM_ORDER = {room: place for place, room in enumerate(ROOMS)}
