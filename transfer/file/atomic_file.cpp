@@ -55,13 +55,13 @@ fs::path resolve(const fs::path& target) {
   return resolved;
 }
 
-// A temporary file is called .NAME.PROCESS-NUMBER.tmp, and what a library writes in its place has a
-// name that begins with that.
+// A temporary file is called .NAME.rebounce-PROCESS-NUMBER.tmp, and what a library writes in its
+// place has a name that begins with that.
 constexpr std::string_view kEnding = ".tmp";
 constexpr std::string_view kLibraryEnding = ".library";
 
 std::string temporary_beginning(const fs::path& target) {
-  return "." + target.filename().string() + ".";
+  return "." + target.filename().string() + ".rebounce-";
 }
 
 fs::path temporary_name(const fs::path& target) {
@@ -81,13 +81,14 @@ std::string temporary_of(const fs::path& target, const std::string& name) {
   return is_temporary ? name.substr(0, ending + kEnding.size()) : std::string();
 }
 
-/// True if a process that lives writes to `temporary`, or if that cannot be known.
-bool is_in_use(const fs::path& temporary) {
+/// Removes `file`, which is `temporary` or belongs to it, unless a process that lives writes to
+/// that. The lock is held meanwhile, so that none begins to.
+void remove_if_left_over(const fs::path& file, const fs::path& temporary) {
   const int descriptor = ::open(temporary.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-  if (descriptor < 0) return errno != ENOENT;
-  const bool locked = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0;
-  ::close(descriptor);
-  return locked;
+  const bool has_no_writer =
+      descriptor < 0 ? errno == ENOENT : ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  if (has_no_writer) ::unlink(file.c_str());
+  if (descriptor >= 0) ::close(descriptor);
 }
 
 /// Removes what killed processes have left beside `target`. What cannot be removed stays.
@@ -98,7 +99,7 @@ void remove_left_over(const fs::path& target) {
        entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     const std::string temporary = temporary_of(target, name);
-    if (!temporary.empty() && !is_in_use(folder / temporary)) ::unlink(entry->path().c_str());
+    if (!temporary.empty()) remove_if_left_over(folder / name, folder / temporary);
   }
 }
 
@@ -144,7 +145,8 @@ void AtomicFile::open_and_lock() {
     if (descriptor_ < 0) fail(target_, errno);
     // File systems without locks do without. Before it was locked another process may have taken
     // the file for one that was left over.
-    ::flock(descriptor_, LOCK_EX);
+    while (::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+    }
     if (is_linked(descriptor_)) return;
     ::close(descriptor_);
   }

@@ -102,10 +102,12 @@ TEST(AtomicFile, TwoAtOnceDoNotMeet) {
 
 TEST(AtomicFile, RemovesWhatKilledProcessesLeft) {
   const test::TemporaryFolder folder;
-  for (const char* name :
-       {".file.123-1.tmp", ".file.123-2.tmp.library", ".file.45-6.tmp.library.aB3"})
+  for (const char* name : {".file.rebounce-123-1.tmp", ".file.rebounce-123-2.tmp.library",
+                           ".file.rebounce-45-6.tmp.library.aB3", ".file.rebounce-7-1.tmp",
+                           ".file.rebounce-7-1.tmp.library"})
     test::write_bytes(folder / name, "half");
-  const Names others{".file.tmp", ".file.other-1.tmp", ".file2.123-1.tmp", "file.123-1.tmp"};
+  const Names others{".file.tmp", ".file.123-1.tmp", ".file.rebounce-a-1.tmp",
+                     ".file2.rebounce-123-1.tmp", "file.rebounce-123-1.tmp"};
   for (const std::string& name : others) test::write_bytes(folder / name, "mine");
   { const AtomicFile never_committed(folder / "file"); }
   for (const std::string& name : others) {
