@@ -11,9 +11,9 @@
 namespace rebounce::gltf {
 namespace {
 
-// The most elements that an accessor may have without data: 16 Mi zeros, more than any asset uses
-// and harmless.
-constexpr std::size_t kMaxUnbackedElements = std::size_t{1} << 24;
+// The most elements that an accessor may have without data: zeros that a file need not hold, so that
+// a small file can ask for them many times. More than any asset uses.
+constexpr std::size_t kMaxUnbackedElements = std::size_t{1} << 20;
 
 static_assert(std::endian::native == std::endian::little, "glTF data is little-endian");
 
