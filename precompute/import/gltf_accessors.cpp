@@ -11,8 +11,8 @@
 namespace rebounce::gltf {
 namespace {
 
-// The most elements that an accessor may have without data: zeros that a file need not hold, so that
-// a small file can ask for them many times. More than any asset uses.
+// The most elements that an accessor may have without data: zeros that a file need not hold, so
+// that a small file can ask for them many times. More than any asset uses.
 constexpr std::size_t kMaxUnbackedElements = std::size_t{1} << 20;
 
 static_assert(std::endian::native == std::endian::little, "glTF data is little-endian");
