@@ -46,15 +46,24 @@ Receivers::Receivers(const TransferData& data, const DirectLightingSettings& set
 
 void Receivers::add_slot(std::uint32_t of_patch, std::span<const LitPoint> points) {
   const std::size_t block = size() / kBlock, slot = size() % kBlock;
-  if (slot == 0) point.resize(point.size() + points_per_patch);
+  if (slot == 0) {
+    point.resize(point.size() + points_per_patch);
+    boxes.emplace_back();
+  }
   if (slot % kPart == 0) bounds.emplace_back();
+  Box box;
   for (std::size_t k = 0; k < points_per_patch; ++k) {
+    box.add(points[k].position);
     PatchPointBlock& here = point[block * points_per_patch + k];
     for (int axis = 0; axis < 3; ++axis) {
       here.position[axis][slot] = points[k].position[axis];
       here.normal[axis][slot] = points[k].normal[axis];
     }
     bounds.back().add(points[k]);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    boxes[block].middle[axis][slot] = 0.5F * (box.low[axis] + box.high[axis]);
+    boxes[block].half[axis][slot] = 0.5F * (box.high[axis] - box.low[axis]);
   }
   patch.push_back(of_patch);
   shift.emplace_back(unit_square(mix_bits(~static_cast<std::uint64_t>(of_patch))));
