@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "runtime/lights/lamp_shadows.h"
 
@@ -12,13 +11,12 @@ namespace {
 constexpr std::size_t kBlock = Receivers::kBlock, kPart = Receivers::kPart;
 constexpr std::size_t kPointsAtOnce = 8;  // of each patch, found before their shadows
 
-// Of a block and of a part of it. Beyond this rays take less time.
-constexpr std::size_t kMostOfBlock = 256, kMostOfPart = 48;
+// Groups of occluders before a block, and occluders before a part. Beyond this rays take less time.
+constexpr std::size_t kMostGroups = 256, kMostOfPart = 64;
+static_assert(kPart == kShadowLanes);
 
 using Coordinates = PatchPointBlock::Coordinates;
-using OfPart = std::array<float, kPart>;
 using Numbers = std::span<const ShadowVolumes::Number>;
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// The light of a lamp without a surface at a block of points.
 struct BlockLight {
@@ -38,39 +36,6 @@ struct BlockLight {
     }
   }
 };
-
-/// Lowers `least` to how far points are on the inner side of `plane`.
-void lower(const ShadowVolumes::Plane& plane, const std::array<Coordinates, 3>& position,
-           std::size_t part, OfPart& least) {
-  const auto &x = position[0], &y = position[1], &z = position[2];
-  const glm::vec3 n = plane.normal;
-  const float distance = plane.distance;
-#pragma omp simd
-  for (std::size_t e = 0; e < kPart; ++e) {
-    const std::size_t at = part * kPart + e;
-    least[e] = std::min(least[e], n.x * x[at] + n.y * y[at] + n.z * z[at] - distance);
-  }
-}
-
-/// The same for the boxes of slots: `sign` 1 for their innermost corner, -1 for their outermost.
-void lower(const ShadowVolumes::Plane& plane, float sign, const Receivers::SlotBoxes& boxes,
-           std::size_t part, OfPart& least) {
-  const auto &x = boxes.middle[0], &y = boxes.middle[1], &z = boxes.middle[2];
-  const auto &half_x = boxes.half[0], &half_y = boxes.half[1], &half_z = boxes.half[2];
-  const glm::vec3 n = plane.normal, m = sign * glm::abs(n);
-  const float distance = plane.distance;
-#pragma omp simd
-  for (std::size_t e = 0; e < kPart; ++e) {
-    const std::size_t at = part * kPart + e;
-    const float middle = n.x * x[at] + n.y * y[at] + n.z * z[at] - distance;
-    least[e] = std::min(least[e], middle + m.x * half_x[at] + m.y * half_y[at] + m.z * half_z[at]);
-  }
-}
-
-void raise(OfPart& most, const OfPart& to) {
-#pragma omp simd
-  for (std::size_t e = 0; e < kPart; ++e) most[e] = std::max(most[e], to[e]);
-}
 
 class LampAtBlock {
  public:
@@ -105,31 +70,26 @@ class LampAtBlock {
 
   /// Adds what needs no ray, and tells what is left.
   void add_volumes(const ShadowVolumes& volumes, std::array<Shade, kBlock>& shade) {
+    using Between = ShadowVolumes::Between;
     Box box;
     for (std::size_t part = 0; part < reached_.size(); ++part) {
       if (!reached_[part]) continue;
       box.add(bounds(part).low);
       box.add(bounds(part).high);
     }
-    std::array<ShadowVolumes::Number, kMostOfBlock> of_block;
-    const ShadowVolumes::Between near = volumes.between(box, of_block);
-    if (!near.all) return;
+    std::array<ShadowVolumes::Number, kMostGroups> groups;
+    std::array<ShadowVolumes::Number, kMostOfPart> numbers;
+    std::size_t group_count = 0, count = 0;
+    const Between near = volumes.groups_between(box, groups, group_count);
+    if (near == Between::kHidden) shade.fill(Shade::kHidden);
+    if (near != Between::kSome) return;
     for (std::size_t part = 0; part < reached_.size(); ++part) {
       if (!reached_[part]) continue;
-      std::array<ShadowVolumes::Number, kMostOfPart> of_part;
-      const ShadowVolumes::Between here =
-          near.hidden ? near : volumes.between(bounds(part), near.number, of_part);
+      const Between here =
+          volumes.between(bounds(part), std::span(groups).first(group_count), numbers, count);
       const auto slots = std::span(shade).subspan(part * kPart, kPart);
-      if (here.hidden) {
-        std::ranges::fill(slots, Shade::kHidden);
-      } else if (here.all && lamp_.has_area()) {
-        look(volumes, here.number, part, slots);
-      } else if (here.all && std::ranges::all_of(here.number, [&](ShadowVolumes::Number number) {
-                   return volumes.is_certain(number);
-                 })) {
-        add_lit_points(volumes, here.number, part);
-        std::ranges::fill(slots, Shade::kHidden);
-      }
+      if (here == Between::kHidden) std::ranges::fill(slots, Shade::kHidden);
+      if (here == Between::kSome) settle(volumes, std::span(numbers).first(count), part, slots);
     }
   }
 
@@ -137,63 +97,56 @@ class LampAtBlock {
     return receivers_.bounds[block_ * reached_.size() + part].box;
   }
 
+  /// Settles the slots of a part that only `numbers` may hide, as far as volumes do.
+  void settle(const ShadowVolumes& volumes, Numbers numbers, std::size_t part,
+              std::span<Shade> shade) {
+    std::array<VolumePlanes, kMostOfPart> outer, inner;
+    std::size_t certain = 0;
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      outer[k] = volumes.outer(numbers[k]);
+      if (volumes.is_certain(numbers[k])) inner[certain++] = volumes.inner(numbers[k]);
+    }
+    const auto all_outer = std::span<const VolumePlanes>(outer).first(numbers.size());
+    if (lamp_.has_area()) {
+      look(all_outer, std::span<const VolumePlanes>(inner).first(certain), part, shade);
+    } else if (certain == numbers.size()) {
+      add_lit_points(all_outer, part);
+      std::ranges::fill(shade, Shade::kHidden);
+    }
+  }
+
   /// Adds the light of a lamp without a surface at the points of a part that are in no shadow.
-  void add_lit_points(const ShadowVolumes& volumes, Numbers numbers, std::size_t part) {
+  void add_lit_points(std::span<const VolumePlanes> volumes, std::size_t part) {
     BlockLight light;
     const std::size_t slots = std::min(kPart, irradiance_.size() - part * kPart);
     for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
       const PatchPointBlock& points = receivers_.points(block_, k);
+      std::array<float, kPart> depth;
+      kernels_.points_in_volumes(volumes.data(), volumes.size(),
+                                 points.position[0].data() + part * kPart, kBlock, depth.data());
+      if (*std::ranges::min_element(depth) >= 0) continue;
       light.evaluate(lamp_, points, part);
-      OfPart depth;  // in the shadow of any
-      depth.fill(-kInfinity);
-      for (const ShadowVolumes::Number number : numbers) {
-        OfPart least;
-        least.fill(kInfinity);
-        for (const ShadowVolumes::Plane& plane : volumes.outer(number)) {
-          lower(plane, points.position, part, least);
-        }
-        raise(depth, least);
-      }
       for (std::size_t e = 0; e < slots; ++e) {
         const float arriving = light.arriving[part * kPart + e];
-        if (arriving > 0 && depth[e] < 0) irradiance_[part * kPart + e] += share_ * arriving;
+        irradiance_[part * kPart + e] += arriving > 0 && depth[e] < 0 ? share_ * arriving : 0;
       }
     }
   }
 
   /// Which slots of a part see a whole lamp with a surface, and which see nothing of it.
-  void look(const ShadowVolumes& volumes, Numbers numbers, std::size_t part,
-            std::span<Shade> shade) const {
-    constexpr std::size_t kOwnPlane = ShadowVolumes::kPlanes - 1;
-    OfPart outer, inner;
-    outer.fill(-kInfinity);
-    inner.fill(-kInfinity);
+  void look(std::span<const VolumePlanes> outer, std::span<const VolumePlanes> inner,
+            std::size_t part, std::span<Shade> shade) const {
     const Receivers::SlotBoxes& boxes = receivers_.boxes[block_];
-    for (const ShadowVolumes::Number number : numbers) {
-      OfPart least;
-      least.fill(kInfinity);
-      const ShadowVolumes::Planes planes = volumes.outer(number);
-      // Boxes of slanted patches reach through the surface that they are on; points do not.
-      OfPart behind;
-      behind.fill(-kInfinity);
-      for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
-        OfPart height;
-        height.fill(kInfinity);
-        lower(planes[kOwnPlane], receivers_.points(block_, k).position, part, height);
-        raise(behind, height);
-      }
-      for (std::size_t p = 0; p < kOwnPlane; ++p) lower(planes[p], 1, boxes, part, least);
-      for (std::size_t e = 0; e < kPart; ++e) least[e] = std::min(least[e], behind[e]);
-      raise(outer, least);
-      if (!volumes.is_certain(number)) continue;
-      least.fill(kInfinity);
-      for (const ShadowVolumes::Plane& plane : volumes.inner(number)) {
-        lower(plane, -1, boxes, part, least);
-      }
-      raise(inner, least);
-    }
+    const std::size_t first = part * kPart;
+    const BoxLanes lanes{.middle = boxes.middle[0].data() + first,
+                         .side = {boxes.side[0][0].data() + first, boxes.side[1][0].data() + first,
+                                  boxes.side[2][0].data() + first},
+                         .stride = kBlock};
+    std::array<float, kPart> partly, wholly;
+    kernels_.boxes_in_volumes(outer.data(), outer.size(), lanes, 1, partly.data());
+    kernels_.boxes_in_volumes(inner.data(), inner.size(), lanes, -1, wholly.data());
     for (std::size_t e = 0; e < kPart; ++e) {
-      shade[e] = inner[e] > 0 ? Shade::kHidden : outer[e] < 0 ? Shade::kFree : Shade::kPartly;
+      shade[e] = wholly[e] > 0 ? Shade::kHidden : partly[e] < 0 ? Shade::kFree : Shade::kPartly;
     }
   }
 
@@ -247,6 +200,7 @@ class LampAtBlock {
 
   const Receivers& receivers_;
   const PreparedLight& lamp_;
+  const ShadowKernels& kernels_ = shadow_kernels();
   std::size_t block_;
   float share_;  ///< of each point of a patch
   std::span<float> irradiance_;

@@ -8,8 +8,8 @@ namespace rebounce {
 namespace {
 
 constexpr std::size_t kLanes = OccluderGroup::kLanes, kCorners = OccluderGroup::kCorners;
-constexpr float kNever = std::numeric_limits<float>::infinity();  // distance of a plane without an
-                                                                  // inner side
+constexpr float kNever = std::numeric_limits<float>::max();  // distance of a plane without
+                                                                // an inner side
 using Lanes = OccluderGroup::Lanes;
 using Vectors = OccluderGroup::Vectors;
 
@@ -17,12 +17,12 @@ void put(Vectors& vectors, std::size_t lane, const glm::vec3& v) {
   for (int axis = 0; axis < 3; ++axis) vectors[axis][lane] = v[axis];
 }
 
-/// A box by its middle and half its sides.
-struct MiddleAndHalf {
-  explicit MiddleAndHalf(const Box& box)
-      : middle(0.5F * (box.low + box.high)), half(0.5F * (box.high - box.low)) {}
-  glm::vec3 middle, half;
-};
+void put(PlaneLanes& planes, std::size_t lane, const glm::vec3& normal, float distance) {
+  planes.x[lane] = normal.x;
+  planes.y[lane] = normal.y;
+  planes.z[lane] = normal.z;
+  planes.distance[lane] = distance;
+}
 
 }  // namespace
 
@@ -75,7 +75,7 @@ void ShadowVolumes::set(const PreparedLight& lamp, std::span<const OccluderGroup
   const Lamp of_lamp(lamp, tolerance);
   for (std::size_t g = 0; g < groups.size(); ++g) {
     for (std::size_t side = 0; side < kCorners; ++side) {
-      set_side(of_lamp, groups[g], side, outer_[g], inner_[g]);
+      set_side(of_lamp, groups[g], side, outer_[g].plane[side], inner_[g].plane[side]);
     }
     set_plane(of_lamp, groups[g], g);
   }
@@ -85,7 +85,7 @@ void ShadowVolumes::set(const PreparedLight& lamp, std::span<const OccluderGroup
 void ShadowVolumes::set_plane(const Lamp& lamp, const OccluderGroup& group, std::size_t g) {
   const auto& [corner_x, corner_y, corner_z] = group.corner[0];
   const auto& [normal_x, normal_y, normal_z] = group.normal;
-  Group &outer = outer_[g], &inner = inner_[g];
+  PlaneLanes &outer = outer_[g].plane[kCorners], &inner = inner_[g].plane[kCorners];
   for (std::size_t k = 0; k < kLanes; ++k) {
     const float x = normal_x[k], y = normal_y[k], z = normal_z[k];
     const float height = (lamp.at.x - lamp.has_place * corner_x[k]) * x +
@@ -96,13 +96,13 @@ void ShadowVolumes::set_plane(const Lamp& lamp, const OccluderGroup& group, std:
     const bool behind = height + reach <= lamp.tolerance;
     const float sign = in_front ? -1.0F : behind ? 1.0F : 0.0F;
     const bool is_there = x * x + y * y + z * z > 0;
-    outer.normal[kCorners][0][k] = inner.normal[kCorners][0][k] = sign * x;
-    outer.normal[kCorners][1][k] = inner.normal[kCorners][1][k] = sign * y;
-    outer.normal[kCorners][2][k] = inner.normal[kCorners][2][k] = sign * z;
+    outer.x[k] = inner.x[k] = sign * x;
+    outer.y[k] = inner.y[k] = sign * y;
+    outer.z[k] = inner.z[k] = sign * z;
     const float distance = sign * (corner_x[k] * x + corner_y[k] * y + corner_z[k] * z);
     // A lamp in the plane meets only its edge.
-    outer.distance[kCorners][k] = is_there && !(in_front && behind) ? distance : kNever;
-    inner.distance[kCorners][k] = in_front != behind && group.solid[k] ? distance : kNever;
+    outer.distance[k] = is_there && !(in_front && behind) ? distance : kNever;
+    inner.distance[k] = in_front != behind && group.solid[k] ? distance : kNever;
   }
 }
 
@@ -110,7 +110,7 @@ void ShadowVolumes::set_plane(const Lamp& lamp, const OccluderGroup& group, std:
 /// is in part in the shadow, on the near side for what is wholly in the shadow. In coordinates
 /// across the side: y inwards in the plane of the occluder, z from it to the lamp's side.
 void ShadowVolumes::set_side(const Lamp& lamp, const OccluderGroup& group, std::size_t side,
-                             Group& outer, Group& inner) {
+                             PlaneLanes& outer, PlaneLanes& inner) {
   constexpr float kLeast = 1e-12F;  // instead of division by zero
   const auto& [corner_x, corner_y, corner_z] = group.corner[side];
   const auto& [inward_x, inward_y, inward_z] = group.inward[side];
@@ -164,78 +164,68 @@ void ShadowVolumes::set_side(const Lamp& lamp, const OccluderGroup& group, std::
     const float is_side = glm::dot(inward, inward) > 0 ? 1.0F : 0.0F;
     const glm::vec3 to_outer = is_side * (outer_y * inward + outer_z * normal);
     const glm::vec3 to_inner = is_side * (inner_y * inward + inner_z * normal);
-    put(outer.normal[side], k, to_outer);
-    put(inner.normal[side], k, to_inner);
-    outer.distance[side][k] = glm::dot(to_outer, corner);
-    inner.distance[side][k] = glm::dot(to_inner, corner);
+    put(outer, k, to_outer, glm::dot(to_outer, corner));
+    put(inner, k, to_inner, glm::dot(to_inner, corner));
   }
 }
 
-ShadowVolumes::Between ShadowVolumes::between(const Box& box, std::span<Number> room) const {
-  const MiddleAndHalf at(box);
-  std::size_t count = 0;
-  for (std::size_t g = 0; g < outer_.size(); ++g) {
-    Lanes outer, inner;
-    outer.fill(kNever);
-    inner.fill(kNever);
-    for (std::size_t p = 0; p < kPlanes; ++p) {
-      const auto &a = outer_[g].normal[p], &b = inner_[g].normal[p];
-      for (std::size_t k = 0; k < kLanes; ++k) {
-        const float middle = a[0][k] * at.middle.x + a[1][k] * at.middle.y + a[2][k] * at.middle.z;
-        const float half = std::abs(a[0][k]) * at.half.x + std::abs(a[1][k]) * at.half.y +
-                           std::abs(a[2][k]) * at.half.z;
-        outer[k] = std::min(outer[k], middle + half - outer_[g].distance[p][k]);
-        const float inner_middle =
-            b[0][k] * at.middle.x + b[1][k] * at.middle.y + b[2][k] * at.middle.z;
-        const float inner_half = std::abs(b[0][k]) * at.half.x + std::abs(b[1][k]) * at.half.y +
-                                 std::abs(b[2][k]) * at.half.z;
-        inner[k] = std::min(inner[k], inner_middle - inner_half - inner_[g].distance[p][k]);
-      }
-    }
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      if (inner[k] > 0) return {.number = {}, .hidden = true};
-      if (outer[k] < 0) continue;
-      if (count == room.size()) return {.number = {}, .all = false};
-      room[count++] = static_cast<Number>(g * kLanes + k);
-    }
+template <typename Visit>
+ShadowVolumes::Between ShadowVolumes::visit_between(const Box& box, Number group,
+                                                    const Visit& visit) const {
+  const ShadowKernels& kernels = shadow_kernels();
+  const glm::vec3 middle = 0.5F * (box.low + box.high), half = 0.5F * (box.high - box.low);
+  Lanes outer, inner;
+  kernels.box_in_volumes(outer_[group].plane, &middle.x, &half.x, 1, outer.data());
+  if (*std::ranges::max_element(outer) < 0) return Between::kSome;
+  kernels.box_in_volumes(inner_[group].plane, &middle.x, &half.x, -1, inner.data());
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    if (inner[k] > 0) return Between::kHidden;
   }
-  return {.number = room.first(count)};
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    if (outer[k] >= 0 && !visit(static_cast<Number>(group * kLanes + k))) return Between::kMany;
+  }
+  return Between::kSome;
 }
 
-ShadowVolumes::Between ShadowVolumes::between(const Box& box, std::span<const Number> among,
-                                              std::span<Number> room) const {
-  const MiddleAndHalf at(box);
-  std::size_t count = 0;
-  for (const Number number : among) {
-    const std::size_t g = number / kLanes, k = number % kLanes;
-    float outer = kNever, inner = kNever;
-    for (std::size_t p = 0; p < kPlanes; ++p) {
-      const auto &a = outer_[g].normal[p], &b = inner_[g].normal[p];
-      const glm::vec3 n(a[0][k], a[1][k], a[2][k]), m(b[0][k], b[1][k], b[2][k]);
-      outer = std::min(outer, glm::dot(n, at.middle) + glm::dot(glm::abs(n), at.half) -
-                                  outer_[g].distance[p][k]);
-      inner = std::min(inner, glm::dot(m, at.middle) - glm::dot(glm::abs(m), at.half) -
-                                  inner_[g].distance[p][k]);
-    }
-    if (inner > 0) return {.number = {}, .hidden = true};
-    if (outer < 0) continue;
-    if (count == room.size()) return {.number = {}, .all = false};
-    room[count++] = number;
+ShadowVolumes::Between ShadowVolumes::groups_between(const Box& box, std::span<Number> room,
+                                                     std::size_t& count) const {
+  count = 0;
+  for (Number group = 0; group < outer_.size(); ++group) {
+    bool any = false;
+    const Between here = visit_between(box, group, [&](Number) { return any = true; });
+    if (here != Between::kSome) return here;
+    if (!any) continue;
+    if (count == room.size()) return Between::kMany;
+    room[count++] = group;
   }
-  return {.number = room.first(count)};
+  return Between::kSome;
+}
+
+ShadowVolumes::Between ShadowVolumes::between(const Box& box, std::span<const Number> groups,
+                                              std::span<Number> room, std::size_t& count) const {
+  count = 0;
+  for (const Number group : groups) {
+    const Between here = visit_between(box, group, [&](Number number) {
+      if (count == room.size()) return false;
+      room[count++] = number;
+      return true;
+    });
+    if (here != Between::kSome) return here;
+  }
+  return Between::kSome;
 }
 
 bool ShadowVolumes::is_certain(Number number) const {
-  return inner_[number / kLanes].distance[kCorners][number % kLanes] != kNever;
+  return inner_[number / kLanes].plane[kCorners].distance[number % kLanes] != kNever;
 }
 
-ShadowVolumes::Planes ShadowVolumes::planes(const std::vector<Group>& groups, Number number) {
+VolumePlanes ShadowVolumes::planes(const std::vector<Group>& groups, Number number) {
   const Group& group = groups[number / kLanes];
   const std::size_t k = number % kLanes;
-  Planes planes;
-  for (std::size_t p = 0; p < kPlanes; ++p) {
-    const auto& [x, y, z] = group.normal[p];
-    planes[p] = {{x[k], y[k], z[k]}, group.distance[p][k]};
+  VolumePlanes planes;
+  for (std::size_t p = 0; p < VolumePlanes::kPlanes; ++p) {
+    const PlaneLanes& lanes = group.plane[p];
+    planes.plane[p] = {lanes.x[k], lanes.y[k], lanes.z[k], lanes.distance[k]};
   }
   return planes;
 }

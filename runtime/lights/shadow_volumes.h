@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "runtime/lights/lamp_kind.h"
+#include "runtime/lights/shadow_kernels.h"
 #include "runtime/rays/box.h"
 #include "runtime/rays/occluders.h"
 
@@ -20,7 +21,7 @@ namespace rebounce {
 /// Occluders by coordinates, so that loops over them are vectorised. Lanes without an occluder stop
 /// nothing.
 struct OccluderGroup {
-  static constexpr std::size_t kLanes = 8, kCorners = Occluder::kCorners;
+  static constexpr std::size_t kLanes = PlaneLanes::kLanes, kCorners = Occluder::kCorners;
   using Lanes = std::array<float, kLanes>;
   using Vectors = std::array<Lanes, 3>;
   std::array<Vectors, kCorners> corner{};
@@ -36,14 +37,6 @@ std::vector<OccluderGroup> in_groups(std::span<const Occluder> occluders);
 class ShadowVolumes {
  public:
   using Number = std::uint32_t;  ///< of an occluder
-  /// A point p is on the inner side of a plane if dot(normal, p) >= distance.
-  struct Plane {
-    glm::vec3 normal;  ///< unit, or 0
-    float distance;
-  };
-  /// Those through the sides of an occluder, and that of itself.
-  static constexpr std::size_t kPlanes = Occluder::kCorners + 1;
-  using Planes = std::array<Plane, kPlanes>;
 
   explicit ShadowVolumes(std::size_t group_count) : outer_(group_count), inner_(group_count) {}
 
@@ -51,35 +44,39 @@ class ShadowVolumes {
   /// `tolerance`, metres: what a lamp may reach behind a plane and count as in front of it.
   void set(const PreparedLight& lamp, std::span<const OccluderGroup> groups, float tolerance);
 
-  /// Occluders that stand between the lamp and something.
-  struct Between {
-    std::span<const Number> number;
-    bool hidden = false;  ///< one of them hides all of the lamp from everywhere in it
-    bool all = true;      ///< false: there was no room for more
+  /// What stands between the lamp and a box.
+  enum class Between : std::uint8_t {
+    kSome,    ///< what was written down
+    kHidden,  ///< something that hides all of the lamp from everywhere in it
+    kMany,    ///< more than there was room for
   };
-  /// Those that may hide something of the lamp from somewhere in `box`, written to `room`.
-  Between between(const Box& box, std::span<Number> room) const;
-  Between between(const Box& box, std::span<const Number> among, std::span<Number> room) const;
+  /// Writes down the groups of which an occluder may hide something of the lamp from somewhere in
+  /// `box`, and counts them.
+  Between groups_between(const Box& box, std::span<Number> room, std::size_t& count) const;
+  /// The same for occluders, of those in `groups`.
+  Between between(const Box& box, std::span<const Number> groups, std::span<Number> room,
+                  std::size_t& count) const;
 
-  /// Nothing outside of them is in the shadow. Of a lamp without a surface, all inside is.
-  Planes outer(Number number) const { return planes(outer_, number); }
-  /// All inside of them is wholly in the shadow.
-  Planes inner(Number number) const { return planes(inner_, number); }
+  /// Nothing outside of it is in the shadow. Of a lamp without a surface, all inside is.
+  VolumePlanes outer(Number number) const { return planes(outer_, number); }
+  /// All inside of it is wholly in the shadow.
+  VolumePlanes inner(Number number) const { return planes(inner_, number); }
 
   /// False if light may get through the occluder or past it on both sides.
   bool is_certain(Number number) const;
 
  private:
   struct Group {
-    std::array<OccluderGroup::Vectors, kPlanes> normal;
-    std::array<OccluderGroup::Lanes, kPlanes> distance;
+    PlaneLanes plane[VolumePlanes::kPlanes];  ///< those of the sides, and the occluder's own
   };
   struct Lamp;
 
   void set_plane(const Lamp& lamp, const OccluderGroup& group, std::size_t g);
-  static void set_side(const Lamp& lamp, const OccluderGroup& group, std::size_t side, Group& outer,
-                       Group& inner);
-  static Planes planes(const std::vector<Group>& groups, Number number);
+  static void set_side(const Lamp& lamp, const OccluderGroup& group, std::size_t side,
+                       PlaneLanes& outer, PlaneLanes& inner);
+  static VolumePlanes planes(const std::vector<Group>& groups, Number number);
+  template <typename Visit>
+  Between visit_between(const Box& box, Number group, const Visit& visit) const;
 
   std::vector<Group> outer_, inner_;
 };

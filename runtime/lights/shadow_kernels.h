@@ -1,0 +1,57 @@
+#pragma once
+
+// Comparisons of points and boxes with planes, for one instruction set.
+
+#include <cstddef>
+
+namespace rebounce {
+
+/// Planes of occluders by coordinates. A point p is on the inner side if
+/// x p.x + y p.y + z p.z >= distance.
+struct PlaneLanes {
+  static constexpr std::size_t kLanes = 8;
+  float x[kLanes], y[kLanes], z[kLanes], distance[kLanes];
+};
+
+/// The planes of a shadow volume: its inside is on the inner side of all of them.
+struct VolumePlanes {
+  static constexpr std::size_t kPlanes = 5;
+  struct Plane {
+    float x, y, z, distance;
+  };
+  Plane plane[kPlanes];
+};
+
+/// Points or boxes that are compared at a time, by coordinates.
+inline constexpr std::size_t kShadowLanes = 16;
+/// Boxes of any orientation: their middle, and half of each of their sides as vectors, [axis][lane]
+/// `stride` floats apart.
+struct BoxLanes {
+  const float* middle;
+  const float* side[3];
+  std::size_t stride;
+};
+
+struct ShadowKernels {
+  const char* name;
+
+  /// least[k] = how far a box along the axes (`middle`, `half` sides) is inside of volume k, whose
+  /// planes are lane k of `plane` [VolumePlanes::kPlanes]: by its innermost corner if `sign` is 1,
+  /// by its outermost if it is -1.
+  void (*box_in_volumes)(const PlaneLanes* plane, const float* middle, const float* half,
+                         float sign, float* least);
+  /// depth[e] = how far point e is inside of any of the `count` volumes; below 0 outside of all.
+  /// Coordinates [axis][lane] are `stride` floats apart.
+  void (*points_in_volumes)(const VolumePlanes* volume, std::size_t count, const float* position,
+                            std::size_t stride, float* depth);
+  /// The same for boxes, by their innermost (`sign` 1) or outermost (-1) corner.
+  void (*boxes_in_volumes)(const VolumePlanes* volume, std::size_t count, const BoxLanes& box,
+                           float sign, float* depth);
+};
+
+/// Those of the widest instruction set that this processor has.
+const ShadowKernels& shadow_kernels();
+
+extern const ShadowKernels kShadowKernelsPortable, kShadowKernelsAvx2, kShadowKernelsAvx512;
+
+}  // namespace rebounce

@@ -1,0 +1,92 @@
+#pragma once
+
+// The loops of ShadowKernels, for the instruction set that a file is compiled for. No function of
+// a library is called: it would be compiled for wide instructions and used everywhere.
+
+#include "runtime/lights/shadow_kernels.h"
+
+namespace rebounce {
+namespace {
+
+constexpr float kBeyondAll = 3.4e38F;
+
+inline float smaller(float a, float b) {
+  return a < b ? a : b;
+}
+inline float larger(float a, float b) {
+  return a > b ? a : b;
+}
+inline float magnitude(float a) {
+  return a < 0 ? -a : a;
+}
+
+void box_in_volumes(const PlaneLanes* plane, const float* middle, const float* half, float sign,
+                    float* least) {
+  const float x = middle[0], y = middle[1], z = middle[2];
+  const float half_x = sign * half[0], half_y = sign * half[1], half_z = sign * half[2];
+  float all[PlaneLanes::kLanes];
+  for (float& value : all) value = kBeyondAll;
+  for (std::size_t p = 0; p < VolumePlanes::kPlanes; ++p) {
+    const PlaneLanes& here = plane[p];
+#pragma omp simd
+    for (std::size_t k = 0; k < PlaneLanes::kLanes; ++k) {
+      const float reach = magnitude(here.x[k]) * half_x + magnitude(here.y[k]) * half_y +
+                          magnitude(here.z[k]) * half_z;
+      const float height = here.x[k] * x + here.y[k] * y + here.z[k] * z - here.distance[k];
+      all[k] = smaller(all[k], height + reach);
+    }
+  }
+  for (std::size_t k = 0; k < PlaneLanes::kLanes; ++k) least[k] = all[k];
+}
+
+void points_in_volumes(const VolumePlanes* volume, std::size_t count, const float* position,
+                       std::size_t stride, float* depth) {
+  const float *x = position, *y = position + stride, *z = position + 2 * stride;
+  float most[kShadowLanes];
+  for (float& value : most) value = -kBeyondAll;
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto& [a, b, c, d, e] = volume[k].plane;
+#pragma omp simd
+    for (std::size_t i = 0; i < kShadowLanes; ++i) {
+      const auto height = [&](const VolumePlanes::Plane& p) {
+        return p.x * x[i] + p.y * y[i] + p.z * z[i] - p.distance;
+      };
+      const float least = smaller(smaller(smaller(height(a), height(b)), height(c)),
+                                  smaller(height(d), height(e)));
+      most[i] = larger(most[i], least);
+    }
+  }
+  for (std::size_t i = 0; i < kShadowLanes; ++i) depth[i] = most[i];
+}
+
+void boxes_in_volumes(const VolumePlanes* volume, std::size_t count, const BoxLanes& box,
+                      float sign, float* depth) {
+  const std::size_t stride = box.stride;
+  float most[kShadowLanes];
+  for (float& value : most) value = -kBeyondAll;
+  for (std::size_t k = 0; k < count; ++k) {
+    float least[kShadowLanes];
+    for (float& value : least) value = kBeyondAll;
+    for (const VolumePlanes::Plane& p : volume[k].plane) {
+#pragma omp simd
+      for (std::size_t i = 0; i < kShadowLanes; ++i) {
+        const auto along = [&](const float* v) {
+          return p.x * v[i] + p.y * v[i + stride] + p.z * v[i + 2 * stride];
+        };
+        const float reach =
+            magnitude(along(box.side[0])) + magnitude(along(box.side[1])) +
+            magnitude(along(box.side[2]));
+        least[i] = smaller(least[i], along(box.middle) - p.distance + sign * reach);
+      }
+    }
+    for (std::size_t i = 0; i < kShadowLanes; ++i) most[i] = larger(most[i], least[i]);
+  }
+  for (std::size_t i = 0; i < kShadowLanes; ++i) depth[i] = most[i];
+}
+
+constexpr ShadowKernels make_shadow_kernels(const char* name) {
+  return {name, box_in_volumes, points_in_volumes, boxes_in_volumes};
+}
+
+}  // namespace
+}  // namespace rebounce
