@@ -100,17 +100,19 @@ class LampAtBlock {
   /// Settles the slots of a part that only `numbers` may hide, as far as volumes do.
   void settle(const ShadowVolumes& volumes, Numbers numbers, std::size_t part,
               std::span<Shade> shade) {
-    std::array<VolumePlanes, kMostOfPart> outer, inner;
-    std::size_t certain = 0;
-    for (std::size_t k = 0; k < numbers.size(); ++k) {
-      outer[k] = volumes.outer(numbers[k]);
-      if (volumes.is_certain(numbers[k])) inner[certain++] = volumes.inner(numbers[k]);
-    }
-    const auto all_outer = std::span<const VolumePlanes>(outer).first(numbers.size());
+    std::array<VolumePlanes, kMostOfPart> planes;
+    for (std::size_t k = 0; k < numbers.size(); ++k) planes[k] = volumes.outer(numbers[k]);
+    const auto outer = std::span<const VolumePlanes>(planes).first(numbers.size());
+    const auto certain = [&](ShadowVolumes::Number k) { return volumes.is_certain(k); };
     if (lamp_.has_area()) {
-      look(all_outer, std::span<const VolumePlanes>(inner).first(certain), part, shade);
-    } else if (certain == numbers.size()) {
-      add_lit_points(all_outer, part);
+      look_for_free(outer, part, shade);
+      std::size_t count = 0;
+      for (const ShadowVolumes::Number number : numbers) {
+        if (certain(number)) planes[count++] = volumes.inner(number);
+      }
+      look_for_hidden(outer.first(count), part, shade);
+    } else if (std::ranges::all_of(numbers, certain)) {
+      add_lit_points(outer, part);
       std::ranges::fill(shade, Shade::kHidden);
     }
   }
@@ -118,36 +120,53 @@ class LampAtBlock {
   /// Adds the light of a lamp without a surface at the points of a part that are in no shadow.
   void add_lit_points(std::span<const VolumePlanes> volumes, std::size_t part) {
     BlockLight light;
-    const std::size_t slots = std::min(kPart, irradiance_.size() - part * kPart);
+    const float share = share_;
+    std::array<float, kPart> sum{};
     for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
       const PatchPointBlock& points = receivers_.points(block_, k);
       std::array<float, kPart> depth;
-      kernels_.points_in_volumes(volumes.data(), volumes.size(),
-                                 points.position[0].data() + part * kPart, kBlock, depth.data());
-      if (*std::ranges::min_element(depth) >= 0) continue;
+      const float least = kernels_.points_in_volumes(
+          volumes.data(), volumes.size(), points.position[0].data() + part * kPart, kBlock,
+          depth.data());
+      if (least >= 0) continue;
       light.evaluate(lamp_, points, part);
-      for (std::size_t e = 0; e < slots; ++e) {
+#pragma omp simd
+      for (std::size_t e = 0; e < kPart; ++e) {
         const float arriving = light.arriving[part * kPart + e];
-        irradiance_[part * kPart + e] += arriving > 0 && depth[e] < 0 ? share_ * arriving : 0;
+        const float free = depth[e] < 0 ? share : 0.0F;
+        sum[e] += free * (arriving > 0 ? arriving : 0.0F);
       }
+    }
+    const auto slots = irradiance_.subspan(part * kPart);
+    std::copy_n(sum.begin(), std::min(kPart, slots.size()), slots.begin());
+  }
+
+  /// Finds the slots of a part from which the whole of a lamp with a surface is seen.
+  void look_for_free(std::span<const VolumePlanes> outer, std::size_t part,
+                     std::span<Shade> shade) const {
+    std::array<float, kPart> depth;
+    kernels_.boxes_in_volumes(outer.data(), outer.size(), slot_boxes(part), 1, depth.data());
+    for (std::size_t e = 0; e < kPart; ++e) {
+      if (depth[e] < 0) shade[e] = Shade::kFree;
     }
   }
 
-  /// Which slots of a part see a whole lamp with a surface, and which see nothing of it.
-  void look(std::span<const VolumePlanes> outer, std::span<const VolumePlanes> inner,
-            std::size_t part, std::span<Shade> shade) const {
-    const Receivers::SlotBoxes& boxes = receivers_.boxes[block_];
-    const std::size_t first = part * kPart;
-    const BoxLanes lanes{.middle = boxes.middle[0].data() + first,
-                         .side = {boxes.side[0][0].data() + first, boxes.side[1][0].data() + first,
-                                  boxes.side[2][0].data() + first},
-                         .stride = kBlock};
-    std::array<float, kPart> partly, wholly;
-    kernels_.boxes_in_volumes(outer.data(), outer.size(), lanes, 1, partly.data());
-    kernels_.boxes_in_volumes(inner.data(), inner.size(), lanes, -1, wholly.data());
+  /// Finds those from which nothing of it is seen.
+  void look_for_hidden(std::span<const VolumePlanes> inner, std::size_t part,
+                       std::span<Shade> shade) const {
+    std::array<float, kPart> depth;
+    kernels_.boxes_in_volumes(inner.data(), inner.size(), slot_boxes(part), -1, depth.data());
     for (std::size_t e = 0; e < kPart; ++e) {
-      shade[e] = wholly[e] > 0 ? Shade::kHidden : partly[e] < 0 ? Shade::kFree : Shade::kPartly;
+      if (depth[e] > 0) shade[e] = Shade::kHidden;
     }
+  }
+
+  BoxLanes slot_boxes(std::size_t part) const {
+    const Receivers::SlotBoxes& boxes = receivers_.boxes[block_];
+    const auto of_part = [&](const auto& vectors) { return vectors[0].data() + part * kPart; };
+    return {.middle = of_part(boxes.middle),
+            .side = {of_part(boxes.side[0]), of_part(boxes.side[1]), of_part(boxes.side[2])},
+            .stride = kBlock};
   }
 
   /// Adds the light of a lamp without a surface, by rays.

@@ -4,11 +4,10 @@ namespace rebounce {
 
 const ShadowKernels& shadow_kernels() {
 #ifdef REBOUNCE_WITH_WIDE_KERNELS
-  static const ShadowKernels& widest =
-      __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") ? kShadowKernelsAvx512
-      : __builtin_cpu_supports("avx2")                                        ? kShadowKernelsAvx2
-                                                                              : kShadowKernelsPortable;
-  return widest;
+  static const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  static const bool has_avx512 =
+      has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl");
+  return has_avx512 ? kShadowKernelsAvx512 : has_avx2 ? kShadowKernelsAvx2 : kShadowKernelsPortable;
 #else
   return kShadowKernelsPortable;
 #endif

@@ -35,15 +35,15 @@ struct BoxLanes {
 struct ShadowKernels {
   const char* name;
 
-  /// least[k] = how far a box along the axes (`middle`, `half` sides) is inside of volume k, whose
-  /// planes are lane k of `plane` [VolumePlanes::kPlanes]: by its innermost corner if `sign` is 1,
-  /// by its outermost if it is -1.
-  void (*box_in_volumes)(const PlaneLanes* plane, const float* middle, const float* half,
-                         float sign, float* least);
+  /// Bit k of the result tells whether a box along the axes (`middle`, `half` sides) meets volume k,
+  /// whose planes are lane k of `plane` [VolumePlanes::kPlanes], if `sign` is 1; whether it is
+  /// wholly inside if `sign` is -1.
+  unsigned (*box_in_volumes)(const PlaneLanes* plane, const float* middle, const float* half,
+                             float sign);
   /// depth[e] = how far point e is inside of any of the `count` volumes; below 0 outside of all.
-  /// Coordinates [axis][lane] are `stride` floats apart.
-  void (*points_in_volumes)(const VolumePlanes* volume, std::size_t count, const float* position,
-                            std::size_t stride, float* depth);
+  /// Coordinates [axis][lane] are `stride` floats apart. Returns the least.
+  float (*points_in_volumes)(const VolumePlanes* volume, std::size_t count, const float* position,
+                             std::size_t stride, float* depth);
   /// The same for boxes, by their innermost (`sign` 1) or outermost (-1) corner.
   void (*boxes_in_volumes)(const VolumePlanes* volume, std::size_t count, const BoxLanes& box,
                            float sign, float* depth);

@@ -17,11 +17,18 @@ inline float larger(float a, float b) {
   return a > b ? a : b;
 }
 inline float magnitude(float a) {
-  return a < 0 ? -a : a;
+  return __builtin_fabsf(a);
+}
+inline float multiply_add(float a, float b, float c) {
+#ifdef __FMA__
+  return __builtin_fmaf(a, b, c);
+#else
+  return a * b + c;
+#endif
 }
 
-void box_in_volumes(const PlaneLanes* plane, const float* middle, const float* half, float sign,
-                    float* least) {
+unsigned box_in_volumes(const PlaneLanes* plane, const float* middle, const float* half,
+                        float sign) {
   const float x = middle[0], y = middle[1], z = middle[2];
   const float half_x = sign * half[0], half_y = sign * half[1], half_z = sign * half[2];
   float all[PlaneLanes::kLanes];
@@ -30,17 +37,23 @@ void box_in_volumes(const PlaneLanes* plane, const float* middle, const float* h
     const PlaneLanes& here = plane[p];
 #pragma omp simd
     for (std::size_t k = 0; k < PlaneLanes::kLanes; ++k) {
-      const float reach = magnitude(here.x[k]) * half_x + magnitude(here.y[k]) * half_y +
-                          magnitude(here.z[k]) * half_z;
-      const float height = here.x[k] * x + here.y[k] * y + here.z[k] * z - here.distance[k];
-      all[k] = smaller(all[k], height + reach);
+      const float height = multiply_add(
+          here.x[k], x, multiply_add(here.y[k], y, multiply_add(here.z[k], z, -here.distance[k])));
+      const float furthest = multiply_add(
+          magnitude(here.x[k]), half_x,
+          multiply_add(magnitude(here.y[k]), half_y,
+                       multiply_add(magnitude(here.z[k]), half_z, height)));
+      all[k] = smaller(all[k], furthest);
     }
   }
-  for (std::size_t k = 0; k < PlaneLanes::kLanes; ++k) least[k] = all[k];
+  unsigned inside = 0;
+#pragma omp simd reduction(| : inside)
+  for (std::size_t k = 0; k < PlaneLanes::kLanes; ++k) inside |= all[k] >= 0 ? 1U << k : 0U;
+  return inside;
 }
 
-void points_in_volumes(const VolumePlanes* volume, std::size_t count, const float* position,
-                       std::size_t stride, float* depth) {
+float points_in_volumes(const VolumePlanes* volume, std::size_t count, const float* position,
+                        std::size_t stride, float* depth) {
   const float *x = position, *y = position + stride, *z = position + 2 * stride;
   float most[kShadowLanes];
   for (float& value : most) value = -kBeyondAll;
@@ -49,14 +62,21 @@ void points_in_volumes(const VolumePlanes* volume, std::size_t count, const floa
 #pragma omp simd
     for (std::size_t i = 0; i < kShadowLanes; ++i) {
       const auto height = [&](const VolumePlanes::Plane& p) {
-        return p.x * x[i] + p.y * y[i] + p.z * z[i] - p.distance;
+        return multiply_add(p.x, x[i],
+                            multiply_add(p.y, y[i], multiply_add(p.z, z[i], -p.distance)));
       };
       const float least = smaller(smaller(smaller(height(a), height(b)), height(c)),
                                   smaller(height(d), height(e)));
       most[i] = larger(most[i], least);
     }
   }
-  for (std::size_t i = 0; i < kShadowLanes; ++i) depth[i] = most[i];
+  float all = kBeyondAll;
+#pragma omp simd reduction(min : all)
+  for (std::size_t i = 0; i < kShadowLanes; ++i) {
+    depth[i] = most[i];
+    all = smaller(all, most[i]);
+  }
+  return all;
 }
 
 void boxes_in_volumes(const VolumePlanes* volume, std::size_t count, const BoxLanes& box,
@@ -71,7 +91,8 @@ void boxes_in_volumes(const VolumePlanes* volume, std::size_t count, const BoxLa
 #pragma omp simd
       for (std::size_t i = 0; i < kShadowLanes; ++i) {
         const auto along = [&](const float* v) {
-          return p.x * v[i] + p.y * v[i + stride] + p.z * v[i + 2 * stride];
+          return multiply_add(p.x, v[i],
+                              multiply_add(p.y, v[i + stride], p.z * v[i + 2 * stride]));
         };
         const float reach =
             magnitude(along(box.side[0])) + magnitude(along(box.side[1])) +

@@ -1,6 +1,7 @@
 #include "runtime/lights/shadow_volumes.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -10,7 +11,6 @@ namespace {
 constexpr std::size_t kLanes = OccluderGroup::kLanes, kCorners = OccluderGroup::kCorners;
 constexpr float kNever = std::numeric_limits<float>::max();  // distance of a plane without
                                                                 // an inner side
-using Lanes = OccluderGroup::Lanes;
 using Vectors = OccluderGroup::Vectors;
 
 void put(Vectors& vectors, std::size_t lane, const glm::vec3& v) {
@@ -174,15 +174,14 @@ ShadowVolumes::Between ShadowVolumes::visit_between(const Box& box, Number group
                                                     const Visit& visit) const {
   const ShadowKernels& kernels = shadow_kernels();
   const glm::vec3 middle = 0.5F * (box.low + box.high), half = 0.5F * (box.high - box.low);
-  Lanes outer, inner;
-  kernels.box_in_volumes(outer_[group].plane, &middle.x, &half.x, 1, outer.data());
-  if (*std::ranges::max_element(outer) < 0) return Between::kSome;
-  kernels.box_in_volumes(inner_[group].plane, &middle.x, &half.x, -1, inner.data());
-  for (std::size_t k = 0; k < kLanes; ++k) {
-    if (inner[k] > 0) return Between::kHidden;
+  const unsigned meets = kernels.box_in_volumes(outer_[group].plane, &middle.x, &half.x, 1);
+  if (meets == 0) return Between::kSome;
+  if (kernels.box_in_volumes(inner_[group].plane, &middle.x, &half.x, -1) != 0) {
+    return Between::kHidden;
   }
-  for (std::size_t k = 0; k < kLanes; ++k) {
-    if (outer[k] >= 0 && !visit(static_cast<Number>(group * kLanes + k))) return Between::kMany;
+  for (unsigned left = meets; left != 0; left &= left - 1) {
+    const auto lane = static_cast<Number>(std::countr_zero(left));
+    if (!visit(group * static_cast<Number>(kLanes) + lane)) return Between::kMany;
   }
   return Between::kSome;
 }

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "runtime/rays/box.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/ray_offset.h"
 #include "runtime/rays/triangle.h"
@@ -247,10 +248,33 @@ class Planes {
   std::vector<Plane> plane_;
 };
 
+/// The lowest ten bits of `x`, with two zeros after each.
+std::uint32_t spread_bits(std::uint32_t x) {
+  std::uint32_t spread = 0;
+  for (int bit = 0; bit < 10; ++bit) spread |= (x >> bit & 1U) << (3 * bit);
+  return spread;
+}
+
+/// Along a Morton curve: neighbours come into one group.
+void sort_by_place(std::vector<Occluder>& occluders) {
+  const auto middle = [](const Occluder& occluder) {
+    return 0.5F * (occluder.corner[0] + occluder.corner[2]);
+  };
+  Box box;
+  for (const Occluder& occluder : occluders) box.add(middle(occluder));
+  const glm::vec3 scale = 1023.0F / glm::max(box.extent(), glm::vec3(1e-20F));
+  const auto key = [&](const Occluder& occluder) {
+    const glm::uvec3 cell(scale * (middle(occluder) - box.low));
+    return spread_bits(cell.x) | spread_bits(cell.y) << 1 | spread_bits(cell.z) << 2;
+  };
+  std::ranges::stable_sort(occluders, {}, key);
+}
+
 }  // namespace
 
 std::vector<Occluder> occluders_of(const DisplayMesh& mesh, std::size_t most) {
   std::vector<Occluder> occluders = Planes(mesh).take();
+  sort_by_place(occluders);
   if (occluders.size() > most) occluders.clear();
   return occluders;
 }
