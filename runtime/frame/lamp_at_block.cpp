@@ -16,6 +16,7 @@ constexpr std::size_t kMostGroups = 256, kMostOfPart = 64;
 static_assert(kPart == kShadowLanes);
 
 using Coordinates = PatchPointBlock::Coordinates;
+using Depths = std::array<float, kPart>;
 using Numbers = std::span<const ShadowVolumes::Number>;
 
 /// The light of a lamp without a surface at a block of points.
@@ -47,33 +48,32 @@ class LampAtBlock {
         share_(1 / static_cast<float>(receivers.points_per_patch)),
         irradiance_(irradiance),
         shadows_(tracer, irradiance),
-        reached_(receivers.reached(block, lamp)) {}
+        left_(receivers.reached(block, lamp)) {}
 
   void add(const ShadowVolumes* volumes) {
-    if (std::ranges::find(reached_, true) == reached_.end()) return;
-    std::array<Shade, kBlock> shade;
-    shade.fill(Shade::kPartly);
-    for (std::size_t slot = 0; slot < kBlock; ++slot) {
-      if (!reached_[slot / kPart]) shade[slot] = Shade::kHidden;
-    }
-    if (volumes != nullptr) add_volumes(*volumes, shade);
-    if (lamp_.has_area()) {
-      add_surface(shade);
-    } else {
-      add_points(shade);
-    }
+    if (!any_left()) return;
+    if (volumes != nullptr) add_by_volumes(*volumes);
+    if (any_left()) add_by_rays();
     shadows_.flush();
   }
 
  private:
-  enum class Shade : std::uint8_t { kFree, kPartly, kHidden };
+  bool any_left() const { return std::ranges::find(left_, true) != left_.end(); }
 
-  /// Adds what needs no ray, and tells what is left.
-  void add_volumes(const ShadowVolumes& volumes, std::array<Shade, kBlock>& shade) {
+  const Box& bounds(std::size_t part) const {
+    return receivers_.bounds[block_ * left_.size() + part].box;
+  }
+
+  std::size_t slots_end(std::size_t part) const {
+    return std::min(irradiance_.size(), (part + 1) * kPart);
+  }
+
+  /// Adds the light of the parts before which there are few occluders; others are left.
+  void add_by_volumes(const ShadowVolumes& volumes) {
     using Between = ShadowVolumes::Between;
     Box box;
-    for (std::size_t part = 0; part < reached_.size(); ++part) {
-      if (!reached_[part]) continue;
+    for (std::size_t part = 0; part < left_.size(); ++part) {
+      if (!left_[part]) continue;
       box.add(bounds(part).low);
       box.add(bounds(part).high);
     }
@@ -81,55 +81,55 @@ class LampAtBlock {
     std::array<ShadowVolumes::Number, kMostOfPart> numbers;
     std::size_t group_count = 0, count = 0;
     const Between near = volumes.groups_between(box, groups, group_count);
-    if (near == Between::kHidden) shade.fill(Shade::kHidden);
+    if (near == Between::kHidden) left_.fill(false);
     if (near != Between::kSome) return;
-    for (std::size_t part = 0; part < reached_.size(); ++part) {
-      if (!reached_[part]) continue;
+    for (std::size_t part = 0; part < left_.size(); ++part) {
+      if (!left_[part]) continue;
       const Between here =
           volumes.between(bounds(part), std::span(groups).first(group_count), numbers, count);
-      const auto slots = std::span(shade).subspan(part * kPart, kPart);
-      if (here == Between::kHidden) std::ranges::fill(slots, Shade::kHidden);
-      if (here == Between::kSome) settle(volumes, std::span(numbers).first(count), part, slots);
+      if (here == Between::kMany) continue;
+      left_[part] = here == Between::kSome &&
+                    !add_part(volumes, std::span(numbers).first(count), part);
     }
   }
 
-  const Box& bounds(std::size_t part) const {
-    return receivers_.bounds[block_ * reached_.size() + part].box;
-  }
-
-  /// Settles the slots of a part that only `numbers` may hide, as far as volumes do.
-  void settle(const ShadowVolumes& volumes, Numbers numbers, std::size_t part,
-              std::span<Shade> shade) {
-    std::array<VolumePlanes, kMostOfPart> planes;
-    for (std::size_t k = 0; k < numbers.size(); ++k) planes[k] = volumes.outer(numbers[k]);
-    const auto outer = std::span<const VolumePlanes>(planes).first(numbers.size());
-    const auto certain = [&](ShadowVolumes::Number k) { return volumes.is_certain(k); };
+  /// Adds the light of a part that only `numbers` may hide. False if that takes rays.
+  bool add_part(const ShadowVolumes& volumes, Numbers numbers, std::size_t part) {
+    std::array<VolumePlanes, kMostOfPart> outer, inner;
+    std::size_t certain = 0;
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      outer[k] = volumes.outer(numbers[k]);
+      if (!volumes.is_certain(numbers[k])) continue;
+      if (lamp_.has_area()) inner[certain] = volumes.inner(numbers[k]);
+      ++certain;
+    }
+    const auto all = std::span<const VolumePlanes>(outer).first(numbers.size());
     if (lamp_.has_area()) {
-      look_for_free(outer, part, shade);
-      std::size_t count = 0;
-      for (const ShadowVolumes::Number number : numbers) {
-        if (certain(number)) planes[count++] = volumes.inner(number);
-      }
-      look_for_hidden(outer.first(count), part, shade);
-    } else if (std::ranges::all_of(numbers, certain)) {
-      add_lit_points(outer, part);
-      std::ranges::fill(shade, Shade::kHidden);
+      add_surface(all, std::span<const VolumePlanes>(inner).first(certain), part);
+      return true;
     }
+    if (certain < numbers.size()) return false;
+    add_lit_points(all, part);
+    return true;
+  }
+
+  /// How far point k of each slot of a part is in `volumes`. Returns the least.
+  float depth_in(std::span<const VolumePlanes> volumes, std::size_t k, std::size_t part,
+                 Depths& depth) const {
+    const PatchPointBlock& points = receivers_.points(block_, k);
+    return kernels_.points_in_volumes(volumes.data(), volumes.size(),
+                                      points.position[0].data() + part * kPart, kBlock,
+                                      depth.data());
   }
 
   /// Adds the light of a lamp without a surface at the points of a part that are in no shadow.
   void add_lit_points(std::span<const VolumePlanes> volumes, std::size_t part) {
     BlockLight light;
     const float share = share_;
-    std::array<float, kPart> sum{};
+    Depths depth, sum{};
     for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
-      const PatchPointBlock& points = receivers_.points(block_, k);
-      std::array<float, kPart> depth;
-      const float least = kernels_.points_in_volumes(
-          volumes.data(), volumes.size(), points.position[0].data() + part * kPart, kBlock,
-          depth.data());
-      if (least >= 0) continue;
-      light.evaluate(lamp_, points, part);
+      if (depth_in(volumes, k, part, depth) >= 0) continue;
+      light.evaluate(lamp_, receivers_.points(block_, k), part);
 #pragma omp simd
       for (std::size_t e = 0; e < kPart; ++e) {
         const float arriving = light.arriving[part * kPart + e];
@@ -137,83 +137,80 @@ class LampAtBlock {
         sum[e] += free * (arriving > 0 ? arriving : 0.0F);
       }
     }
-    const auto slots = irradiance_.subspan(part * kPart);
-    std::copy_n(sum.begin(), std::min(kPart, slots.size()), slots.begin());
+    std::copy_n(sum.begin(), slots_end(part) - part * kPart, &irradiance_[part * kPart]);
   }
 
-  /// Finds the slots of a part from which the whole of a lamp with a surface is seen.
-  void look_for_free(std::span<const VolumePlanes> outer, std::size_t part,
-                     std::span<Shade> shade) const {
-    std::array<float, kPart> depth;
-    kernels_.boxes_in_volumes(outer.data(), outer.size(), slot_boxes(part), 1, depth.data());
-    for (std::size_t e = 0; e < kPart; ++e) {
-      if (depth[e] < 0) shade[e] = Shade::kFree;
+  /// Adds the light of a lamp with a surface to a part. Points outside of all `outer` volumes see
+  /// the whole lamp, those in one of `inner` nothing of it; rays are for the others.
+  void add_surface(std::span<const VolumePlanes> outer, std::span<const VolumePlanes> inner,
+                   std::size_t part) {
+    Depths partly, wholly;
+    for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
+      if (depth_in(inner, k, part, wholly) >= 0) continue;
+      depth_in(outer, k, part, partly);
+      for (std::size_t slot = part * kPart; slot < slots_end(part); ++slot) {
+        const std::size_t e = slot - part * kPart;
+        if (wholly[e] >= 0) continue;
+        if (partly[e] < 0) {
+          const PatchPointBlock& points = receivers_.points(block_, k);
+          irradiance_[slot] +=
+              share_ * lamp_.unoccluded_irradiance(points.at(slot), points.normal_at(slot));
+        } else {
+          add_surface(k, slot);
+        }
+      }
     }
   }
 
-  /// Finds those from which nothing of it is seen.
-  void look_for_hidden(std::span<const VolumePlanes> inner, std::size_t part,
-                       std::span<Shade> shade) const {
-    std::array<float, kPart> depth;
-    kernels_.boxes_in_volumes(inner.data(), inner.size(), slot_boxes(part), -1, depth.data());
-    for (std::size_t e = 0; e < kPart; ++e) {
-      if (depth[e] > 0) shade[e] = Shade::kHidden;
+  /// Adds the light of a lamp with a surface at one point, by rays.
+  void add_surface(std::size_t k, std::size_t slot) {
+    const std::size_t samples = receivers_.area_light_samples;
+    const auto around = [](float x) { return x < 1 ? x : x - 1; };
+    std::array<glm::vec2, kMaxAreaLightSamples> places;
+    const glm::vec2& shift = receivers_.shift[block_ * kBlock + slot];
+    for (std::size_t j = 0; j < samples; ++j) {
+      const glm::vec2 moved = receivers_.places[k * samples + j] + shift;
+      places[j] = {around(moved.x), around(moved.y)};
     }
+    const PatchPointBlock& points = receivers_.points(block_, k);
+    shadows_.add_surface(lamp_, {points.at(slot), points.normal_at(slot)},
+                         std::span(places).first(samples), share_, slot);
   }
 
-  BoxLanes slot_boxes(std::size_t part) const {
-    const Receivers::SlotBoxes& boxes = receivers_.boxes[block_];
-    const auto of_part = [&](const auto& vectors) { return vectors[0].data() + part * kPart; };
-    return {.middle = of_part(boxes.middle),
-            .side = {of_part(boxes.side[0]), of_part(boxes.side[1]), of_part(boxes.side[2])},
-            .stride = kBlock};
+  /// Adds the light of all parts that are left.
+  void add_by_rays() {
+    if (!lamp_.has_area()) return add_points_by_rays();
+    for_each_slot([&](std::size_t slot) {
+      for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) add_surface(k, slot);
+    });
   }
 
-  /// Adds the light of a lamp without a surface, by rays.
-  void add_points(const std::array<Shade, kBlock>& shade) {
+  void add_points_by_rays() {
     std::array<BlockLight, kPointsAtOnce> light;
     for (std::size_t first = 0; first < receivers_.points_per_patch; first += kPointsAtOnce) {
       const std::size_t last = std::min(first + kPointsAtOnce, receivers_.points_per_patch);
-      for (std::size_t part = 0; part < reached_.size(); ++part) {
-        if (shade[part * kPart] == Shade::kHidden) continue;
+      for (std::size_t part = 0; part < left_.size(); ++part) {
+        if (!left_[part]) continue;
         for (std::size_t k = first; k < last; ++k) {
           light[k - first].evaluate(lamp_, receivers_.points(block_, k), part);
         }
       }
       // Rays from the points of a patch take nearly the same way, so they follow each other.
-      for (std::size_t slot = 0; slot < irradiance_.size(); ++slot) {
-        if (shade[slot] == Shade::kHidden) continue;
+      for_each_slot([&](std::size_t slot) {
         for (std::size_t k = first; k < last; ++k) {
           const auto& [here, arriving] = light[k - first];
           if (arriving[slot] <= 0) continue;
           shadows_.add_ray(receivers_.points(block_, k).at(slot), here.at(slot),
                            share_ * arriving[slot], slot);
         }
-      }
+      });
     }
   }
 
-  /// Adds the light of a lamp with a surface.
-  void add_surface(const std::array<Shade, kBlock>& shade) {
-    const std::size_t samples = receivers_.area_light_samples;
-    const auto around = [](float x) { return x < 1 ? x : x - 1; };
-    std::array<glm::vec2, kMaxAreaLightSamples> places;
+  template <typename Work>
+  void for_each_slot(const Work& work) const {
     for (std::size_t slot = 0; slot < irradiance_.size(); ++slot) {
-      if (shade[slot] == Shade::kHidden) continue;
-      const glm::vec2& shift = receivers_.shift[block_ * kBlock + slot];
-      for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
-        const PatchPointBlock& points = receivers_.points(block_, k);
-        const LitPoint point{points.at(slot), points.normal_at(slot)};
-        if (shade[slot] == Shade::kFree) {
-          irradiance_[slot] += share_ * lamp_.unoccluded_irradiance(point.position, point.normal);
-          continue;
-        }
-        for (std::size_t j = 0; j < samples; ++j) {
-          const glm::vec2 moved = receivers_.places[k * samples + j] + shift;
-          places[j] = {around(moved.x), around(moved.y)};
-        }
-        shadows_.add_surface(lamp_, point, std::span(places).first(samples), share_, slot);
-      }
+      if (left_[slot / kPart]) work(slot);
     }
   }
 
@@ -224,7 +221,7 @@ class LampAtBlock {
   float share_;  ///< of each point of a patch
   std::span<float> irradiance_;
   LampShadows shadows_;
-  Receivers::Reached reached_;
+  Receivers::Reached left_;  ///< parts whose light is still to be added
 };
 
 }  // namespace

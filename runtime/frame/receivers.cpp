@@ -26,37 +26,6 @@ std::vector<LitPoint> lit_points(const TransferData& data, const DirectLightingS
   return points;
 }
 
-struct OrientedBox {
-  glm::vec3 middle;
-  std::array<glm::vec3, 3> half_side;
-};
-
-/// A box around points of one patch: flat if the patch is, and about as long as it.
-OrientedBox box_along_surface(std::span<const LitPoint> points) {
-  const glm::vec3 origin = points[0].position, normal = points[0].normal;
-  glm::vec3 along(0);
-  for (const LitPoint& point : points) {
-    const glm::vec3 path = point.position - origin;
-    const glm::vec3 flat = path - glm::dot(path, normal) * normal;
-    if (glm::dot(flat, flat) > glm::dot(along, along)) along = flat;
-  }
-  if (along == glm::vec3(0)) along = glm::cross(normal, glm::vec3(normal.y, normal.z, -normal.x));
-  const float length = glm::length(along);
-  const glm::vec3 x = length > 0 ? along / length : glm::vec3(1, 0, 0);
-  const std::array axes = {x, glm::cross(normal, x), normal};
-  Box box;
-  for (const LitPoint& point : points) {
-    const glm::vec3 path = point.position - origin;
-    box.add({glm::dot(path, axes[0]), glm::dot(path, axes[1]), glm::dot(path, axes[2])});
-  }
-  OrientedBox oriented{.middle = origin, .half_side = {}};
-  for (int k = 0; k < 3; ++k) {
-    oriented.middle += 0.5F * (box.low[k] + box.high[k]) * axes[k];
-    oriented.half_side[k] = 0.5F * (box.high[k] - box.low[k]) * axes[k];
-  }
-  return oriented;
-}
-
 }  // namespace
 
 Receivers::Receivers(const TransferData& data, const DirectLightingSettings& settings)
@@ -77,10 +46,7 @@ Receivers::Receivers(const TransferData& data, const DirectLightingSettings& set
 
 void Receivers::add_slot(std::uint32_t of_patch, std::span<const LitPoint> points) {
   const std::size_t block = size() / kBlock, slot = size() % kBlock;
-  if (slot == 0) {
-    point.resize(point.size() + points_per_patch);
-    boxes.emplace_back();
-  }
+  if (slot == 0) point.resize(point.size() + points_per_patch);
   if (slot % kPart == 0) bounds.emplace_back();
   for (std::size_t k = 0; k < points_per_patch; ++k) {
     PatchPointBlock& here = point[block * points_per_patch + k];
@@ -89,11 +55,6 @@ void Receivers::add_slot(std::uint32_t of_patch, std::span<const LitPoint> point
       here.normal[axis][slot] = points[k].normal[axis];
     }
     bounds.back().add(points[k]);
-  }
-  const auto [middle, side] = box_along_surface(points);
-  for (int axis = 0; axis < 3; ++axis) {
-    boxes[block].middle[axis][slot] = middle[axis];
-    for (int k = 0; k < 3; ++k) boxes[block].side[k][axis][slot] = side[k][axis];
   }
   patch.push_back(of_patch);
   shift.emplace_back(unit_square(mix_bits(~static_cast<std::uint64_t>(of_patch))));

@@ -31,13 +31,6 @@ struct Receivers {
   std::vector<std::uint32_t> patch;    ///< [slots]
   std::vector<PatchPointBlock> point;  ///< [blocks][points_per_patch], one for each slot
   std::vector<ReceiverBounds> bounds;  ///< [parts] of their points
-  /// Boxes around the points of each slot of a block, along its own axes, by coordinates: their
-  /// middles, and half of each side as a vector.
-  struct SlotBoxes {
-    std::array<PatchPointBlock::Coordinates, 3> middle;
-    std::array<std::array<PatchPointBlock::Coordinates, 3>, 3> side;
-  };
-  std::vector<SlotBoxes> boxes;  ///< [blocks]
   /// [points_per_patch][area_light_samples] sample points, for every lamp with a surface.
   std::vector<glm::vec2> places;
   std::vector<glm::vec2> shift;  ///< [slots] of the sample points

@@ -1,6 +1,6 @@
 #pragma once
 
-// Comparisons of points and boxes with planes, for one instruction set.
+// Comparisons of points and boxes with the planes of shadow volumes, for one instruction set.
 
 #include <cstddef>
 
@@ -22,15 +22,8 @@ struct VolumePlanes {
   Plane plane[kPlanes];
 };
 
-/// Points or boxes that are compared at a time, by coordinates.
+/// Points that are compared at a time.
 inline constexpr std::size_t kShadowLanes = 16;
-/// Boxes of any orientation: their middle, and half of each of their sides as vectors, [axis][lane]
-/// `stride` floats apart.
-struct BoxLanes {
-  const float* middle;
-  const float* side[3];
-  std::size_t stride;
-};
 
 struct ShadowKernels {
   const char* name;
@@ -44,9 +37,6 @@ struct ShadowKernels {
   /// Coordinates [axis][lane] are `stride` floats apart. Returns the least.
   float (*points_in_volumes)(const VolumePlanes* volume, std::size_t count, const float* position,
                              std::size_t stride, float* depth);
-  /// The same for boxes, by their innermost (`sign` 1) or outermost (-1) corner.
-  void (*boxes_in_volumes)(const VolumePlanes* volume, std::size_t count, const BoxLanes& box,
-                           float sign, float* depth);
 };
 
 /// Those of the widest instruction set that this processor has.

@@ -79,34 +79,8 @@ float points_in_volumes(const VolumePlanes* volume, std::size_t count, const flo
   return all;
 }
 
-void boxes_in_volumes(const VolumePlanes* volume, std::size_t count, const BoxLanes& box,
-                      float sign, float* depth) {
-  const std::size_t stride = box.stride;
-  float most[kShadowLanes];
-  for (float& value : most) value = -kBeyondAll;
-  for (std::size_t k = 0; k < count; ++k) {
-    float least[kShadowLanes];
-    for (float& value : least) value = kBeyondAll;
-    for (const VolumePlanes::Plane& p : volume[k].plane) {
-#pragma omp simd
-      for (std::size_t i = 0; i < kShadowLanes; ++i) {
-        const auto along = [&](const float* v) {
-          return multiply_add(p.x, v[i],
-                              multiply_add(p.y, v[i + stride], p.z * v[i + 2 * stride]));
-        };
-        const float reach =
-            magnitude(along(box.side[0])) + magnitude(along(box.side[1])) +
-            magnitude(along(box.side[2]));
-        least[i] = smaller(least[i], along(box.middle) - p.distance + sign * reach);
-      }
-    }
-    for (std::size_t i = 0; i < kShadowLanes; ++i) most[i] = larger(most[i], least[i]);
-  }
-  for (std::size_t i = 0; i < kShadowLanes; ++i) depth[i] = most[i];
-}
-
 constexpr ShadowKernels make_shadow_kernels(const char* name) {
-  return {name, box_in_volumes, points_in_volumes, boxes_in_volumes};
+  return {name, box_in_volumes, points_in_volumes};
 }
 
 }  // namespace
