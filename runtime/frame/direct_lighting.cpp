@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kBlock = Receivers::kBlock;
 constexpr std::size_t kAddedPerTask = 16;     // blocks per task where no light is traced
-constexpr std::size_t kMostOccluders = 4096;  // beyond this rays take less time
+constexpr std::size_t kMostPlanes = 1024;  // of occluders; beyond this only the largest are used
 
 }  // namespace
 
@@ -37,8 +37,7 @@ DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer
     : data_(data),
       tracer_(tracer),
       receivers_(std::make_shared<const Receivers>(data, settings)),
-      occluders_(std::make_shared<const std::vector<OccluderGroup>>(
-          in_groups(occluders_of(data.mesh, kMostOccluders)))) {
+      occluders_(std::make_shared<const OccluderGroups>(find_occluders(data.mesh, kMostPlanes))) {
   make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
 }
 
@@ -47,7 +46,7 @@ DirectLighting::DirectLighting(const DirectLighting&) = default;
 
 void DirectLighting::make_room(std::size_t light_count) {
   while (responses_.size() < light_count) {
-    responses_.emplace_back(receivers_->size(), receivers_->block_count(), occluders_->size());
+    responses_.emplace_back(receivers_->size(), receivers_->block_count(), occluders_->group.size());
   }
 }
 
@@ -60,7 +59,7 @@ void DirectLighting::compute(std::span<const Light> lights, const Sky& sky,
     parallel_for(scheduler, light_count_, [&](std::size_t k) {
       LightResponse& response = responses_[k];
       if (response.stale) {
-        response.volumes.set(response.light, *occluders_, tracer_.offset_distance());
+        response.volumes.set(response.light, occluders_->group, tracer_.offset_distance());
       }
     });
   }
@@ -97,8 +96,8 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
       std::span(response.irradiance).subspan(block * kBlock, receivers_->slots_in(block));
   std::ranges::fill(irradiance, 0.0F);
   response.lit[block] = 0;
-  add_lamp(*receivers_, tracer_, response.light, occluders_->empty() ? nullptr : &response.volumes,
-           block, irradiance);
+  add_lamp(*receivers_, tracer_, response.light, response.volumes, occluders_->is_whole, block,
+           irradiance);
   response.lit[block] = std::ranges::any_of(irradiance, [](float e) { return e > 0; }) ? 1 : 0;
 }
 

@@ -13,7 +13,7 @@
 
 namespace rebounce {
 
-struct OccluderGroup;
+struct OccluderGroups;
 struct Receivers;
 
 /// Direct irradiance of the patches of one scene, with shadows.
@@ -54,7 +54,7 @@ class DirectLighting {
   const TransferData& data_;
   const RayTracer& tracer_;
   std::shared_ptr<const Receivers> receivers_;
-  std::shared_ptr<const std::vector<OccluderGroup>> occluders_;  ///< none: rays find all shadows
+  std::shared_ptr<const OccluderGroups> occluders_;
   std::vector<LightResponse> responses_;
   std::size_t light_count_ = 0;  ///< of the current frame; at most the number of responses
   int traced_light_count_ = 0;

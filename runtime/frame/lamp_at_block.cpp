@@ -41,79 +41,78 @@ struct BlockLight {
 class LampAtBlock {
  public:
   LampAtBlock(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
-              std::size_t block, std::span<float> irradiance)
+              const ShadowVolumes& volumes, bool is_whole, std::size_t block,
+              std::span<float> irradiance)
       : receivers_(receivers),
         lamp_(lamp),
+        volumes_(volumes),
+        is_whole_(is_whole),
         block_(block),
         share_(1 / static_cast<float>(receivers.points_per_patch)),
         irradiance_(irradiance),
         shadows_(tracer, irradiance),
-        left_(receivers.reached(block, lamp)) {}
+        reached_(receivers.reached(block, lamp)) {}
 
-  void add(const ShadowVolumes* volumes) {
-    if (!any_left()) return;
-    if (volumes != nullptr) add_by_volumes(*volumes);
-    if (any_left()) add_by_rays();
+  void add() {
+    Box box;
+    for (std::size_t part = 0; part < reached_.size(); ++part) {
+      if (!reached_[part]) continue;
+      box.add(bounds(part).low);
+      box.add(bounds(part).high);
+    }
+    if (box.low.x > box.high.x) return;
+    std::array<ShadowVolumes::Number, kMostGroups> groups;
+    std::size_t count = 0;
+    const Between between = volumes_.groups_between(box, groups, count);
+    if (between == Between::kHidden) return;
+    for (std::size_t part = 0; part < reached_.size(); ++part) {
+      if (reached_[part]) add_part(part, between, std::span(groups).first(count));
+    }
     shadows_.flush();
   }
 
  private:
-  bool any_left() const { return std::ranges::find(left_, true) != left_.end(); }
+  using Between = ShadowVolumes::Between;
+
+  /// Volumes that some points of a part may be in.
+  struct Volumes {
+    std::array<VolumePlanes, kMostOfPart> outer, inner;
+    std::size_t outer_count = 0, inner_count = 0;
+    bool are_all = false;  ///< nothing else stands before the part
+  };
 
   const Box& bounds(std::size_t part) const {
-    return receivers_.bounds[block_ * left_.size() + part].box;
+    return receivers_.bounds[block_ * reached_.size() + part].box;
   }
 
   std::size_t slots_end(std::size_t part) const {
     return std::min(irradiance_.size(), (part + 1) * kPart);
   }
 
-  /// Adds the light of the parts before which there are few occluders; others are left.
-  void add_by_volumes(const ShadowVolumes& volumes) {
-    using Between = ShadowVolumes::Between;
-    Box box;
-    for (std::size_t part = 0; part < left_.size(); ++part) {
-      if (!left_[part]) continue;
-      box.add(bounds(part).low);
-      box.add(bounds(part).high);
-    }
-    std::array<ShadowVolumes::Number, kMostGroups> groups;
+  /// Adds the light of a part. `groups`: of occluders, if `between` is kSome.
+  void add_part(std::size_t part, Between between, Numbers groups) {
     std::array<ShadowVolumes::Number, kMostOfPart> numbers;
-    std::size_t group_count = 0, count = 0;
-    const Between near = volumes.groups_between(box, groups, group_count);
-    if (near == Between::kHidden) left_.fill(false);
-    if (near != Between::kSome) return;
-    for (std::size_t part = 0; part < left_.size(); ++part) {
-      if (!left_[part]) continue;
-      const Between here =
-          volumes.between(bounds(part), std::span(groups).first(group_count), numbers, count);
-      if (here == Between::kMany) continue;
-      left_[part] = here == Between::kSome &&
-                    !add_part(volumes, std::span(numbers).first(count), part);
+    std::size_t count = 0;
+    if (between == Between::kSome) between = volumes_.between(bounds(part), groups, numbers, count);
+    if (between == Between::kHidden) return;
+    Volumes volumes;
+    volumes.are_all = between == Between::kSome && is_whole_;
+    for (const ShadowVolumes::Number number : std::span(numbers).first(count)) {
+      volumes.outer[volumes.outer_count++] = volumes_.outer(number);
+      if (volumes_.is_certain(number)) {
+        volumes.inner[volumes.inner_count++] = volumes_.inner(number);
+      }
     }
-  }
-
-  /// Adds the light of a part that only `numbers` may hide. False if that takes rays.
-  bool add_part(const ShadowVolumes& volumes, Numbers numbers, std::size_t part) {
-    std::array<VolumePlanes, kMostOfPart> outer, inner;
-    std::size_t certain = 0;
-    for (std::size_t k = 0; k < numbers.size(); ++k) {
-      outer[k] = volumes.outer(numbers[k]);
-      if (!volumes.is_certain(numbers[k])) continue;
-      if (lamp_.has_area()) inner[certain] = volumes.inner(numbers[k]);
-      ++certain;
-    }
-    const auto all = std::span<const VolumePlanes>(outer).first(numbers.size());
     if (lamp_.has_area()) {
-      add_surface(all, std::span<const VolumePlanes>(inner).first(certain), part);
-      return true;
+      add_surface(volumes, part);
+    } else if (volumes.are_all && volumes.inner_count == volumes.outer_count) {
+      add_lit_points(volumes, part);
+    } else {
+      add_points(volumes, part);
     }
-    if (certain < numbers.size()) return false;
-    add_lit_points(all, part);
-    return true;
   }
 
-  /// How far point k of each slot of a part is in `volumes`. Returns the least.
+  /// How far point k of each slot of a part is in the first `count` of `volumes`. Returns the least.
   float depth_in(std::span<const VolumePlanes> volumes, std::size_t k, std::size_t part,
                  Depths& depth) const {
     const PatchPointBlock& points = receivers_.points(block_, k);
@@ -122,13 +121,34 @@ class LampAtBlock {
                                       depth.data());
   }
 
-  /// Adds the light of a lamp without a surface at the points of a part that are in no shadow.
-  void add_lit_points(std::span<const VolumePlanes> volumes, std::size_t part) {
+  /// What is in the way to point k of each slot of a part: nothing, something that hides the whole
+  /// lamp, or what only rays tell.
+  enum class Way : std::uint8_t { kFree, kHidden, kUnknown };
+  using Ways = std::array<Way, kPart>;
+
+  /// Returns false if all are hidden.
+  bool look(const Volumes& volumes, std::size_t k, std::size_t part, Ways& ways) const {
+    Depths partly, wholly;
+    if (depth_in(std::span(volumes.inner).first(volumes.inner_count), k, part, wholly) >= 0) {
+      return false;
+    }
+    depth_in(std::span(volumes.outer).first(volumes.outer_count), k, part, partly);
+    for (std::size_t e = 0; e < kPart; ++e) {
+      const bool free = volumes.are_all && partly[e] < 0;
+      ways[e] = wholly[e] >= 0 ? Way::kHidden : free ? Way::kFree : Way::kUnknown;
+    }
+    return true;
+  }
+
+  /// Adds the light of a lamp without a surface to a part of which volumes tell all.
+  void add_lit_points(const Volumes& volumes, std::size_t part) {
     BlockLight light;
     const float share = share_;
     Depths depth, sum{};
     for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
-      if (depth_in(volumes, k, part, depth) >= 0) continue;
+      if (depth_in(std::span(volumes.outer).first(volumes.outer_count), k, part, depth) >= 0) {
+        continue;
+      }
       light.evaluate(lamp_, receivers_.points(block_, k), part);
 #pragma omp simd
       for (std::size_t e = 0; e < kPart; ++e) {
@@ -140,22 +160,45 @@ class LampAtBlock {
     std::copy_n(sum.begin(), slots_end(part) - part * kPart, &irradiance_[part * kPart]);
   }
 
-  /// Adds the light of a lamp with a surface to a part. Points outside of all `outer` volumes see
-  /// the whole lamp, those in one of `inner` nothing of it; rays are for the others.
-  void add_surface(std::span<const VolumePlanes> outer, std::span<const VolumePlanes> inner,
-                   std::size_t part) {
-    Depths partly, wholly;
-    for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
-      if (depth_in(inner, k, part, wholly) >= 0) continue;
-      depth_in(outer, k, part, partly);
+  /// The same, by rays where volumes do not tell.
+  void add_points(const Volumes& volumes, std::size_t part) {
+    std::array<BlockLight, kPointsAtOnce> light;
+    std::array<Ways, kPointsAtOnce> ways;
+    for (std::size_t first = 0; first < receivers_.points_per_patch; first += kPointsAtOnce) {
+      const std::size_t last = std::min(first + kPointsAtOnce, receivers_.points_per_patch);
+      for (std::size_t k = first; k < last; ++k) {
+        if (!look(volumes, k, part, ways[k - first])) ways[k - first].fill(Way::kHidden);
+        light[k - first].evaluate(lamp_, receivers_.points(block_, k), part);
+      }
+      // Rays from the points of a patch take nearly the same way, so they follow each other.
       for (std::size_t slot = part * kPart; slot < slots_end(part); ++slot) {
-        const std::size_t e = slot - part * kPart;
-        if (wholly[e] >= 0) continue;
-        if (partly[e] < 0) {
-          const PatchPointBlock& points = receivers_.points(block_, k);
+        for (std::size_t k = first; k < last; ++k) {
+          const auto& [here, arriving] = light[k - first];
+          const Way way = ways[k - first][slot - part * kPart];
+          if (arriving[slot] <= 0 || way == Way::kHidden) continue;
+          if (way == Way::kFree) {
+            irradiance_[slot] += share_ * arriving[slot];
+          } else {
+            shadows_.add_ray(receivers_.points(block_, k).at(slot), here.at(slot),
+                             share_ * arriving[slot], slot);
+          }
+        }
+      }
+    }
+  }
+
+  /// Adds the light of a lamp with a surface to a part.
+  void add_surface(const Volumes& volumes, std::size_t part) {
+    Ways ways;
+    for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
+      if (!look(volumes, k, part, ways)) continue;
+      const PatchPointBlock& points = receivers_.points(block_, k);
+      for (std::size_t slot = part * kPart; slot < slots_end(part); ++slot) {
+        const Way way = ways[slot - part * kPart];
+        if (way == Way::kFree) {
           irradiance_[slot] +=
               share_ * lamp_.unoccluded_irradiance(points.at(slot), points.normal_at(slot));
-        } else {
+        } else if (way == Way::kUnknown) {
           add_surface(k, slot);
         }
       }
@@ -177,58 +220,24 @@ class LampAtBlock {
                          std::span(places).first(samples), share_, slot);
   }
 
-  /// Adds the light of all parts that are left.
-  void add_by_rays() {
-    if (!lamp_.has_area()) return add_points_by_rays();
-    for_each_slot([&](std::size_t slot) {
-      for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) add_surface(k, slot);
-    });
-  }
-
-  void add_points_by_rays() {
-    std::array<BlockLight, kPointsAtOnce> light;
-    for (std::size_t first = 0; first < receivers_.points_per_patch; first += kPointsAtOnce) {
-      const std::size_t last = std::min(first + kPointsAtOnce, receivers_.points_per_patch);
-      for (std::size_t part = 0; part < left_.size(); ++part) {
-        if (!left_[part]) continue;
-        for (std::size_t k = first; k < last; ++k) {
-          light[k - first].evaluate(lamp_, receivers_.points(block_, k), part);
-        }
-      }
-      // Rays from the points of a patch take nearly the same way, so they follow each other.
-      for_each_slot([&](std::size_t slot) {
-        for (std::size_t k = first; k < last; ++k) {
-          const auto& [here, arriving] = light[k - first];
-          if (arriving[slot] <= 0) continue;
-          shadows_.add_ray(receivers_.points(block_, k).at(slot), here.at(slot),
-                           share_ * arriving[slot], slot);
-        }
-      });
-    }
-  }
-
-  template <typename Work>
-  void for_each_slot(const Work& work) const {
-    for (std::size_t slot = 0; slot < irradiance_.size(); ++slot) {
-      if (left_[slot / kPart]) work(slot);
-    }
-  }
-
   const Receivers& receivers_;
   const PreparedLight& lamp_;
+  const ShadowVolumes& volumes_;
+  bool is_whole_;
   const ShadowKernels& kernels_ = shadow_kernels();
   std::size_t block_;
   float share_;  ///< of each point of a patch
   std::span<float> irradiance_;
   LampShadows shadows_;
-  Receivers::Reached left_;  ///< parts whose light is still to be added
+  Receivers::Reached reached_;
 };
 
 }  // namespace
 
 void add_lamp(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
-              const ShadowVolumes* volumes, std::size_t block, std::span<float> irradiance) {
-  LampAtBlock(receivers, tracer, lamp, block, irradiance).add(volumes);
+              const ShadowVolumes& volumes, bool is_whole, std::size_t block,
+              std::span<float> irradiance) {
+  LampAtBlock(receivers, tracer, lamp, volumes, is_whole, block, irradiance).add();
 }
 
 }  // namespace rebounce

@@ -14,12 +14,14 @@ namespace rebounce {
 
 /// Adds the irradiance from `lamp` at intensity 1 to that of the slots of a block, in lx.
 ///
-/// Shadows come from `volumes`, those of all that stands in the scene: what they hide or leave free
-/// as a whole needs no ray. Points of patches are compared with the volumes of lamps without a
-/// surface; where a lamp with a surface is hidden in part, rays to its sample points tell how much.
-/// Rays also take the place of volumes where there are too many in one place, or where light may
-/// get through, and everywhere if `volumes` is null. Does not allocate.
+/// Shadows come from `volumes`, those of what stands in the scene: points in none of them see the
+/// lamp, and points inside one that is wholly in the shadow see nothing of it. Rays tell of the
+/// others: of points from which a lamp with a surface is hidden in part, and of those behind
+/// something that lets light through. They also take the place of volumes where there are too many
+/// of them in one place. `is_whole` tells whether `volumes` are all that stands in the scene;
+/// otherwise rays look for the rest. Does not allocate.
 void add_lamp(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
-              const ShadowVolumes* volumes, std::size_t block, std::span<float> irradiance);
+              const ShadowVolumes& volumes, bool is_whole, std::size_t block,
+              std::span<float> irradiance);
 
 }  // namespace rebounce

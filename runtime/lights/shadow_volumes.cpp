@@ -26,23 +26,22 @@ void put(PlaneLanes& planes, std::size_t lane, const glm::vec3& normal, float di
 
 }  // namespace
 
-std::vector<OccluderGroup> in_groups(std::span<const Occluder> occluders) {
-  std::vector<OccluderGroup> groups((occluders.size() + kLanes - 1) / kLanes);
-  for (std::size_t k = 0; k < occluders.size(); ++k) {
-    OccluderGroup& group = groups[k / kLanes];
+OccluderGroups::OccluderGroups(const Occluders& occluders)
+    : group((occluders.piece.size() + kLanes - 1) / kLanes), is_whole(occluders.is_whole) {
+  for (std::size_t k = 0; k < occluders.piece.size(); ++k) {
+    OccluderGroup& here = group[k / kLanes];
     const std::size_t lane = k % kLanes;
-    const Occluder& occluder = occluders[k];
-    put(group.normal, lane, occluder.normal);
-    group.solid[lane] = occluder.solid;
+    const Occluder& occluder = occluders.piece[k];
+    put(here.normal, lane, occluder.normal);
+    here.solid[lane] = occluder.solid;
     for (std::size_t c = 0; c < kCorners; ++c) {
       const glm::vec3 from = occluder.corner[c];
       const glm::vec3 along = occluder.corner[(c + 1) % kCorners] - from;
       const float length = glm::length(along);
-      put(group.corner[c], lane, from);
-      if (length > 0) put(group.inward[c], lane, glm::cross(occluder.normal, along / length));
+      put(here.corner[c], lane, from);
+      if (length > 0) put(here.inward[c], lane, glm::cross(occluder.normal, along / length));
     }
   }
-  return groups;
 }
 
 /// What a lamp's surface lies in: a ball around its position, or the parallelogram that its sides

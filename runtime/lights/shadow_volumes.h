@@ -31,7 +31,12 @@ struct OccluderGroup {
   std::array<bool, kLanes> solid{};
 };
 
-std::vector<OccluderGroup> in_groups(std::span<const Occluder> occluders);
+struct OccluderGroups {
+  std::vector<OccluderGroup> group;
+  bool is_whole;  ///< see Occluders
+
+  explicit OccluderGroups(const Occluders& occluders);
+};
 
 /// What occluders hide of one lamp.
 class ShadowVolumes {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <map>
-#include <numeric>
 #include <span>
 #include <utility>
 
@@ -139,31 +138,37 @@ struct Plane {
   }
 };
 
-/// A corner by its position: meshes have several vertices in one place.
+/// A side by the positions of its ends: meshes have several vertices in one place.
 using SideKey = std::pair<Float3, Float3>;
 
 class Planes {
  public:
-  explicit Planes(const DisplayMesh& mesh)
+  Planes(const DisplayMesh& mesh, std::size_t most)
       : mesh_(mesh),
         tolerance_(ray_offset_distance(mesh.position) / 4),
         plane_of_(mesh.surface_count(), kNone) {
     for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
-      for (const SideKey& side : sides_of(t)) of_side_[std::minmax(side.first, side.second)].push_back(t);
+      for (const SideKey& side : sides_of(t)) by_side_.emplace_back(std::minmax(side.first, side.second), t);
     }
-    std::vector<std::uint32_t> order(mesh.surface_count());
-    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::sort(by_side_);
+    std::vector<std::pair<double, std::uint32_t>> by_area;
+    for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
+      const double area = area_of(corners_of(mesh, t));
+      if (area > 0) by_area.emplace_back(-area, t);
+    }
     // The largest first: its corners say best where the plane is.
-    std::ranges::stable_sort(order, std::greater<>(),
-                             [&](std::uint32_t t) { return area_of(corners_of(mesh, t)); });
-    for (const std::uint32_t t : order) {
-      if (plane_of_[t] == kNone && area_of(corners_of(mesh, t)) > 0) grow(t);
+    std::ranges::sort(by_area);
+    for (const auto& [area, t] : by_area) {
+      if (plane_of_[t] != kNone) continue;
+      is_whole_ = plane_.size() < most;
+      if (!is_whole_) return;
+      grow(t);
     }
   }
 
-  std::vector<Occluder> take() const {
-    std::vector<Occluder> occluders;
-    for (const Plane& plane : plane_) add_pieces(plane, occluders);
+  Occluders take() const {
+    Occluders occluders{.piece = {}, .is_whole = is_whole_};
+    for (const Plane& plane : plane_) add_pieces(plane, occluders.piece);
     return occluders;
   }
 
@@ -172,6 +177,14 @@ class Planes {
     const auto& [a, b, c] = mesh_.triangle[t];
     const std::vector<Float3>& p = mesh_.position;
     return {SideKey{p[a], p[b]}, SideKey{p[b], p[c]}, SideKey{p[c], p[a]}};
+  }
+
+  /// The triangles that have a side.
+  template <typename Visit>
+  void for_each_at(const SideKey& side, const Visit& visit) const {
+    const SideKey key = std::minmax(side.first, side.second);
+    auto at = std::ranges::lower_bound(by_side_, std::pair(key, 0U));
+    for (; at != by_side_.end() && at->first == key; ++at) visit(at->second);
   }
 
   void grow(std::uint32_t first) {
@@ -184,12 +197,13 @@ class Planes {
     plane_of_[first] = number;
     const bool solid = mesh_.opacity.of_triangle(first).empty();
     for (std::size_t k = 0; solid && k < plane.triangle.size(); ++k) {
-      for (const SideKey& side : sides_of(plane.triangle[k])) {
-        for (const std::uint32_t t : of_side_.at(std::minmax(side.first, side.second))) {
-          if (plane_of_[t] != kNone || !belongs_to(plane, t)) continue;
+      const std::array<SideKey, 3> sides = sides_of(plane.triangle[k]);
+      for (const SideKey& side : sides) {
+        for_each_at(side, [&](std::uint32_t t) {
+          if (plane_of_[t] != kNone || !belongs_to(plane, t)) return;
           plane_of_[t] = number;
           plane.triangle.push_back(t);
-        }
+        });
       }
     }
     plane_.push_back(std::move(plane));
@@ -243,9 +257,10 @@ class Planes {
 
   const DisplayMesh& mesh_;
   double tolerance_;
-  std::map<SideKey, std::vector<std::uint32_t>> of_side_;
+  std::vector<std::pair<SideKey, std::uint32_t>> by_side_;
   std::vector<std::uint32_t> plane_of_;  ///< [triangles]
   std::vector<Plane> plane_;
+  bool is_whole_ = true;
 };
 
 /// The lowest ten bits of `x`, with two zeros after each.
@@ -272,10 +287,9 @@ void sort_by_place(std::vector<Occluder>& occluders) {
 
 }  // namespace
 
-std::vector<Occluder> occluders_of(const DisplayMesh& mesh, std::size_t most) {
-  std::vector<Occluder> occluders = Planes(mesh).take();
-  sort_by_place(occluders);
-  if (occluders.size() > most) occluders.clear();
+Occluders find_occluders(const DisplayMesh& mesh, std::size_t most) {
+  Occluders occluders = Planes(mesh, most).take();
+  sort_by_place(occluders.piece);
   return occluders;
 }
 

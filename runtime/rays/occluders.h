@@ -19,10 +19,15 @@ struct Occluder {
   bool solid;        ///< false: light may get through, by an opacity map
 };
 
-/// The surface that `mesh` traces rays against (its first surface_count() triangles), with
-/// neighbouring triangles of one plane joined wherever that gives a convex piece of at most four
-/// corners. Pieces deviate from the triangles by less than a quarter of ray_offset_distance().
-/// Returns nothing if there are more than `most` pieces.
-std::vector<Occluder> occluders_of(const DisplayMesh& mesh, std::size_t most);
+struct Occluders {
+  std::vector<Occluder> piece;
+  bool is_whole = true;  ///< false: only some of the largest pieces of the surface
+};
+
+/// The surface that `mesh` traces rays against (its first surface_count() triangles), cut into
+/// pieces anew: neighbouring triangles in one plane, to a quarter of ray_offset_distance(), are
+/// joined first. Pieces near each other follow each other. If there are more than `most` planes,
+/// only `most` are taken, those of the largest triangles.
+Occluders find_occluders(const DisplayMesh& mesh, std::size_t most);
 
 }  // namespace rebounce
