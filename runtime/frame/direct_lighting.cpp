@@ -12,9 +12,9 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kBlock = Receivers::kBlock;
 constexpr std::size_t kAddedPerTask = 16;     // blocks per task where no light is traced
-constexpr std::size_t kMostPlanes = 1024;  // of occluders; beyond this only the largest are used
+// Planes of a scene whose shadow volumes are all compared with, and those of a scene that has more.
+constexpr std::size_t kWholeScene = 1024, kLargestPlanes = 64;
 
 }  // namespace
 
@@ -33,11 +33,13 @@ struct DirectLighting::LightResponse {
 };
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
-                               const DirectLightingSettings& settings)
+                               const DirectLightingSettings& settings, ShadowMethod method)
     : data_(data),
       tracer_(tracer),
       receivers_(std::make_shared<const Receivers>(data, settings)),
-      occluders_(std::make_shared<const OccluderGroups>(find_occluders(data.mesh, kMostPlanes))) {
+      occluders_(std::make_shared<const OccluderGroups>(
+          method == ShadowMethod::kVolumes ? find_occluders(data.mesh, kWholeScene, kLargestPlanes)
+                                           : Occluders{.piece = {}, .is_whole = false})) {
   make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
 }
 
@@ -93,7 +95,7 @@ void DirectLighting::prepare(std::span<const Light> lights) {
 
 void DirectLighting::respond(LightResponse& response, std::size_t block) const {
   const std::span<float> irradiance =
-      std::span(response.irradiance).subspan(block * kBlock, receivers_->slots_in(block));
+      std::span(response.irradiance).subspan(block * Receivers::kBlock, receivers_->slots_in(block));
   std::ranges::fill(irradiance, 0.0F);
   response.lit[block] = 0;
   add_lamp(*receivers_, tracer_, response.light, response.volumes, occluders_->is_whole, block,
@@ -103,7 +105,7 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
 
 void DirectLighting::add_up(const Sky& sky, std::size_t block,
                             std::span<Float3> direct_irradiance) const {
-  const std::size_t begin = block * kBlock, count = receivers_->slots_in(block);
+  const std::size_t begin = block * Receivers::kBlock, count = receivers_->slots_in(block);
   const std::span<const std::uint32_t> patch = std::span(receivers_->patch).subspan(begin, count);
   for (const std::uint32_t i : patch) direct_irradiance[i] = sky_irradiance(data_, sky, i);
   for (const LightResponse& response : std::span(responses_).first(light_count_)) {

@@ -16,6 +16,12 @@ namespace rebounce {
 struct OccluderGroups;
 struct Receivers;
 
+/// How shadows are found.
+enum class ShadowMethod : std::uint8_t {
+  kVolumes,  ///< by the shadow volumes of flat pieces of surface, and by rays where those do not tell
+  kRays,     ///< by rays from all points: what kVolumes is compared with
+};
+
 /// Direct irradiance of the patches of one scene, with shadows.
 ///
 /// The points on patches and on lamps are chosen once, so a moving light does not flicker. The
@@ -29,7 +35,8 @@ class DirectLighting {
   /// `data` and `tracer` (over the first surface_count triangles of data.mesh) must outlive the
   /// object and its copies. Throws Error if a setting is out of range.
   DirectLighting(const TransferData& data, const RayTracer& tracer,
-                 const DirectLightingSettings& settings = {});
+                 const DirectLightingSettings& settings = {},
+                 ShadowMethod method = ShadowMethod::kVolumes);
   ~DirectLighting();
   DirectLighting(const DirectLighting&);
   DirectLighting& operator=(const DirectLighting&) = delete;

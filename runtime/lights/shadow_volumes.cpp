@@ -47,10 +47,10 @@ OccluderGroups::OccluderGroups(const Occluders& occluders)
 /// What a lamp's surface lies in: a ball around its position, or the parallelogram that its sides
 /// span there. A lamp without a place is infinitely far.
 struct ShadowVolumes::Lamp {
-  explicit Lamp(const PreparedLight& lamp, float tolerance)
+  Lamp(const PreparedLight& lamp, float of_planes)
       : at(lamp.kind->has_place() ? lamp.position : -lamp.direction),
         has_place(lamp.kind->has_place() ? 1.0F : 0.0F),
-        tolerance(tolerance) {
+        tolerance(of_planes) {
     if (!lamp.has_area()) return;
     side = lamp.side;
     other_side = lamp.other_side;

@@ -143,7 +143,7 @@ using SideKey = std::pair<Float3, Float3>;
 
 class Planes {
  public:
-  Planes(const DisplayMesh& mesh, std::size_t most)
+  Planes(const DisplayMesh& mesh, std::size_t most, std::size_t largest)
       : mesh_(mesh),
         tolerance_(ray_offset_distance(mesh.position) / 4),
         plane_of_(mesh.surface_count(), kNone) {
@@ -160,8 +160,11 @@ class Planes {
     std::ranges::sort(by_area);
     for (const auto& [area, t] : by_area) {
       if (plane_of_[t] != kNone) continue;
-      is_whole_ = plane_.size() < most;
-      if (!is_whole_) return;
+      if (plane_.size() == most) {
+        is_whole_ = false;
+        plane_.resize(std::min(most, largest));
+        return;
+      }
       grow(t);
     }
   }
@@ -287,8 +290,8 @@ void sort_by_place(std::vector<Occluder>& occluders) {
 
 }  // namespace
 
-Occluders find_occluders(const DisplayMesh& mesh, std::size_t most) {
-  Occluders occluders = Planes(mesh, most).take();
+Occluders find_occluders(const DisplayMesh& mesh, std::size_t most, std::size_t largest) {
+  Occluders occluders = Planes(mesh, most, largest).take();
   sort_by_place(occluders.piece);
   return occluders;
 }

@@ -27,7 +27,7 @@ struct Occluders {
 /// The surface that `mesh` traces rays against (its first surface_count() triangles), cut into
 /// pieces anew: neighbouring triangles in one plane, to a quarter of ray_offset_distance(), are
 /// joined first. Pieces near each other follow each other. If there are more than `most` planes,
-/// only `most` are taken, those of the largest triangles.
-Occluders find_occluders(const DisplayMesh& mesh, std::size_t most);
+/// only `largest` are taken, those of the largest triangles.
+Occluders find_occluders(const DisplayMesh& mesh, std::size_t most, std::size_t largest);
 
 }  // namespace rebounce
