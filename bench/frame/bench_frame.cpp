@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::array<std::size_t, 3> kLightCounts = {1, 4, 16};
 constexpr std::size_t kMovingCount = 2;  // of the lights of a whole frame
-constexpr std::size_t kMapSize = 8;  // of an irradiance map
+constexpr std::size_t kMapSize = 8;      // of an irradiance map
 
 constexpr const char* kBareRays = "16,384 shadow rays alone";
 
@@ -86,9 +86,16 @@ class FrameBenchmark {
     add_outputs();
     const std::vector<Timing> timings = time_interleaved(cases_, {.rounds = options_.repeats});
     for (std::size_t k = 0; k < cases_.size(); ++k) {
-      table.add({scene_name(engine_.data()), engine_.data().patches.size(), threads,
-                 names_[k].first, names_[k].second, timings[k].median * 1e6, timings[k].spread,
-                 {}, {}, {}});
+      table.add({scene_name(engine_.data()),
+                 engine_.data().patches.size(),
+                 threads,
+                 names_[k].first,
+                 names_[k].second,
+                 timings[k].median * 1e6,
+                 timings[k].spread,
+                 {},
+                 {},
+                 {}});
     }
   }
 
@@ -168,8 +175,16 @@ void run_direct(const TransferData& data, const CommonOptions& options, int thre
   const std::vector<Timing> timings = time_interleaved(cases, {.rounds = options.repeats});
   const std::string name = scene_name(data);
   const auto microseconds = [&](std::size_t k) { return timings[k].median * 1e6; };
-  table.add({name, data.patches.size(), threads, kBareRays, {}, microseconds(0), timings[0].spread,
-             {}, {}, {}});
+  table.add({name,
+             data.patches.size(),
+             threads,
+             kBareRays,
+             {},
+             microseconds(0),
+             timings[0].spread,
+             {},
+             {},
+             {}});
   for (std::size_t k = 0; k < direct.rows().size(); ++k) {
     const DirectCases::Row& row = direct.rows()[k];
     table.add({name, data.patches.size(), threads, row.name, row.lights, microseconds(1 + 2 * k),
@@ -185,6 +200,7 @@ TransferData patches_of(const std::string& scene, std::size_t patch_count) {
   data.record.scene_name = std::filesystem::path(scene).filename().string();
   data.mesh = std::move(model.mesh);
   data.patches = std::move(model.patches);
+  data.patches.sky_visibility.assign(data.patches.size(), 0);
   return data;
 }
 
@@ -195,9 +211,8 @@ void run(const FrameOptions& options) {
     for (const std::string& scene : options.input.inputs) {
       for (const std::size_t count : options.input.patch_counts) {
         const TransferData data = patches_of(scene, count);
-        run_at_thread_counts(options.common, [&](int threads) {
-          run_direct(data, options.common, threads, table);
-        });
+        run_at_thread_counts(
+            options.common, [&](int threads) { run_direct(data, options.common, threads, table); });
         save("bench_frame", table, options.common);
       }
     }

@@ -30,7 +30,8 @@ DirectCases::DirectCases(const TransferData& data, const RayTracer& tracer)
   for (const LightType type : kLampTypes) {
     const DirectErrors of_type = errors(type);
     for (const std::size_t count : kMovedCounts) {
-      rows_.push_back({"direct, " + std::string(lamp_kind(type).plural) + " moved", count, of_type});
+      rows_.push_back(
+          {"direct, " + std::string(lamp_kind(type).plural) + " moved", count, of_type});
     }
   }
 }
@@ -38,8 +39,7 @@ DirectCases::DirectCases(const TransferData& data, const RayTracer& tracer)
 /// Lamps in the free space of the scene. What shines one way only shines towards some patch.
 std::vector<Light> DirectCases::lamps(LightType type, std::size_t count) const {
   const double diagonal = box_around(data_.mesh.position).diagonal();
-  std::vector<Light> lamps =
-      random_point_lights(data_, tracer_, static_cast<int>(count), kSeed);
+  std::vector<Light> lamps = random_point_lights(data_, tracer_, static_cast<int>(count), kSeed);
   for (std::size_t k = 0; k < lamps.size(); ++k) {
     const Float3& target = data_.patches.centroid[mix_bits(k) % data_.patches.size()];
     lamps[k] = lamp_of_type(type, lamps[k], target, diagonal);

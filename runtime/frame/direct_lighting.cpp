@@ -12,7 +12,7 @@
 namespace rebounce {
 namespace {
 
-constexpr std::size_t kAddedPerTask = 16;     // blocks per task where no light is traced
+constexpr std::size_t kAddedPerTask = 16;  // blocks per task where no light is traced
 // Planes of a scene whose shadow volumes are all compared with, and those of a scene that has more.
 constexpr std::size_t kWholeScene = 1024, kLargestPlanes = 64;
 
@@ -48,7 +48,8 @@ DirectLighting::DirectLighting(const DirectLighting&) = default;
 
 void DirectLighting::make_room(std::size_t light_count) {
   while (responses_.size() < light_count) {
-    responses_.emplace_back(receivers_->size(), receivers_->block_count(), occluders_->group.size());
+    responses_.emplace_back(receivers_->size(), receivers_->block_count(),
+                            occluders_->group.size());
   }
 }
 
@@ -95,7 +96,8 @@ void DirectLighting::prepare(std::span<const Light> lights) {
 
 void DirectLighting::respond(LightResponse& response, std::size_t block) const {
   const std::span<float> irradiance =
-      std::span(response.irradiance).subspan(block * Receivers::kBlock, receivers_->slots_in(block));
+      std::span(response.irradiance)
+          .subspan(block * Receivers::kBlock, receivers_->slots_in(block));
   std::ranges::fill(irradiance, 0.0F);
   response.lit[block] = 0;
   add_lamp(*receivers_, tracer_, response.light, response.volumes, occluders_->is_whole, block,

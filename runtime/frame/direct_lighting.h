@@ -18,7 +18,8 @@ struct Receivers;
 
 /// How shadows are found.
 enum class ShadowMethod : std::uint8_t {
-  kVolumes,  ///< by the shadow volumes of flat pieces of surface, and by rays where those do not tell
+  kVolumes,  ///< by the shadow volumes of flat pieces of surface, and by rays where those do not
+             ///< tell
   kRays,     ///< by rays from all points: what kVolumes is compared with
 };
 

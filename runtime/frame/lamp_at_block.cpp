@@ -112,7 +112,8 @@ class LampAtBlock {
     }
   }
 
-  /// How far point k of each slot of a part is in the first `count` of `volumes`. Returns the least.
+  /// How far point k of each slot of a part is in the first `count` of `volumes`. Returns the
+  /// least.
   float depth_in(std::span<const VolumePlanes> volumes, std::size_t k, std::size_t part,
                  Depths& depth) const {
     const PatchPointBlock& points = receivers_.points(block_, k);

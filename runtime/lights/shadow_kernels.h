@@ -3,6 +3,7 @@
 // Comparisons of points and boxes with the planes of shadow volumes, for one instruction set.
 
 #include <cstddef>
+#include <span>
 
 namespace rebounce {
 
@@ -28,8 +29,8 @@ inline constexpr std::size_t kShadowLanes = 16;
 struct ShadowKernels {
   const char* name;
 
-  /// Bit k of the result tells whether a box along the axes (`middle`, `half` sides) meets volume k,
-  /// whose planes are lane k of `plane` [VolumePlanes::kPlanes], if `sign` is 1; whether it is
+  /// Bit k of the result tells whether a box along the axes (`middle`, `half` sides) meets volume
+  /// k, whose planes are lane k of `plane` [VolumePlanes::kPlanes], if `sign` is 1; whether it is
   /// wholly inside if `sign` is -1.
   unsigned (*box_in_volumes)(const PlaneLanes* plane, const float* middle, const float* half,
                              float sign);
@@ -39,7 +40,10 @@ struct ShadowKernels {
                              std::size_t stride, float* depth);
 };
 
-/// Those of the widest instruction set that this processor has.
+/// Those that this processor can run, the portable ones first.
+std::span<const ShadowKernels* const> shadow_kernel_sets();
+
+/// The last of them.
 const ShadowKernels& shadow_kernels();
 
 extern const ShadowKernels kShadowKernelsPortable, kShadowKernelsAvx2, kShadowKernelsAvx512;

@@ -39,10 +39,10 @@ unsigned box_in_volumes(const PlaneLanes* plane, const float* middle, const floa
     for (std::size_t k = 0; k < PlaneLanes::kLanes; ++k) {
       const float height = multiply_add(
           here.x[k], x, multiply_add(here.y[k], y, multiply_add(here.z[k], z, -here.distance[k])));
-      const float furthest = multiply_add(
-          magnitude(here.x[k]), half_x,
-          multiply_add(magnitude(here.y[k]), half_y,
-                       multiply_add(magnitude(here.z[k]), half_z, height)));
+      const float furthest =
+          multiply_add(magnitude(here.x[k]), half_x,
+                       multiply_add(magnitude(here.y[k]), half_y,
+                                    multiply_add(magnitude(here.z[k]), half_z, height)));
       all[k] = smaller(all[k], furthest);
     }
   }
@@ -65,8 +65,8 @@ float points_in_volumes(const VolumePlanes* volume, std::size_t count, const flo
         return multiply_add(p.x, x[i],
                             multiply_add(p.y, y[i], multiply_add(p.z, z[i], -p.distance)));
       };
-      const float least = smaller(smaller(smaller(height(a), height(b)), height(c)),
-                                  smaller(height(d), height(e)));
+      const float least =
+          smaller(smaller(smaller(height(a), height(b)), height(c)), smaller(height(d), height(e)));
       most[i] = larger(most[i], least);
     }
   }

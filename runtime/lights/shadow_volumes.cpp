@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kLanes = OccluderGroup::kLanes, kCorners = OccluderGroup::kCorners;
 constexpr float kNever = std::numeric_limits<float>::max();  // distance of a plane without
-                                                                // an inner side
+                                                             // an inner side
 using Vectors = OccluderGroup::Vectors;
 
 void put(Vectors& vectors, std::size_t lane, const glm::vec3& v) {

@@ -25,7 +25,8 @@ struct OccluderGroup {
   using Lanes = std::array<float, kLanes>;
   using Vectors = std::array<Lanes, 3>;
   std::array<Vectors, kCorners> corner{};
-  /// Unit, in the plane, perpendicular to the side from a corner to the next; 0 if it has no length.
+  /// Unit, in the plane, perpendicular to the side from a corner to the next; 0 if it has no
+  /// length.
   std::array<Vectors, kCorners> inward{};
   Vectors normal{};
   std::array<bool, kLanes> solid{};

@@ -148,7 +148,8 @@ class Planes {
         tolerance_(ray_offset_distance(mesh.position) / 4),
         plane_of_(mesh.surface_count(), kNone) {
     for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
-      for (const SideKey& side : sides_of(t)) by_side_.emplace_back(std::minmax(side.first, side.second), t);
+      for (const SideKey& side : sides_of(t))
+        by_side_.emplace_back(std::minmax(side.first, side.second), t);
     }
     std::ranges::sort(by_side_);
     std::vector<std::pair<double, std::uint32_t>> by_area;
@@ -192,7 +193,8 @@ class Planes {
 
   void grow(std::uint32_t first) {
     const auto corner = corners_of(mesh_, first);
-    Plane plane{.origin = corner[0], .normal = front_normal(corner), .x = {}, .y = {}, .triangle = {}};
+    Plane plane{
+        .origin = corner[0], .normal = front_normal(corner), .x = {}, .y = {}, .triangle = {}};
     plane.x = glm::normalize(corner[1] - corner[0]);
     plane.y = glm::cross(plane.normal, plane.x);
     const auto number = static_cast<std::uint32_t>(plane_.size());
@@ -216,9 +218,8 @@ class Planes {
     if (!mesh_.opacity.of_triangle(t).empty()) return false;
     const auto corner = corners_of(mesh_, t);
     return glm::dot(area_vector(corner), plane.normal) > 0 &&
-           std::ranges::all_of(corner, [&](const glm::dvec3& p) {
-             return std::abs(plane.height(p)) < tolerance_;
-           });
+           std::ranges::all_of(
+               corner, [&](const glm::dvec3& p) { return std::abs(plane.height(p)) < tolerance_; });
   }
 
   /// The sides that no second triangle of the plane has the other way round.
@@ -236,7 +237,8 @@ class Planes {
     }
     std::vector<Side> sides;
     for (const auto& [side, times] : count) {
-      if (times > 0) sides.push_back({plane.at(to_dvec3(side.first)), plane.at(to_dvec3(side.second))});
+      if (times > 0)
+        sides.push_back({plane.at(to_dvec3(side.first)), plane.at(to_dvec3(side.second))});
     }
     return sides;
   }
@@ -246,8 +248,8 @@ class Planes {
     for (const Outline& piece : ConvexPieces(outline(plane), tolerance_).take()) {
       // Fans of pieces with four corners, if there are more.
       for (std::size_t k = 1; k + 1 < piece.size(); k += 2) {
-        const std::array<std::size_t, Occluder::kCorners> number{
-            0, k, k + 1, std::min(k + 2, piece.size() - 1)};
+        const std::array<std::size_t, Occluder::kCorners> number{0, k, k + 1,
+                                                                 std::min(k + 2, piece.size() - 1)};
         Occluder occluder{.corner = {}, .normal = plane.normal, .solid = solid};
         for (std::size_t c = 0; c < number.size(); ++c) {
           const glm::dvec2& at = piece[number[c]];
