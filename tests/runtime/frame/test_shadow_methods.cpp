@@ -7,7 +7,7 @@
 
 #include "runtime/frame/direct_lighting.h"
 #include "runtime/lights/lamp_kind.h"
-#include "tests/support/furnished_box.h"
+#include "tests/support/test_scene_data.h"
 #include "transfer/base/area_norm.h"
 
 namespace rebounce::test_shadow_methods {

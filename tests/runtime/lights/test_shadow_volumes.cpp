@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "tests/support/furnished_box.h"
+#include "tests/support/test_scene_data.h"
 
 namespace rebounce::test_shadow_volumes {
 namespace {

@@ -5,7 +5,7 @@
 #include <random>
 
 #include "runtime/rays/ray_tracer.h"
-#include "tests/support/furnished_box.h"
+#include "tests/support/test_scene_data.h"
 
 namespace rebounce::test_occluders {
 namespace {
