@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kAddedPerTask = 16;  // blocks per task where no light is traced
 // Planes of a scene whose shadow volumes are all compared with, and those of a scene that has more.
-constexpr std::size_t kWholeScene = 1024, kLargestPlanes = 64;
+constexpr std::size_t kWholeScene = 1024, kLargestPlanes = 64;  // lab/091
 
 }  // namespace
 
