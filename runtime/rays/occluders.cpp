@@ -48,8 +48,6 @@ class ConvexPieces {
       low = glm::min(low, s.from);
       high = glm::max(high, s.from);
     }
-    low -= tolerance;
-    high += tolerance;
     cut({low, {high.x, low.y}, high, {low.x, high.y}}, {side.begin(), side.end()});
   }
 
