@@ -1,13 +1,17 @@
 // bench_frame: the stages of a frame: direct light, the product, outputs.
 
 #include <algorithm>
+#include <filesystem>
 #include <memory>
 #include <utility>
 
+#include "bench/frame/direct_cases.h"
 #include "bench/support/input.h"
 #include "bench/support/program.h"
 #include "bench/support/timing.h"
+#include "precompute/import/import_gltf.h"
 #include "precompute/lights/random_lights.h"
+#include "precompute/patches/patch_model.h"
 #include "rebounce/outputs.h"
 #include "runtime/frame/engine_parts.h"
 #include "runtime/outputs/probe_irradiance.h"
@@ -21,10 +25,12 @@ namespace {
 
 constexpr std::array<std::size_t, 3> kLightCounts = {1, 4, 16};
 constexpr std::size_t kMovingCount = 2;  // of the lights of a whole frame
-constexpr std::size_t kBareRays = 16384;
-constexpr std::size_t kMapSize = 8;  // of an irradiance map
+constexpr std::size_t kMapSize = 8;      // of an irradiance map
+
+constexpr const char* kBareRays = "16,384 shadow rays alone";
 
 struct FrameOptions {
+  bool direct_only = false;
   InputOptions input{.patch_counts = {4000}};
   CommonOptions common{.repeats = 31};
 };
@@ -39,16 +45,6 @@ class MovingLights {
         random_point_lights(engine.data(), *engine.parts().tracer, twice, 7);
     lights_.assign(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
     elsewhere_.assign(all.begin() + static_cast<std::ptrdiff_t>(count), all.end());
-  }
-
-  void turn_into(LightType type) {
-    for (std::vector<Light>* lights : {&lights_, &elsewhere_}) {
-      for (Light& light : *lights) {
-        light.type = type;
-        light.radius = 0.05F;
-        light.outer_cone_angle = 0.6F;
-      }
-    }
   }
 
   std::span<const Light> next() {
@@ -84,15 +80,22 @@ class FrameBenchmark {
     names_.clear();
     cases_.clear();
     for (const std::size_t count : kLightCounts) add_lights(count);
-    add_bare_rays();
     add("initial exitance", {}, [this] { engine_.parts().compute_initial_exitance(); });
     add("product", {}, [this] { engine_.parts().apply_transfer(); });
     add("radiosity", {}, [this] { engine_.parts().compute_radiosity(); });
     add_outputs();
     const std::vector<Timing> timings = time_interleaved(cases_, {.rounds = options_.repeats});
     for (std::size_t k = 0; k < cases_.size(); ++k) {
-      table.add({scene_name(engine_.data()), engine_.data().patches.size(), threads,
-                 names_[k].first, names_[k].second, timings[k].median * 1e6, timings[k].spread});
+      table.add({scene_name(engine_.data()),
+                 engine_.data().patches.size(),
+                 threads,
+                 names_[k].first,
+                 names_[k].second,
+                 timings[k].median * 1e6,
+                 timings[k].spread,
+                 {},
+                 {},
+                 {}});
     }
   }
 
@@ -103,44 +106,16 @@ class FrameBenchmark {
   }
 
   void add_lights(std::size_t count) {
-    const auto all = std::make_shared<MovingLights>(engine_, count, count);
-    add("direct, all moved", count,
-        [this, all] { engine_.parts().compute_direct(all->next(), {}); });
     const auto none = std::make_shared<MovingLights>(engine_, count, 0);
     const auto still = std::make_shared<Engine>(engine_);
     add("direct, none moved", count,
         [still, none] { still->parts().compute_direct(none->next(), {}); });
-    for (const auto& [name, type] : {std::pair("direct, spots moved", LightType::kSpot),
-                                     std::pair("direct, spheres moved", LightType::kSphere)}) {
-      const auto lights = std::make_shared<MovingLights>(engine_, count, count);
-      lights->turn_into(type);
-      add(name, count, [this, lights] { engine_.parts().compute_direct(lights->next(), {}); });
-    }
     // The whole frame keeps its own engine: what does not move is known from its last frame.
     const auto some = std::make_shared<MovingLights>(engine_, count, kMovingCount);
     const auto own = std::make_shared<Engine>(engine_);
     add("frame, two moved", count, [this, own, some] {
       own->relight(some->next(), {});
       reconstruct_at_vertices(own->data().mesh, own->indirect_irradiance(), vertices_);
-    });
-  }
-
-  /// What the ray tracer alone takes for some of the rays of a frame: from patches to one lamp.
-  void add_bare_rays() {
-    const TransferData& scene = engine_.data();
-    const RayTracer& tracer = *engine_.parts().tracer;
-    const Float3 lamp = random_point_lights(scene, tracer, 1, 7).front().position;
-    const auto rays = std::make_shared<std::vector<Ray>>(kBareRays);
-    for (std::size_t k = 0; k < kBareRays; ++k) {
-      const std::size_t patch = k * scene.patches.size() / kBareRays;
-      Ray& ray = (*rays)[k];
-      ray.origin = tracer.offset_point(scene.patches.centroid[patch], scene.patches.normal[patch]);
-      ray.t_near = 0;
-      for (int c = 0; c < 3; ++c) ray.direction[c] = lamp[c] - ray.origin[c];
-    }
-    add("16,384 shadow rays alone", {}, [&tracer, rays] {
-      for (Ray& ray : *rays) ray.t_far = 1;
-      tracer.occluded(*rays);
     });
   }
 
@@ -191,11 +166,64 @@ class FrameBenchmark {
   std::vector<TimedCase> cases_;
 };
 
+/// Direct light alone. It needs no operator.
+void run_direct(const TransferData& data, const CommonOptions& options, int threads, Table& table) {
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  DirectCases direct(data, tracer);
+  std::vector<TimedCase> cases = {bare_rays(data, tracer)};
+  direct.add_to(cases);
+  const std::vector<Timing> timings = time_interleaved(cases, {.rounds = options.repeats});
+  const std::string name = scene_name(data);
+  const auto microseconds = [&](std::size_t k) { return timings[k].median * 1e6; };
+  table.add({name,
+             data.patches.size(),
+             threads,
+             kBareRays,
+             {},
+             microseconds(0),
+             timings[0].spread,
+             {},
+             {},
+             {}});
+  for (std::size_t k = 0; k < direct.rows().size(); ++k) {
+    const DirectCases::Row& row = direct.rows()[k];
+    table.add({name, data.patches.size(), threads, row.name, row.lights, microseconds(1 + 2 * k),
+               timings[1 + 2 * k].spread, microseconds(2 + 2 * k), row.errors.mean,
+               row.errors.largest});
+  }
+}
+
+/// The patches of a scene, without an operator.
+TransferData patches_of(const std::string& scene, std::size_t patch_count) {
+  PatchModel model = make_patch_model(import_gltf(scene), {.patch_count = patch_count});
+  TransferData data;
+  data.record.scene_name = std::filesystem::path(scene).filename().string();
+  data.mesh = std::move(model.mesh);
+  data.patches = std::move(model.patches);
+  data.patches.sky_visibility.assign(data.patches.size(), 0);
+  return data;
+}
+
 void run(const FrameOptions& options) {
-  Table table({"scene", "patches", "threads", "stage", "lights", "microseconds", "spread"});
+  Table table({"scene", "patches", "threads", "stage", "lights", "microseconds", "spread",
+               "all traced", "error", "largest error"});
+  if (options.direct_only) {
+    for (const std::string& scene : options.input.inputs) {
+      for (const std::size_t count : options.input.patch_counts) {
+        const TransferData data = patches_of(scene, count);
+        run_at_thread_counts(
+            options.common, [&](int threads) { run_direct(data, options.common, threads, table); });
+        save("bench_frame", table, options.common);
+      }
+    }
+    return publish("bench_frame", table, options.common);
+  }
   for_each_input(options.input, [&](const std::shared_ptr<const TransferData>& data) {
     FrameBenchmark benchmark(data, options.common);
-    run_at_thread_counts(options.common, [&](int threads) { benchmark.run(threads, table); });
+    run_at_thread_counts(options.common, [&](int threads) {
+      run_direct(*data, options.common, threads, table);
+      benchmark.run(threads, table);
+    });
     save("bench_frame", table, options.common);
   });
   publish("bench_frame", table, options.common);
@@ -208,6 +236,8 @@ int main(int argc, char** argv) {
   rebounce::bench::FrameOptions options;
   CLI::App app("Times the stages of a frame, with 1, 4 and 16 lights.", "bench_frame");
   rebounce::bench::add_input_options(app, options.input);
+  app.add_flag("--direct-only", options.direct_only,
+               "Direct light alone, of scenes whose operator is not built");
   app.add_option("--probes", options.input.settings.probes.spacing,
                  "Light probes this many metres apart, of scenes that are built")
       ->check(CLI::PositiveNumber);

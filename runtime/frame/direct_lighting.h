@@ -13,7 +13,15 @@
 
 namespace rebounce {
 
+struct OccluderGroups;
 struct Receivers;
+
+/// How shadows are found.
+enum class ShadowMethod : std::uint8_t {
+  kVolumes,  ///< by the shadow volumes of flat pieces of surface, and by rays where those do not
+             ///< tell
+  kRays,     ///< by rays from all points: what kVolumes is compared with
+};
 
 /// Direct irradiance of the patches of one scene, with shadows.
 ///
@@ -28,7 +36,8 @@ class DirectLighting {
   /// `data` and `tracer` (over the first surface_count triangles of data.mesh) must outlive the
   /// object and its copies. Throws Error if a setting is out of range.
   DirectLighting(const TransferData& data, const RayTracer& tracer,
-                 const DirectLightingSettings& settings = {});
+                 const DirectLightingSettings& settings = {},
+                 ShadowMethod method = ShadowMethod::kVolumes);
   ~DirectLighting();
   DirectLighting(const DirectLighting&);
   DirectLighting& operator=(const DirectLighting&) = delete;
@@ -53,6 +62,7 @@ class DirectLighting {
   const TransferData& data_;
   const RayTracer& tracer_;
   std::shared_ptr<const Receivers> receivers_;
+  std::shared_ptr<const OccluderGroups> occluders_;
   std::vector<LightResponse> responses_;
   std::size_t light_count_ = 0;  ///< of the current frame; at most the number of responses
   int traced_light_count_ = 0;

@@ -40,19 +40,39 @@ CutPolygon above_horizon(const glm::vec3& position, const glm::vec3& normal,
   return polygon;
 }
 
+/// Lambert's term for the edge from `a` to `b`, whose lengths are given: the angle that it subtends
+/// times what the unit normal of its plane with the receiver has of `normal`.
+float edge_term(const glm::vec3& a, const glm::vec3& b, float length_a, float length_b,
+                const glm::vec3& normal) {
+  const glm::vec3 axis = glm::cross(a, b);
+  const float product = length_a * length_b, cosine = glm::dot(a, b) / product;
+  if (!(cosine >= 0)) {  // an obtuse angle, or a corner at the receiver
+    const float sine = glm::length(axis);
+    return sine > 0 ? std::atan2(sine, glm::dot(a, b)) * glm::dot(axis, normal) / sine : 0;
+  }
+  // The arc cosine is sqrt(1 - x) times a polynomial, to 2e-8 (M. Abramowitz, I. Stegun, "Handbook
+  // of Mathematical Functions", 1964, 4.4.46). So the angle over its sine needs no small
+  // difference.
+  constexpr std::array kCoefficients = {-0.0012624911F, 0.0066700901F,  -0.0170881256F,
+                                        0.0308918810F,  -0.0501743046F, 0.0889789874F,
+                                        -0.2145988016F, 1.5707963050F};
+  float polynomial = 0;
+  for (const float coefficient : kCoefficients) polynomial = polynomial * cosine + coefficient;
+  return polynomial / (std::sqrt(1 + cosine) * product) * glm::dot(axis, normal);
+}
+
 }  // namespace
 
 float point_to_polygon_form_factor(const glm::vec3& position, const glm::vec3& normal,
                                    std::span<const glm::vec3> corner) {
   assert(corner.size() <= kMaxCorners);
   const CutPolygon polygon = above_horizon(position, normal, corner);
+  std::array<float, kMaxCorners + 1> length;
+  for (std::size_t k = 0; k < polygon.count; ++k) length[k] = glm::length(polygon.corner[k]);
   float sum = 0;
   for (std::size_t k = 0; k < polygon.count; ++k) {
-    const glm::vec3& a = polygon.corner[k];
-    const glm::vec3& b = polygon.corner[(k + 1) % polygon.count];
-    const glm::vec3 axis = glm::cross(a, b);
-    const float sine = glm::length(axis);
-    if (sine > 0) sum += std::atan2(sine, glm::dot(a, b)) * glm::dot(axis, normal) / sine;
+    const std::size_t next = k + 1 < polygon.count ? k + 1 : 0;
+    sum += edge_term(polygon.corner[k], polygon.corner[next], length[k], length[next], normal);
   }
   return std::clamp(std::abs(sum) / (2 * std::numbers::pi_v<float>), 0.0F, 1.0F);
 }
