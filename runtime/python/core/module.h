@@ -14,7 +14,8 @@ namespace rebounce::python {
 
 /// Memory of a product.
 struct ProductScratch {
-  std::vector<float> light, result;
+  std::vector<float> light, result;  ///< of a pass
+  std::vector<float> turned;         ///< columns that lay side by side
   std::vector<float> workspace;
 };
 

@@ -20,21 +20,43 @@ namespace {
 // second cache.
 constexpr std::size_t kPassLights = 4;
 
-// A block of rows and columns that is turned at a time: it stays in the first cache. A row of it is
-// so long that few lines are loaded for little of them, since rows lie on pages of their own.
-constexpr std::size_t kTurnedRows = 16, kTurnedColumns = 120;
+// Columns side by side are turned at least this many at a time: a cache line of each row.
+constexpr std::size_t kTurnedColumns = 16;  // lab/097
 
-// Rows are fetched this many ahead.
+// Rows are fetched this many ahead, since each may lie on a page of its own.
 constexpr std::size_t kRowsAhead = 16;
 
 using Four = float __attribute__((vector_size(16)));
+using FourDoubles = double __attribute__((vector_size(32)));
 using FourPlaces = int __attribute__((vector_size(16)));
 
-/// Rows become columns. Entry (r, c) of `from` is at r * from_stride + c, of `to` at r * to_stride
-/// + c.
-void turn_four(const float* from, std::size_t from_stride, float* to, std::size_t to_stride) {
+Four load_four(const float* from) {
+  Four four;
+  std::memcpy(&four, from, sizeof(four));
+  return four;
+}
+
+Four load_four(const double* from) {
+  FourDoubles four;
+  std::memcpy(&four, from, sizeof(four));
+  return __builtin_convertvector(four, Four);
+}
+
+void store_four(const Four& four, float* to) {
+  std::memcpy(to, &four, sizeof(four));
+}
+
+void store_four(const Four& four, double* to) {
+  const auto doubles = __builtin_convertvector(four, FourDoubles);
+  std::memcpy(to, &doubles, sizeof(doubles));
+}
+
+/// Four rows become four columns. Entry (r, c) of `from` is at r * from_stride + c, of `to` at
+/// r * to_stride + c.
+template <typename From, typename To>
+void turn_four(const From* from, std::size_t from_stride, To* to, std::size_t to_stride) {
   Four row[4];
-  for (std::size_t r = 0; r < 4; ++r) std::memcpy(&row[r], from + r * from_stride, sizeof(Four));
+  for (std::size_t r = 0; r < 4; ++r) row[r] = load_four(from + r * from_stride);
   constexpr FourPlaces kLow{0, 4, 1, 5}, kHigh{2, 6, 3, 7};
   const Four a = __builtin_shuffle(row[0], row[2], kLow),
              b = __builtin_shuffle(row[1], row[3], kLow);
@@ -42,86 +64,65 @@ void turn_four(const float* from, std::size_t from_stride, float* to, std::size_
   const Four d = __builtin_shuffle(row[1], row[3], kHigh);
   const Four column[4] = {__builtin_shuffle(a, b, kLow), __builtin_shuffle(a, b, kHigh),
                           __builtin_shuffle(c, d, kLow), __builtin_shuffle(c, d, kHigh)};
-  for (std::size_t r = 0; r < 4; ++r) std::memcpy(to + r * to_stride, &column[r], sizeof(Four));
+  for (std::size_t r = 0; r < 4; ++r) store_four(column[r], to + r * to_stride);
 }
 
-/// As many rows and columns of `from` become columns and rows of `to`.
-void turn(const float* from, std::size_t from_stride, std::size_t rows, std::size_t columns,
-          float* to, std::size_t to_stride) {
-  const std::size_t whole_rows = rows / 4 * 4, whole_columns = columns / 4 * 4;
-  for (std::size_t c = 0; c < whole_columns; c += 4) {
-    for (std::size_t r = 0; r < whole_rows; r += 4) {
-      turn_four(from + r * from_stride + c, from_stride, to + c * to_stride + r, to_stride);
-    }
-  }
-  for (std::size_t c = 0; c < columns; ++c) {
-    for (std::size_t r = c < whole_columns ? whole_rows : 0; r < rows; ++r) {
-      to[c * to_stride + r] = from[r * from_stride + c];
-    }
-  }
-}
-
-/// Columns of an array [rows][columns] in C order, side by side in a row.
+/// Some columns of an array in C order: entry (r, k) is at r * stride + k.
 template <typename Number>
 struct SideBySide {
-  Number* first;  ///< of the first row
-  std::size_t columns, row_stride;
+  Number* first;
+  std::size_t rows, columns, stride;
 };
 
-/// Fetches a row, to write it or to read it.
+/// Fetches four rows, to write them or to read them.
 template <bool kWrite, typename Number>
-void fetch_row(const SideBySide<Number>& columns, std::size_t row) {
-  const char* const first = reinterpret_cast<const char*>(columns.first + row * columns.row_stride);
-  constexpr std::size_t kLine = 64;
-  for (std::size_t at = 0; at < columns.columns * sizeof(Number); at += kLine) {
-    __builtin_prefetch(first + at, kWrite ? 1 : 0);
+void fetch_four_rows(const SideBySide<Number>& array, std::size_t row) {
+  constexpr std::size_t kOfLine = 64 / sizeof(Number);
+  for (std::size_t r = row; r < std::min(row + 4, array.rows); ++r) {
+    for (std::size_t k = 0; k < array.columns; k += kOfLine) {
+      __builtin_prefetch(array.first + r * array.stride + k, kWrite ? 1 : 0);
+    }
   }
 }
 
-/// Writes the columns into `out` [columns][rows].
-template <typename Number>
-void turn_to_planes(const SideBySide<const Number>& in, std::size_t rows, float* out) {
-  if (in.columns < 4) {
-    for (std::size_t k = 0; k < in.columns; ++k, out += rows) {
-      for (std::size_t r = 0; r < rows; ++r) {
-        out[r] = static_cast<float>(in.first[r * in.row_stride + k]);
-      }
-    }
-    return;
+/// Calls squares(r, k) for all squares of 4 x 4 entries from (r, k) on, row by row, and entries(r,
+/// k) for what is left over.
+template <bool kWrite, typename Number, typename Squares, typename Entries>
+void for_all(const SideBySide<Number>& array, const Squares& squares, const Entries& entries) {
+  const std::size_t whole_rows = array.rows / 4 * 4, whole_columns = array.columns / 4 * 4;
+  for (std::size_t r = 0; r < whole_rows; r += 4) {
+    fetch_four_rows<kWrite>(array, r + kRowsAhead);
+    for (std::size_t k = 0; k < whole_columns; k += 4) squares(r, k);
   }
-  alignas(64) float block[kTurnedRows][kTurnedColumns];
-  for (std::size_t begin = 0; begin < rows; begin += kTurnedRows) {
-    const std::size_t count = std::min(rows - begin, kTurnedRows);
-    for (std::size_t r = 0; r < count; ++r) {
-      if (begin + r + kRowsAhead < rows) fetch_row<false>(in, begin + r + kRowsAhead);
-      const Number* const row = in.first + (begin + r) * in.row_stride;
-      for (std::size_t k = 0; k < in.columns; ++k) block[r][k] = static_cast<float>(row[k]);
-    }
-    turn(block[0], kTurnedColumns, count, in.columns, out + begin, rows);
+  for (std::size_t k = 0; k < array.columns; ++k) {
+    for (std::size_t r = k < whole_columns ? whole_rows : 0; r < array.rows; ++r) entries(r, k);
   }
 }
 
-/// Writes `in` [columns][rows] into the columns.
+/// Writes the columns of the array into `out` [columns][rows].
 template <typename Number>
-void turn_from_planes(const float* in, std::size_t rows, const SideBySide<Number>& out) {
-  if (out.columns < 4) {
-    for (std::size_t k = 0; k < out.columns; ++k, in += rows) {
-      for (std::size_t r = 0; r < rows; ++r) {
-        out.first[r * out.row_stride + k] = static_cast<Number>(in[r]);
-      }
-    }
-    return;
-  }
-  alignas(64) float block[kTurnedRows][kTurnedColumns];
-  for (std::size_t begin = 0; begin < rows; begin += kTurnedRows) {
-    const std::size_t count = std::min(rows - begin, kTurnedRows);
-    for (std::size_t r = 0; r < count; ++r) fetch_row<true>(out, begin + r);
-    turn(in + begin, rows, out.columns, count, block[0], kTurnedColumns);
-    for (std::size_t r = 0; r < count; ++r) {
-      Number* const row = out.first + (begin + r) * out.row_stride;
-      for (std::size_t k = 0; k < out.columns; ++k) row[k] = static_cast<Number>(block[r][k]);
-    }
-  }
+void turn_to_planes(const SideBySide<const Number>& in, float* out) {
+  for_all<false>(
+      in,
+      [&](std::size_t r, std::size_t k) {
+        turn_four(in.first + r * in.stride + k, in.stride, out + k * in.rows + r, in.rows);
+      },
+      [&](std::size_t r, std::size_t k) {
+        out[k * in.rows + r] = static_cast<float>(in.first[r * in.stride + k]);
+      });
+}
+
+/// Writes `in` [columns][rows] into the columns of the array.
+template <typename Number>
+void turn_from_planes(const float* in, const SideBySide<Number>& out) {
+  for_all<true>(
+      out,
+      [&](std::size_t r, std::size_t k) {
+        turn_four(in + k * out.rows + r, out.rows, out.first + r * out.stride + k, out.stride);
+      },
+      [&](std::size_t r, std::size_t k) {
+        out.first[r * out.stride + k] = static_cast<Number>(in[k * out.rows + r]);
+      });
 }
 
 // All tasks of a product on the thread that calls it.
@@ -146,33 +147,22 @@ class Product {
 
   /// Columns one after the other, [columns][rows].
   void apply_to_planes(const Number* in, Number* out, std::size_t columns) const {
-    const bool direct = std::is_same_v<Number, float> && !adjoint_;
-    for_each_chunk(columns, pass_, direct ? 0 : pass_, [&](const Chunk& chunk) {
-      const std::size_t first = chunk.begin * rows_, size = chunk.count * rows_;
-      if constexpr (std::is_same_v<Number, float>) {
-        if (!adjoint_) return multiply(chunk, in + first, out + first, chunk.count);
-      }
-      float *const light = chunk.scratch.light.data(), *const result = chunk.scratch.result.data();
-      std::transform(in + first, in + first + size, light,
-                     [](Number value) { return static_cast<float>(value); });
-      multiply_scaled(chunk, light, result, chunk.count);
-      std::transform(result, result + size, out + first,
-                     [](float value) { return static_cast<Number>(value); });
+    for_each_chunk(columns, pass_, 0, [&](const Chunk& chunk) {
+      const std::size_t first = chunk.begin * rows_;
+      multiply(chunk, in + first, out + first, chunk.count);
     });
   }
 
   /// Columns side by side, [rows][columns].
   void apply_to_rows(const Number* in, Number* out, std::size_t columns) const {
-    const std::size_t each = piece_count(columns, static_cast<std::size_t>(omp_get_max_threads()));
-    const std::size_t most = std::min(kTurnedColumns, piece_count(each, pass_) * pass_);
+    const std::size_t most = piece_count(kTurnedColumns, pass_) * pass_;
     for_each_chunk(columns, most, most, [&](const Chunk& chunk) {
-      float *const light = chunk.scratch.light.data(), *const result = chunk.scratch.result.data();
-      turn_to_planes<Number>({in + chunk.begin, chunk.count, columns}, rows_, light);
+      float* const turned = chunk.scratch.turned.data();
+      turn_to_planes<Number>({in + chunk.begin, rows_, chunk.count, columns}, turned);
       for (std::size_t k = 0; k < chunk.count; k += pass_) {
-        multiply_scaled(chunk, light + k * rows_, result + k * rows_,
-                        std::min(pass_, chunk.count - k));
+        multiply(chunk, turned + k * rows_, turned + k * rows_, std::min(pass_, chunk.count - k));
       }
-      turn_from_planes<Number>(result, rows_, {out + chunk.begin, chunk.count, columns});
+      turn_from_planes<Number>(turned, {out + chunk.begin, rows_, chunk.count, columns});
     });
   }
 
@@ -193,8 +183,9 @@ class Product {
     for (std::size_t t = 0; t < threads; ++t) {
       scratch.push_back(memory_.take());
       scratch.back()->workspace.resize(transfer_.batch_workspace_size(kPassLights));
-      scratch.back()->light.resize(std::min(turned, columns) * rows_);
-      scratch.back()->result.resize(std::min(turned, columns) * rows_);
+      scratch.back()->light.resize(std::min(pass_, columns) * rows_);
+      scratch.back()->result.resize(std::min(pass_, columns) * rows_);
+      scratch.back()->turned.resize(std::min(turned, columns) * rows_);
     }
     const Scheduler scheduler = threads > 1 ? kHere : Scheduler{};
 #pragma omp parallel for schedule(dynamic) num_threads(threads) if (threads > 1)
@@ -205,20 +196,32 @@ class Product {
     for (std::unique_ptr<ProductScratch>& used : scratch) memory_.give(std::move(used));
   }
 
-  void multiply(const Chunk& chunk, const float* in, float* out, std::size_t columns) const {
-    transfer_.apply_planes(channel_, {in, columns * rows_}, {out, columns * rows_},
-                           chunk.scratch.workspace, chunk.scheduler);
+  /// One pass: at most pass_ columns, one after the other; `in` and `out` may be the same. The
+  /// operator reads and writes light patch by patch in an order of its own, so it gets memory that
+  /// stays in the second cache.
+  template <typename Light>
+  void multiply(const Chunk& chunk, const Light* in, Light* out, std::size_t columns) const {
+    const std::size_t size = columns * rows_;
+    float *const light = chunk.scratch.light.data(), *const result = chunk.scratch.result.data();
+    std::transform(in, in + size, light, [](Light value) { return static_cast<float>(value); });
+    if (adjoint_) {
+      for_each_plane(light, size, [](float& value, float area) { value /= area; });
+    }
+    transfer_.apply_planes(channel_, {light, size}, {result, size}, chunk.scratch.workspace,
+                           chunk.scheduler);
+    if (adjoint_) {
+      for_each_plane(result, size, [](float& value, float area) { value *= area; });
+    }
+    std::transform(result, result + size, out,
+                   [](float value) { return static_cast<Light>(value); });
   }
 
-  /// Divides by the area before, and multiplies with it afterwards, for the adjoint.
-  void multiply_scaled(const Chunk& chunk, float* in, float* out, std::size_t columns) const {
-    const std::size_t n = transfer_.patch_count(), size = columns * rows_;
-    for (std::size_t k = 0; adjoint_ && k < size; k += n) {
-      for (std::size_t i = 0; i < n; ++i) in[k + i] /= area_[i];
-    }
-    multiply(chunk, in, out, columns);
-    for (std::size_t k = 0; adjoint_ && k < size; k += n) {
-      for (std::size_t i = 0; i < n; ++i) out[k + i] *= area_[i];
+  /// Calls scale(value, area of its patch) for all values of planes.
+  template <typename Scale>
+  void for_each_plane(float* plane, std::size_t size, const Scale& scale) const {
+    const std::size_t n = transfer_.patch_count();
+    for (const float* const end = plane + size; plane != end; plane += n) {
+      for (std::size_t i = 0; i < n; ++i) scale(plane[i], area_[i]);
     }
   }
 

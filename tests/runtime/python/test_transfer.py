@@ -145,6 +145,13 @@ def test_operators_work_in_solvers(small_room):
     assert info == 0
     assert relative(B, M0 + rho * (small_room.transfer.channel(0) @ M0)) < 1e-4
     op = small_room.transfer.channel(0)
+    # I + rho Y is the inverse of that system; SciPy puts it together.
+    inverse = scipy.sparse.linalg.aslinearoperator(scipy.sparse.identity(n)) + (
+        scipy.sparse.linalg.aslinearoperator(scipy.sparse.diags(rho)) @ op
+    )
+    again, info = scipy.sparse.linalg.gmres(inverse, B, tol=1e-6, atol=0)
+    assert info == 0
+    assert relative(again, M0) < 1e-3
     found = scipy.sparse.linalg.lsqr(op, op @ M0, atol=1e-9, btol=1e-9, iter_lim=2000)[0]
     assert relative(op @ found, op @ M0) < 1e-3
 
