@@ -29,6 +29,7 @@ struct LightError {
   double error = 0;  ///< relative area-weighted L2 error of the indirect irradiance at receivers
   /// Area norm of the light that arrives at receivers, relative to that of the emitted light.
   double arriving = 0;
+  std::size_t light = 0;  ///< its place among the lights
 };
 
 /// Returns the reference: indirect irradiances [n] in lx of some lights, given as initial exitances
