@@ -11,15 +11,15 @@
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/validation_error.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
 
 namespace rebounce::bench {
 namespace {
 
-// The gates are over so many lights, and their largest error may be so many times the tolerance.
+// The promise is about groups of so many lights.
 constexpr std::size_t kGateLights = 64;
-constexpr double kLargestOverMean = 3;
 
 // Residual of conjugate gradients, of what a light gives off: of that, hardly less than a millionth
 // arrives.
