@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/built_scene.h"
-#include "tests/support/long_run.h"
+#include "tests/precompute/build/long_run.h"
 
 namespace rebounce::test_long_run {
 namespace {
@@ -20,7 +20,7 @@ TEST(LongRun, FramesStayThoseOfAFreshEngine) {
   EXPECT_EQ(run.different(), 0) << "seed " << kSeed;
   EXPECT_GT(run.refused(), 3) << "seed " << kSeed;
   EXPECT_EQ(run.mistaken(), 0) << "seed " << kSeed;
-  EXPECT_EQ(run.crowded(), 20) << "seed " << kSeed;
+  EXPECT_EQ(run.crowded(), 40) << "seed " << kSeed;
   EXPECT_EQ(run.allocations(), 0) << "seed " << kSeed;
 }
 

@@ -147,10 +147,10 @@ class LongRun {
     for (std::size_t k = 0; k < lamps_.size(); ++k) {
       if (lamps_[k].intensity > 0) traced_[k] = 0;
     }
-    if (frames_ % 5000 == 4000) {  // a crowd, for twenty frames
+    if (frames_ % 5000 == 400) {  // a crowd, for twenty frames
       while (lamps_.size() < kMostLamps) add_lamp();
       for (std::size_t k = 0; k < kMostLamps; ++k) move(k);
-    } else if (frames_ % 5000 == 4020) {
+    } else if (frames_ % 5000 == 420) {
       lamps_.resize(4);
       traced_.resize(4);
     }
