@@ -86,7 +86,8 @@ double radiosity_residual(const Engine& engine, const FormFactorOperator& form_f
 std::optional<ErrorEstimate> error_of(const Engine& engine, const std::string& kind,
                                       std::span<const Float3> indirect_irradiance) {
   const TransferData& data = engine.data();
-  if (kind == kNoFormFactors || !data.transfer->roles().all_are_both()) return std::nullopt;
+  if (kind == kNoFormFactors || !data.transfer) return std::nullopt;
+  if (!data.transfer->roles().all_are_both()) return std::nullopt;
   const FormFactorSource source = kind == kLinks        ? FormFactorSource::kLinks
                                   : kind == kCompressed ? FormFactorSource::kCompressed
                                                         : FormFactorSource::kExact;

@@ -89,8 +89,8 @@ typedef struct rebounce_transfer_info {
   float error_mean;  /* measured: of the indirect irradiance under many point lights, relative to it
                         in the area-weighted L2 norm, the mean over these */
   float error_max;   /* the largest of these */
-  float error_bound; /* no more than one in a thousand of further lights of any kind errs more, with a
-                        confidence of 95 % */
+  float error_bound; /* one in a thousand of further lights of a kind may err more, no more of them,
+                        with a confidence of 95 % */
 } rebounce_transfer_info;
 
 /* Writes the size, and zeros. */

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/built_scene.h"
 #include "tests/precompute/build/long_run.h"
+#include "tests/support/built_scene.h"
 
 namespace rebounce::test_long_run_large {
 namespace {
