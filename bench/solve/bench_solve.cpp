@@ -1,6 +1,8 @@
 // bench_solve: sweeps over every form of the form factors; and what a file promises, tried: its
 // operator under many fresh lights.
 
+#include <fstream>
+
 #include "bench/solve/light_errors.h"
 #include "bench/solve/sweep_times.h"
 #include "bench/support/input.h"
@@ -46,17 +48,21 @@ Table table_of(const std::string& part) {
   return part == kSweeps ? make_sweep_table() : make_light_error_table();
 }
 
-void measure(const TransferData& data, const SolveOptions& options, Table& table) {
-  if (options.part == kLightErrors) return measure_light_errors(data, options.light_errors, table);
+void measure(const TransferData& data, const SolveOptions& options, Table& table, Table& single) {
+  if (options.part == kLightErrors) {
+    return measure_light_errors(data, options.light_errors, table, single);
+  }
   const std::vector<Form> forms = forms_of(data, options.form_factor_tolerance);
   measure_sweeps(data, forms, light_changes(data).front().after, options.common.repeats, table);
 }
 
 void run(const SolveOptions& options) {
-  Table table = table_of(options.part);
+  Table table = table_of(options.part), single = make_single_light_table();
   for_each_input(options.input, [&](const std::shared_ptr<const TransferData>& data) {
-    measure(*data, options, table);
+    measure(*data, options, table, single);
     save("bench_solve", table, options.common);
+    if (options.light_errors.each.empty()) return;
+    std::ofstream(options.light_errors.each) << single.csv();
   });
   publish("bench_solve", table, options.common);
 }
@@ -78,10 +84,12 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1e-5, 0.5))
       ->capture_default_str();
   app.add_option("--lights", options.light_errors.light_count, "Lights of each kind")
-      ->check(CLI::Range(1, 100000))
+      ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   app.add_option("--seed", options.light_errors.seed, "Seed of these, not that of the build")
       ->capture_default_str();
+  app.add_option("--each", options.light_errors.each,
+                 "CSV file for a row of every light: its error, and how much of it arrives");
   app.add_flag("--iterate", options.light_errors.iterate,
                "Their truth by conjugate gradients alone, with neither a dense inverse nor the "
                "operator to begin with");

@@ -11,19 +11,22 @@
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/validation_error.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
 
 namespace rebounce::bench {
 namespace {
 
-// The gates are over so many lights, and their largest error may be so many times the tolerance.
+// The promise is about groups of so many lights.
 constexpr std::size_t kGateLights = 64;
-constexpr double kLargestOverMean = 3;
 
 // Residual of conjugate gradients, of what a light gives off: of that, hardly less than a millionth
 // arrives.
 constexpr double kResidual = 1e-9;
+
+// Lights that are held in memory.
+constexpr int kLightsAtOnce = 1024;
 
 /// What arrives of lights, as the form factors of a file say.
 class Truth {
@@ -70,6 +73,17 @@ std::optional<double> recorded_bound(const TransferData& data, LightKind kind) {
   return report.at(place).get<double>();
 }
 
+/// The number of patches that a light is on: the squared sum of their flux over the sum of squares.
+double lit_patches(std::span<const Float3> exitance, std::span<const float> area) {
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < area.size(); ++i) {
+    const double flux = area[i] * (exitance[i][0] + exitance[i][1] + exitance[i][2]);
+    sum += flux;
+    squares += flux * flux;
+  }
+  return squares > 0 ? sum * sum / squares : 0;
+}
+
 std::size_t count_above(std::span<const LightError> errors, double limit) {
   return static_cast<std::size_t>(
       std::ranges::count_if(errors, [=](const LightError& e) { return e.error > limit; }));
@@ -95,16 +109,31 @@ Table make_light_error_table() {
                 "bound_of_kind", "over_bound_of_kind", "bound", "over_bound", "truth_error"});
 }
 
+Table make_single_light_table() {
+  return Table({"scene", "patches", "kind", "error", "arriving", "lit_patches"});
+}
+
 void measure_light_errors(const TransferData& data, const LightErrorSettings& settings,
-                          Table& table) {
+                          Table& table, Table& single) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
   const Truth truth(data, settings.iterate);
   const BuildRecord& record = data.record;
   const double limit = kLargestOverMean * record.tolerance;
   for (const LightKind kind : kLightKinds) {
-    const auto lights = random_initial_exitances(data, tracer, kind, settings.light_count,
-                                                 settings.seed, data.transfer->roles());
-    const std::vector<LightError> errors = light_errors(data, lights, std::cref(truth));
+    std::vector<LightError> errors;
+    double truth_error = 0;
+    for (int done = 0; done < settings.light_count; done += kLightsAtOnce) {
+      const int count = std::min(kLightsAtOnce, settings.light_count - done);
+      const auto lights = random_initial_exitances(data, tracer, kind, count, settings.seed + done,
+                                                   data.transfer->roles());
+      if (done == 0) truth_error = truth.error(lights);
+      for (const LightError& e : light_errors(data, lights, std::cref(truth))) {
+        errors.push_back(e);
+        if (settings.each.empty()) continue;
+        single.add({scene_name(data), data.patches.size(), name(kind), e.error, e.arriving,
+                    lit_patches(lights[e.light], data.patches.area)});
+      }
+    }
     if (errors.empty()) continue;
     const auto worst = std::ranges::max_element(errors, {}, &LightError::error);
     double sum = 0;
@@ -117,7 +146,7 @@ void measure_light_errors(const TransferData& data, const LightErrorSettings& se
          worst->arriving, count_above(errors, limit), groups_above(errors, limit),
          bound ? Table::Cell(*bound) : Table::Cell(),
          bound ? Table::Cell(count_above(errors, *bound)) : Table::Cell(), record.error_bound,
-         count_above(errors, record.error_bound), truth.error(lights)});
+         count_above(errors, record.error_bound), truth_error});
   }
 }
 

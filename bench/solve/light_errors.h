@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "bench/support/table.h"
 #include "transfer/file/transfer_data.h"
@@ -13,15 +14,21 @@ struct LightErrorSettings {
   /// The truth by conjugate gradients alone, with neither a dense inverse nor the operator to begin
   /// with: many times slower.
   bool iterate = false;
+  std::string each;  ///< CSV file for a row of every light; empty: none
 };
 
 Table make_light_error_table();
 
+/// A row for each light: its error, how much of it arrives (LightError), and on how many patches
+/// its flux is, as the squared sum over the sum of squares.
+Table make_single_light_table();
+
 /// Adds a row for each kind of light: the errors of the operator of `data` under fresh lights,
-/// beside the bounds on record. The truth is that of the form factors of `data`, which are to be
-/// those that the operator was made from: by conjugate gradients or, of pairs, a dense inverse of
-/// their own, which is many times faster and is itself held against conjugate gradients.
+/// beside the bounds on record, and to `single` one for each light. The truth is that of the form
+/// factors of `data`, which are to be those that the operator was made from: by conjugate gradients
+/// or, of pairs, a dense inverse of their own, which is many times faster and is itself held
+/// against conjugate gradients.
 void measure_light_errors(const TransferData& data, const LightErrorSettings& settings,
-                          Table& table);
+                          Table& table, Table& single);
 
 }  // namespace rebounce::bench

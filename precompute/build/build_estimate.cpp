@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "precompute/base/process_memory.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/compression/matrix_free_plan.h"
 #include "precompute/exchange/links/link_refinement.h"
 #include "precompute/exchange/pairs/closure.h"
 #include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
 #include "transfer/exchange/linked_form_factors.h"
 
@@ -29,6 +29,9 @@ constexpr std::size_t kPairBytesMade = sizeof(ExchangeEntry) + 3 * kEntryBytes;
 
 // A pair beside a dense inverse: in the matrix, and expanded to rows that hold it twice.
 constexpr std::size_t kPairBytesKept = 2 * kEntryBytes + 2 * kEntryBytes;
+
+// What libraries take when they are first used, Embree and OpenBLAS above all (lab/106).
+constexpr std::size_t kLibraryBytes = 12'000'000;
 
 // A link during refinement: the link, its copy, and the flat arrays.
 constexpr std::size_t kLinkBytesFound = 4 * sizeof(Link);
@@ -86,7 +89,11 @@ std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_co
       kind == OperatorKind::kNoOperator
           ? 0
           : dense_transfer_peak_bytes(patch_count, matrix_count, arithmetic_of(kind));
-  return std::max(kPairBytesMade * pairs, kPairBytesKept * pairs + inverses);
+  const std::uint64_t compression = kind == OperatorKind::kHierarchical
+                                        ? dense_compression_peak_bytes(patch_count, matrix_count)
+                                        : 0;
+  return std::max({kPairBytesMade * pairs, kPairBytesKept * pairs + inverses,
+                   kEntryBytes * pairs + compression});
 }
 
 std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
@@ -112,7 +119,8 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
   CostEstimate estimate = estimate_of(n, roles);
   if (decided.exchange_source == ExchangeSource::kPairs) {
-    estimate.peak_bytes = peak_bytes_of_pairs(n, matrices, decided.operator_kind);
+    estimate.peak_bytes = resident_memory_bytes() + kLibraryBytes +
+                          peak_bytes_of_pairs(n, matrices, decided.operator_kind);
     return estimate;
   }
   const LinkedBuild build{n, links_of_furnished_room(n), matrices, roles, decided.tolerance};

@@ -157,7 +157,8 @@ std::string error_text(const json& report) {
          fmt::format("  {:<10} {:>6} {:>9} {:>9} {:>9}\n", "light", "lights", "mean", "largest",
                      "bound") +
          rows +
-         "  With 95 % probability none of 1,000 further lights of a kind is above its bound.\n";
+         "  No more than one in 1,000 further lights of a kind is above its bound (95 % "
+         "confidence).\n";
 }
 
 /// What the operator was made from; empty where the file does not say.

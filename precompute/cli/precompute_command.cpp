@@ -11,6 +11,7 @@
 #include "precompute/cli/info_json.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/web_file.h"
+#include "precompute/lights/validation_error.h"
 #include "precompute/patches/patch_selection.h"
 #include "rebounce/error.h"
 #include "transfer/base/precision.h"
@@ -132,6 +133,14 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report,
         "the operator misses its tolerance: the mean error is {:.2g}, the tolerance {:.2g}; "
         "raise --tolerance, or use --precision f32 or --operator dense",
         record.error_mean, record.tolerance));
+  }
+  if (record.tolerance > 0 && record.error_max > kLargestOverMean * record.tolerance) {
+    throw Error(fmt::format(
+        "the operator errs too much under single lamps: the largest error of the check is {:.2g}, "
+        "three times the tolerance is {:.2g}; the file is written: count it as one of tolerance "
+        "{:.2g}, or try another --seed or --operator dense",
+        record.error_max, kLargestOverMean * record.tolerance,
+        record.error_max / kLargestOverMean));
   }
   if (keeps_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {
     throw Error(fmt::format(

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -77,6 +79,27 @@ double radiosity_residual(const Engine& engine, const FormFactorOperator& form_f
   }
   const double norm = area_norm(engine.initial_exitance(), patches.area);
   return norm > 0 ? area_norm(rest, patches.area) / norm : 0;
+}
+
+/// The error of a solution by the form factors `kind` of the file; none where the operator does not
+/// serve all patches, or there is none.
+std::optional<ErrorEstimate> error_of(const Engine& engine, const std::string& kind,
+                                      std::span<const Float3> indirect_irradiance) {
+  const TransferData& data = engine.data();
+  if (kind == kNoFormFactors || !data.transfer) return std::nullopt;
+  if (!data.transfer->roles().all_are_both()) return std::nullopt;
+  const FormFactorSource source = kind == kLinks        ? FormFactorSource::kLinks
+                                  : kind == kCompressed ? FormFactorSource::kCompressed
+                                                        : FormFactorSource::kExact;
+  return ErrorEstimator(engine.shared_data(), source)
+      .estimate_error(engine.initial_exitance(), indirect_irradiance, engine.scheduler());
+}
+
+/// A number of an estimate in JSON, which knows no infinity.
+nlohmann::json number_or_null(const std::optional<ErrorEstimate>& estimate,
+                              double ErrorEstimate::*number) {
+  if (!estimate || !std::isfinite((*estimate).*number)) return nullptr;
+  return (*estimate).*number;
 }
 
 std::span<const float> as_floats(std::span<const Float3> values) {
@@ -167,7 +190,8 @@ std::unique_ptr<const FormFactorOperator> choose_form_factors(const std::string&
 /// What is said of a solution beside the method's own figures.
 struct SolveReport {
   std::string form_factors;
-  std::optional<double> residual;  ///< none without form factors
+  std::optional<double> residual;      ///< none without form factors
+  std::optional<ErrorEstimate> error;  ///< none where it cannot be told
   FrameFlux flux;
   double direct_microseconds = 0;
 };
@@ -176,13 +200,16 @@ void print_summary(const SolveOptions& chosen, const SolveReport& report, const 
                    const CommonOptions& options) {
   const auto& residual = report.residual;
   if (options.json) {
-    const nlohmann::json summary = {{"method", chosen.method},
-                                    {"form_factors", report.form_factors},
-                                    {"sweeps", solution.sweeps},
-                                    {"residual", residual ? nlohmann::json(*residual) : nullptr},
-                                    {"microseconds", solution.microseconds},
-                                    {"direct_microseconds", report.direct_microseconds},
-                                    {"lumens", as_json(report.flux)}};
+    const nlohmann::json summary = {
+        {"method", chosen.method},
+        {"form_factors", report.form_factors},
+        {"sweeps", solution.sweeps},
+        {"residual", residual ? nlohmann::json(*residual) : nullptr},
+        {"error_estimate", number_or_null(report.error, &ErrorEstimate::error)},
+        {"error_bound", number_or_null(report.error, &ErrorEstimate::bound)},
+        {"microseconds", solution.microseconds},
+        {"direct_microseconds", report.direct_microseconds},
+        {"lumens", as_json(report.flux)}};
     fmt::print("{}\n", summary.dump(2));
   } else if (!options.quiet) {
     fmt::print("{}\n", described(report.flux));
@@ -194,6 +221,10 @@ void print_summary(const SolveOptions& chosen, const SolveReport& report, const 
     fmt::print("{}\n", residual ? fmt::format("residual {:.2e}", *residual)
                                 : "no residual: the file has no form factors (precompute "
                                   "--store-form-factors)");
+    if (report.error) {
+      fmt::print("error of the indirect light {:.2e}, at most {:.2e}\n", report.error->error,
+                 report.error->bound);
+    }
   }
 }
 
@@ -219,6 +250,7 @@ void run(const SolveOptions& chosen, const CommonOptions& options) {
   print_summary(chosen,
                 {.form_factors = kind,
                  .residual = residual,
+                 .error = error_of(engine, kind, solution.indirect_irradiance),
                  .flux = flux_of(engine, solution.indirect_irradiance),
                  .direct_microseconds = direct_microseconds},
                 solution, options);

@@ -133,6 +133,19 @@ void MatrixCompression::emphasise(const TransferOperator& transfer) {
   }
 }
 
+void MatrixCompression::add_training_light(const ReferenceLighting& lights, std::size_t k) {
+  truth_.append(lights, k);
+  const Eigen::Index last = frame_.sample.cols();
+  frame_.sample.conservativeResize(Eigen::NoChange, last + 1);
+  frame_.sample.col(last) =
+      truth_.normalised_light(truth_.light_count() - 1, frame_.tree.patch, frame_.sample.rows());
+  if (!equilibrated_) return;
+  for (std::size_t i = 0; i < frame_.tree.patch.size(); ++i) {
+    const int exponent = exponent_[i];
+    frame_.sample(static_cast<Eigen::Index>(i), last) *= std::exp2(exponent);
+  }
+}
+
 HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
                                     Exitances training, double multiplier,
                                     const Progress& progress) {

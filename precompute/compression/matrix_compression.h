@@ -73,6 +73,9 @@ class MatrixCompression {
   /// Gives the training lights weight by the errors that they have with `transfer`.
   void emphasise(const TransferOperator& transfer);
 
+  /// Adds light k of `lights`, of the same matrix, to the training lights.
+  void add_training_light(const ReferenceLighting& lights, std::size_t k);
+
  private:
   const SymmetricMatrix& matrix_;
   PartSizes sizes_;

@@ -17,16 +17,14 @@
 namespace rebounce {
 namespace {
 
-// Bytes per patch of the lights: the light, a copy and its result; for training lights also their
-// directions on clusters.
-constexpr std::size_t kLightBytes =
-    3 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
-    sizeof(double) * kMostTrainingLights;
-
 // Upper estimate of the bytes per patch, for each matrix, of the operator of the first stage and
 // the rounds of the second. It holds at the default tolerance and grows with this power of 1 /
 // tolerance.
 constexpr double kOperatorBytes = 10.5e3, kOperatorGrowth = 0.4;
+
+// Of a patch while a dense operator is compressed, beside the lights: candidates of the search, the
+// blocks that are at work, and the light that they are judged by (lab/106).
+constexpr std::size_t kSearchBytes = 23000;
 
 }  // namespace
 
@@ -47,7 +45,7 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
       kOperatorBytes * static_cast<double>(matrix_count) *
       wanted_part(settings.roles, patch_count) *
       std::pow(kDefaultTolerance / settings.compression.tolerance, kOperatorGrowth);
-  const std::size_t kept = patch_count * kLightBytes +
+  const std::size_t kept = patch_count * kFittingLightBytes +
                            static_cast<std::size_t>(static_cast<double>(patch_count) * operators);
 
   MatrixFreeTransferPlan plan;
@@ -58,6 +56,12 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
                       threads * kBlasBytes + kept;
     if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
+}
+
+std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
+  const std::uint64_t triangle = static_cast<std::uint64_t>(patch_count) * patch_count / 2;
+  return triangle * sizeof(float) * matrix_count +
+         patch_count * (kFittingLightBytes + kSearchBytes);
 }
 
 /// Throws Error if there is a memory limit and a plan does not fit into it.

@@ -36,6 +36,9 @@ struct MatrixFreeTransferPlan {
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings = {});
 
+/// Peak memory of compressing a dense operator (f32) to a hierarchical one, with the dense one.
+std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
+
 /// Throws Error if the plan for so many patches is above the limit of `settings`.
 void check_memory(std::size_t patch_count, const MatrixFreeTransferPlan& plan,
                   const MatrixFreeTransferSettings& settings);

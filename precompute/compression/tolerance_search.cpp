@@ -40,6 +40,9 @@ constexpr double kPlainStart = 2;
 // that the nearest caches do not hold, and the start of loops (lab/036).
 constexpr double kVectorSize = 9, kBlockSize = 96, kSizedPatches = 16384;
 
+// The most validation lights that become training lights too.
+constexpr std::size_t kMostJoined = 64;
+
 /// The truth of a uniform light stands in for validation lights from which nothing arrives.
 ReferenceLighting validation_truth(const SymmetricMatrix& matrix,
                                    std::span<const std::vector<Float3>> lights) {
@@ -100,6 +103,30 @@ class Best {
   std::shared_ptr<const HierarchicalOperator> best_;
 };
 
+/// The validation lights that an operator errs too much under become training lights as well, each
+/// once, so that the weights know of them: a lamp of a rare kind, that lights one patch alone or
+/// burns in a closet, costs little there, and much if the whole operator has to be finer for it.
+class WorstLights {
+ public:
+  explicit WorstLights(double limit) : limit_(limit) {}
+
+  void join(const ReferenceLighting& validation, std::span<const double> errors,
+            MatrixCompression& compression) {
+    joined_.resize(errors.size());
+    for (std::size_t k = 0; k < errors.size(); ++k) {
+      if (errors[k] <= limit_ || joined_[k] || count_ == kMostJoined) continue;
+      compression.add_training_light(validation, k);
+      joined_[k] = true;
+      ++count_;
+    }
+  }
+
+ private:
+  double limit_;
+  std::vector<bool> joined_;
+  std::size_t count_ = 0;
+};
+
 /// The multiplier at which a search begins.
 double search_start(const HierarchicalSettings& settings, std::size_t patch_count) {
   const double usual = initial_multiplier(settings.tolerance, patch_count);
@@ -127,15 +154,19 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   MultiplierSearch search(compression.multiplier_for(search_start(settings, patches.size())),
                           {kAim * tolerance, kMost * tolerance});
   Best best(kMost * tolerance);
+  WorstLights worst(kMost * kLargestOverMean * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
     const auto candidate = std::make_shared<const HierarchicalOperator>(
         encode_values(compression.at(search.multiplier(), kept, part), settings.precision));
-    const double error = validation_error(validation.errors(*candidate));
+    const std::vector<double> errors = validation.errors(*candidate);
+    const double error = validation_error(errors);
     best.offer(candidate, error);
     search.report(error, static_cast<double>(candidate->bytes()));
-    if (!search.done()) compression.emphasise(*candidate);
+    if (search.done()) break;
+    worst.join(validation, errors, compression);
+    compression.emphasise(*candidate);
   }
   return best.take();
 }

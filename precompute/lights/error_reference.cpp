@@ -12,6 +12,10 @@ void ErrorReference::add(double received, double all) {
   if (all > 0) squares_ += std::pow(received / all, 2);
 }
 
+void ErrorReference::append(const ErrorReference& other, std::size_t k) {
+  add(other.lights_[k].received, other.lights_[k].all);
+}
+
 double ErrorReference::reference(std::size_t light) const {
   const double usual = std::sqrt(squares_ / static_cast<double>(lights_.size()));
   return std::max(lights_[light].received, usual * lights_[light].all);

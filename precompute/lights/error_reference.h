@@ -16,6 +16,9 @@ class ErrorReference {
   /// Adds a light: the area norms of what arrives at receivers and at all patches.
   void add(double received, double all);
 
+  /// Adds light k of another.
+  void append(const ErrorReference& other, std::size_t k);
+
   /// The reference of a light, numbered in the order of adding.
   double reference(std::size_t light) const;
 

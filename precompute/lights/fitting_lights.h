@@ -31,6 +31,12 @@ struct DrawnLights {
 /// The largest numbers of lights: those of an open scene with lamps of its own.
 inline constexpr std::size_t kMostTrainingLights = 193, kMostValidationLights = 513;
 
+/// Bytes per patch of the lights while an operator is fitted to them: the light, a copy and its
+/// result; for training lights also their directions on clusters.
+inline constexpr std::size_t kFittingLightBytes =
+    3 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
+    sizeof(double) * kMostTrainingLights;
+
 /// Draws the lights that the operator of a scene is fitted to. Training lights are point lights,
 /// spot lights and, in an open scene, suns; validation lights are other point lights. Both contain
 /// the light of the scene's own lamps, which comes first among the validation lights. All are cut

@@ -79,7 +79,7 @@ std::vector<LightError> light_errors(const TransferData& data,
       data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
       const double seen = area_norm(truths[k], area);
       received.add(seen, all);
-      errors.push_back({.arriving = seen / area_norm(some[k], area)});
+      errors.push_back({.arriving = seen / area_norm(some[k], area), .light = done + k});
       data.transfer->apply(some[k], indirect_irradiance, workspace);
       results.push_back(indirect_irradiance);
       arrived.push_back(std::move(truths[k]));

@@ -21,7 +21,7 @@ struct KindError {
   int dark_count = 0;   ///< lights from which nothing arrives (arrives_nowhere)
   double mean = 0;
   double max = 0;
-  double bound = 0;  ///< exceeds 1,000 further errors with 95 % probability: error_bound.h
+  double bound = 0;  ///< one in a thousand further errors may be above: error_bound.h
 };
 
 /// The error of an operator under one light.
@@ -29,6 +29,7 @@ struct LightError {
   double error = 0;  ///< relative area-weighted L2 error of the indirect irradiance at receivers
   /// Area norm of the light that arrives at receivers, relative to that of the emitted light.
   double arriving = 0;
+  std::size_t light = 0;  ///< its place among the lights
 };
 
 /// Returns the reference: indirect irradiances [n] in lx of some lights, given as initial exitances

@@ -60,6 +60,12 @@ ReferenceLighting::ReferenceLighting(const SymmetricMatrix& matrix,
   keep_received(matrix.roles());
 }
 
+void ReferenceLighting::append(const ReferenceLighting& other, std::size_t k) {
+  lights_.push_back(other.lights_[k]);
+  truths_.push_back(other.truths_[k]);
+  received_.append(other.received_, k);
+}
+
 void ReferenceLighting::keep_received(const PatchRoles& roles) {
   for (std::vector<Float3>& truth : truths_) {
     const double all = area_norm(truth, area_);
@@ -99,16 +105,24 @@ std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) 
 
 Eigen::MatrixXd ReferenceLighting::normalised_lights(std::span<const std::uint32_t> patch,
                                                      std::size_t position_count) const {
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(position_count),
-                                                 static_cast<Eigen::Index>(lights_.size()));
+  Eigen::MatrixXd result(static_cast<Eigen::Index>(position_count),
+                         static_cast<Eigen::Index>(lights_.size()));
   for (std::size_t k = 0; k < lights_.size(); ++k) {
-    const double norm = received_.reference(k);
-    if (norm == 0) continue;
-    for (std::size_t i = 0; i < patch.size(); ++i) {
-      const Float3& m0 = lights_[k][patch[i]];
-      result(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) =
-          std::sqrt(area_[patch[i]]) * (m0[0] + m0[1] + m0[2]) / (kChannelCount * norm);
-    }
+    result.col(static_cast<Eigen::Index>(k)) = normalised_light(k, patch, position_count);
+  }
+  return result;
+}
+
+Eigen::VectorXd ReferenceLighting::normalised_light(std::size_t k,
+                                                    std::span<const std::uint32_t> patch,
+                                                    std::size_t position_count) const {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(position_count));
+  const double norm = received_.reference(k);
+  if (norm == 0) return result;
+  for (std::size_t i = 0; i < patch.size(); ++i) {
+    const Float3& m0 = lights_[k][patch[i]];
+    result[static_cast<Eigen::Index>(i)] =
+        std::sqrt(area_[patch[i]]) * (m0[0] + m0[1] + m0[2]) / (kChannelCount * norm);
   }
   return result;
 }

@@ -25,6 +25,9 @@ class ReferenceLighting {
 
   std::size_t light_count() const { return lights_.size(); }
 
+  /// Takes over light k of another, of the same matrix.
+  void append(const ReferenceLighting& other, std::size_t k);
+
   const ErrorReference& received() const { return received_; }
 
   /// The relative area-weighted L2 error of `transfer` under each light (error_reference.h). It has
@@ -36,6 +39,10 @@ class ReferenceLighting {
   /// its errors are relative to 1.
   Eigen::MatrixXd normalised_lights(std::span<const std::uint32_t> patch,
                                     std::size_t position_count) const;
+
+  /// Light k alone, in the same way.
+  Eigen::VectorXd normalised_light(std::size_t k, std::span<const std::uint32_t> patch,
+                                   std::size_t position_count) const;
 
  private:
   /// Sets the products at patches that are no receivers to 0.

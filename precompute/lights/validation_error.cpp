@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kGroup = 64, kValidationConfidence = 0.95;
 
-// The largest error of a group may be this multiple of the mean.
-constexpr double kLargestOverMean = 3;
+// A light of the sample itself needs less of a margin than those that nobody has seen (lab/103).
+constexpr double kSeenPart = 0.8;
 
 // The tail is this fraction of the sample, and at least kLeastValidationTail errors; fewer errors
 // than kLeastSample give no tail.
@@ -38,7 +38,8 @@ double validation_error(std::span<const double> errors) {
   std::ranges::sort(falling, std::greater<>());
   const double mean =
       std::accumulate(falling.begin(), falling.end(), 0.0) / static_cast<double>(falling.size());
-  return std::max(mean, largest_of_group(falling) / kLargestOverMean);
+  return std::max({mean, largest_of_group(falling) / kLargestOverMean,
+                   kSeenPart * falling.front() / kLargestOverMean});
 }
 
 }  // namespace rebounce

@@ -89,8 +89,8 @@ typedef struct rebounce_transfer_info {
   float error_mean;  /* measured: of the indirect irradiance under many point lights, relative to it
                         in the area-weighted L2 norm, the mean over these */
   float error_max;   /* the largest of these */
-  float error_bound; /* above the errors of 1,000 further lights of any kind, with a probability of
-                        95 % */
+  float error_bound; /* one in a thousand of further lights of a kind may err more, no more of them,
+                        with a confidence of 95 % */
 } rebounce_transfer_info;
 
 /* Writes the size, and zeros. */
@@ -351,6 +351,28 @@ rebounce_status rebounce_engine_probe_irradiance(const rebounce_engine* engine,
 /* Writes normals [size x size][3] for irradiance maps: the directions at the middles of the texels
  * of an octahedral map, u fastest, +z in its middle. */
 void rebounce_octahedral_normals(size_t size, float* normals);
+
+/* ---- The error of a frame ---- */
+
+/* Finds the error of frames from their residuals, with form factors of a transfer file. */
+typedef struct rebounce_error_estimator rebounce_error_estimator;
+
+/* Makes one; it keeps the transfer's data. Fails with REBOUNCE_INVALID_ARGUMENT if these have no
+ * form factors (precompute --store-form-factors or --compress-form-factors), or their operator has
+ * receivers or sources. */
+rebounce_status rebounce_error_estimator_create(rebounce_transfer* transfer,
+                                                rebounce_error_estimator** estimator);
+
+/* NULL is ignored. */
+void rebounce_error_estimator_destroy(rebounce_error_estimator* estimator);
+
+/* Writes the error of the indirect irradiance of the last frame of an engine of the same transfer,
+ * relative to the solution with the form factors in the area-weighted L2 norm, and an upper limit
+ * of it, INFINITY if too little light arrives to tell. Takes the time of two gathers and a product.
+ * `bound` may be NULL. */
+rebounce_status rebounce_engine_estimate_error(const rebounce_engine* engine,
+                                               rebounce_error_estimator* estimator, double* error,
+                                               double* bound);
 
 /* ---- The graphics card ---- */
 

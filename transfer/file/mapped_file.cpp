@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <system_error>
@@ -17,6 +18,17 @@ namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
   throw Error("cannot read " + path.string() + ": " + reason + "; check its name and permissions");
+}
+
+/// Throws Error if the machine has less memory than the file has bytes. All of them are read at
+/// once, and the operator again in every frame.
+void check_memory_for(const std::filesystem::path& path, std::uint64_t size) {
+  const std::uint64_t memory = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
+                               static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
+  if (size <= memory) return;
+  const auto gib = [](std::uint64_t bytes) { return std::to_string(bytes >> 30) + " GiB"; };
+  throw Error("cannot read " + path.string() + ": it has " + gib(size) + ", this machine " +
+              gib(memory) + " of memory; make it with fewer patches or without form factors");
 }
 
 class Descriptor {
@@ -64,6 +76,7 @@ SharedArray<std::byte> map_file(const std::filesystem::path& path) {
   }
   if (!S_ISREG(status.st_mode)) fail(path, "it is not a regular file");
   if (status.st_size == 0) return {};  // mmap does not map empty files
+  check_memory_for(path, static_cast<std::uint64_t>(status.st_size));
   auto mapping =
       std::make_shared<const Mapping>(path, descriptor, static_cast<std::size_t>(status.st_size));
   const std::span<const std::byte> bytes = mapping->bytes();

@@ -115,6 +115,43 @@ class Solver {
   std::unique_ptr<Parts> parts_;
 };
 
+/// How far an indirect irradiance is from the solution with the form factors of a file, relative to
+/// that solution in the area-weighted L2 norm over all patches and channels.
+struct ErrorEstimate {
+  double error = 0;  ///< off by about the error of the operator, relative to itself
+  /// The error is at most this, but for rounding in single precision, some 1e-6. Infinite if too
+  /// little light arrives to tell. It is close to `error` unless reflectances come close to 1.
+  double bound = 0;
+};
+
+/// Finds the error of frames from their residuals, with the form factors of a transfer file: two
+/// gathers and a product with the operator for each frame. What errs in the form factors
+/// themselves, such as their own compression, is no part of it. See notes/concepts/errors.md.
+///
+/// It belongs to one thread at a time and gives the same bits for any scheduler. After construction
+/// nothing allocates. An estimator that was moved from may only be destroyed.
+class ErrorEstimator {
+ public:
+  /// Throws Error if `data` is null, has no form factors of this source, no operator, or one that
+  /// does not serve all patches.
+  explicit ErrorEstimator(std::shared_ptr<const TransferData> data,
+                          FormFactorSource source = FormFactorSource::kBest);
+  ~ErrorEstimator();
+  ErrorEstimator(ErrorEstimator&&) noexcept;
+  ErrorEstimator& operator=(ErrorEstimator&&) noexcept;
+
+  /// The error of `indirect_irradiance` H [n] in lx under `initial_exitance` M0 = rho E + Me [n] in
+  /// lx: those of an Engine, for instance. Throws Error if a size is wrong, an exitance is negative
+  /// or not finite, or an irradiance is not finite.
+  ErrorEstimate estimate_error(std::span<const Float3> initial_exitance,
+                               std::span<const Float3> indirect_irradiance,
+                               const Scheduler& scheduler = {});
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
 /// Solves once, from nothing, and writes the solution [n] in lx to `radiosity`. Makes a Solver:
 /// keep one for more than one solve. Throws Error as that does.
 SolveResult solve_radiosity(const std::shared_ptr<const TransferData>& data, SolveMethod method,

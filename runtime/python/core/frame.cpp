@@ -75,6 +75,21 @@ py::tuple solve(const Data& data, const Array<float>& initial_exitance, const st
   return py::make_tuple(array_of(std::move(radiosity)), how);
 }
 
+std::unique_ptr<ErrorEstimator> make_error_estimator(const Data& data) {
+  const py::gil_scoped_release unlocked;
+  return std::make_unique<ErrorEstimator>(data.transfer);
+}
+
+py::tuple estimate_error(ErrorEstimator& estimator, const Engine& engine) {
+  ErrorEstimate found;
+  {
+    const py::gil_scoped_release unlocked;
+    found = estimator.estimate_error(engine.initial_exitance(), engine.indirect_irradiance(),
+                                     engine.scheduler());
+  }
+  return py::make_tuple(found.error, found.bound);
+}
+
 std::vector<float> cie_sky_of(int type, const Float3& sun_direction, float ground_reflectance) {
   const SkyDistribution sky = cie_sky(type, sun_direction, ground_reflectance);
   return {sky.begin(), sky.end()};
@@ -103,6 +118,9 @@ void add_frame(py::module_& module) {
       .def_property_readonly("initial_exitance", &light_of<&Engine::initial_exitance>)
       .def_property_readonly("indirect_irradiance", &light_of<&Engine::indirect_irradiance>)
       .def_property_readonly("radiosity", &light_of<&Engine::radiosity>);
+  py::class_<ErrorEstimator>(module, "ErrorEstimator")
+      .def(py::init(&make_error_estimator), py::arg("data"))
+      .def("estimate_error", &estimate_error, py::arg("engine"));
   module.def("solve", &solve, py::arg("data"), py::arg("initial_exitance"), py::arg("method"),
              py::arg("residual"), py::arg("max_sweeps"));
   module.def("lights_of_data", [](const Data& data) { return lights_of(data->lights); });

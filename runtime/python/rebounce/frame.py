@@ -112,6 +112,8 @@ class Engine:
         self, data: "TransferData", points_per_patch: int = 8, area_light_samples: int = 4
     ) -> None:
         self._core = _core.Engine(data._core, points_per_patch, area_light_samples)
+        self._data = data._core
+        self._estimator: Optional["_core.ErrorEstimator"] = None
         self._materials: List[str] = data.record["materials"]
 
     def relight(self, lights: Sequence[Light] = (), sky: Optional[Sky] = None) -> None:
@@ -135,6 +137,18 @@ class Engine:
             named = [material]
         for m in named:
             self._core.set_emission_scale(m, [float(x) for x in np.broadcast_to(scale, 3)])
+
+    def estimate_error(self) -> Tuple[float, float]:
+        """The error of the indirect irradiance of the last frame, and an upper limit of it.
+
+        Both are relative to the solution with the form factors that the data keep, in the
+        area-weighted L2 norm; the limit is inf if too little light arrives to tell. It takes the
+        time of two gathers and a product. Raises Error if the data keep no form factors, or the
+        operator has receivers or sources.
+        """
+        if self._estimator is None:
+            self._estimator = _core.ErrorEstimator(self._data)
+        return self._estimator.estimate_error(self._core)
 
     @property
     def direct_irradiance(self) -> Floats:

@@ -46,6 +46,10 @@ TEST(ValidationError, FindsWhatTheLargestOf64LightsIsOfAnExponentialTail) {
   }
 }
 
+TEST(ValidationError, SeesASingleLightThatTheTailDoesNot) {
+  EXPECT_NEAR(validation_error(errors(512, 0.0009, {0.032})), 0.8 * 0.032 / 3, 1e-12);
+}
+
 TEST(ValidationError, DoesNotDependOnTheOrder) {
   std::vector<double> many = errors(256, 0.003, {0.022, 0.03, 0.04, 0.05});
   const double judged = validation_error(many);

@@ -254,6 +254,15 @@ TEST(Safetensors, ReportsAFileThatCannotBeRead) {
   expect_error([&] { SafetensorsFile(folder / "empty"); }, "truncated, shorter than a header");
 }
 
+TEST(Safetensors, RefusesAFileThatMemoryCannotHold) {
+  const test::TemporaryFolder folder;
+  test::write_bytes(folder / "huge", std::string(16, ' '));
+  std::error_code error;
+  std::filesystem::resize_file(folder / "huge", std::uintmax_t{4} << 40, error);  // a hole
+  if (error) GTEST_SKIP() << "no files of 4 TiB here: " << error.message();
+  expect_error([&] { SafetensorsFile(folder / "huge"); }, "it has 4096 GiB, this machine");
+}
+
 /// One to four random edits: what a bad disk, a bad tool or a bad person might do.
 std::string mutated(std::string bytes, std::mt19937_64& random) {
   static const std::vector<std::string> kTokens{
