@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstring>
 
-#include "transfer/format/row_format.h"
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/vector_load.h"
 
@@ -23,7 +22,7 @@ struct Vector4 {
   static constexpr std::size_t kWidth = 4;
   static constexpr std::size_t kStrip = 16;
   static constexpr std::size_t kLights = 1;
-  static constexpr std::size_t kCouplingVectors = 2;
+  static constexpr std::size_t kCouplingVectors = 4;
   Floats v;
 
   static Vector4 load(const float* p) { return {read<Floats>(p)}; }
@@ -37,6 +36,7 @@ struct Vector4 {
     return {std::bit_cast<Floats>(sign | (magnitude >= 0x7C00U ? infinite : finite))};
   }
   static Vector4 load_some(const float* p, std::size_t count) {
+    if (count >= kWidth) return load(p);
     float some[kWidth] = {};
     for (std::size_t k = 0; k < count; ++k) some[k] = p[k];
     return load(some);
@@ -49,6 +49,7 @@ struct Vector4 {
     multiply_add(broadcast(scale), *this, load(p)).store(p);
   }
   void store_some(float* p, std::size_t count) const {
+    if (count >= kWidth) return store(p);
     for (std::size_t k = 0; k < count; ++k) p[k] = v[k];
   }
   /// A vector whose lanes are zero where those of both are.
@@ -88,38 +89,7 @@ struct Vector4 {
   };
 
   /// Loads the entries of packed rows (RowFormat), like EntryLanes.
-  class PackedLanes {
-   public:
-    explicit PackedLanes(const ChannelLanes& lanes) : lanes_(lanes) {}
-
-    /// A row in one format.
-    class Row {
-     public:
-      Row(const PackedLanes& lanes, RowFormat format) : lanes_(lanes.lanes_), format_(format) {}
-      /// Loads the column of a vector; reads 8 bytes.
-      Vector4 load(const std::uint8_t* row, std::size_t vector) const {
-        const std::size_t first = vector * lanes_.matrix_count * format_.half_bytes();
-        std::uint64_t bits = 0;
-        std::memcpy(&bits, row + first / 2, sizeof bits);
-        bits >>= first % 2 * 4;
-        Integers high;
-        for (std::size_t k = 0; k < kWidth; ++k) {
-          high[k] = static_cast<std::int32_t>(bits >> (lanes_.value[k] * format_.bits()));
-        }
-        const int above = 32 - static_cast<int>(format_.bits());
-        return {__builtin_convertvector((high << above) >> above, Floats)};
-      }
-      /// What the loaded entries are multiplied with.
-      Vector4 step() const { return broadcast(format_.step()); }
-
-     private:
-      const ChannelLanes& lanes_;
-      RowFormat format_;
-    };
-
-   private:
-    const ChannelLanes& lanes_;
-  };
+  class PackedLanes;
 
  private:
   template <typename Lanes>
@@ -144,3 +114,9 @@ inline void store_side_by_side(const Vector4& red, const Vector4& green, const V
 
 }  // namespace
 }  // namespace rebounce
+
+#if defined(__wasm_simd128__)
+#include "transfer/kernels/packed_lanes_wasm.h"
+#else
+#include "transfer/kernels/packed_lanes_portable.h"
+#endif

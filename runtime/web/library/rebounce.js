@@ -193,6 +193,25 @@ export class Engine {
     }
   }
 
+  /**
+   * What a sky of the CIE looks like, in parts of its luminance: [height][width], rows from below
+   * up, columns from -x over +z and +x to -z.
+   */
+  skyPanorama(type, sunDirection, width, height, groundReflectance = 0.2) {
+    const instance = this.#instance;
+    const sun = instance.put(new Uint8Array(new Float32Array(sunDirection).buffer));
+    const cells = instance.allocate(4 * skyCellCount);
+    const texels = instance.allocate(4 * width * height);
+    try {
+      instance.check('rebounce_cie_sky', type, sun, groundReflectance, cells);
+      const [ground] = instance.floats(cells, 1);
+      instance.check('rebounce_web_sky_panorama', type, sun, ground, width, height, texels);
+      return instance.floats(texels, width * height).slice();
+    } finally {
+      for (const address of [sun, cells, texels]) instance.release(address);
+    }
+  }
+
   /** From the next frame on, the sky is uniform. */
   setUniformSky() {
     this.#instance.check('rebounce_engine_set_sky_distribution', this.#address, 0);
@@ -254,6 +273,11 @@ export class Engine {
     this.#instance.check('rebounce_web_chosen_direct', this.#address, this.#chosen, this.#patches,
                          this.#vertices);
     return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
+  }
+
+  /** The same at patches, [n][3], of the last call of vertexDirectIrradianceOf. */
+  chosenDirectIrradiance() {
+    return this.#instance.floats(this.#patches, 3 * this.patchCount);
   }
 
   /** The light at probes: harmonics of degree 0 to 2, [probeCount][9][3], cd/m². */

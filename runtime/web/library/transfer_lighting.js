@@ -118,7 +118,7 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
     this.#write(this.#attribute.array, this.#engine.vertexIrradiance());
     this.#attribute.needsUpdate = true;
     this.#writeAttached();
-    this.probes?.write(this.#engine.probeLight());
+    this.probes?.write(this.#engine.probeLight(), this.#parts.value.y);
     this.#engine.timings.vertices = performance.now() - begin;
   }
 

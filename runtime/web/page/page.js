@@ -1,8 +1,10 @@
 // The page: loads a scene, and draws a frame whenever the browser shows one.
 
 import { isSupported } from '../library/rebounce.js';
+import { GaussSeidel } from './comparison.js';
 import { Hand } from './hand.js';
 import { Panel } from './panel.js';
+import { ProbeBaking } from './probe_baking.js';
 import { scenes } from './scenes.js';
 import { Stage } from './stage.js';
 
@@ -26,10 +28,11 @@ function say(title, text, action) {
   message.hidden = false;
 }
 
-function progress(part) {
+function progress(part, title) {
   loading.classList.toggle('on', part < 1);
   loading.setAttribute('aria-valuenow', Math.round(100 * part));
-  loading.firstElementChild.style.width = `${100 * part}%`;
+  loading.style.setProperty('--part', part);
+  if (title) loading.querySelector('p').textContent = title;
 }
 
 function makeStage() {
@@ -69,11 +72,14 @@ function reload() {
 async function open(id) {
   const description = scenes.find((scene) => scene.id === id) ?? scenes[0];
   const wasRunning = running;
-  progress(0.02);
+  const title = `Loading the ${description.title.toLowerCase()}`;
+  const onProgress = (part) => progress(Math.min(0.99, part), title);
+  onProgress(0);
   try {
-    const shown = await stage.load(description, `scenes/${description.id}.safetensors`, progress);
+    const shown = await stage.load(description, `scenes/${description.id}.safetensors`, onProgress);
     if (!shown) return;
     message.hidden = true;
+    document.body.classList.add('begun');
     history.replaceState(null, '', `#${description.id}`);
     panel.showScene();
     running = true;
@@ -86,13 +92,17 @@ async function open(id) {
   }
 }
 
-/** Shows Gauss-Seidel beside, whose form factors are fetched now, or closes it. */
-async function compare(wanted) {
+const comparisons = { 'gauss-seidel': GaussSeidel, probes: ProbeBaking };
+
+/** Shows Gauss-Seidel or a grid of probes beside, with form factors that are fetched now; or none. */
+async function compare(kind) {
+  const onProgress = (part) => progress(Math.min(0.99, part), 'Loading the form factors');
   try {
-    if (wanted) {
-      progress(0.02);
+    if (comparisons[kind]) {
+      onProgress(0);
       const name = stage.description.id;
-      await stage.openComparison(`scenes/${name}.form_factors.safetensors`, progress);
+      await stage.openComparison(
+          comparisons[kind], `scenes/${name}.form_factors.safetensors`, onProgress);
     } else {
       stage.closeComparison();
     }
@@ -100,7 +110,7 @@ async function compare(wanted) {
     panel.showComparison();
   } catch (error) {
     say('The comparison cannot be shown', error.message,
-        { title: 'Try again', run: () => compare(wanted).catch(() => {}) });
+        { title: 'Try again', run: () => compare(kind).catch(() => {}) });
     throw error;
   } finally {
     progress(1);
@@ -109,9 +119,9 @@ async function compare(wanted) {
 
 function start() {
   panel = new Panel(stage, scenes, (id) => open(id).catch(() => {}),
-                    (wanted) => compare(wanted).catch(() => {}));
+                    (kind) => compare(kind).catch(() => {}));
   new Hand(stage, () => panel.showLamps());
-  addEventListener('resize', () => panel.showComparison());
+  addEventListener('resize', () => panel.place());
   stage.canvas.addEventListener('webglcontextlost', (event) => {
     event.preventDefault();
     running = false;
