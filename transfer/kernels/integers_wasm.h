@@ -14,8 +14,8 @@ namespace rebounce {
 namespace {
 
 struct IntegersWasm : Integers128 {
-  static constexpr std::size_t kStrip = 16;
-  // Sums of two groups of ranks fill twelve of the sixteen registers that x86-64 has.
+  static constexpr std::size_t kStrip = 16;  // lab/094
+  // Sums of two groups of ranks fill twelve of the sixteen registers that x86-64 has (lab/094).
   static constexpr std::size_t kProjectedGroups = 2;
 
   class Rounding {
@@ -101,8 +101,8 @@ struct IntegersWasm : Integers128 {
     }
     Magnitudes result;
     wasm_v128_store(result.largest.data(), largest);
-    wasm_v128_store(result.sum.data(), wasm_f32x4_add(wasm_f32x4_add(sum[0], sum[2]),
-                                                      wasm_f32x4_add(sum[1], sum[3])));
+    wasm_v128_store(result.sum.data(),
+                    wasm_f32x4_add(wasm_f32x4_add(sum[0], sum[2]), wasm_f32x4_add(sum[1], sum[3])));
     return result;
   }
 
@@ -116,9 +116,9 @@ struct IntegersWasm : Integers128 {
       v128_t rank[kRankGroup];
       for (std::size_t r = 0; r < kRankGroup; ++r) {
         const bool is_wanted = wanted.begin <= r && r < wanted.end;
-        rank[r] = is_wanted ? nearest(wasm_f32x4_mul(
-                                  wasm_v128_load(from + r * kChannelLanes), scale))
-                            : wasm_i32x4_splat(0);
+        rank[r] = is_wanted
+                      ? nearest(wasm_f32x4_mul(wasm_v128_load(from + r * kChannelLanes), scale))
+                      : wasm_i32x4_splat(0);
       }
       // (channel) of ranks 0 and 2, and of 1 and 3; the largest and least words are kept in range.
       const v128_t even = wasm_i16x8_narrow_i32x4(rank[0], rank[2]);

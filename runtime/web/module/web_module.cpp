@@ -112,8 +112,8 @@ extern "C" {
 }
 
 /// Writes what a sky of the CIE looks like, in parts of its luminance: [height][width], rows from
-/// below up, columns from -x over +z and +x to -z. Below the horizon it is as bright as the cell 0 of
-/// rebounce_cie_sky.
+/// below up, columns from -x over +z and +x to -z. Below the horizon it is as bright as the cell 0
+/// of rebounce_cie_sky.
 [[clang::export_name("rebounce_web_sky_panorama")]] rebounce_status rebounce_web_sky_panorama(
     int type, const Float3* sun_direction, float ground, int width, int height, float* luminance) {
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {

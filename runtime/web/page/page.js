@@ -95,14 +95,14 @@ async function open(id) {
 const comparisons = { 'gauss-seidel': GaussSeidel, probes: ProbeBaking };
 
 /** Shows Gauss-Seidel or a grid of probes beside, with form factors that are fetched now; or none. */
-async function compare(kind) {
+async function compare(kind, settings = {}) {
   const onProgress = (part) => progress(Math.min(0.99, part), 'Loading the form factors');
   try {
     if (comparisons[kind]) {
       onProgress(0);
       const name = stage.description.id;
       await stage.openComparison(
-          comparisons[kind], `scenes/${name}.form_factors.safetensors`, onProgress);
+          comparisons[kind], settings, `scenes/${name}.form_factors.safetensors`, onProgress);
     } else {
       stage.closeComparison();
     }
@@ -110,7 +110,7 @@ async function compare(kind) {
     panel.showComparison();
   } catch (error) {
     say('The comparison cannot be shown', error.message,
-        { title: 'Try again', run: () => compare(kind).catch(() => {}) });
+        { title: 'Try again', run: () => compare(kind, settings).catch(() => {}) });
     throw error;
   } finally {
     progress(1);

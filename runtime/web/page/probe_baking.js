@@ -7,8 +7,7 @@ import { Side } from './comparison.js';
 import { toLight } from '../library/three_lights.js';
 import { GridLight } from './grid_light.js';
 
-const probeCount = 490;    // about, as in three.js's example of a large scene
-const furtherBounces = 1;  // likewise
+const furtherBounces = 1;  // as in three.js's example of a large scene
 const measuredEvery = 8;   // frames: reading back waits for the graphics card
 
 /** The surface with three.js's own materials; all of them take up a grid of probes. */
@@ -27,7 +26,7 @@ function makePlain(mesh) {
   return plain;
 }
 
-function makeGrid(bounds) {
+function makeGrid(bounds, probeCount) {
   const size = bounds.getSize(new THREE.Vector3());
   const cell = Math.cbrt(size.x * size.y * size.z / probeCount);
   const counts = size.toArray().map((length) => Math.max(2, Math.round(length / cell)));
@@ -59,11 +58,12 @@ export class ProbeBaking {
   #frame = 0;
   #measured = '';    // the lights of the last measurement of a bake that was done
 
-  constructor(stage, solver) {
+  /** About `probeCount` probes; by default as in three.js's example of a large scene. */
+  constructor(stage, solver, { probeCount = 490 } = {}) {
     this.#stage = stage;
     this.solver = solver;
     this.#plain = makePlain(stage.lighting.mesh);
-    this.#grid = makeGrid(stage.bounds);
+    this.#grid = makeGrid(stage.bounds, probeCount);
     this.objects = [this.#plain, this.#grid];
     const { centroid, normal } = stage.lighting.transfer.patches;
     this.#light = new GridLight(this.#grid, rowsOf(centroid), rowsOf(normal));

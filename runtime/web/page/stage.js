@@ -187,10 +187,10 @@ export class Stage {
   }
 
   /**
-   * Shows something beside, by one of the classes of comparisons; the form factors of what has
-   * converged are another file.
+   * Shows something beside, by one of the classes of comparisons with its settings; the form factors
+   * of what has converged are another file.
    */
-  async openComparison(Comparison, url, onProgress) {
+  async openComparison(Comparison, settings, url, onProgress) {
     const { lighting } = this;
     const solver = await lighting.transfer.loadSolver(url, { onProgress });
     if (lighting !== this.lighting) {
@@ -198,7 +198,7 @@ export class Stage {
       return;
     }
     this.closeComparison();
-    this.comparison = new Comparison(this, solver);
+    this.comparison = new Comparison(this, solver, settings);
     for (const object of this.comparison.objects) object.visible = false;
     this.scene.add(...this.comparison.objects);
     this.resize();
@@ -290,7 +290,16 @@ export class Stage {
   /** Chooses the exposure by the light that there is. */
   expose() {
     const light = this.lighting.engine.radiosity();
-    const mean = light.reduce((sum, value) => sum + value, 0) / light.length;
+    const { area } = this.lighting.transfer.patches;
+    // By patches, which are small where there is something to see; by area under the sun.
+    let sum = 0, byArea = 0, allArea = 0;
+    area.forEach((size, k) => {
+      const bright = (light[3 * k] + light[3 * k + 1] + light[3 * k + 2]) / 3;
+      sum += bright;
+      byArea += size * bright;
+      allArea += size;
+    });
+    const mean = Math.max(sum / area.length, byArea / allArea);
     this.renderer.toneMappingExposure = 0.3 * Math.PI / Math.max(mean, 1e-3);
   }
 

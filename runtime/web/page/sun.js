@@ -20,7 +20,7 @@ export function sunAndSky(hour) {
   };
   const dusk = Math.max(0.004, Math.min(1, (altitude + 0.1) / 0.35));
   const sky = {
-    color: [0.55 + 0.3 * low, 0.72, 1], luminance: 300 * dusk, type: 12, sunDirection: direction,
+    color: [0.38 + 0.4 * low, 0.62 + 0.08 * low, 1], luminance: 480 * dusk, type: 12, sunDirection: direction,
   };
   return { sun, sky };
 }

@@ -61,7 +61,8 @@ const product: number = engine.relight([lamp], { luminance: 100 }).product;
 const light: Float32Array = engine.indirectIrradiance();
 const lighting = await TransferLighting.load(new URL('https://example.org/room.safetensors'));
 new Scene().add(lighting.mesh);
-lighting.update([new PointLight(), lamp], { luminance: product * light.length });
+lighting.attach(new Scene());
+lighting.update([new PointLight(), lamp], { luminance: product * light.length, ground: 0.5 });
 // @ts-expect-error: there is no such lamp
 engine.relight([{ type: 'candle' }]);
 `;
