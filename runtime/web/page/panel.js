@@ -100,9 +100,9 @@ export class Panel {
 
   addLamp(kind) {
     const { bounds, description } = this.#stage;
-    // High in the middle: furniture stands below.
-    const { x, z } = bounds.min.clone().lerp(bounds.max, 0.5);
-    const middle = [x, bounds.min.y + 0.78 * (bounds.max.y - bounds.min.y), z];
+    // High in the middle, where furniture stands below, and beside those that were added before.
+    const { x, z } = bounds.min.clone().lerp(bounds.max, 0.4 + 0.1 * this.#stage.lamps.length);
+    const middle = [x, bounds.min.y + 0.72 * (bounds.max.y - bounds.min.y), z];
     const colors = ['#ffd2a1', '#9cc4ff', '#ff9c8f', '#b8ffb0'];
     this.#stage.addLamp({
       kind, position: middle, color: colors[this.#stage.lamps.length % colors.length],

@@ -20,7 +20,8 @@ export function sunAndSky(hour) {
   };
   const dusk = Math.max(0.004, Math.min(1, (altitude + 0.1) / 0.35));
   const sky = {
-    color: [0.38 + 0.4 * low, 0.62 + 0.08 * low, 1], luminance: 480 * dusk, type: 12, sunDirection: direction,
+    color: [0.38 + 0.4 * low * dusk, 0.62 + 0.08 * low * dusk, 1], luminance: 480 * dusk, type: 12,
+    sunDirection: direction,
   };
   return { sun, sky };
 }
