@@ -10,20 +10,24 @@ import { Stage } from './stage.js';
 
 const loading = document.getElementById('loading');
 const message = document.getElementById('message');
+let running = false;  // whether frames are drawn
 
 function say(title, text, action) {
   message.replaceChildren();
   const strong = document.createElement('strong');
   strong.textContent = title;
   message.append(strong, text);
-  if (action) {
+  const actions = action ? [action] : [];
+  if (running) actions.push({ title: 'Close', run: () => {} });  // what was shown goes on
+  if (actions.length > 0) message.append(document.createElement('br'));
+  for (const { title: name, run } of actions) {
     const button = document.createElement('button');
-    button.textContent = action.title;
+    button.textContent = name;
     button.addEventListener('click', () => {
       message.hidden = true;
-      action.run();
+      run();
     });
-    message.append(document.createElement('br'), button);
+    message.append(button);
   }
   message.hidden = false;
 }
@@ -50,7 +54,7 @@ function makeStage() {
 }
 
 const stage = makeStage();
-let panel = null, running = false, lastTimings = {};
+let panel = null, lastTimings = {};
 
 function frame() {
   if (!running) return;

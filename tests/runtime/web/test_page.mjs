@@ -355,6 +355,10 @@ test('what is missing or damaged has a message, and the next scene can be shown'
   assert.match(await messageOf(null), /404/);
   assert.match(await messageOf(good.subarray(0, good.length / 2)), /truncated/);
   assert.match(await messageOf(Buffer.from('<html></html>')), /safetensors|header|short/);
+  rmSync(bad);
+  await page.click('#scenes [data-scene=pavilion]');
+  await page.click('#message button:text("Close")');
+  assert.ok(await page.locator('#message').isHidden(), 'what was shown goes on');
   copyFileSync(scene, bad);
   assert.ok(await sum(page) > 0);
 });
