@@ -3,6 +3,7 @@
 import * as THREE from 'three';
 import { LightProbeGridWebGL } from 'three/addons/lighting/LightProbeGridWebGL.js';
 import { TransferLighting } from '../../runtime/web/library/transfer_lighting.js';
+import { GridLight } from '../../runtime/web/page/grid_light.js';
 
 const probesPerFrame = 4;  // as three.js's example of a large scene
 const right = 0.05;
@@ -31,55 +32,6 @@ const lamps = [];
 
 function draw() {
   renderer.render(scene, camera);
-}
-
-/** The four numbers of each texel of a grid's texture. */
-function readAtlas(grid) {
-  const { x: nx, y: ny, z: nz } = grid.resolution;
-  const depth = 7 * (nz + 2);
-  const atlas = new Float32Array(4 * nx * ny * depth);
-  const gl = renderer.getContext();
-  for (let layer = 0; layer < depth; ++layer) {
-    renderer.setRenderTarget(grid._renderTarget, layer);
-    gl.readPixels(0, 0, nx, ny, gl.RGBA, gl.FLOAT, atlas, 4 * nx * ny * layer);
-  }
-  renderer.setRenderTarget(null);
-  return atlas;
-}
-
-/** The irradiance of a grid at a point, as three.js's shader finds it. */
-function irradiance(grid, atlas, { position, normal }) {
-  const size = grid.resolution.toArray();
-  const low = grid.boundingBox.min.toArray(), high = grid.boundingBox.max.toArray();
-  const places = size.map((count, c) => {
-    const range = high[c] - low[c];
-    const at = (position[c] + 0.5 * normal[c] * range / count - low[c]) / range;
-    const place = Math.min(Math.max(at * count, 0.5), count - 0.5) - 0.5;
-    const first = Math.min(Math.floor(place), count - 1);
-    return { first, second: Math.min(first + 1, count - 1), part: place - first };
-  });
-  const sum = new Float64Array(28);
-  for (let corner = 0; corner < 8; ++corner) {
-    let weight = 1;
-    const [x, y, z] = places.map(({ first, second, part }, c) => {
-      const far = (corner >> c) & 1;
-      weight *= far ? part : 1 - part;
-      return far ? second : first;
-    });
-    for (let t = 0; t < 7; ++t) {
-      const layer = t * (size[2] + 2) + 1 + z;
-      for (let c = 0; c < 4; ++c) {
-        sum[4 * t + c] += weight * atlas[4 * (x + size[0] * (y + size[1] * layer)) + c];
-      }
-    }
-  }
-  const [x, y, z] = normal;
-  const basis = [
-    0.886227, 2 * 0.511664 * y, 2 * 0.511664 * z, 2 * 0.511664 * x, 2 * 0.429043 * x * y,
-    2 * 0.429043 * y * z, 0.743125 * z * z - 0.247708, 2 * 0.429043 * x * z,
-    0.429043 * (x * x - y * y),
-  ];
-  return [0, 1, 2].map((c) => Math.max(0, basis.reduce((all, b, k) => all + b * sum[3 * k + c], 0)));
 }
 
 window.bench = {
@@ -116,11 +68,13 @@ window.bench = {
       grid.updateBoundingBox();
       return grid;
     };
-    const valuesOf = (grid) => {
-      const atlas = readAtlas(grid);
-      return points.map((point) => irradiance(grid, atlas, point));
-    };
     const grid = make();
+    const reader = new GridLight(grid, points.map(({ position }) => position),
+                                 points.map(({ normal }) => normal));
+    const valuesOf = (one) => {
+      const light = reader.read(renderer, one);
+      return points.map((_, k) => [...light.subarray(3 * k, 3 * k + 3)]);
+    };
     scene.add(grid);
     grid.bake(renderer, scene, { bounces, near: 0.02, far: 50 });
     const values = valuesOf(grid);

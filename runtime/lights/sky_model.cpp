@@ -1,4 +1,4 @@
-#include "rebounce/sky.h"
+#include "runtime/lights/sky_model.h"
 
 #include <algorithm>
 #include <array>
@@ -8,6 +8,7 @@
 #include <string>
 
 #include "rebounce/error.h"
+#include "rebounce/sky.h"
 #include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
@@ -15,11 +16,6 @@ namespace {
 
 // Sample points along each side of a cell, for its mean luminance.
 constexpr int kPointsAcross = 8;
-
-/// Gradation 1 + a exp(b / cos Z), indicatrix 1 + c (exp(d X) - exp(d pi / 2)) + e cos² X.
-struct SkyType {
-  double a, b, c, d, e;
-};
 
 // ISO 15469:2004, table 1.
 constexpr std::array<SkyType, kCieSkyCount> kTypes = {{{4, -0.70, 0, -1, 0},
@@ -38,51 +34,43 @@ constexpr std::array<SkyType, kCieSkyCount> kTypes = {{{4, -0.70, 0, -1, 0},
                                                        {-1, -0.15, 16, -3, 0.3},
                                                        {-1, -0.15, 24, -2.8, 0.15}}};
 
-class CieSky {
- public:
-  CieSky(const SkyType& type, const glm::dvec3& to_sun)
-      : type_(type), to_sun_(to_sun), zenith_(indicatrix(to_sun.y) * gradation(1)) {}
-
-  /// The luminance relative to the zenith.
-  double luminance(const glm::dvec3& direction) const {
-    return indicatrix(glm::dot(direction, to_sun_)) * gradation(direction.y) / zenith_;
+const SkyType& type_of(int number) {
+  if (number < 1 || number > kCieSkyCount) {
+    throw Error("there is no CIE sky " + std::to_string(number) + "; ask for 1 to 15");
   }
-
- private:
-  double gradation(double cosine) const {
-    return 1 + (cosine > 0 ? type_.a * std::exp(type_.b / cosine) : 0.0);
-  }
-
-  double indicatrix(double cosine) const {
-    const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
-    return 1 + type_.c * (std::exp(type_.d * angle) - std::exp(type_.d * std::numbers::pi / 2)) +
-           type_.e * cosine * cosine;
-  }
-
-  SkyType type_;
-  glm::dvec3 to_sun_;
-  double zenith_;
-};
-
-void check(int type, const glm::dvec3& to_sun, float ground_reflectance) {
-  if (type < 1 || type > kCieSkyCount) {
-    throw Error("there is no CIE sky " + std::to_string(type) + "; ask for 1 to 15");
-  }
-  if (!(ground_reflectance >= 0 && ground_reflectance <= 1)) {
-    throw Error("the reflectance of the ground must be from 0 to 1");
-  }
-  const bool sees_sun = kTypes[static_cast<std::size_t>(type - 1)].c > 0;
-  if (!(glm::length(to_sun) > 0) || (sees_sun && !(to_sun.y >= 0))) {
-    throw Error("the sun of a CIE sky must stand above the horizon: its light travels downwards");
-  }
+  return kTypes[static_cast<std::size_t>(number - 1)];
 }
 
 }  // namespace
 
+CieSky::CieSky(int type, const glm::dvec3& sun_direction)
+    : type_(type_of(type)), to_sun_(-sun_direction) {
+  if (!(glm::length(to_sun_) > 0) || (type_.c > 0 && !(to_sun_.y >= 0))) {
+    throw Error("the sun of a CIE sky must stand above the horizon: its light travels downwards");
+  }
+  to_sun_ = glm::normalize(to_sun_);
+  zenith_ = indicatrix(to_sun_.y) * gradation(1);
+}
+
+double CieSky::luminance(const glm::dvec3& direction) const {
+  return indicatrix(glm::dot(direction, to_sun_)) * gradation(direction.y) / zenith_;
+}
+
+double CieSky::gradation(double cosine) const {
+  return 1 + (cosine > 0 ? type_.a * std::exp(type_.b / cosine) : 0.0);
+}
+
+double CieSky::indicatrix(double cosine) const {
+  const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
+  return 1 + type_.c * (std::exp(type_.d * angle) - std::exp(type_.d * std::numbers::pi / 2)) +
+         type_.e * cosine * cosine;
+}
+
 SkyDistribution cie_sky(int type, const Float3& sun_direction, float ground_reflectance) {
-  const glm::dvec3 to_sun = -to_dvec3(sun_direction);
-  check(type, to_sun, ground_reflectance);
-  const CieSky sky(kTypes[static_cast<std::size_t>(type - 1)], glm::normalize(to_sun));
+  const CieSky sky(type, to_dvec3(sun_direction));
+  if (!(ground_reflectance >= 0 && ground_reflectance <= 1)) {
+    throw Error("the reflectance of the ground must be from 0 to 1");
+  }
   SkyDistribution mean{};
   double horizontal = 0;  // horizontal irradiance
   for (std::uint32_t cell = 1; cell < kSkyCellCount; ++cell) {

@@ -18,12 +18,12 @@
 // the words of even and of odd ranks. Groups of ranks whose coefficients round to nothing are left
 // out, and so are positions without light: the bits are the same.
 //
-// `N` has vectors of 32-bit sums: Sum, zero, add. Projection: kProjected positions at a time;
-// Ranks, load_ranks; Light, load_light; ProjectedSum, first_sum, add_projected; Rounding (of 16
-// positions), store_coefficients; measure_run. Expansion: kExpanded positions in a vector;
-// Positions, load_positions; Pair, broadcast_pair; add_products; CoefficientRounding, add_to_light;
-// magnitudes_of_lanes. kStrip: positions whose sums fit the registers. kLeastSums: independent sums
-// that hide the latency of add_products.
+// `N` has vectors of 32-bit sums: Sum, zero, add. Projection: kProjected positions at a time, of
+// kProjectedGroups groups of ranks; Ranks, load_ranks; Light, load_light; ProjectedSum, first_sum,
+// add_projected; Rounding (of 16 positions), store_coefficients; measure_run. Expansion: kExpanded
+// positions in a vector; Positions, load_positions; Pair, broadcast_pair; add_products;
+// CoefficientRounding, add_to_light; magnitudes_of_lanes. kStrip: positions whose sums fit the
+// registers. kLeastSums: independent sums that hide the latency of add_products.
 //
 // Integer sums do not depend on their order. Floats are converted, scaled and added in one fixed
 // order. So all instruction sets give the same bits.
@@ -258,7 +258,7 @@ REBOUNCE_INLINE inline void project_chunk(const std::int8_t* values, const Basis
     }
   }
   const auto project = [&]<bool kSigned>() REBOUNCE_INLINE {
-    for_each_rows<4>(all.count, [&]<std::size_t kGroups>(std::size_t g) {
+    for_each_rows<N::kProjectedGroups>(all.count, [&]<std::size_t kGroups>(std::size_t g) {
       project_groups<N, kGroups, kSigned>(bases, positions, light, add_to,
                                           coefficient + g * kRankGroup * kChannelLanes);
       for (StripBasis& basis : bases) basis.values += kGroups * basis.group_step;

@@ -28,6 +28,7 @@ struct Integers256 {
 
   // Projection in 16-bit integers: sums are (4 ranks)(2 pairs of positions).
 
+  static constexpr std::size_t kProjectedGroups = 4;
   static constexpr std::size_t kProjected = 4;
   static constexpr std::size_t kLightBytes = 2;  ///< of a position
   struct Ranks {

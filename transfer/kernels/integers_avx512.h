@@ -30,6 +30,7 @@ struct Integers512 {
   // Projection: sums are (4 groups of positions)(4 ranks), of the higher bytes of the light and of
   // the lower ones.
 
+  static constexpr std::size_t kProjectedGroups = 4;
   static constexpr std::size_t kProjected = 16;
   /// Of a position: each four positions' higher bytes are there four times, then the lower ones.
   static constexpr std::size_t kLightBytes = 2 * kRankGroup;

@@ -7,6 +7,10 @@
 #include <cstdint>
 #include <cstring>
 
+#if defined(__wasm_simd128__)
+#include <wasm_simd128.h>
+#endif
+
 #include "transfer/format/row_format.h"
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/vector_load.h"
@@ -23,7 +27,7 @@ struct Vector4 {
   static constexpr std::size_t kWidth = 4;
   static constexpr std::size_t kStrip = 16;
   static constexpr std::size_t kLights = 1;
-  static constexpr std::size_t kCouplingVectors = 2;
+  static constexpr std::size_t kCouplingVectors = 4;
   Floats v;
 
   static Vector4 load(const float* p) { return {read<Floats>(p)}; }
@@ -37,6 +41,7 @@ struct Vector4 {
     return {std::bit_cast<Floats>(sign | (magnitude >= 0x7C00U ? infinite : finite))};
   }
   static Vector4 load_some(const float* p, std::size_t count) {
+    if (count >= kWidth) return load(p);
     float some[kWidth] = {};
     for (std::size_t k = 0; k < count; ++k) some[k] = p[k];
     return load(some);
@@ -49,6 +54,7 @@ struct Vector4 {
     multiply_add(broadcast(scale), *this, load(p)).store(p);
   }
   void store_some(float* p, std::size_t count) const {
+    if (count >= kWidth) return store(p);
     for (std::size_t k = 0; k < count; ++k) p[k] = v[k];
   }
   /// A vector whose lanes are zero where those of both are.
@@ -87,6 +93,66 @@ struct Vector4 {
     const ChannelLanes& lanes_;
   };
 
+#if defined(__wasm_simd128__)
+  /// Loads the entries of packed rows (RowFormat), like EntryLanes. An entry is the four bytes that
+  /// begin with it, shifted to the left by a product, and back (lab/094).
+  class PackedLanes {
+    struct Place {
+      v128_t bytes, factors;
+    };
+
+   public:
+    explicit PackedLanes(const ChannelLanes& lanes) : matrix_count_(lanes.matrix_count) {
+      for (unsigned width = 0; width < kWidths; ++width) {
+        const unsigned bits = 4 * width + 4;
+        for (unsigned half = 0; half < 2; ++half) {
+          std::uint8_t bytes[16];
+          std::uint32_t factors[kWidth];
+          for (std::size_t k = 0; k < kWidth; ++k) {
+            const unsigned bit = lanes.value[k] * bits + half * 4;
+            for (unsigned b = 0; b < 4; ++b)
+              bytes[4 * k + b] = static_cast<std::uint8_t>(bit / 8 + b);
+            factors[k] = 1U << (32 - bits - bit % 8);
+          }
+          places_[width][half] = {wasm_v128_load(bytes), wasm_v128_load(factors)};
+        }
+      }
+    }
+
+    /// A row in one format.
+    class Row {
+     public:
+      Row(const PackedLanes& lanes, RowFormat format)
+          : places_(lanes.places_[format.width()]),
+            half_bytes_(lanes.matrix_count_ * format.half_bytes()),
+            above_(32 - format.bits()),
+            step_(format.step()) {}
+      /// Loads the column of a vector; reads 8 bytes.
+      Vector4 load(const std::uint8_t* row, std::size_t vector) const {
+        const std::size_t first = vector * half_bytes_;
+        const Place& place = places_[first % 2];
+        const v128_t bytes =
+            wasm_i8x16_swizzle(wasm_v128_load64_zero(row + first / 2), place.bytes);
+        const v128_t high = wasm_i32x4_mul(bytes, place.factors);
+        return {std::bit_cast<Floats>(wasm_f32x4_convert_i32x4(wasm_i32x4_shr(high, above_)))};
+      }
+      /// What the loaded entries are multiplied with.
+      Vector4 step() const { return broadcast(step_); }
+
+     private:
+      const Place* places_;
+      std::size_t half_bytes_;
+      std::uint32_t above_;
+      float step_;
+    };
+
+   private:
+    static constexpr unsigned kWidths = 4;
+    /// Of a column that begins with a byte, and of one that begins with the second half of one.
+    Place places_[kWidths][2];
+    std::size_t matrix_count_;
+  };
+#else
   /// Loads the entries of packed rows (RowFormat), like EntryLanes.
   class PackedLanes {
    public:
@@ -120,6 +186,7 @@ struct Vector4 {
    private:
     const ChannelLanes& lanes_;
   };
+#endif
 
  private:
   template <typename Lanes>

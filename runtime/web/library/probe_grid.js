@@ -62,10 +62,10 @@ export class ProbeGrid extends THREE.Light {
     this.#light = new Float32Array(floats * valid.length);
   }
 
-  /** @param {Float32Array} light [probes][9][3], cd/m² */
-  write(light) {
+  /** @param {Float32Array} light [probes][9][3], cd/m², shown times `part` */
+  write(light, part = 1) {
     const own = this.#light;
-    own.set(light);
+    for (let k = 0; k < own.length; ++k) own[k] = part * light[k];
     for (const { probe, around } of this.#standIns) {
       for (let k = 0; k < floats; ++k) {
         let sum = 0;
@@ -76,14 +76,14 @@ export class ProbeGrid extends THREE.Light {
     const [nx, ny, nz] = this.#grid;
     const within = (k, count) => Math.min(Math.max(k - 1, 0), count - 1);
     const { data, width, height } = this.texture.image;
-    for (let part = 0, to = 0; part < subVolumes; ++part) {
+    for (let volume = 0, to = 0; volume < subVolumes; ++volume) {
       for (let z = 0; z < nz + 4; ++z) {  // one more at both ends, as three.js wants it
         for (let y = 0; y < height; ++y) {
           for (let x = 0; x < width; ++x, to += 4) {
             const probe =
                 within(x, nx) + nx * (within(y, ny) + ny * within(z - 1, nz));
             for (let c = 0; c < 4; ++c) {
-              const number = 4 * part + c;
+              const number = 4 * volume + c;
               data[to + c] = number < floats
                   ? THREE.DataUtils.toHalfFloat(own[floats * probe + number]) : 0;
             }

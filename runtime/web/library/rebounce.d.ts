@@ -49,6 +49,13 @@ export interface Mesh {
   readonly surfaceCount: number;
 }
 
+/** What the light of patches is of: [patchCount] m², [patchCount][3] m, [patchCount][3] unit. */
+export interface Patches {
+  readonly area: Float32Array;
+  readonly centroid: Float32Array;
+  readonly normal: Float32Array;
+}
+
 export interface Material {
   readonly name: string;
   readonly baseColor: number[];
@@ -110,7 +117,12 @@ export class Transfer {
   readonly materials: Material[];
   readonly cameras: Camera[];
   readonly probes: Probes | null;
+  /** What messages call the file. */
+  readonly name: string;
+  readonly patches: Patches;
   readonly patchCount: number;
+  /** Whether the sky may look different in different directions. */
+  readonly hasSkyCells: boolean;
   /** Whether any patch sees the sky. */
   readonly seesSky: boolean;
   /** The measured error of indirect light, relative. */
@@ -132,6 +144,16 @@ export class Engine {
   relight(lights: readonly Light[], sky?: Sky): Timings;
   /** Gives the sky the look of a sky of the CIE, 1 (overcast) to 15; 12 is clear. */
   setSky(type: number, sunDirection: readonly number[], groundReflectance?: number): void;
+  /**
+   * What such a sky looks like, in parts of its luminance: [height][width], rows from below up,
+   * columns from -x over +z and +x to -z.
+   */
+  skyPanorama(type: number, sunDirection: readonly number[], width: number, height: number,
+              groundReflectance?: number): Float32Array;
+  /** Makes the sky uniform, as at first. */
+  setUniformSky(): void;
+  /** Makes it uniform above the horizon, and `ground` times as bright below. */
+  setSkyAboveGround(ground: number): void;
   /** Scales what the surfaces of a material emit, from the next frame on. */
   setEmissionScale(material: number, scale: readonly number[]): void;
   /** [patchCount][3], lx */
@@ -146,22 +168,31 @@ export class Engine {
    * 1; to be called at most once after each frame.
    */
   vertexDirectIrradianceOf(chosen: ArrayLike<number>): Float32Array;
+  /** The same at patches, [patchCount][3], of the last call of vertexDirectIrradianceOf. */
+  chosenDirectIrradiance(): Float32Array;
   /** [probeCount][9][3], cd/m²: spherical harmonics of degree 0 to 2. */
   probeLight(): Float32Array;
   dispose(): void;
 }
 
-/** What sweeps took and how far both sides are from the converged solution, relative. */
+/** What sweeps took, and how far their light is from what has converged, relative. */
 export interface Swept {
   milliseconds: number;
   error: number;
-  engineError: number;
 }
 
 /** Gauss-Seidel that goes on from its last solution, for comparison. */
 export class Solver {
   private constructor();
+  readonly patchCount: number;
   readonly vertexCount: number;
+  /**
+   * Solves for the light of the engine's last frame until it has converged; how far the engine's
+   * indirect light is from that: relative, area-weighted L2.
+   */
+  converge(engine: Engine): number;
+  /** How far other indirect light, [patchCount][3] in lx, is from what has converged. */
+  errorOf(irradiance: ArrayLike<number>): number;
   /** Sweeps for the light of the engine's last frame. */
   sweep(engine: Engine, count: number): Swept;
   /** [vertexCount][3], lx: the bounced light of the last sweeps. */

@@ -77,11 +77,15 @@ export class Transfer {
       for (const address of [bytes, title, result]) instance.release(address);
     }
     const file = readSafetensors(buffer);
+    this.name = name;
     this.mesh = readMesh(file);
     this.materials = readMaterials(file);
     this.cameras = readCameras(file);
     this.probes = readProbes(file);
-    this.patchCount = file.tensor('patch.area').length;
+    this.patches = readPatches(file);
+    this.patchCount = this.patches.area.length;
+    /** Whether the sky may look different in different directions. */
+    this.hasSkyCells = file.tensor('sky.entry_begin') !== null;
     this.seesSky = file.tensor('patch.sky_visibility').some((part) => part > 0.01);
     this.errorMean = Number(file.metadata.error_mean);
   }
@@ -189,6 +193,41 @@ export class Engine {
     }
   }
 
+  /**
+   * What a sky of the CIE looks like, in parts of its luminance: [height][width], rows from below
+   * up, columns from -x over +z and +x to -z.
+   */
+  skyPanorama(type, sunDirection, width, height, groundReflectance = 0.2) {
+    const instance = this.#instance;
+    const sun = instance.put(new Uint8Array(new Float32Array(sunDirection).buffer));
+    const cells = instance.allocate(4 * skyCellCount);
+    const texels = instance.allocate(4 * width * height);
+    try {
+      instance.check('rebounce_cie_sky', type, sun, groundReflectance, cells);
+      const [ground] = instance.floats(cells, 1);
+      instance.check('rebounce_web_sky_panorama', type, sun, ground, width, height, texels);
+      return instance.floats(texels, width * height).slice();
+    } finally {
+      for (const address of [sun, cells, texels]) instance.release(address);
+    }
+  }
+
+  /** From the next frame on, the sky is uniform. */
+  setUniformSky() {
+    this.#instance.check('rebounce_engine_set_sky_distribution', this.#address, 0);
+  }
+
+  /** From the next frame on, the sky is uniform, and what is below the horizon `ground` times it. */
+  setSkyAboveGround(ground) {
+    const cells = this.#instance.put(new Uint8Array(
+        new Float32Array(skyCellCount).fill(1).fill(ground, 0, 1).buffer));
+    try {
+      this.#instance.check('rebounce_engine_set_sky_distribution', this.#address, cells);
+    } finally {
+      this.#instance.release(cells);
+    }
+  }
+
   /** From the next frame on, the surfaces of a material emit that of the scene times `scale`. */
   setEmissionScale(material, scale) {
     const address = this.#instance.put(new Uint8Array(new Float32Array(scale).buffer));
@@ -236,6 +275,11 @@ export class Engine {
     return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
   }
 
+  /** The same at patches, [n][3], of the last call of vertexDirectIrradianceOf. */
+  chosenDirectIrradiance() {
+    return this.#instance.floats(this.#patches, 3 * this.patchCount);
+  }
+
   /** The light at probes: harmonics of degree 0 to 2, [probeCount][9][3], cd/m². */
   probeLight() {
     this.#instance.check('rebounce_engine_probe_light', this.#address, this.#probes,
@@ -264,9 +308,11 @@ export class Solver {
   #address;
   #result;
   #vertices;
+  #patches;
 
-  constructor(instance, transfer, { mesh }, buffer, name) {
+  constructor(instance, transfer, { mesh, patchCount }, buffer, name) {
     this.#instance = instance;
+    this.patchCount = patchCount;
     this.vertexCount = mesh.position.length / 3;
     const bytes = instance.put(new Uint8Array(buffer));
     const title = instance.putText(name);
@@ -277,20 +323,38 @@ export class Solver {
     } finally {
       for (const address of [bytes, title, result]) instance.release(address);
     }
-    this.#result = instance.allocate(3 * 8);
+    this.#result = instance.allocate(2 * 8);
     this.#vertices = instance.allocate(12 * this.vertexCount);
+    this.#patches = instance.allocate(12 * patchCount);
+  }
+
+  /**
+   * Solves for the light of the engine's last frame until it has converged.
+   * @returns {number} how far the engine's indirect light is from that, relative
+   */
+  converge(engine) {
+    this.#instance.check('rebounce_web_solver_converge', this.#address, engine.address,
+                         this.#result);
+    return this.#instance.doubles(this.#result, 1)[0];
   }
 
   /**
    * Sweeps for the light of the engine's last frame, from where the last sweeps ended.
-   * @returns {{milliseconds: number, error: number, engineError: number}} of the sweeps alone, and
-   *   how far the indirect light of the sweeps and of the engine are from the converged solution
+   * @returns {{milliseconds: number, error: number}} of the sweeps alone, and how far their indirect
+   *   light is from what has converged
    */
   sweep(engine, count) {
     this.#instance.check('rebounce_web_solver_sweep', this.#address, engine.address, count,
                          this.#result);
-    const [milliseconds, error, engineError] = this.#instance.doubles(this.#result, 3);
-    return { milliseconds, error, engineError };
+    const [milliseconds, error] = this.#instance.doubles(this.#result, 2);
+    return { milliseconds, error };
+  }
+
+  /** How far other indirect light of the patches, [n][3], is from what has converged, relative. */
+  errorOf(irradiance) {
+    this.#instance.floats(this.#patches, 3 * this.patchCount).set(irradiance);
+    this.#instance.check('rebounce_web_solver_error', this.#address, this.#patches, this.#result);
+    return this.#instance.doubles(this.#result, 1)[0];
   }
 
   vertexIrradiance() {
@@ -303,10 +367,18 @@ export class Solver {
   dispose() {
     if (this.#address && !this.#instance.broken) {
       this.#instance.call('rebounce_web_solver_destroy', this.#address);
-      for (const address of [this.#result, this.#vertices]) this.#instance.release(address);
+      for (const address of [this.#result, this.#vertices, this.#patches]) {
+        this.#instance.release(address);
+      }
     }
     this.#address = 0;
   }
+}
+
+function readPatches(file) {
+  const [area, centroid, normal] =
+      ['area', 'centroid', 'normal'].map((name) => file.tensor(`patch.${name}`));
+  return { area, centroid, normal };
 }
 
 function readMesh(file) {

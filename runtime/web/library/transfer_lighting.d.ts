@@ -1,4 +1,6 @@
-import type { Box3, Data3DTexture, Light as ThreeLight, Material, Mesh, Vector3 } from 'three';
+import type {
+  Box3, Data3DTexture, Light as ThreeLight, Material, Mesh, Object3D, Vector3,
+} from 'three';
 import type { Engine, Light, LoadOptions, Sky, Timings, Transfer } from './rebounce.js';
 
 /** The three.js light as a light of Rebounce; null for one that is neither lamp nor sun. */
@@ -6,6 +8,8 @@ export function toLight(light: ThreeLight): Light | null;
 
 /** A sky; with `type` it looks as that of the CIE. */
 export interface LightingSky extends Sky {
+  /** Luminance below the horizon in parts of that above; 1. Not with `type`. */
+  ground?: number;
   type?: number;
   sunDirection?: readonly number[];
 }
@@ -33,6 +37,13 @@ export class TransferLighting {
   show(direct: number, bounced: number): void;
   /** Lets a material show bounced light on geometry with the attribute `bouncedIrradiance`. */
   patch<T extends Material>(material: T): T;
+  /**
+   * Lets the meshes in and below `object` show bounced light, with all of their attributes and
+   * materials: they are cut as the file's surface is. They are those of the scene that the file was
+   * made from, where they stood then; `mesh` is not needed beside them. Throws RebounceError if one
+   * is not part of the surface, moves or is instanced; nothing is changed then.
+   */
+  attach(object: Object3D): void;
   /** One frame, to be called before the scene is drawn. */
   update(lights: Iterable<ThreeLight | Light>, sky?: LightingSky): void;
   /** The same surface once more, for other bounced light at the vertices of the file. */

@@ -1,37 +1,16 @@
 // Rebounce for three.js: the light that lamps bounce, on a scene that stands still.
 
 import * as THREE from 'three';
+import { SurfaceFitter } from './fitted_mesh.js';
+import { loadTexture, makeMaterial } from './material.js';
 import { ProbeGrid } from './probe_grid.js';
 import { Transfer } from './rebounce.js';
-import { closeCracks } from './watertight.js';
+import { Surface } from './surface.js';
+import { toLight, toSky } from './three_lights.js';
 
-const none = 0xFFFFFFFF;
+export { toLight };
+
 const attributeName = 'bouncedIrradiance';
-
-/** The three.js light as a light of Rebounce; null for one that is neither lamp nor sun. */
-export function toLight(light) {
-  const position = light.getWorldPosition(new THREE.Vector3()).toArray();
-  const intensity = light.visible ? light.intensity : 0;
-  const plain = { position, color: light.color.toArray(), intensity };
-  const alongTarget = () => light.target.getWorldPosition(new THREE.Vector3())
-                                .sub(light.getWorldPosition(new THREE.Vector3())).toArray();
-  if (light.isPointLight) return { ...plain, type: 'point', range: light.distance };
-  if (light.isSpotLight) {
-    const outerConeAngle = light.angle;
-    const spot = { outerConeAngle, innerConeAngle: outerConeAngle * (1 - light.penumbra) };
-    return { ...plain, type: 'spot', range: light.distance, direction: alongTarget(), spot };
-  }
-  if (light.isDirectionalLight) return { ...plain, type: 'directional', direction: alongTarget() };
-  if (light.isRectAreaLight) {
-    const turned = light.getWorldQuaternion(new THREE.Quaternion());
-    return {
-      ...plain, type: 'rectangle', width: light.width, height: light.height,
-      direction: new THREE.Vector3(0, 0, -1).applyQuaternion(turned).toArray(),
-      tangent: new THREE.Vector3(1, 0, 0).applyQuaternion(turned).toArray(),
-    };
-  }
-  return null;
-}
 
 // What three.js draws without shadows arrives by the attribute instead.
 const lightLoops = THREE.ShaderChunk.lights_fragment_begin.replace(
@@ -54,7 +33,7 @@ export class TransferLighting {
   #attribute;
   #parts = { value: new THREE.Vector2(1, 1) };  // of direct and bounced light that are shown
   #twins = [];
-  #sky;
+  #attached = [];  // { attribute, vertices } of meshes of the scene's own
   #skyKey = '';
   #direct;
 
@@ -68,7 +47,7 @@ export class TransferLighting {
   constructor(transfer, textures) {
     this.#transfer = transfer;
     this.#engine = transfer.createEngine();
-    this.#surface = seenSurface(transfer.mesh);
+    this.#surface = new Surface(transfer.mesh);
     this.#direct = new Float32Array(transfer.mesh.position.length);
     this.probes = transfer.probes ? new ProbeGrid(transfer.probes) : null;
     this.mesh = this.#makeMesh(textures);
@@ -121,32 +100,35 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
 
   /**
    * One frame: what arrives from `lights`, which are those of three.js or of a light file, and from
-   * `sky`, { color, luminance, type, sunDirection } where the last two ask for a sky of the CIE.
+   * `sky`, { color, luminance, ground, type, sunDirection }: below the horizon it is `ground` times
+   * as bright; the last two ask for a sky of the CIE instead.
    */
   update(lights, sky = {}) {
     const plain = [];
     for (const light of lights) {
       if (!light.isLight) plain.push(light);
-      else if (light.isHemisphereLight) sky = fromHemisphere(light);
+      else if (light.isHemisphereLight) sky = toSky(light);
       else plain.push(toLight(light));
     }
     const known = plain.filter((light) => light !== null);
-    if (sky !== this.#sky) this.#changeSky(sky);
+    this.#changeSky(sky);
     this.#engine.relight(known, sky);
     const begin = performance.now();
     this.#writeDirect(known, sky);
     this.#write(this.#attribute.array, this.#engine.vertexIrradiance());
     this.#attribute.needsUpdate = true;
-    this.probes?.write(this.#engine.probeLight());
+    this.#writeAttached();
+    this.probes?.write(this.#engine.probeLight(), this.#parts.value.y);
     this.#engine.timings.vertices = performance.now() - begin;
   }
 
-  #changeSky(sky) {
-    this.#sky = sky;
-    const key = `${sky.type},${sky.sunDirection}`;
-    if (!sky.type || key === this.#skyKey) return;
+  #changeSky({ type, sunDirection, ground }) {
+    const key = `${type},${type ? sunDirection : ground}`;
+    if (key === this.#skyKey) return;
     this.#skyKey = key;
-    this.#engine.setSky(sky.type, sky.sunDirection);
+    if (type) this.#engine.setSky(type, sunDirection);
+    else if (ground !== undefined && this.#transfer.hasSkyCells) this.#engine.setSkyAboveGround(ground);
+    else this.#engine.setUniformSky();
   }
 
   #writeDirect(lights, sky) {
@@ -162,34 +144,58 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
     for (let k = 0; k < count; ++k) {
       shown[k] = bounced * bouncedIrradiance[k] + direct * this.#direct[k];
     }
-    fillAdded(shown, 3, this.#surface.added, count / 3);
+    this.#surface.fill(shown, 3);
   }
 
   #makeMesh(textures) {
-    const { mesh, materials } = this.#transfer;
-    const { added, triangle, from } = this.#surface;
-    const spread = (values, size) => {
-      const all = new Float32Array(values.length + size * added.length);
-      all.set(values);
-      return fillAdded(all, size, added, values.length / size);
-    };
-    const geometry = new THREE.BufferGeometry();
-    const position = spread(mesh.position, 3), count = mesh.position.length / 3;
-    added.forEach(({ at }, k) => {
-      position.set(mesh.position.subarray(3 * at, 3 * at + 3), 3 * (count + k));
-    });
-    geometry.setAttribute('position', new THREE.BufferAttribute(position, 3));
-    geometry.setAttribute('normal', new THREE.BufferAttribute(spread(mesh.normal, 3), 3));
-    geometry.setAttribute('uv', new THREE.BufferAttribute(spread(mesh.texcoord, 2), 2));
-    geometry.setAttribute('color', new THREE.BufferAttribute(spread(mesh.color, 3), 3));
+    const { materials } = this.#transfer;
+    const geometry = this.#surface.makeGeometry(materials.length);
     this.#attribute = this.#addAttribute(geometry);
-    const { index, groups } = groupByMaterial(triangle, from, mesh.triangleMaterial, materials.length);
-    geometry.setIndex(new THREE.BufferAttribute(index, 1));
-    for (const { start, count: size, material } of groups) geometry.addGroup(start, size, material);
     const drawn = new THREE.Mesh(geometry, materials.map((material, k) =>
         this.patch(makeMaterial(material, textures[k]))));
     drawn.castShadow = drawn.receiveShadow = true;
     return drawn;
+  }
+
+  /**
+   * Lets the meshes in and below `object`, of the scene that the file was made from, show bounced
+   * light: cuts them as the file's surface is cut, and patches copies of their materials. `mesh` is
+   * not needed then. Throws RebounceError if a mesh is not part of the surface; nothing has changed
+   * then.
+   */
+  attach(object) {
+    object.updateWorldMatrix(true, true);
+    const fitter = new SurfaceFitter(this.#surface);
+    const fitted = [];
+    object.traverse((mesh) => {
+      if (mesh.isMesh) fitted.push({ mesh, ...fitter.fit(mesh, this.#transfer.name) });
+    });
+    const copies = new Map();
+    const patched = (material) => {
+      if (!copies.has(material)) {
+        const copy = this.patch(material.clone());
+        copy.side = THREE.FrontSide;  // the second sides of double-sided triangles have their own
+        copies.set(material, copy);
+      }
+      return copies.get(material);
+    };
+    for (const { mesh, geometry, vertices } of fitted) {
+      mesh.geometry = geometry;
+      mesh.material = Array.isArray(mesh.material)
+          ? mesh.material.map(patched) : patched(mesh.material);
+      mesh.castShadow = mesh.receiveShadow = true;
+      this.#attached.push({ mesh, vertices, attribute: this.#addAttribute(geometry) });
+    }
+  }
+
+  #writeAttached() {
+    const { array } = this.#attribute;
+    for (const { vertices, attribute } of this.#attached) {
+      for (let k = 0; k < vertices.length; ++k) {
+        for (let c = 0; c < 3; ++c) attribute.array[3 * k + c] = array[3 * vertices[k] + c];
+      }
+      attribute.needsUpdate = true;
+    }
   }
 
   #addAttribute(geometry) {
@@ -226,6 +232,7 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
   /** Frees memory of the module and of the graphics card. */
   dispose() {
     for (const mesh of [this.mesh, ...this.#twins]) mesh.geometry.dispose();
+    for (const { mesh } of this.#attached) mesh.geometry.dispose();
     for (const material of this.mesh.material) {
       material.map?.dispose();
       material.dispose();
@@ -234,78 +241,4 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
     this.#engine.dispose();
     this.#transfer.dispose();
   }
-}
-
-/** Fills the values of added vertices, from number `count` on, by those of the ends of their edges. */
-function fillAdded(values, size, added, count) {
-  for (let k = 0; k < added.length; ++k) {
-    const { ends: [a, b], part } = added[k];
-    for (let c = 0; c < size; ++c) {
-      values[size * (count + k) + c] =
-          (1 - part) * values[size * a + c] + part * values[size * b + c];
-    }
-  }
-  return values;
-}
-
-function fromHemisphere(light) {
-  return { color: light.color.toArray(), luminance: light.intensity / Math.PI };
-}
-
-/**
- * The surface without cracks, and without sides that nothing sees: where two solids meet, these
- * would show as dots along the seam.
- */
-function seenSurface({ position, triangle, trianglePatch, absorbed }) {
-  const surface = closeCracks(position, triangle);
-  const seen = (t) => trianglePatch[t] !== none && absorbed[trianglePatch[t]] < 0.98;
-  const kept = surface.from.flatMap((t, k) => (seen(t) ? [k] : []));
-  return {
-    added: surface.added, from: kept.map((k) => surface.from[k]),
-    triangle: kept.flatMap((k) => surface.triangle.slice(3 * k, 3 * k + 3)),
-  };
-}
-
-/** The triangles of each material one after the other. */
-function groupByMaterial(triangle, from, triangleMaterial, materialCount) {
-  const index = new Uint32Array(triangle.length);
-  const groups = [];
-  let end = 0;
-  for (let material = 0; material < materialCount; ++material) {
-    const start = end;
-    from.forEach((original, t) => {
-      if (triangleMaterial[original] !== material) return;
-      for (let k = 0; k < 3; ++k) index[end++] = triangle[3 * t + k];
-    });
-    if (end > start) groups.push({ start, count: end - start, material });
-  }
-  return { index, groups };
-}
-
-function makeMaterial(material, texture) {
-  return new THREE.MeshLambertMaterial({
-    name: material.name,
-    color: new THREE.Color(...material.baseColor),
-    emissive: new THREE.Color(...material.emittedLuminance),
-    vertexColors: true,
-    shadowSide: THREE.FrontSide,  // surfaces have a second side of their own where they show one
-    map: texture,
-    alphaTest: material.alphaMode === 'mask' ? material.alphaCutoff : 0,
-    transparent: material.alphaMode === 'blend',
-    opacity: material.alpha,
-  });
-}
-
-const wraps = {
-  repeat: THREE.RepeatWrapping, clamp: THREE.ClampToEdgeWrapping, mirror: THREE.MirroredRepeatWrapping,
-};
-
-async function loadTexture({ texture }) {
-  if (!texture) return null;
-  const made = new THREE.Texture(await createImageBitmap(new Blob([texture.image])));
-  made.colorSpace = THREE.SRGBColorSpace;
-  made.flipY = false;
-  [made.wrapS, made.wrapT] = texture.wrap.map((wrap) => wraps[wrap]);
-  made.needsUpdate = true;
-  return made;
 }

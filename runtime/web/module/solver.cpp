@@ -39,6 +39,9 @@ struct rebounce_web_solver {
   double error(std::span<const rebounce::Float3> irradiance) const {
     return rebounce::relative_difference(irradiance, converged_irradiance, data->patches.area);
   }
+  void gather(const rebounce::RadiositySolver& from, std::span<rebounce::Float3> irradiance) {
+    form_factors.gather(from.radiosity(), irradiance, workspace);
+  }
 
   std::shared_ptr<const rebounce::TransferData> data;
   rebounce::CompressedFormFactors form_factors;
@@ -69,24 +72,38 @@ extern "C" {
   delete solver;
 }
 
+/// Finds the converged solution for the light of the engine's last frame. Writes the relative error
+/// of the engine's indirect irradiance against it.
+[[clang::export_name("rebounce_web_solver_converge")]] rebounce_status rebounce_web_solver_converge(
+    rebounce_web_solver* solver, const rebounce_engine* engine, double* engine_error) {
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    solver->converged.solve(engine->engine.initial_exitance(), kConverged);
+    solver->gather(solver->converged, solver->converged_irradiance);
+    *engine_error = solver->error(engine->engine.indirect_irradiance());
+    return REBOUNCE_OK;
+  });
+}
+
 /// Sweeps for the light of the engine's last frame, from the solution before. Writes the
-/// milliseconds of the sweeps, then the relative errors of the indirect irradiance of the sweeps
-/// and of the engine, against the converged solution.
+/// milliseconds of the sweeps, then the relative error of their indirect irradiance.
 [[clang::export_name("rebounce_web_solver_sweep")]] rebounce_status rebounce_web_solver_sweep(
     rebounce_web_solver* solver, const rebounce_engine* engine, int sweeps, double* result) {
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    const std::span<const Float3> initial_exitance = engine->engine.initial_exitance();
-    const SolveResult swept = solver->swept.solve(
-        initial_exitance, {.max_sweeps = sweeps, .residual = 0, .measure_residual = false});
-    solver->converged.solve(initial_exitance, kConverged);
-    const auto gather = [&](const RadiositySolver& from, std::span<Float3> irradiance) {
-      solver->form_factors.gather(from.radiosity(), irradiance, solver->workspace);
-    };
-    gather(solver->swept, solver->swept_irradiance);
-    gather(solver->converged, solver->converged_irradiance);
+    const SolveResult swept =
+        solver->swept.solve(engine->engine.initial_exitance(),
+                            {.max_sweeps = sweeps, .residual = 0, .measure_residual = false});
+    solver->gather(solver->swept, solver->swept_irradiance);
     result[0] = swept.microseconds / 1000;
     result[1] = solver->error(solver->swept_irradiance);
-    result[2] = solver->error(engine->engine.indirect_irradiance());
+    return REBOUNCE_OK;
+  });
+}
+
+/// Writes the relative error of any indirect irradiance of the patches, [n].
+[[clang::export_name("rebounce_web_solver_error")]] rebounce_status rebounce_web_solver_error(
+    const rebounce_web_solver* solver, const Float3* irradiance, double* error) {
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    *error = solver->error({irradiance, solver->data->patches.size()});
     return REBOUNCE_OK;
   });
 }

@@ -1,13 +1,18 @@
 // What the page calls besides rebounce.h: a frame of lights in plain arrays, timed by stages.
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <glm/glm.hpp>
+#include <numbers>
 #include <span>
 
 #include "rebounce.h"
 #include "runtime/frame/c_handles.h"
+#include "runtime/lights/sky_model.h"
 #include "runtime/outputs/vertex_light.h"
+#include "runtime/rays/float3_glm.h"
 
 extern "C" {
 
@@ -102,6 +107,26 @@ extern "C" {
     const std::span<Float3> patch_light(patches, data.patches.size());
     parts.direct_lighting->compute(engine->lights, parts.sky, patch_light);
     light_at_vertices(data.mesh, patch_light, {vertices, data.mesh.position.size()});
+    return REBOUNCE_OK;
+  });
+}
+
+/// Writes what a sky of the CIE looks like, in parts of its luminance: [height][width], rows from
+/// below up, columns from -x over +z and +x to -z. Below the horizon it is as bright as the cell 0
+/// of rebounce_cie_sky.
+[[clang::export_name("rebounce_web_sky_panorama")]] rebounce_status rebounce_web_sky_panorama(
+    int type, const Float3* sun_direction, float ground, int width, int height, float* luminance) {
+  return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
+    const CieSky sky(type, to_dvec3(*sun_direction));
+    for (int row = 0; row < height; ++row) {
+      const double altitude = ((row + 0.5) / height - 0.5) * std::numbers::pi;
+      for (int column = 0; column < width; ++column) {
+        const double around = (column + 0.5) / width * 2 * std::numbers::pi;
+        const glm::dvec3 direction{-std::cos(altitude) * std::cos(around), std::sin(altitude),
+                                   std::cos(altitude) * std::sin(around)};
+        *luminance++ = altitude > 0 ? static_cast<float>(sky.luminance(direction)) : ground;
+      }
+    }
     return REBOUNCE_OK;
   });
 }

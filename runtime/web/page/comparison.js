@@ -1,14 +1,15 @@
-// Gauss-Seidel in the other half of the picture: its light, how wrong it is, and for how long.
+// What the other half of the picture can show, how wrong it is, and for how long.
 
 const right = 0.01;  // of the light, in the area-weighted mean square
 
 /** Counts the frames in which one side has not been right. */
-class Lag {
+export class Lag {
   frames = 0;   // since it was right
   settled = 0;  // that the last change took
 
-  add(error) {
-    if (error > right) {
+  /** One frame, in which it is right or not. */
+  add(isRight) {
+    if (!isRight) {
       ++this.frames;
     } else if (this.frames > 0) {
       this.settled = this.frames;
@@ -17,29 +18,56 @@ class Lag {
   }
 }
 
-export class Comparison {
-  sweeps = 1;
-  milliseconds = 0;
-  ours = { error: 0, lag: new Lag() };
-  theirs = { error: 0, lag: new Lag() };
-  #lighting;
+/** One half: its error against the converged solution of the frame, and its lag. */
+export class Side {
+  error = NaN;
+  lag = new Lag();
 
-  constructor(lighting, solver) {
-    this.#lighting = lighting;
+  add(error) {
+    this.error = error;
+    this.lag.add(error <= right);
+  }
+}
+
+/** Gauss-Seidel, which goes on from its last solution. */
+export class GaussSeidel {
+  kind = 'gauss-seidel';
+  title = 'Gauss-Seidel';
+  pace = 1;       // sweeps a frame
+  mostPace = 8;
+  milliseconds = 0;
+  ours = new Side();
+  theirs = new Side();
+  #lighting;
+  #twin;
+
+  constructor(stage, solver) {
+    this.#lighting = stage.lighting;
     this.solver = solver;
-    this.twin = lighting.makeTwin();
-    this.twin.mesh.visible = false;
+    this.#twin = stage.lighting.makeTwin();
+    this.objects = [this.#twin.mesh];
+  }
+
+  get paceText() {
+    return `${this.pace} ${this.pace === 1 ? 'sweep' : 'sweeps'} a frame`;
+  }
+
+  get note() {
+    return `${this.milliseconds.toFixed(1)} ms`;
   }
 
   /** One frame, after that of the lighting. */
   update() {
-    const { milliseconds, error, engineError } = this.solver.sweep(this.#lighting.engine, this.sweeps);
+    this.ours.add(this.solver.converge(this.#lighting.engine));
+    const { milliseconds, error } = this.solver.sweep(this.#lighting.engine, this.pace);
     this.milliseconds += 0.1 * (milliseconds - this.milliseconds);
-    for (const [side, now] of [[this.ours, engineError], [this.theirs, error]]) {
-      side.error = now;
-      side.lag.add(now);
-    }
-    this.twin.write(this.solver.vertexIrradiance());
+    this.theirs.add(error);
+    this.#twin.write(this.solver.vertexIrradiance());
+  }
+
+  /** To be called around the drawing of its half; the result draws what follows as before. */
+  begin() {
+    return () => {};
   }
 
   dispose() {

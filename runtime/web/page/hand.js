@@ -24,7 +24,6 @@ export class Hand {
       canvas.classList.add('held');
       stage.controls.enabled = false;
       this.#grab(thing, event);
-      if (thing === stage.ball) return;
       stage.chosen = thing;
       onChoose();
     }, { capture: true });
@@ -89,14 +88,29 @@ export class Hand {
   }
 
   #moveByKey(event) {
-    const { chosen, camera, size } = this.#stage;
+    const { chosen, camera, controls, size } = this.#stage;
     const axes = {
       ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0],
       PageUp: [0, 0, -1], PageDown: [0, 0, 1],
     };
-    if (!chosen || !axes[event.key]) return;
+    const axis = axes[event.key];
+    if (!axis) return;
     event.preventDefault();
-    const step = new THREE.Vector3(...axes[event.key]).applyQuaternion(camera.quaternion);
-    this.#stage.move(chosen, chosen.home.clone().addScaledVector(step, size / 40));
+    if (event.shiftKey) {
+      turn(camera, controls.target, axis);
+    } else if (chosen) {
+      const step = new THREE.Vector3(...axis).applyQuaternion(camera.quaternion);
+      this.#stage.move(chosen, chosen.home.clone().addScaledVector(step, size / 40));
+    }
   }
+}
+
+/** Turns the view around its target by a twentieth of a radian, or comes closer. */
+function turn(camera, target, [right, up, back]) {
+  const from = new THREE.Spherical().setFromVector3(camera.position.clone().sub(target));
+  from.theta += right / 20;
+  from.phi -= up / 20;
+  from.radius *= 1 + back / 20;
+  from.makeSafe();
+  camera.position.setFromSpherical(from).add(target);
 }

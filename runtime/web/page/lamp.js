@@ -1,6 +1,7 @@
 // A lamp that can be dragged: a light of three.js with something to take hold of.
 
 import * as THREE from 'three';
+import { makeRing } from './ring.js';
 
 /** What the page offers, and how bright each is beside a point of the same brightness. */
 export const lampKinds = [
@@ -36,9 +37,7 @@ export class Lamp {
     if (kind === 'point') this.#makePoint(intensity, radius, size);
     else if (kind === 'spot') this.#makeSpot(intensity, radius, place);
     else this.#makeArea(intensity, size);
-    this.ring = new THREE.Mesh(
-        new THREE.RingGeometry(radius * 1.6, radius * 1.85, 48),
-        new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.8, toneMapped: false }));
+    this.ring = makeRing(1.6 * radius);
     this.object.add(this.light, this.bulb, this.ring);
     this.color = color;
   }

@@ -1,35 +1,42 @@
 // The page: loads a scene, and draws a frame whenever the browser shows one.
 
 import { isSupported } from '../library/rebounce.js';
+import { GaussSeidel } from './comparison.js';
 import { Hand } from './hand.js';
 import { Panel } from './panel.js';
+import { ProbeBaking } from './probe_baking.js';
 import { scenes } from './scenes.js';
 import { Stage } from './stage.js';
 
 const loading = document.getElementById('loading');
 const message = document.getElementById('message');
+let running = false;  // whether frames are drawn
 
 function say(title, text, action) {
   message.replaceChildren();
   const strong = document.createElement('strong');
   strong.textContent = title;
   message.append(strong, text);
-  if (action) {
+  const actions = action ? [action] : [];
+  if (running) actions.push({ title: 'Close', run: () => {} });  // what was shown goes on
+  if (actions.length > 0) message.append(document.createElement('br'));
+  for (const { title: name, run } of actions) {
     const button = document.createElement('button');
-    button.textContent = action.title;
+    button.textContent = name;
     button.addEventListener('click', () => {
       message.hidden = true;
-      action.run();
+      run();
     });
-    message.append(document.createElement('br'), button);
+    message.append(button);
   }
   message.hidden = false;
 }
 
-function progress(part) {
+function progress(part, title) {
   loading.classList.toggle('on', part < 1);
   loading.setAttribute('aria-valuenow', Math.round(100 * part));
-  loading.firstElementChild.style.width = `${100 * part}%`;
+  loading.style.setProperty('--part', part);
+  if (title) loading.querySelector('p').textContent = title;
 }
 
 function makeStage() {
@@ -47,7 +54,7 @@ function makeStage() {
 }
 
 const stage = makeStage();
-let panel = null, running = false, lastTimings = {};
+let panel = null, lastTimings = {};
 
 function frame() {
   if (!running) return;
@@ -69,11 +76,14 @@ function reload() {
 async function open(id) {
   const description = scenes.find((scene) => scene.id === id) ?? scenes[0];
   const wasRunning = running;
-  progress(0.02);
+  const title = `Loading the ${description.title.toLowerCase()}`;
+  const onProgress = (part) => progress(Math.min(0.99, part), title);
+  onProgress(0);
   try {
-    const shown = await stage.load(description, `scenes/${description.id}.safetensors`, progress);
+    const shown = await stage.load(description, `scenes/${description.id}.safetensors`, onProgress);
     if (!shown) return;
     message.hidden = true;
+    document.body.classList.add('begun');
     history.replaceState(null, '', `#${description.id}`);
     panel.showScene();
     running = true;
@@ -86,13 +96,17 @@ async function open(id) {
   }
 }
 
-/** Shows Gauss-Seidel beside, whose form factors are fetched now, or closes it. */
-async function compare(wanted) {
+const comparisons = { 'gauss-seidel': GaussSeidel, probes: ProbeBaking };
+
+/** Shows Gauss-Seidel or a grid of probes beside, with form factors that are fetched now; or none. */
+async function compare(kind, settings = {}) {
+  const onProgress = (part) => progress(Math.min(0.99, part), 'Loading the form factors');
   try {
-    if (wanted) {
-      progress(0.02);
+    if (comparisons[kind]) {
+      onProgress(0);
       const name = stage.description.id;
-      await stage.openComparison(`scenes/${name}.form_factors.safetensors`, progress);
+      await stage.openComparison(
+          comparisons[kind], settings, `scenes/${name}.form_factors.safetensors`, onProgress);
     } else {
       stage.closeComparison();
     }
@@ -100,7 +114,7 @@ async function compare(wanted) {
     panel.showComparison();
   } catch (error) {
     say('The comparison cannot be shown', error.message,
-        { title: 'Try again', run: () => compare(wanted).catch(() => {}) });
+        { title: 'Try again', run: () => compare(kind, settings).catch(() => {}) });
     throw error;
   } finally {
     progress(1);
@@ -109,9 +123,9 @@ async function compare(wanted) {
 
 function start() {
   panel = new Panel(stage, scenes, (id) => open(id).catch(() => {}),
-                    (wanted) => compare(wanted).catch(() => {}));
+                    (kind) => compare(kind).catch(() => {}));
   new Hand(stage, () => panel.showLamps());
-  addEventListener('resize', () => panel.showComparison());
+  addEventListener('resize', () => panel.place());
   stage.canvas.addEventListener('webglcontextlost', (event) => {
     event.preventDefault();
     running = false;

@@ -15,10 +15,12 @@ const byId = (id) => document.getElementById(id);
 /** A part of the light, as a percentage. */
 const percent = (part) => `${(100 * part).toFixed(part < 0.1 ? 1 : 0)} %`;
 
-function sideText({ error, lag }, more) {
-  const state = lag.frames > 0 ? `${lag.frames} frames behind`
-      : lag.settled > 0 ? `right, after ${lag.settled} frames` : 'right in the same frame';
-  return `error ${Number.isFinite(error) ? percent(error) : '-'} \u00B7 ${state}${more}`;
+/** How wrong one half of a comparison is, and for how long. */
+function sideText({ error, lag }) {
+  const state = lag.frames > 0 ? `${lag.frames} ${lag.frames === 1 ? 'frame' : 'frames'} behind`
+      : lag.settled > 0 ? `caught up after ${lag.settled} ${lag.settled === 1 ? 'frame' : 'frames'}`
+      : 'right in the same frame';
+  return `error ${Number.isFinite(error) ? percent(error) : '-'} \u00B7 ${state}`;
 }
 
 function press(button, on) {
@@ -31,7 +33,7 @@ export class Panel {
   #part = 'all';
   #times = new Map();
 
-  /** Calls onScene(id) and onCompare(open) when asked for another scene, or for the other half. */
+  /** Calls onScene(id) and onCompare(kind) when asked for another scene, or for another half. */
   constructor(stage, scenes, onScene, onCompare) {
     this.#stage = stage;
     this.#onCompare = onCompare;
@@ -46,8 +48,10 @@ export class Panel {
       button.addEventListener('click', () => this.addLamp(kind));
       byId('add').append(button);
     }
-    byId('compare').addEventListener('click', () => onCompare(!stage.comparison));
-    byId('sweeps').addEventListener('input', () => this.#setSweeps());
+    for (const button of byId('compare').children) {
+      button.addEventListener('click', () => onCompare(button.dataset.kind));
+    }
+    byId('pace').addEventListener('input', () => this.#setPace());
     for (const [id, part] of [['sun-on', 'sunIsOn'], ['sky-on', 'skyIsOn']]) {
       byId(id).addEventListener('click', () => {
         stage[part] = !stage[part];
@@ -67,20 +71,38 @@ export class Panel {
   #onKey(event) {
     if (event.target.matches('input, button') && event.key === ' ') return;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const parts = { 1: 'all', 2: 'bounced', 3: 'direct' };
-    if (parts[event.key]) this.show(parts[event.key]);
-    else if (event.key === ' ') this.toggleSwing();
-    else if (event.key === 'a') this.addLamp('point');
-    else if (event.key === 'c') this.#onCompare(!this.#stage.comparison);
-    else return;
+    const beside = (kind) => this.#onCompare(this.#stage.comparison?.kind === kind ? '' : kind);
+    const actions = {
+      1: () => this.show('all'), 2: () => this.show('bounced'), 3: () => this.show('direct'),
+      ' ': () => this.toggleSwing(), a: () => this.addLamp('point'), n: () => this.#chooseNext(),
+      o: () => this.#switchChosen(),
+      c: () => beside('gauss-seidel'), g: () => beside('probes'),
+    };
+    const act = actions[event.key.toLowerCase()];
+    if (!act) return;
+    act();
     event.preventDefault();
+  }
+
+  #chooseNext() {
+    const { movable, chosen } = this.#stage;
+    this.#stage.chosen = movable[(movable.indexOf(chosen) + 1) % movable.length] ?? null;
+    this.showLamps();
+  }
+
+  #switchChosen() {
+    const { chosen, lamps } = this.#stage;
+    if (!lamps.includes(chosen)) return;
+    chosen.on = !chosen.on;
+    chosen.refresh();
+    this.showLamps();
   }
 
   addLamp(kind) {
     const { bounds, description } = this.#stage;
-    // High in the middle: furniture stands below.
-    const { x, z } = bounds.min.clone().lerp(bounds.max, 0.5);
-    const middle = [x, bounds.min.y + 0.78 * (bounds.max.y - bounds.min.y), z];
+    // High in the middle, where furniture stands below, and beside those that were added before.
+    const { x, z } = bounds.min.clone().lerp(bounds.max, 0.4 + 0.1 * this.#stage.lamps.length);
+    const middle = [x, bounds.min.y + 0.72 * (bounds.max.y - bounds.min.y), z];
     const colors = ['#ffd2a1', '#9cc4ff', '#ff9c8f', '#b8ffb0'];
     this.#stage.addLamp({
       kind, position: middle, color: colors[this.#stage.lamps.length % colors.length],
@@ -109,43 +131,59 @@ export class Panel {
     byId('clock').textContent = clockText(hour);
   }
 
-  #setSweeps() {
+  #setPace() {
     const { comparison } = this.#stage;
     if (!comparison) return;
-    comparison.sweeps = Number(byId('sweeps').value);
-    byId('sweep-count').textContent =
-        `${comparison.sweeps} ${comparison.sweeps === 1 ? 'sweep' : 'sweeps'} a frame`;
+    comparison.pace = Number(byId('pace').value);
+    byId('pace-text').textContent = comparison.paceText;
   }
 
   /** To be called when the other half was opened or closed. */
   showComparison() {
-    const open = this.#stage.comparison !== null;
-    press(byId('compare'), open);
-    for (const id of ['sweeps', 'sweep-count', 'halves']) byId(id).hidden = !open;
-    document.body.classList.toggle('split', open);
-    this.#setSweeps();
-    // On a narrow page the controls cover both ends.
-    const { top, width } = document.querySelector('aside').getBoundingClientRect();
-    const isNarrow = width >= innerWidth;
+    const { comparison } = this.#stage;
+    for (const button of byId('compare').children) {
+      button.setAttribute('aria-checked', button.dataset.kind === (comparison?.kind ?? ''));
+    }
+    for (const id of ['pace', 'pace-text', 'halves']) byId(id).hidden = !comparison;
+    document.body.classList.toggle('split', Boolean(comparison));
+    if (comparison) {
+      byId('pace').max = comparison.mostPace;
+      byId('pace').value = comparison.pace;
+      byId('halves').children[1].firstElementChild.textContent = comparison.title;
+      this.#setPace();
+    }
+    this.place();
+  }
+
+  /** To be called when the page has another size, or the controls have. */
+  place() {
+    const { top, left, width } = document.querySelector('aside').getBoundingClientRect();
+    const isNarrow = width >= innerWidth;  // the controls cover both ends, not the right
     this.#stage.covered = {
       above: isNarrow ? byId('scenes').getBoundingClientRect().bottom : 0,
       below: isNarrow ? innerHeight - top : 0,
+      right: isNarrow ? 0 : innerWidth - left,
     };
     this.#stage.resize();
-    this.#stage.views().forEach(({ left, top: above }, k) => {
+    const views = this.#stage.views();
+    byId('halves').style.setProperty('--divide', `${views.at(-1).left}px`);
+    views.forEach(({ left: x, top: y, height }, k) => {
       const half = byId('halves').children[k];
-      half.style.left = `${left}px`;
-      half.style.top = `${above}px`;
+      half.style.setProperty('--left', `${x}px`);
+      half.style.setProperty('--top', `${y}px`);
+      half.style.setProperty('--height', `${height}px`);
     });
   }
 
   #showErrors() {
     const { comparison } = this.#stage;
     if (!comparison) return;
-    const { ours, theirs, milliseconds } = comparison;
-    const [left, right] = [...byId('halves').children].map((half) => half.lastElementChild);
-    left.textContent = sideText(ours, '');
-    right.textContent = sideText(theirs, ` \u00B7 ${milliseconds.toFixed(1)} ms`);
+    const { ours, theirs, note } = comparison;
+    [[sideText(ours), ''], [sideText(theirs), ` \u00B7 ${note}`]].forEach((texts, k) => {
+      byId('halves').children[k].querySelectorAll('span').forEach((shown, part) => {
+        if (shown.textContent !== texts[part]) shown.textContent = texts[part];
+      });
+    });
   }
 
   /** To be called when another scene is there. */
@@ -170,37 +208,45 @@ export class Panel {
     for (const button of byId('add').children) {
       button.disabled = this.#stage.lamps.length >= mostLamps;
     }
+    this.place();
   }
 
   #lampItem(lamp) {
-    const color = element('input', { type: 'color', value: lamp.color, 'aria-label': 'Colour' });
+    const { title: kind } = lampKinds.find((one) => one.kind === lamp.kind);
+    const title = `${kind} ${this.#stage.lamps.indexOf(lamp) + 1}`;
+    const color = element('input', { type: 'color', value: lamp.color, 'aria-label': `${title}: colour` });
     color.addEventListener('input', () => { lamp.color = color.value; });
     const power = element('input', {
       type: 'range', min: -2, max: 2, step: 0.01, value: Math.log2(lamp.part),
-      'aria-label': 'Brightness',
+      'aria-label': `${title}: brightness`,
     });
     power.addEventListener('input', () => {
       lamp.part = 2 ** Number(power.value);
       lamp.refresh();
     });
-    const toggle = element(
-        'button', { class: 'power', 'aria-pressed': lamp.on, title: 'Switch on or off' });
+    const toggle = element('button', {
+      class: 'power', 'aria-pressed': lamp.on, title: 'Switch on or off (key: O)',
+      'aria-label': `${title}: on`,
+    });
     toggle.addEventListener('click', () => {
       lamp.on = !lamp.on;
       lamp.refresh();
       toggle.setAttribute('aria-pressed', lamp.on);
     });
-    const remove = element('button', { class: 'remove', title: 'Remove' }, '\u00D7');
+    const remove = element(
+        'button', { class: 'remove', title: 'Remove', 'aria-label': `${title}: remove` }, '\u00D7');
     remove.addEventListener('click', () => {
       this.#stage.removeLamp(lamp);
       this.showLamps();
     });
     const item = element('li', {}, color, power, toggle, remove);
     item.classList.toggle('chosen', lamp === this.#stage.chosen);
-    item.addEventListener('pointerdown', () => {
-      this.#stage.chosen = lamp;
-      for (const other of byId('lamps').children) other.classList.toggle('chosen', other === item);
-    });
+    for (const type of ['pointerdown', 'focusin']) {
+      item.addEventListener(type, () => {
+        this.#stage.chosen = lamp;
+        for (const other of byId('lamps').children) other.classList.toggle('chosen', other === item);
+      });
+    }
     return item;
   }
 
@@ -219,7 +265,7 @@ export class Panel {
     }
     const patches = document.createTextNode('');
     byId('times').firstElementChild.append(
-        element('div', {}, element('dt', {}, 'Patches'), element('dd', {}, patches)));
+        element('div', { class: 'optional' }, element('dt', {}, 'Patches'), element('dd', {}, patches)));
     this.#times.set('patches', { value: patches });
   }
 

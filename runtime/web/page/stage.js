@@ -5,22 +5,26 @@ import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { RectAreaLightUniformsLib } from 'three/addons/lights/RectAreaLightUniformsLib.js';
 import { TransferLighting } from '../library/transfer_lighting.js';
 import { Ball } from './ball.js';
-import { Comparison } from './comparison.js';
 import { Lamp } from './lamp.js';
+import { SkyDome } from './sky_dome.js';
 import { sunAndSky } from './sun.js';
 
 export const mostLamps = 4;
+
+const ground = '#101114';  // as the style sheet's
 
 export class Stage {
   lamps = [];
   chosen = null;
   ball = null;
   comparison = null;
+  dome = null;
   swinging = false;
   hour = null;
   sunIsOn = true;
   skyIsOn = true;
-  covered = { above: 0, below: 0 };  // pixels of the canvas
+  covered = { above: 0, below: 0, right: 0 };  // pixels of the canvas
+  part = 'all';  // of the light
   #turn = 0;
 
   constructor(canvas) {
@@ -28,6 +32,7 @@ export class Stage {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.toneMapping = THREE.AgXToneMapping;
     this.renderer.shadowMap.enabled = true;
+    this.renderer.setClearColor(ground);
     RectAreaLightUniformsLib.init();
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera();
@@ -62,7 +67,7 @@ export class Stage {
     this.bounds = lighting.mesh.geometry.boundingBox;
     this.size = lighting.mesh.geometry.boundingSphere.radius;
     this.#placeCamera();
-    this.#placeSun();
+    this.#placeSky();
     this.floor = this.bounds.getCenter(new THREE.Vector3()).setY(this.bounds.min.y);
     for (const lamp of description.lamps) this.addLamp(lamp);
     this.#placeProbes();
@@ -75,6 +80,7 @@ export class Stage {
   #clear() {
     for (const lamp of [...this.lamps]) this.removeLamp(lamp);
     this.closeComparison();
+    this.chosen = null;
     if (this.ball) {
       this.scene.remove(this.ball.object, this.lighting.probes);
       this.ball.dispose();
@@ -85,6 +91,11 @@ export class Stage {
       this.lighting.dispose();
     }
     this.scene.remove(this.sun, this.sun.target);
+    if (this.dome) {
+      this.scene.remove(this.dome.object);
+      this.dome.dispose();
+      this.dome = null;
+    }
   }
 
   #darken() {
@@ -121,8 +132,12 @@ export class Stage {
     this.resize();
   }
 
-  #placeSun() {
+  /** Sun and sky, where the scene has a time of day. */
+  #placeSky() {
     if (this.hour === null) return;
+    this.dome = new SkyDome(6 * this.size);
+    this.bounds.getCenter(this.dome.object.position);
+    this.scene.add(this.dome.object);
     const { camera } = this.sun.shadow;
     camera.left = camera.bottom = -this.size;
     camera.right = camera.top = this.size;
@@ -138,47 +153,60 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(clientWidth, clientHeight, false);
     const [{ width, height }] = this.views();
-    const covers = !this.comparison && height - this.covered.above - this.covered.below > height / 3;
-    const above = covers ? this.covered.above : 0;
-    const open = covers ? height - above - this.covered.below : height;
-    this.camera.aspect = width / open;
+    // In one view the scene stands in the middle of what is not covered.
+    const { above, below, right } = this.comparison || !this.#leavesRoom()
+        ? { above: 0, below: 0, right: 0 } : this.covered;
+    const [across, down] = [width - right, height - above - below];
+    this.camera.aspect = across / down;
     // A narrow picture shows as much from side to side as a square one.
     const half = Math.tan(THREE.MathUtils.degToRad((this.fov ?? 50) / 2));
     const wider = Math.max(1, 1 / this.camera.aspect);
     this.camera.fov = THREE.MathUtils.radToDeg(2 * Math.atan(half * wider));
-    // What the camera is pointed at is in the middle of what is not covered.
-    this.camera.setViewOffset(width, open, 0, -above, width, height);
+    this.camera.setViewOffset(across, down, 0, -above, width, height);
+  }
+
+  #leavesRoom() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const { above, below, right } = this.covered;
+    return height - above - below > height / 3 && width - right > width / 3;
   }
 
   /** The parts of the canvas that show the scene, in pixels from its upper left: one, or two. */
   views() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    if (!this.comparison) return [{ left: 0, top: 0, width, height }];
-    const half = width > height ? [width / 2, height] : [width, (height - this.covered.below) / 2];
-    const [across, down] = width > height ? [half[0], 0] : [0, half[1]];
+    const { clientWidth, clientHeight } = this.canvas;
+    if (!this.comparison) return [{ left: 0, top: 0, width: clientWidth, height: clientHeight }];
+    const { above, right, below } =
+        this.#leavesRoom() ? this.covered : { above: 0, right: 0, below: 0 };
+    const [width, height] = [clientWidth - right, clientHeight - above - below];
+    const isWide = width > height;
+    const half = isWide ? { width: width / 2, height } : { width, height: height / 2 };
     return [
-      { left: 0, top: 0, width: half[0], height: half[1] },
-      { left: across, top: down, width: half[0], height: half[1] },
+      { left: 0, top: above, ...half },
+      { left: isWide ? half.width : 0, top: isWide ? above : above + half.height, ...half },
     ];
   }
 
-  /** Shows Gauss-Seidel beside; its form factors are another file. */
-  async openComparison(url, onProgress) {
+  /**
+   * Shows something beside, by one of the classes of comparisons with its settings; the form factors
+   * of what has converged are another file.
+   */
+  async openComparison(Comparison, settings, url, onProgress) {
     const { lighting } = this;
     const solver = await lighting.transfer.loadSolver(url, { onProgress });
-    if (lighting !== this.lighting || this.comparison) {
+    if (lighting !== this.lighting) {
       solver.dispose();
-      return false;
+      return;
     }
-    this.comparison = new Comparison(lighting, solver);
-    this.scene.add(this.comparison.twin.mesh);
+    this.closeComparison();
+    this.comparison = new Comparison(this, solver, settings);
+    for (const object of this.comparison.objects) object.visible = false;
+    this.scene.add(...this.comparison.objects);
     this.resize();
-    return true;
   }
 
   closeComparison() {
     if (!this.comparison) return;
-    this.scene.remove(this.comparison.twin.mesh);
+    this.scene.remove(...this.comparison.objects);
     this.comparison.dispose();
     this.comparison = null;
     this.resize();
@@ -228,12 +256,12 @@ export class Stage {
     this.sky = {};
     this.sun.intensity = 0;
     this.sun.castShadow = false;
-    this.scene.background = new THREE.Color('#101114');
     if (hour === null) return;
-    const { sun, sky, shown } = sunAndSky(hour);
+    const { sun, sky } = sunAndSky(hour);
+    this.dome.object.visible = this.skyIsOn;
     if (this.skyIsOn) {
       this.sky = sky;
-      this.scene.background.setRGB(...shown);
+      this.dome.paint(this.lighting.engine, sky);
     }
     if (!sun || !this.sunIsOn) return;
     this.sun.intensity = sun.intensity;
@@ -245,6 +273,8 @@ export class Stage {
 
   /** Shows 'all' light, or 'bounced' or 'direct' light alone. */
   show(part) {
+    this.part = part;
+    this.ball?.showDirect(part !== 'bounced');
     this.lighting.show(part === 'bounced' ? 0 : 1, part === 'direct' ? 0 : 1);
   }
 
@@ -260,7 +290,16 @@ export class Stage {
   /** Chooses the exposure by the light that there is. */
   expose() {
     const light = this.lighting.engine.radiosity();
-    const mean = light.reduce((sum, value) => sum + value, 0) / light.length;
+    const { area } = this.lighting.transfer.patches;
+    // By patches, which are small where there is something to see; by area under the sun.
+    let sum = 0, byArea = 0, allArea = 0;
+    area.forEach((size, k) => {
+      const bright = (light[3 * k] + light[3 * k + 1] + light[3 * k + 2]) / 3;
+      sum += bright;
+      byArea += size * bright;
+      allArea += size;
+    });
+    const mean = Math.max(sum / area.length, byArea / allArea);
     this.renderer.toneMappingExposure = 0.3 * Math.PI / Math.max(mean, 1e-3);
   }
 
@@ -280,19 +319,29 @@ export class Stage {
 
   /** Draws what the last frame has lit, in one view or in two. */
   draw() {
-    for (const lamp of this.lamps) lamp.face(this.camera, lamp === this.chosen);
+    for (const thing of this.movable) thing.face(this.camera, thing === this.chosen);
     const views = this.views();
     const { renderer, scene, camera, canvas, comparison } = this;
+    if (views.length > 1) {
+      renderer.setScissorTest(false);
+      renderer.setClearColor(ground);  // a bake has left another
+      renderer.clear();
+    }
     renderer.setScissorTest(views.length > 1);
-    if (this.ball) this.ball.object.visible = views.length === 1;  // probes hold our light alone
     views.forEach(({ left, top, width, height }, k) => {
       const bottom = canvas.clientHeight - top - height;
       renderer.setViewport(left, bottom, width, height);
       renderer.setScissor(left, bottom, width, height);
-      this.lighting.mesh.visible = k === 0;
-      if (comparison) comparison.twin.mesh.visible = k === 1;
-      renderer.shadowMap.autoUpdate = k === 0;
+      const isOther = k === 1;
+      this.lighting.mesh.visible = !isOther;
+      for (const object of comparison?.objects ?? []) object.visible = isOther;
+      // Probes of the file hold our light alone.
+      if (this.ball) this.ball.object.visible = comparison?.kind !== 'gauss-seidel';
+      const restore = isOther ? comparison.begin() : () => {};
+      renderer.shadowMap.autoUpdate = !isOther;
       renderer.render(scene, camera);
+      restore();
+      for (const object of comparison?.objects ?? []) object.visible = false;
     });
     renderer.shadowMap.autoUpdate = true;
     this.lighting.mesh.visible = true;

@@ -3,8 +3,7 @@
 const noonIlluminance = 6000;  // lx
 const highest = 1.05;          // rad, the sun's altitude at noon
 
-/** @returns {{sun: object|null, sky: object, shown: number[]}} a light, null at night; a sky, and
- *   the colour that stands for it */
+/** @returns {{sun: object|null, sky: object}} a light, null at night, and a sky */
 export function sunAndSky(hour) {
   const day = Math.PI * (hour - 6) / 12;
   const altitude = highest * Math.sin(day);
@@ -21,13 +20,10 @@ export function sunAndSky(hour) {
   };
   const dusk = Math.max(0.004, Math.min(1, (altitude + 0.1) / 0.35));
   const sky = {
-    color: [0.55 + 0.3 * low, 0.72, 1], luminance: 300 * dusk, type: 12, sunDirection: direction,
+    color: [0.38 + 0.4 * low * dusk, 0.62 + 0.08 * low * dusk, 1], luminance: 480 * dusk, type: 12,
+    sunDirection: direction,
   };
-  // Clear colours are not tone mapped.
-  const shown = [
-    0.01 + dusk * (0.3 + 0.35 * low), 0.012 + 0.44 * dusk, 0.02 + dusk * (0.66 - 0.25 * low),
-  ];
-  return { sun, sky, shown };
+  return { sun, sky };
 }
 
 /** The hour as a clock shows it. */

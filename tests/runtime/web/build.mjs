@@ -29,6 +29,7 @@ precompute('cornell_box', join(page, 'scenes/cornell_box.safetensors'), '--for',
            '--compress-form-factors', '0.001', '--probes', '4,4,4', '--probe-rays', '96');
 precompute('furnished_room', join(folder, 'room.safetensors'));
 precompute('furnished_room', join(page, 'scenes/furnished_room.safetensors'), '--for', 'web');
+precompute('pavilion', join(folder, 'pavilion.safetensors'));
 writeFileSync(join(folder, 'room_lights.json'), JSON.stringify({ lights: roomLights }));
 run(program, 'render', join(folder, 'room.safetensors'), '--lights', join(folder, 'room_lights.json'),
     '--show', 'indirect', '--exposure', String(roomExposure), '--size', '320x240', '--quiet', '-o',

@@ -5,7 +5,7 @@ import { execFileSync } from 'node:child_process';
 import { copyFileSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { chromiumPath, launchArguments, skipWithout, web } from './support.mjs';
+import { chromiumPath, launchArguments, root, skipWithout, web } from './support.mjs';
 
 const folder = process.argv[2];
 const project = join(folder, 'project');
@@ -19,6 +19,7 @@ const versions = JSON.parse(readFileSync(join(web, 'package.json'), 'utf8')).dev
 
 const app = `
 import * as THREE from 'three';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { TransferLighting } from 'rebounce/three';
 
 const lighting = await TransferLighting.load('cornell_box.safetensors');
@@ -46,7 +47,16 @@ function brightness() {
 lighting.show(1, 1);
 const all = brightness();
 lighting.show(1, 0);
-window.result = { all, direct: brightness() };
+const direct = brightness();
+
+// The same with the meshes and materials of the glTF file.
+const { scene: own } = await new GLTFLoader().loadAsync('cornell_box.gltf');
+lighting.attach(own);
+scene.remove(lighting.mesh);
+scene.add(own);
+const ownDirect = brightness();
+lighting.show(1, 1);
+window.result = { all, direct, ownDirect, own: brightness() };
 `;
 
 const typed = `
@@ -61,7 +71,8 @@ const product: number = engine.relight([lamp], { luminance: 100 }).product;
 const light: Float32Array = engine.indirectIrradiance();
 const lighting = await TransferLighting.load(new URL('https://example.org/room.safetensors'));
 new Scene().add(lighting.mesh);
-lighting.update([new PointLight(), lamp], { luminance: product * light.length });
+lighting.attach(new Scene());
+lighting.update([new PointLight(), lamp], { luminance: product * light.length, ground: 0.5 });
 // @ts-expect-error: there is no such lamp
 engine.relight([{ type: 'candle' }]);
 `;
@@ -79,6 +90,7 @@ before(async () => {
   writeFileSync(join(project, 'package.json'), '{ "type": "module", "private": true }');
   npm('install', `./${packed}`, `three@${versions.three}`, 'typescript@5.9.3', '@types/three@0.187.0');
   copyFileSync(join(folder, 'cornell_box.safetensors'), join(project, 'cornell_box.safetensors'));
+  copyFileSync(join(root, 'tests/scenes/cornell_box.gltf'), join(project, 'cornell_box.gltf'));
   writeFileSync(join(project, 'app.js'), app);
   writeFileSync(join(project, 'typed.ts'), typed);
   server = await serve(project);
@@ -96,14 +108,18 @@ async function draws(name, html) {
   page.on('pageerror', (error) => faults.push(String(error)));
   await page.goto(server.url + name);
   await page.waitForFunction(() => window.result !== undefined, null, { timeout: 60000 });
-  const { all, direct } = await page.evaluate(() => window.result);
+  const { all, direct, ownDirect, own } = await page.evaluate(() => window.result);
   assert.ok(direct > 1 && all > 1.1 * direct, `all light ${all}, direct light ${direct}`);
+  // Standard materials are a little glossy where those of the transfer file are not.
+  assert.ok(Math.abs(own - all) < 0.1 * all, `all light on meshes of its own ${own}, not ${all}`);
+  assert.ok(Math.abs(ownDirect - direct) < 0.1 * direct, `direct light ${ownDirect}, not ${direct}`);
   assert.deepEqual(faults, []);
 }
 
 test('it draws without a bundler', async () => {
   const imports = {
     three: './node_modules/three/build/three.module.js',
+    'three/addons/': './node_modules/three/examples/jsm/',
     'rebounce/three': './node_modules/rebounce/library/transfer_lighting.js',
   };
   await draws('plain.html', `<script type="importmap">${JSON.stringify({ imports })}</script>
