@@ -125,6 +125,10 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   for (const std::string& line : build_advice(data, report)) fmt::print("advice: {}\n", line);
 }
 
+// The largest error of the check may be this multiple of the tolerance. The promise is three times
+// as much for 64 lights; the check has four times as many, whose largest error lies higher.
+constexpr double kLargestOfCheck = 3.5;
+
 /// The file is written even if a tolerance is not reached; it holds the measured errors.
 void check_tolerances(const BuildRecord& record, const BuildReport& report,
                       bool keeps_form_factors) {
@@ -134,7 +138,7 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report,
         "raise --tolerance, or use --precision f32 or --operator dense",
         record.error_mean, record.tolerance));
   }
-  if (record.tolerance > 0 && record.error_max > kLargestOverMean * record.tolerance) {
+  if (record.tolerance > 0 && record.error_max > kLargestOfCheck * record.tolerance) {
     throw Error(fmt::format(
         "the operator errs too much under single lamps: the largest error of the check is {:.2g}, "
         "three times the tolerance is {:.2g}; the file is written: count it as one of tolerance "
