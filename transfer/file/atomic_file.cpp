@@ -61,7 +61,7 @@ constexpr std::string_view kEnding = ".tmp";
 constexpr std::string_view kLibraryEnding = ".library";
 
 std::string temporary_beginning(const fs::path& target) {
-  return "." + target.filename().string() + ".rebounce-";
+  return std::string(".").append(target.filename().string()).append(".rebounce-");
 }
 
 fs::path temporary_name(const fs::path& target) {
