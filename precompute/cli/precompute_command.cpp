@@ -127,7 +127,7 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
 
 // The largest error of the check may be this multiple of the tolerance. The promise is three times
 // as much for 64 lights; the check has four times as many, whose largest error lies higher.
-constexpr double kLargestOfCheck = 3.5;
+constexpr double kLargestOfCheck = 3.5;  // lab/103
 
 /// The file is written even if a tolerance is not reached; it holds the measured errors.
 void check_tolerances(const BuildRecord& record, const BuildReport& report,
