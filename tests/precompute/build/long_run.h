@@ -24,6 +24,7 @@
 #include "rebounce/error.h"
 #include "runtime/rays/box.h"
 #include "tests/support/allocation_counter.h"
+#include "transfer/file/transfer_data.h"
 
 namespace rebounce::test {
 
