@@ -92,7 +92,8 @@ std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_co
   const std::uint64_t compression = kind == OperatorKind::kHierarchical
                                         ? dense_compression_peak_bytes(patch_count, matrix_count)
                                         : 0;
-  return std::max({kPairBytesMade * pairs, kPairBytesKept * pairs + inverses,
+  return resident_memory_bytes() + kLibraryBytes +
+         std::max({kPairBytesMade * pairs, kPairBytesKept * pairs + inverses,
                    kEntryBytes * pairs + compression});
 }
 
@@ -119,8 +120,7 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
   CostEstimate estimate = estimate_of(n, roles);
   if (decided.exchange_source == ExchangeSource::kPairs) {
-    estimate.peak_bytes = resident_memory_bytes() + kLibraryBytes +
-                          peak_bytes_of_pairs(n, matrices, decided.operator_kind);
+    estimate.peak_bytes = peak_bytes_of_pairs(n, matrices, decided.operator_kind);
     return estimate;
   }
   const LinkedBuild build{n, links_of_furnished_room(n), matrices, roles, decided.tolerance};

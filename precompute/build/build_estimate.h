@@ -17,8 +17,8 @@ namespace rebounce {
 /// machine.
 std::uint64_t memory_limit_bytes(const BuildSettings& settings);
 
-/// Peak memory of form factors and operator from pairs beside the scene and the program, if half of
-/// all patches face each other.
+/// Peak memory of the process while it makes form factors and operator from pairs, if half of all
+/// patches face each other: on top of what it holds when this is called.
 /// `matrix_count`: distinct reflectance channels.
 std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_count,
                                   OperatorKind kind);

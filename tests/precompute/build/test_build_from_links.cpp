@@ -250,10 +250,12 @@ TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
   };
   const std::uint64_t pairs = peak_bytes(ExchangeSource::kPairs, 0),
                       links = peak_bytes(ExchangeSource::kLinks, pairs - 1);
-  ASSERT_NE(pairs, links);
-  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, 0), pairs);
-  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, pairs), pairs);
-  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, pairs - 1), links);
+  // What the process holds already counts for pairs, and is not the same each time.
+  constexpr std::uint64_t kHeldMore = 8 << 20;
+  ASSERT_GT(pairs, links + 2 * kHeldMore);
+  EXPECT_NEAR(peak_bytes(ExchangeSource::kAutomatic, 0), pairs, kHeldMore);
+  EXPECT_NEAR(peak_bytes(ExchangeSource::kAutomatic, pairs + kHeldMore), pairs, kHeldMore);
+  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, pairs - kHeldMore), links);
 }
 
 }  // namespace
