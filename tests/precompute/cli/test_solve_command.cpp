@@ -106,6 +106,20 @@ TEST_F(SolveCommand, SaysHowMuchLightThereIsAndWhatEachStageTakes) {
   EXPECT_GT(drawn["microseconds"]["product"], 0);
 }
 
+TEST_F(SolveCommand, SaysTheErrorOfItsFrameWhereThereAreFormFactors) {
+  const auto solved = [&](const std::string& file) {
+    return summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv")});
+  };
+  const json with = solved(precompute("with.safetensors", {"--store-form-factors"}));
+  EXPECT_GT(with["error_estimate"].get<double>(), 1e-5);
+  EXPECT_LT(with["error_estimate"].get<double>(), 0.02);
+  EXPECT_GE(with["error_bound"].get<double>(), with["error_estimate"].get<double>());
+  EXPECT_LT(with["error_bound"].get<double>(), 0.1);
+  const json without = solved(precompute("without.safetensors"));
+  EXPECT_TRUE(without["error_estimate"].is_null());
+  EXPECT_TRUE(without["error_bound"].is_null());
+}
+
 TEST_F(SolveCommand, EveryMethodReachesTheResidualItWasAsked) {
   const std::string file = precompute("box.safetensors", {"--store-form-factors"});
   for (const NamedSolveMethod& method : kSolveMethods) {

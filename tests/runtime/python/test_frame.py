@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rebounce
-from conftest import ROOT
+from conftest import ROOT, SCENE
 
 LAMP = rebounce.Light(position=(1.0, 1.6, 1.1), intensity=50)
 
@@ -20,6 +20,25 @@ def test_engine_gives_what_the_operator_says(small_room):
     # What the lamp gives is 4 pi candela of lumen, and all of it arrives somewhere.
     flux = small_room.area @ engine.direct_irradiance
     assert flux == pytest.approx(4 * np.pi * 50, rel=0.02)
+
+
+def test_the_error_of_a_frame_is_known(small_room, cornell):
+    engine = rebounce.Engine(small_room)  # a dense operator, exact up to rounding
+    engine.relight([LAMP])
+    error, bound = engine.estimate_error()
+    assert 0 <= error <= bound < 1e-4
+    engine = rebounce.Engine(cornell)
+    engine.relight([LAMP])
+    error, bound = engine.estimate_error()
+    assert 1e-5 < error <= bound < 0.1
+
+
+def test_the_error_of_a_frame_needs_form_factors():
+    data = rebounce.precompute(SCENE, patches=100, quality="low", progress=False)
+    engine = rebounce.Engine(data)
+    engine.relight([LAMP])
+    with pytest.raises(rebounce.Error, match="form factors"):
+        engine.estimate_error()
 
 
 def test_results_are_views_of_the_last_frame(small_room):

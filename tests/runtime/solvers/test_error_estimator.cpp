@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "rebounce.h"
 #include "rebounce/engine.h"
 #include "rebounce/error.h"
 #include "rebounce/solvers.h"
@@ -12,9 +13,11 @@
 #include "tests/support/allocation_counter.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/random_light.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/test_scene_data.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
+#include "transfer/file/transfer_file_io.h"
 #include "transfer/operator/transfer_operator.h"
 
 namespace rebounce::test_error_estimator {
@@ -86,6 +89,46 @@ TEST(ErrorEstimator, TakesTheFrameOfAnEngineWithoutAllocating) {
   EXPECT_EQ(one.bound, other.bound);
   EXPECT_EQ(test::count_allocations(estimate), 0);
   EXPECT_GT(one.error, 0);
+}
+
+TEST(ErrorEstimator, SaysTheSameFromC) {
+  const auto data = two_squares();
+  DisplayMesh& mesh = data->mesh;
+  mesh.base_color_texcoord.resize(mesh.position.size());
+  mesh.emissive_texcoord.resize(mesh.position.size());
+  mesh.vertex_color.resize(mesh.position.size());
+  mesh.weight_begin.assign(mesh.position.size() + 1, 0);
+  data->materials.resize(1);
+  Light lamp;
+  lamp.position = {0, 1, 0};
+  Engine engine(data);
+  engine.relight({&lamp, 1}, {});
+  const ErrorEstimate expected =
+      ErrorEstimator(data).estimate_error(engine.initial_exitance(), engine.indirect_irradiance());
+  const test::TemporaryFolder folder;
+  const std::string path = (folder / "room.safetensors").string();
+  save_transfer_file(path, *data);
+
+  rebounce_transfer* transfer = nullptr;
+  rebounce_engine* c_engine = nullptr;
+  rebounce_error_estimator* estimator = nullptr;
+  ASSERT_EQ(rebounce_transfer_load(path.c_str(), &transfer), REBOUNCE_OK) << rebounce_last_error();
+  ASSERT_EQ(rebounce_engine_create(transfer, nullptr, &c_engine), REBOUNCE_OK);
+  ASSERT_EQ(rebounce_error_estimator_create(transfer, &estimator), REBOUNCE_OK);
+  rebounce_light c_lamp;
+  rebounce_light_init(&c_lamp);
+  c_lamp.position[1] = 1;
+  ASSERT_EQ(rebounce_engine_relight(c_engine, &c_lamp, 1, nullptr), REBOUNCE_OK);
+  double error = -1, bound = -1;
+  EXPECT_EQ(rebounce_engine_estimate_error(c_engine, estimator, &error, &bound), REBOUNCE_OK);
+  EXPECT_EQ(error, expected.error);
+  EXPECT_EQ(bound, expected.bound);
+  EXPECT_EQ(rebounce_engine_estimate_error(c_engine, estimator, &error, nullptr), REBOUNCE_OK);
+  EXPECT_EQ(rebounce_engine_estimate_error(c_engine, nullptr, &error, &bound),
+            REBOUNCE_INVALID_ARGUMENT);
+  rebounce_error_estimator_destroy(estimator);
+  rebounce_engine_destroy(c_engine);
+  rebounce_transfer_release(transfer);
 }
 
 TEST(ErrorEstimator, SaysWhatItLacks) {
