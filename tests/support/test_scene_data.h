@@ -100,6 +100,15 @@ inline void add_even_exchange(TransferData& data) {
                    SharedArray(std::move(exchange))};
 }
 
+/// Two squares that face each other; the operator is that of the first bounce alone.
+inline std::shared_ptr<TransferData> facing_squares() {
+  auto data = std::make_shared<TransferData>();
+  add_square(*data, 1, 0, 4, true, {0.5F, 0.4F, 0.3F});
+  add_square(*data, 1, 2, 4, false, {0.2F, 0.7F, 0.6F});
+  add_even_exchange(*data);
+  return data;
+}
+
 /// A parallelogram from `corner` along `x` and `y`, cut into steps² x 2 patches; its front is where
 /// they turn counter-clockwise.
 inline void add_parallelogram(TransferData& data, const glm::vec3& corner, const glm::vec3& x,

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "tests/runtime/rays/occluder_samples.h"
 #include "tests/support/test_scene_data.h"
 
 namespace rebounce::test_shadow_volumes {
@@ -38,19 +39,6 @@ float depth(const VolumePlanes& volume, const glm::vec3& p) {
   return least;
 }
 
-bool crosses(const Occluder& piece, const glm::vec3& a, const glm::vec3& b) {
-  const float from = glm::dot(a - piece.corner[0], piece.normal);
-  const float to = glm::dot(b - piece.corner[0], piece.normal);
-  if ((from > 0) == (to > 0)) return false;
-  const glm::vec3 at = glm::mix(a, b, from / (from - to));
-  for (std::size_t k = 0; k < Occluder::kCorners; ++k) {
-    const glm::vec3 corner = piece.corner[k];
-    const glm::vec3 side = piece.corner[(k + 1) % Occluder::kCorners] - corner;
-    if (glm::dot(glm::cross(side, at - corner), piece.normal) < 0) return false;
-  }
-  return true;
-}
-
 /// Places all over the surface of a lamp, or the one that it has.
 std::vector<glm::vec3> places_of(const PreparedLight& lamp, const glm::vec3& from) {
   if (!lamp.kind->has_place()) return {from - 100.0F * lamp.direction};
@@ -80,7 +68,7 @@ TEST(ShadowVolumes, TellWhatOfALampAnOccluderHides) {
         const float outer = depth(volumes.outer(0), p), inner = depth(volumes.inner(0), p);
         const std::vector<glm::vec3> places = places_of(lamp, p);
         const auto crossed = static_cast<std::size_t>(std::ranges::count_if(
-            places, [&](const glm::vec3& place) { return crosses(occluder, p, place); }));
+            places, [&](const glm::vec3& place) { return test::crosses(occluder, p, place); }));
         if (outer < -kEdge) {
           EXPECT_EQ(crossed, 0U) << kind->name;
           ++free;

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "runtime/rays/ray_tracer.h"
+#include "tests/runtime/rays/occluder_samples.h"
 #include "tests/support/test_scene_data.h"
 
 namespace rebounce::test_occluders {
@@ -28,20 +29,6 @@ double area(const TransferData& data) {
   double sum = 0;
   for (const float a : data.patches.area) sum += a;
   return sum;
-}
-
-/// Whether the way from `a` to `b` goes through a piece.
-bool crosses(const Occluder& piece, const glm::vec3& a, const glm::vec3& b) {
-  const float from = glm::dot(a - piece.corner[0], piece.normal);
-  const float to = glm::dot(b - piece.corner[0], piece.normal);
-  if ((from > 0) == (to > 0)) return false;
-  const glm::vec3 at = glm::mix(a, b, from / (from - to));
-  for (std::size_t k = 0; k < Occluder::kCorners; ++k) {
-    const glm::vec3 corner = piece.corner[k];
-    const glm::vec3 side = piece.corner[(k + 1) % Occluder::kCorners] - corner;
-    if (glm::dot(glm::cross(side, at - corner), piece.normal) < 0) return false;
-  }
-  return true;
 }
 
 TEST(Occluders, FacesOfBoxesBecomeOnePieceEach) {
@@ -68,7 +55,7 @@ TEST(Occluders, HolesStayOpen) {
   EXPECT_EQ(occluders.piece.size(), 4U);
   EXPECT_NEAR(area(occluders), 24, 1e-4);
   for (const Occluder& piece : occluders.piece) {
-    EXPECT_FALSE(crosses(piece, {2.5F, 2.5F, -1}, {2.5F, 2.5F, 1}));
+    EXPECT_FALSE(test::crosses(piece, {2.5F, 2.5F, -1}, {2.5F, 2.5F, 1}));
   }
 }
 
@@ -91,7 +78,7 @@ TEST(Occluders, StopTheSameRaysAsTheTriangles) {
     ray[0].t_far = 1;
     tracer.occluded(ray);
     const bool crossed = std::ranges::any_of(
-        occluders.piece, [&](const Occluder& piece) { return crosses(piece, a, b); });
+        occluders.piece, [&](const Occluder& piece) { return test::crosses(piece, a, b); });
     stopped += crossed ? 1 : 0;
     different += crossed != is_occluded(ray[0]) ? 1 : 0;
   }

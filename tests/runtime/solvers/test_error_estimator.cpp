@@ -23,15 +23,6 @@
 namespace rebounce::test_error_estimator {
 namespace {
 
-/// The operator is that of the first bounce alone.
-std::shared_ptr<TransferData> two_squares() {
-  auto data = std::make_shared<TransferData>();
-  test::add_square(*data, 1, 0, 4, true, {0.5F, 0.4F, 0.3F});
-  test::add_square(*data, 1, 2, 4, false, {0.2F, 0.7F, 0.6F});
-  test::add_even_exchange(*data);
-  return data;
-}
-
 std::vector<Float3> exact_indirect_irradiance(const std::shared_ptr<const TransferData>& data,
                                               std::span<const Float3> exitance) {
   std::vector<Float3> radiosity(exitance.size());
@@ -41,7 +32,7 @@ std::vector<Float3> exact_indirect_irradiance(const std::shared_ptr<const Transf
 }
 
 TEST(ErrorEstimator, TheBoundHoldsWhereTheOperatorIsFarOff) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   ErrorEstimator estimator(data);
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const std::vector<Float3> exitance = test::random_light(data->patches.size(), seed);
@@ -56,7 +47,7 @@ TEST(ErrorEstimator, TheBoundHoldsWhereTheOperatorIsFarOff) {
 }
 
 TEST(ErrorEstimator, FindsNothingWrongWithTheSolution) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   const std::vector<Float3> exitance = test::random_light(data->patches.size(), 5);
   const ErrorEstimate estimate =
       ErrorEstimator(data).estimate_error(exitance, exact_indirect_irradiance(data, exitance));
@@ -67,14 +58,14 @@ TEST(ErrorEstimator, FindsNothingWrongWithTheSolution) {
 }
 
 TEST(ErrorEstimator, IsInfiniteWhereNoLightIsExpected) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   const std::vector<Float3> dark(data->patches.size(), Float3{0, 0, 0});
   const std::vector<Float3> leaked(dark.size(), Float3{1, 1, 1});
   EXPECT_TRUE(std::isinf(ErrorEstimator(data).estimate_error(dark, leaked).bound));
 }
 
 TEST(ErrorEstimator, TakesTheFrameOfAnEngineWithoutAllocating) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   Engine engine(data);
   Light lamp;
   lamp.position = {0, 1, 0};
@@ -92,7 +83,7 @@ TEST(ErrorEstimator, TakesTheFrameOfAnEngineWithoutAllocating) {
 }
 
 TEST(ErrorEstimator, SaysTheSameFromC) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   DisplayMesh& mesh = data->mesh;
   mesh.base_color_texcoord.resize(mesh.position.size());
   mesh.emissive_texcoord.resize(mesh.position.size());
@@ -132,7 +123,7 @@ TEST(ErrorEstimator, SaysTheSameFromC) {
 }
 
 TEST(ErrorEstimator, SaysWhatItLacks) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   const std::vector<Float3> light(data->patches.size(), Float3{1, 1, 1});
   ErrorEstimator estimator(data);
   const std::vector<Float3> few(3);

@@ -12,16 +12,8 @@
 namespace rebounce::test_file_solver {
 namespace {
 
-std::shared_ptr<TransferData> two_squares() {
-  auto data = std::make_shared<TransferData>();
-  test::add_square(*data, 1, 0, 4, true, {0.5F, 0.4F, 0.3F});
-  test::add_square(*data, 1, 2, 4, false, {0.2F, 0.7F, 0.6F});
-  test::add_even_exchange(*data);
-  return data;
-}
-
 TEST(FileSolver, EveryMethodFindsTheSameLight) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   const std::vector<Float3> exitance(data->patches.size(), {3, 2, 1});
   std::vector<Float3> first(exitance.size()), again(exitance.size());
   const SolveSettings exact = {.max_sweeps = 200, .residual = 1e-6};
@@ -40,7 +32,7 @@ TEST(FileSolver, EveryMethodFindsTheSameLight) {
 }
 
 TEST(FileSolver, SaysWhatAFileHasNot) {
-  const auto data = two_squares();
+  const auto data = test::facing_squares();
   const auto make = [&](FormFactorSource source) { Solver(data, SolveMethod::kJacobi, source); };
   EXPECT_NO_THROW(make(FormFactorSource::kExact));
   test::expect_error([&] { make(FormFactorSource::kLinks); }, "--store-links");
