@@ -3,15 +3,12 @@
 // Frame after frame of one engine, as a game that runs for hours sees them: lamps jump, switch, lie
 // inside of walls, and now and then are no lamps at all.
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <ctime>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <memory>
@@ -27,13 +24,6 @@
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce::test {
-
-/// Resident memory of the process in bytes.
-inline std::size_t resident_bytes() {
-  std::size_t all = 0, resident = 0;
-  std::ifstream("/proc/self/statm") >> all >> resident;
-  return resident * static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
-}
 
 /// Processor time of the calling thread: what a frame takes whoever else is at work, if OpenMP has
 /// one thread.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "precompute/base/process_memory.h"
 #include "tests/precompute/build/long_run.h"
 #include "tests/support/built_scene.h"
 
@@ -19,9 +20,9 @@ TEST(LongRunLarge, AMillionFramesLeaveMemoryAndBitsAsTheyWere) {
       kSeed);
   // The first crowd has come: its frames touch memory for as many lamps as there ever are.
   while (run.frames() < test::LongRun::kCompared) run.frame();
-  const std::size_t before = test::resident_bytes();
+  const std::size_t before = resident_memory_bytes();
   while (run.frames() < kFrames) run.frame();
-  const std::size_t after = test::resident_bytes();
+  const std::size_t after = resident_memory_bytes();
   std::printf("resident: %zu KiB after %zu frames, %zu KiB after %zu\n", before / 1024,
               test::LongRun::kCompared, after / 1024, kFrames);
   run.print_times();
