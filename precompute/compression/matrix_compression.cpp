@@ -141,8 +141,8 @@ void MatrixCompression::add_training_light(const ReferenceLighting& lights, std:
       truth_.normalised_light(truth_.light_count() - 1, frame_.tree.patch, frame_.sample.rows());
   if (!equilibrated_) return;
   for (std::size_t i = 0; i < frame_.tree.patch.size(); ++i) {
-    const int exponent = exponent_[i];
-    frame_.sample(static_cast<Eigen::Index>(i), last) *= std::exp2(exponent);
+    frame_.sample(static_cast<Eigen::Index>(i), last) *=
+        std::exp2(static_cast<float>(exponent_[i]));
   }
 }
 

@@ -58,7 +58,7 @@ float points_in_volumes(const VolumePlanes* volume, std::size_t count, const flo
   float most[kShadowLanes];
   for (float& value : most) value = -kBeyondAll;
   for (std::size_t k = 0; k < count; ++k) {
-    const auto& [a, b, c, d, e] = volume[k].plane;
+    const auto& plane = volume[k].plane;
 #pragma omp simd
     for (std::size_t i = 0; i < kShadowLanes; ++i) {
       const auto height = [&](const VolumePlanes::Plane& p) {
@@ -66,7 +66,8 @@ float points_in_volumes(const VolumePlanes* volume, std::size_t count, const flo
                             multiply_add(p.y, y[i], multiply_add(p.z, z[i], -p.distance)));
       };
       const float least =
-          smaller(smaller(smaller(height(a), height(b)), height(c)), smaller(height(d), height(e)));
+          smaller(smaller(smaller(height(plane[0]), height(plane[1])), height(plane[2])),
+                  smaller(height(plane[3]), height(plane[4])));
       most[i] = larger(most[i], least);
     }
   }

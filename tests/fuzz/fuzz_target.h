@@ -10,7 +10,8 @@
 #include <span>
 #include <string_view>
 
-/// Gives one input to a target. Returns 0; a fault ends the process.
+/// Gives one input to a target. Returns 0; a fault ends the process. libFuzzer chose the name.
+// NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
 namespace rebounce::fuzz {

@@ -28,7 +28,6 @@ constexpr std::size_t kRowsAhead = 16;
 
 using Four = float __attribute__((vector_size(16)));
 using FourDoubles = double __attribute__((vector_size(32)));
-using FourPlaces = int __attribute__((vector_size(16)));
 
 Four load_four(const float* from) {
   Four four;
@@ -57,13 +56,11 @@ template <typename From, typename To>
 void turn_four(const From* from, std::size_t from_stride, To* to, std::size_t to_stride) {
   Four row[4];
   for (std::size_t r = 0; r < 4; ++r) row[r] = load_four(from + r * from_stride);
-  constexpr FourPlaces kLow{0, 4, 1, 5}, kHigh{2, 6, 3, 7};
-  const Four a = __builtin_shuffle(row[0], row[2], kLow),
-             b = __builtin_shuffle(row[1], row[3], kLow);
-  const Four c = __builtin_shuffle(row[0], row[2], kHigh);
-  const Four d = __builtin_shuffle(row[1], row[3], kHigh);
-  const Four column[4] = {__builtin_shuffle(a, b, kLow), __builtin_shuffle(a, b, kHigh),
-                          __builtin_shuffle(c, d, kLow), __builtin_shuffle(c, d, kHigh)};
+  const auto low = [](Four a, Four b) { return __builtin_shufflevector(a, b, 0, 4, 1, 5); };
+  const auto high = [](Four a, Four b) { return __builtin_shufflevector(a, b, 2, 6, 3, 7); };
+  const Four a = low(row[0], row[2]), b = low(row[1], row[3]);
+  const Four c = high(row[0], row[2]), d = high(row[1], row[3]);
+  const Four column[4] = {low(a, b), high(a, b), low(c, d), high(c, d)};
   for (std::size_t r = 0; r < 4; ++r) store_four(column[r], to + r * to_stride);
 }
 
@@ -249,9 +246,9 @@ py::array apply_to(const Data& data, const py::array_t<Number>& light, bool adjo
   if ((light.flags() & (py::array::c_style | py::array::f_style)) == 0) {
     return apply_to<Number>(data, Array<Number>(light), adjoint, channel);
   }
-  const auto result = array_like<Number>(light);
+  auto result = array_like<Number>(light);
   const Number* const in = light.data();
-  auto* const out = const_cast<Number*>(result.data());
+  Number* const out = result.mutable_data();
   const auto columns = static_cast<std::size_t>(light.ndim() == 1 ? 1 : light.shape(1));
   const py::gil_scoped_release unlocked;
   const Product<Number> product(data, channel, adjoint);
