@@ -7,15 +7,12 @@
 
 #include "rebounce/scene_data.h"
 #include "rebounce/types.h"
+#include "runtime/images/coded_image.h"
 
 namespace rebounce {
 
-/// A decoded image: 8-bit sRGB, alpha last, rows from the top.
-struct Image {
-  int width = 0;
-  int height = 0;
-  std::vector<std::uint8_t> rgba;  ///< [height][width][4]
-};
+/// A decoded image, in sRGB.
+using Image = RgbaImage;
 
 /// The place of a vertex in the lightmap that its asset is unwrapped for.
 struct LightmapTexcoord {

@@ -1,12 +1,7 @@
-// tinygltf and stb as their headers have them, compiled with the sanitizers; the linker takes these
-// before the libraries of the system.
-
-#define STB_IMAGE_IMPLEMENTATION
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#include <stb_image.h>
-#include <stb_image_write.h>
+// tinygltf as its header has it, compiled with the sanitizers; the linker takes it before the library
+// of the system. It is given no images.
 
 #define TINYGLTF_IMPLEMENTATION
-#define TINYGLTF_NO_INCLUDE_STB_IMAGE
-#define TINYGLTF_NO_INCLUDE_STB_IMAGE_WRITE
+#define TINYGLTF_NO_STB_IMAGE
+#define TINYGLTF_NO_STB_IMAGE_WRITE
 #include <tiny_gltf.h>

@@ -27,6 +27,7 @@ ROOMS = {
     "transfer/exchange": "Form factors as they are stored, their product and their sweeps.",
     "transfer/file": "The transfer file: reading, checking and writing it.",
     "runtime/rays": "Triangles, boxes, sample points, and the one file that calls Embree.",
+    "runtime/images": "Pixels of PNG and JPEG files, decoded and encoded.",
     "runtime/lights": "Kinds of lamps, a file each; skies; what of their light arrives at a point.",
     "runtime/outputs": "Light of patches taken to vertices, texels and probes.",
     "runtime/frame": "One frame: direct light, one product, radiosity; the same for C.",

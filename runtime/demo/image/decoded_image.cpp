@@ -1,13 +1,10 @@
 #include "runtime/demo/image/decoded_image.h"
 
-#include <stb_image.h>
-
 #include <algorithm>
-#include <limits>
-#include <memory>
 #include <string>
 
 #include "rebounce/error.h"
+#include "runtime/images/coded_image.h"
 
 namespace rebounce {
 namespace {
@@ -20,23 +17,17 @@ DecodedImage decode_image(const Texture& texture) {
   const auto fail = [](const std::string& reason) -> Error {
     return Error("texture: " + reason + "; precompute the scene again from an intact file");
   };
-  if (texture.encoded.size() > std::numeric_limits<int>::max()) throw fail("too many bytes");
-  const auto* bytes = texture.encoded.data();
-  const int byte_count = static_cast<int>(texture.encoded.size());
-  DecodedImage base;
-  int channel_count = 0;
-  if (!stbi_info_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count)) {
-    throw fail("not a PNG or JPEG image");
+  const auto image = decode_png_or_jpeg(texture.encoded);
+  if (!image) throw fail("not a PNG or JPEG image, or a damaged one");
+  if (image->width > kMaxSide || image->height > kMaxSide) {
+    throw fail("more than 16384 texels a side");
   }
-  if (base.width > kMaxSide || base.height > kMaxSide) throw fail("more than 16384 texels a side");
-  const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
-      stbi_load_from_memory(bytes, byte_count, &base.width, &base.height, &channel_count, 4),
-      stbi_image_free);
-  if (!texels) throw fail("a damaged image");
-  const std::size_t count = std::size_t{1} * base.width * base.height;
+  DecodedImage base{.width = image->width, .height = image->height};
+  const std::size_t count = image->rgba.size() / 4;
   base.rgb.reserve(3 * count);
   base.alpha.reserve(count);
-  for (const stbi_uc* texel = texels.get(); texel != texels.get() + 4 * count; texel += 4) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint8_t* texel = image->rgba.data() + 4 * k;
     base.rgb.insert(base.rgb.end(), texel, texel + 3);
     base.alpha.push_back(texel[3]);
   }

@@ -1,15 +1,12 @@
 #include "runtime/demo/image/image_file.h"
 
-#include <png.h>
-
 #include <algorithm>
 #include <cmath>
 #include <span>
-#include <string>
 
-#include "rebounce/error.h"
 #include "runtime/demo/image/srgb.h"
 #include "runtime/demo/image/tone_curve.h"
+#include "runtime/images/coded_image.h"
 #include "runtime/rays/float3_glm.h"
 #include "transfer/file/atomic_file.h"
 
@@ -44,20 +41,7 @@ ScreenImage tone_map(const Picture& picture) {
 }
 
 std::vector<std::uint8_t> encode_png(const ScreenImage& image) {
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
-  header.width = static_cast<png_uint_32>(image.width);
-  header.height = static_cast<png_uint_32>(image.height);
-  header.format = PNG_FORMAT_RGB;
-  png_alloc_size_t byte_count = PNG_IMAGE_PNG_SIZE_MAX(header);
-  std::vector<std::uint8_t> bytes(byte_count);
-  if (!png_image_write_to_memory(&header, bytes.data(), &byte_count, 0, image.rgb.data(), 0,
-                                 nullptr)) {
-    throw Error("picture: libpng could not encode it: " + std::string(header.message) +
-                "; check its size");
-  }
-  bytes.resize(byte_count);
-  return bytes;
+  return encode_png(image.width, image.height, 3, image.rgb);
 }
 
 void write_png(const std::filesystem::path& path, const ScreenImage& image) {

@@ -1,15 +1,14 @@
 // The viewer by the pictures it draws without a window, and what it says where there is no display.
 
 #include <gtest/gtest.h>
-#include <stb_image.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
+#include "runtime/images/coded_image.h"
 #include "tests/support/command_line.h"
 
 namespace rebounce::test_view_command {
@@ -38,12 +37,15 @@ struct Image {
 };
 
 Image read_image(const std::string& path) {
-  Image image;
-  int channels = 0;
-  const std::unique_ptr<stbi_uc, void (*)(void*)> texels(
-      stbi_load(path.c_str(), &image.width, &image.height, &channels, 3), stbi_image_free);
-  EXPECT_TRUE(texels) << path;
-  if (texels) image.rgb.assign(texels.get(), texels.get() + 3 * image.width * image.height);
+  const std::string bytes = test::read_bytes(path);
+  const auto read =
+      decode_png_or_jpeg({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  EXPECT_TRUE(read) << path;
+  if (!read) return {};
+  Image image{read->width, read->height, {}};
+  for (std::size_t k = 0; k < read->rgba.size(); ++k) {
+    if (k % 4 != 3) image.rgb.push_back(read->rgba[k]);
+  }
   return image;
 }
 

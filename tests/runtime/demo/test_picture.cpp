@@ -1,5 +1,4 @@
 #include <gtest/gtest.h>
-#include <stb_image.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +11,9 @@
 #include "runtime/demo/image/image_file.h"
 #include "runtime/demo/picture/camera.h"
 #include "runtime/demo/picture/picture.h"
+#include "runtime/images/coded_image.h"
 #include "tests/support/rectangle_scene.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/with_threads.h"
 
 namespace rebounce::test_picture {
@@ -436,13 +437,15 @@ TEST(Png, IsWrittenAndReadBack) {
   std::filesystem::create_directories(folder);
   const auto path = folder / "picture.png";
   write_png(path, image);
-  int width = 0, height = 0, channels = 0;
-  stbi_uc* read = stbi_load(path.c_str(), &width, &height, &channels, 3);
-  ASSERT_NE(read, nullptr);
-  EXPECT_EQ(width, 7);
-  EXPECT_EQ(height, 5);
-  EXPECT_EQ(std::memcmp(read, image.rgb.data(), image.rgb.size()), 0);
-  stbi_image_free(read);
+  const std::string bytes = test::read_bytes(path);
+  const auto read =
+      decode_png_or_jpeg({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->width, 7);
+  EXPECT_EQ(read->height, 5);
+  for (std::size_t k = 0; k < image.rgb.size(); ++k) {
+    ASSERT_EQ(read->rgba[k / 3 * 4 + k % 3], image.rgb[k]) << k;
+  }
   const auto files = std::filesystem::directory_iterator(folder);
   EXPECT_EQ(std::distance(begin(files), end(files)), 1) << "no temporary file is left";
   std::filesystem::remove_all(folder);
