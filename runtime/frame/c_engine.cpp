@@ -82,10 +82,10 @@ void rebounce_light_init(rebounce_light* light) {
 
 rebounce_status rebounce_ies_profile_parse(const char* text, size_t text_size, const char* name,
                                            rebounce_ies_profile** profile) {
+  clear(profile);
   if (text == nullptr || name == nullptr || profile == nullptr) {
     return missing("rebounce_ies_profile_parse");
   }
-  *profile = nullptr;
   return guarded(REBOUNCE_BAD_INPUT, [&] {
     auto handle = std::make_unique<rebounce_ies_profile>();
     handle->profile = parse_ies_profile({text, text_size}, name);
@@ -105,8 +105,8 @@ void rebounce_engine_settings_init(rebounce_engine_settings* settings) {
 rebounce_status rebounce_engine_create(rebounce_transfer* transfer,
                                        const rebounce_engine_settings* settings,
                                        rebounce_engine** engine) {
+  clear(engine);
   if (transfer == nullptr || engine == nullptr) return missing("rebounce_engine_create");
-  *engine = nullptr;
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     rebounce_engine_settings chosen;
     rebounce_engine_settings_init(&chosen);
@@ -120,8 +120,8 @@ rebounce_status rebounce_engine_create(rebounce_transfer* transfer,
 }
 
 rebounce_status rebounce_engine_clone(const rebounce_engine* engine, rebounce_engine** clone) {
+  clear(clone);
   if (engine == nullptr || clone == nullptr) return missing("rebounce_engine_clone");
-  *clone = nullptr;
   return guarded(REBOUNCE_INTERNAL, [&] {
     auto handle = std::make_unique<rebounce_engine>(*engine);
     handle->lights.reserve(engine->lights.capacity());

@@ -47,6 +47,12 @@ static_assert(sizeof(Float3) == 3 * sizeof(float));
 /// Keeps `message` for rebounce_last_error() and returns `status`.
 rebounce_status fail(rebounce_status status, const char* message) noexcept;
 
+/// Writes NULL where a call that fails leaves no handle; `handle` may be NULL itself.
+template <typename Handle>
+void clear(Handle** handle) {
+  if (handle != nullptr) *handle = nullptr;
+}
+
 /// Fails with a message about an argument of `function` that is NULL.
 rebounce_status missing(const char* function) noexcept;
 

@@ -42,8 +42,8 @@ void copy_camera(const Camera& from, rebounce_camera& to) {
 extern "C" {
 
 rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** transfer) {
+  clear(transfer);
   if (path == nullptr || transfer == nullptr) return missing("rebounce_transfer_load");
-  *transfer = nullptr;
   return guarded(REBOUNCE_BAD_INPUT, [&] {
     const auto* const utf8 = reinterpret_cast<const char8_t*>(path);
     auto handle = std::make_unique<rebounce_transfer>();
@@ -55,10 +55,10 @@ rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** tra
 
 rebounce_status rebounce_transfer_read(const void* bytes, size_t size, const char* name,
                                        rebounce_transfer** transfer) {
+  clear(transfer);
   if (bytes == nullptr || name == nullptr || transfer == nullptr) {
     return missing("rebounce_transfer_read");
   }
-  *transfer = nullptr;
   return guarded(REBOUNCE_BAD_INPUT, [&] {
     const auto* const first = static_cast<const std::byte*>(bytes);
     auto handle = std::make_unique<rebounce_transfer>();

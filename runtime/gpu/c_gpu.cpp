@@ -64,10 +64,10 @@ extern "C" {
 rebounce_status rebounce_gpu_engine_create(rebounce_transfer* transfer,
                                            rebounce_gl_get_proc_address get_proc_address,
                                            rebounce_gpu_engine** engine) {
+  clear(engine);
   if (transfer == nullptr || get_proc_address == nullptr || engine == nullptr) {
     return missing("rebounce_gpu_engine_create");
   }
-  *engine = nullptr;
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
     *engine = new rebounce_gpu_engine{GpuEngine(transfer->data, get_proc_address)};
     return REBOUNCE_OK;

@@ -58,6 +58,8 @@ const char* rebounce_version(void);
  * has. Valid until the next one that fails. */
 const char* rebounce_last_error(void);
 
+/* A call that makes a handle writes NULL in its place if it fails. */
+
 /* ---- Transfer data: everything that was found out about a scene offline ---- */
 
 typedef struct rebounce_transfer rebounce_transfer;

@@ -17,6 +17,7 @@ extern "C" {
 
 rebounce_status rebounce_error_estimator_create(rebounce_transfer* transfer,
                                                 rebounce_error_estimator** estimator) {
+  clear(estimator);
   if (transfer == nullptr || estimator == nullptr) {
     return missing("rebounce_error_estimator_create");
   }

@@ -144,6 +144,31 @@ TEST_F(FromC, RefusesMemoryThatIsNoFile) {
   EXPECT_EQ(rebounce_transfer_read(nullptr, 0, "room", &read), REBOUNCE_INVALID_ARGUMENT);
 }
 
+// A caller may end the handle of before without a look at the status.
+TEST_F(FromC, WhatFailsLeavesNoHandle) {
+  const auto old_transfer = reinterpret_cast<rebounce_transfer*>(&lamp_);
+  const auto old_engine = reinterpret_cast<rebounce_engine*>(&lamp_);
+  rebounce_transfer* transfer = old_transfer;
+  EXPECT_NE(rebounce_transfer_read(nullptr, 0, "room", &transfer), REBOUNCE_OK);
+  EXPECT_EQ(transfer, nullptr);
+  transfer = old_transfer;
+  EXPECT_NE(rebounce_transfer_load(nullptr, &transfer), REBOUNCE_OK);
+  EXPECT_EQ(transfer, nullptr);
+  rebounce_engine* engine = old_engine;
+  EXPECT_NE(rebounce_engine_create(nullptr, nullptr, &engine), REBOUNCE_OK);
+  EXPECT_EQ(engine, nullptr);
+  engine = old_engine;
+  EXPECT_NE(rebounce_engine_clone(nullptr, &engine), REBOUNCE_OK);
+  EXPECT_EQ(engine, nullptr);
+  auto* profile = reinterpret_cast<rebounce_ies_profile*>(&lamp_);
+  EXPECT_NE(rebounce_ies_profile_parse(nullptr, 0, "lamp", &profile), REBOUNCE_OK);
+  EXPECT_EQ(profile, nullptr);
+  auto* estimator = reinterpret_cast<rebounce_error_estimator*>(&lamp_);
+  EXPECT_NE(rebounce_error_estimator_create(transfer_, &estimator), REBOUNCE_OK)
+      << "the file has no form factors";
+  EXPECT_EQ(estimator, nullptr);
+}
+
 TEST_F(FromC, AFrameDoesNotAllocate) {
   ASSERT_EQ(rebounce_engine_relight(engine_, &lamp_, 1, nullptr), REBOUNCE_OK);
   const int count = test::count_allocations([&] {
