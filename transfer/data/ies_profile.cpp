@@ -43,6 +43,7 @@ class IesReader {
       const float candela = number("candela value");
       if (!(candela >= 0)) refuse("has a negative candela value");
       profile->candela.push_back(scale * candela);
+      if (!std::isfinite(profile->candela.back())) refuse("has a candela value that is too large");
     }
     for (float& a : profile->vertical) a = std::min(a * kDegree, std::numbers::pi_v<float>);
     for (float& a : profile->horizontal) a *= kDegree;

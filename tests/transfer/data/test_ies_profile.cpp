@@ -62,6 +62,7 @@ TEST(IesProfile, WhatIsNoProfileIsRefused) {
   refuse(kRound, "100 50 0", "100 nan 0", "candela value");
   refuse(kRound, "100 50 0", "100 -5 0", "negative");
   refuse(kRound, "1000 2 3", "1000 -2 3", "negative multiplier");
+  refuse(kRound, "1000 2 3", "1000 2e38 3", "too large");
   refuse(kQuarters, "0 45 90", "0 45 80", "90, 180 or 360");
   refuse(kQuarters, "0 45 90", "5 45 90", "begin with 0");
 }
