@@ -8,4 +8,7 @@ namespace rebounce {
 /// (resident); 0 where it does not tell.
 std::uint64_t resident_memory_bytes();
 
+/// Gives memory that is not in use back to the system, where the allocator keeps it (glibc).
+void return_freed_memory();
+
 }  // namespace rebounce

@@ -1,7 +1,6 @@
 #include "precompute/build/build_estimate.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include "precompute/exchange/pairs/closure.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "rebounce/error.h"
+#include "transfer/base/machine_memory.h"
 #include "transfer/exchange/linked_form_factors.h"
 
 namespace rebounce {
@@ -49,11 +49,6 @@ constexpr std::size_t kPatchBytes = 8000;
 // Upper estimate of the links of a patch over the cube root of the number of patches:
 // furnished rooms have 10 to 10.5, empty ones a quarter of it (lab/059).
 constexpr double kFurnishedLinks = 11;
-
-std::uint64_t machine_memory_bytes() {
-  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
-         static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
-}
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));

@@ -100,8 +100,7 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
           .subspan(block * Receivers::kBlock, receivers_->slots_in(block));
   std::ranges::fill(irradiance, 0.0F);
   response.lit[block] = 0;
-  add_lamp(*receivers_, tracer_, response.light, response.volumes, occluders_->is_whole, block,
-           irradiance);
+  add_lamp(*receivers_, tracer_, response.light, *occluders_, response.volumes, block, irradiance);
   response.lit[block] = std::ranges::any_of(irradiance, [](float e) { return e > 0; }) ? 1 : 0;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "runtime/lights/lamp_shadows.h"
+#include "runtime/lights/light_sampling.h"
 
 namespace rebounce {
 namespace {
@@ -41,12 +42,12 @@ struct BlockLight {
 class LampAtBlock {
  public:
   LampAtBlock(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
-              const ShadowVolumes& volumes, bool is_whole, std::size_t block,
+              const OccluderGroups& occluders, const ShadowVolumes& volumes, std::size_t block,
               std::span<float> irradiance)
       : receivers_(receivers),
         lamp_(lamp),
+        occluders_(occluders),
         volumes_(volumes),
-        is_whole_(is_whole),
         block_(block),
         share_(1 / static_cast<float>(receivers.points_per_patch)),
         irradiance_(irradiance),
@@ -74,11 +75,12 @@ class LampAtBlock {
  private:
   using Between = ShadowVolumes::Between;
 
-  /// Volumes that some points of a part may be in.
-  struct Volumes {
-    std::array<VolumePlanes, kMostOfPart> outer, inner;
-    std::size_t outer_count = 0, inner_count = 0;
-    bool are_all = false;  ///< nothing else stands before the part
+  /// Occluders in whose volumes some points of a part may be.
+  struct Before {
+    std::array<ShadowVolumes::Number, kMostOfPart> all, certain;
+    std::size_t count = 0, certain_count = 0;
+    bool is_whole = false;  ///< nothing else stands before the part
+    bool is_solid = false;  ///< and light gets through none of them
   };
 
   const Box& bounds(std::size_t part) const {
@@ -91,33 +93,31 @@ class LampAtBlock {
 
   /// Adds the light of a part. `groups`: of occluders, if `between` is kSome.
   void add_part(std::size_t part, Between between, Numbers groups) {
-    std::array<ShadowVolumes::Number, kMostOfPart> numbers;
-    std::size_t count = 0;
-    if (between == Between::kSome) between = volumes_.between(bounds(part), groups, numbers, count);
+    Before before;
+    if (between == Between::kSome) {
+      between = volumes_.between(bounds(part), groups, before.all, before.count);
+    }
     if (between == Between::kHidden) return;
-    Volumes volumes;
-    volumes.are_all = between == Between::kSome && is_whole_;
-    for (const ShadowVolumes::Number number : std::span(numbers).first(count)) {
-      volumes.outer[volumes.outer_count++] = volumes_.outer(number);
-      if (volumes_.is_certain(number)) {
-        volumes.inner[volumes.inner_count++] = volumes_.inner(number);
-      }
+    before.is_whole = between == Between::kSome && occluders_.is_whole;
+    before.is_solid = before.is_whole;
+    for (const ShadowVolumes::Number number : std::span(before.all).first(before.count)) {
+      before.is_solid &= occluders_.is_solid(number);
+      if (volumes_.is_certain(number)) before.certain[before.certain_count++] = number;
     }
     if (lamp_.has_area()) {
-      add_surface(volumes, part);
-    } else if (volumes.are_all && volumes.inner_count == volumes.outer_count) {
-      add_lit_points(volumes, part);
+      add_surface(before, part);
+    } else if (before.is_whole && before.certain_count == before.count) {
+      add_lit_points(before, part);
     } else {
-      add_points(volumes, part);
+      add_points(before, part);
     }
   }
 
-  /// How far point k of each slot of a part is in the first `count` of `volumes`. Returns the
-  /// least.
-  float depth_in(std::span<const VolumePlanes> volumes, std::size_t k, std::size_t part,
-                 Depths& depth) const {
+  /// How far point k of each slot of a part is in some of `volumes`. Returns the least.
+  float depth_in(std::span<const VolumePlanes> volumes, Numbers numbers, std::size_t k,
+                 std::size_t part, Depths& depth) const {
     const PatchPointBlock& points = receivers_.points(block_, k);
-    return kernels_.points_in_volumes(volumes.data(), volumes.size(),
+    return kernels_.points_in_volumes(volumes.data(), numbers.data(), numbers.size(),
                                       points.position[0].data() + part * kPart, kBlock,
                                       depth.data());
   }
@@ -128,28 +128,26 @@ class LampAtBlock {
   using Ways = std::array<Way, kPart>;
 
   /// Returns false if all are hidden.
-  bool look(const Volumes& volumes, std::size_t k, std::size_t part, Ways& ways) const {
+  bool look(const Before& before, std::size_t k, std::size_t part, Ways& ways) const {
     Depths partly, wholly;
-    if (depth_in(std::span(volumes.inner).first(volumes.inner_count), k, part, wholly) >= 0) {
-      return false;
-    }
-    depth_in(std::span(volumes.outer).first(volumes.outer_count), k, part, partly);
+    const Numbers certain = std::span(before.certain).first(before.certain_count);
+    if (depth_in(volumes_.inner(), certain, k, part, wholly) >= 0) return false;
+    depth_in(volumes_.outer(), std::span(before.all).first(before.count), k, part, partly);
     for (std::size_t e = 0; e < kPart; ++e) {
-      const bool free = volumes.are_all && partly[e] < 0;
+      const bool free = before.is_whole && partly[e] < 0;
       ways[e] = wholly[e] >= 0 ? Way::kHidden : free ? Way::kFree : Way::kUnknown;
     }
     return true;
   }
 
   /// Adds the light of a lamp without a surface to a part of which volumes tell all.
-  void add_lit_points(const Volumes& volumes, std::size_t part) {
+  void add_lit_points(const Before& before, std::size_t part) {
     BlockLight light;
     const float share = share_;
+    const Numbers all = std::span(before.all).first(before.count);
     Depths depth, sum{};
     for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
-      if (depth_in(std::span(volumes.outer).first(volumes.outer_count), k, part, depth) >= 0) {
-        continue;
-      }
+      if (depth_in(volumes_.outer(), all, k, part, depth) >= 0) continue;
       light.evaluate(lamp_, receivers_.points(block_, k), part);
 #pragma omp simd
       for (std::size_t e = 0; e < kPart; ++e) {
@@ -162,13 +160,13 @@ class LampAtBlock {
   }
 
   /// The same, by rays where volumes do not tell.
-  void add_points(const Volumes& volumes, std::size_t part) {
+  void add_points(const Before& before, std::size_t part) {
     std::array<BlockLight, kPointsAtOnce> light;
     std::array<Ways, kPointsAtOnce> ways;
     for (std::size_t first = 0; first < receivers_.points_per_patch; first += kPointsAtOnce) {
       const std::size_t last = std::min(first + kPointsAtOnce, receivers_.points_per_patch);
       for (std::size_t k = first; k < last; ++k) {
-        if (!look(volumes, k, part, ways[k - first])) ways[k - first].fill(Way::kHidden);
+        if (!look(before, k, part, ways[k - first])) ways[k - first].fill(Way::kHidden);
         light[k - first].evaluate(lamp_, receivers_.points(block_, k), part);
       }
       // Rays from the points of a patch take nearly the same way, so they follow each other.
@@ -189,42 +187,92 @@ class LampAtBlock {
   }
 
   /// Adds the light of a lamp with a surface to a part.
-  void add_surface(const Volumes& volumes, std::size_t part) {
+  void add_surface(const Before& before, std::size_t part) {
     Ways ways;
+    PartValues unoccluded, seen;
     for (std::size_t k = 0; k < receivers_.points_per_patch; ++k) {
-      if (!look(volumes, k, part, ways)) continue;
-      const PatchPointBlock& points = receivers_.points(block_, k);
+      if (!look(before, k, part, ways)) continue;
+      lamp_.unoccluded_irradiance(receivers_.points(block_, k), part, unoccluded);
+      PartValues open;
+      bool any_open = false;
+      for (std::size_t e = 0; e < kPart; ++e) {
+        open[e] = ways[e] == Way::kUnknown && unoccluded[e] > 0 ? 1.0F : 0.0F;
+        any_open |= open[e] > 0;
+      }
+      if (any_open && before.is_solid) find_seen(before, k, part, open, seen);
       for (std::size_t slot = part * kPart; slot < slots_end(part); ++slot) {
-        const Way way = ways[slot - part * kPart];
-        if (way == Way::kFree) {
-          irradiance_[slot] +=
-              share_ * lamp_.unoccluded_irradiance(points.at(slot), points.normal_at(slot));
-        } else if (way == Way::kUnknown) {
-          add_surface(k, slot);
+        const std::size_t e = slot - part * kPart;
+        if (ways[e] == Way::kFree) {
+          irradiance_[slot] += share_ * unoccluded[e];
+        } else if (open[e] > 0) {
+          if (before.is_solid && seen[e] >= 0) {
+            irradiance_[slot] += share_ * unoccluded[e] * seen[e];
+          } else {
+            add_surface(k, slot);
+          }
         }
       }
     }
   }
 
+  /// Sample point j of the lamp for point k of a slot.
+  float sample(std::size_t j, std::size_t k, std::size_t part, std::size_t e, int axis) const {
+    const float moved = receivers_.places[k * receivers_.area_light_samples + j][axis] +
+                        receivers_.shift[block_ * reached_.size() + part][axis][e];
+    return moved < 1 ? moved : moved - 1;
+  }
+
+  /// The part of a lamp with a surface that is seen from point k of each slot of a part, by what
+  /// its places add to its light; below 0 where they add nothing. `open`: which points matter.
+  void find_seen(const Before& before, std::size_t k, std::size_t part, const PartValues& open,
+                 PartValues& seen) const {
+    const std::size_t count = receivers_.area_light_samples;
+    const PatchPointBlock& points = receivers_.points(block_, k);
+    std::array<std::array<PartValues, 3>, kMaxAreaLightSamples> path;
+    std::array<PartValues, kMaxAreaLightSamples> weight, hidden;
+    PartValues u, v;
+    PlacesOfPart places;
+    for (std::size_t j = 0; j < count; ++j) {
+      for (std::size_t e = 0; e < kPart; ++e) {
+        u[e] = sample(j, k, part, e, 0);
+        v[e] = sample(j, k, part, e, 1);
+      }
+      lamp_.kind->surface->places_of_part(lamp_, points, part, u, v, places);
+      path[j] = places.path;
+      weight[j] = places.weight;
+      hidden[j].fill(0);
+    }
+    kernels_.hide_places(volumes_.outer().data(), occluders_.piece.data(), before.all.data(),
+                         before.count, points.position[0].data() + part * kPart, kBlock,
+                         open.data(), path[0][0].data(), count, shadow_ray_length(1),
+                         hidden[0].data());
+    for (std::size_t e = 0; e < kPart; ++e) {
+      float whole = 0, arriving = 0;
+      for (std::size_t j = 0; j < count; ++j) {
+        whole += weight[j][e];
+        arriving += weight[j][e] * (1 - hidden[j][e]);
+      }
+      seen[e] = whole > 0 ? arriving / whole : -1.0F;
+    }
+  }
+
   /// Adds the light of a lamp with a surface at one point, by rays.
   void add_surface(std::size_t k, std::size_t slot) {
-    const std::size_t samples = receivers_.area_light_samples;
-    const auto around = [](float x) { return x < 1 ? x : x - 1; };
+    const std::size_t count = receivers_.area_light_samples;
     std::array<glm::vec2, kMaxAreaLightSamples> places;
-    const glm::vec2& shift = receivers_.shift[block_ * kBlock + slot];
-    for (std::size_t j = 0; j < samples; ++j) {
-      const glm::vec2 moved = receivers_.places[k * samples + j] + shift;
-      places[j] = {around(moved.x), around(moved.y)};
+    for (std::size_t j = 0; j < count; ++j) {
+      const std::size_t part = slot / kPart, e = slot % kPart;
+      places[j] = {sample(j, k, part, e, 0), sample(j, k, part, e, 1)};
     }
     const PatchPointBlock& points = receivers_.points(block_, k);
     shadows_.add_surface(lamp_, {points.at(slot), points.normal_at(slot)},
-                         std::span(places).first(samples), share_, slot);
+                         std::span(places).first(count), share_, slot);
   }
 
   const Receivers& receivers_;
   const PreparedLight& lamp_;
+  const OccluderGroups& occluders_;
   const ShadowVolumes& volumes_;
-  bool is_whole_;
   const ShadowKernels& kernels_ = shadow_kernels();
   std::size_t block_;
   float share_;  ///< of each point of a patch
@@ -236,9 +284,9 @@ class LampAtBlock {
 }  // namespace
 
 void add_lamp(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
-              const ShadowVolumes& volumes, bool is_whole, std::size_t block,
+              const OccluderGroups& occluders, const ShadowVolumes& volumes, std::size_t block,
               std::span<float> irradiance) {
-  LampAtBlock(receivers, tracer, lamp, volumes, is_whole, block, irradiance).add();
+  LampAtBlock(receivers, tracer, lamp, occluders, volumes, block, irradiance).add();
 }
 
 }  // namespace rebounce

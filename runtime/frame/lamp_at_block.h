@@ -15,13 +15,13 @@ namespace rebounce {
 /// Adds the irradiance from `lamp` at intensity 1 to that of the slots of a block, in lx.
 ///
 /// Shadows come from `volumes`, those of what stands in the scene: points in none of them see the
-/// lamp, and points inside one that is wholly in the shadow see nothing of it. Rays tell of the
-/// others: of points from which a lamp with a surface is hidden in part, and of those behind
-/// something that lets light through. They also take the place of volumes where there are too many
-/// of them in one place. `is_whole` tells whether `volumes` are all that stands in the scene;
-/// otherwise rays look for the rest. Does not allocate.
+/// lamp, and points inside one that is wholly in the shadow see nothing of it. From the others a
+/// lamp with a surface may be hidden in part: places on it are looked at, past the occluders in
+/// whose volumes the point lies. Rays tell of points behind something that lets light through, and
+/// where there are too many volumes in one place. `occluders` are those that `volumes` belong to;
+/// if they are not all that stands in the scene, rays look for the rest. Does not allocate.
 void add_lamp(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
-              const ShadowVolumes& volumes, bool is_whole, std::size_t block,
+              const OccluderGroups& occluders, const ShadowVolumes& volumes, std::size_t block,
               std::span<float> irradiance);
 
 }  // namespace rebounce

@@ -47,7 +47,10 @@ Receivers::Receivers(const TransferData& data, const DirectLightingSettings& set
 void Receivers::add_slot(std::uint32_t of_patch, std::span<const LitPoint> points) {
   const std::size_t block = size() / kBlock, slot = size() % kBlock;
   if (slot == 0) point.resize(point.size() + points_per_patch);
-  if (slot % kPart == 0) bounds.emplace_back();
+  if (slot % kPart == 0) {
+    bounds.emplace_back();
+    shift.emplace_back();
+  }
   for (std::size_t k = 0; k < points_per_patch; ++k) {
     PatchPointBlock& here = point[block * points_per_patch + k];
     for (int axis = 0; axis < 3; ++axis) {
@@ -57,7 +60,10 @@ void Receivers::add_slot(std::uint32_t of_patch, std::span<const LitPoint> point
     bounds.back().add(points[k]);
   }
   patch.push_back(of_patch);
-  shift.emplace_back(unit_square(mix_bits(~static_cast<std::uint64_t>(of_patch))));
+  const glm::dvec2 moved = unit_square(mix_bits(~static_cast<std::uint64_t>(of_patch)));
+  for (int axis = 0; axis < 2; ++axis) {
+    shift.back()[axis][slot % kPart] = static_cast<float>(moved[axis]);
+  }
 }
 
 std::size_t Receivers::slots_in(std::size_t block) const {

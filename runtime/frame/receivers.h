@@ -33,7 +33,8 @@ struct Receivers {
   std::vector<ReceiverBounds> bounds;  ///< [parts] of their points
   /// [points_per_patch][area_light_samples] sample points, for every lamp with a surface.
   std::vector<glm::vec2> places;
-  std::vector<glm::vec2> shift;  ///< [slots] of the sample points
+  /// [parts] what is added to the sample points of each patch, u and v.
+  std::vector<std::array<PartValues, 2>> shift;
 
   std::size_t size() const { return patch.size(); }
   std::size_t block_count() const { return point.size() / points_per_patch; }

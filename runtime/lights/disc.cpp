@@ -12,7 +12,6 @@
 #include "runtime/lights/lamp_geometry.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/rays/sampling.h"
 
 namespace rebounce {
 namespace {
@@ -36,10 +35,39 @@ void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
   const glm::vec3 to_center = lamp.position - point;
   const float area = lamp.area * lamp.range_window(glm::dot(to_center, to_center));
   for (std::size_t k = 0; k < places.size(); ++k) {
-    // Unit square to unit disc (P. Shirley, K. Chiu, 1997).
-    const glm::vec2 at(square_to_cosine_hemisphere(places[k]));
+    glm::vec2 at;
+    square_to_disc(places[k].x, places[k].y, at.x, at.y);
     light[k] = from_flat_place(lamp, to_center, area, at);
   }
+}
+
+void places_of_part(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                    const PartValues& u, const PartValues& v, PlacesOfPart& places) {
+  PartValues x, y;
+#pragma omp simd
+  for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) square_to_disc(u[e], v[e], x[e], y[e]);
+  flat_places(lamp, points, part, x, y, places);
+}
+
+/// The form factor of a disc that is wholly above the horizon: around a whole rim the integral is
+/// 2 pi (a / s - b e / (s (s + d))), with s² = d² - e² and the names of Rim, here without small
+/// differences of large numbers. `squared`: square of the distance to the centre; `along`: the
+/// centre's place along the disc's axis; `height`: over the horizon; `cosine`: of the angle between
+/// axis and normal.
+inline float whole_disc(float radius, float squared, float along, float height, float cosine) {
+  const float r = radius * radius, z = along * along, off = std::max(0.0F, squared - z);
+  const float difference = off - r;
+  const float s = std::sqrt(difference * difference + z * (z + 2 * (off + r)));
+  const float turned = r * (1 + (r + 2 * z - 2 * off) / (s + squared));  // s + r - squared
+  const float factor = r * std::abs(cosine * turned + 2 * along * height) / (s * (s + squared + r));
+  return std::min(1.0F, std::max(0.0F, factor));
+}
+
+/// How far the rim reaches above and below the centre, seen against the horizon. A little more, so
+/// that rounding cuts no disc off.
+inline float disc_amplitude(float radius, float cosine) {
+  constexpr float kMargin = 1.001F;
+  return kMargin * radius * std::sqrt(std::max(0.0F, 1 - cosine * cosine)) + 1e-3F * radius;
 }
 
 constexpr double kPi = std::numbers::pi;
@@ -108,22 +136,50 @@ double edge_integral(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3&
   return sine > 0 ? std::atan2(sine, glm::dot(a, b)) * glm::dot(axis, normal) / sine : 0.0;
 }
 
-float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal) {
-  const glm::vec3 to_center = lamp.position - point;
-  if (glm::dot(to_center, lamp.direction) >= 0) return 0;  // behind the disc, or in its plane
+float cut_disc(const PreparedLight& lamp, const glm::vec3& to_center, const glm::vec3& normal) {
   const glm::dvec3 center(to_center), up(normal);
   const Rim rim(center, up, glm::dvec3(lamp.direction), lamp.radius);
   const double height = glm::dot(center, up), amplitude = rim.amplitude(up);
   if (height <= -amplitude) return 0;
-  double sum = 0;
-  if (height >= amplitude) {
-    sum = rim.integral(-kPi, kPi);
-  } else {
-    const double turn = rim.turn(up), half = std::acos(-height / amplitude);
-    sum = rim.integral(turn - half, turn + half) +
-          edge_integral(rim.at(turn + half), rim.at(turn - half), up);
-  }
+  const double turn = rim.turn(up), half = std::acos(std::max(-1.0, -height / amplitude));
+  const double sum = rim.integral(turn - half, turn + half) +
+                     edge_integral(rim.at(turn + half), rim.at(turn - half), up);
   return static_cast<float>(std::clamp(std::abs(sum) / (2 * kPi), 0.0, 1.0));
+}
+
+float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal) {
+  const glm::vec3 to_center = lamp.position - point;
+  const float along = glm::dot(to_center, lamp.direction);
+  if (along >= 0) return 0;  // behind the disc, or in its plane
+  const float height = glm::dot(to_center, normal), cosine = glm::dot(lamp.direction, normal);
+  const float amplitude = disc_amplitude(lamp.radius, cosine);
+  return height >= amplitude
+             ? whole_disc(lamp.radius, glm::dot(to_center, to_center), along, height, cosine)
+             : cut_disc(lamp, to_center, normal);
+}
+
+void form_factors(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                  PartValues& factor) {
+  const glm::vec3 middle = lamp.position, direction = lamp.direction;
+  const float radius = lamp.radius;
+  const std::size_t begin = part * UnitLightBlock::kPart;
+#pragma omp simd
+  for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
+    const std::size_t k = begin + e;
+    const float x = middle.x - points.position[0][k];
+    const float y = middle.y - points.position[1][k];
+    const float z = middle.z - points.position[2][k];
+    const float normal_x = points.normal[0][k], normal_y = points.normal[1][k],
+                normal_z = points.normal[2][k];
+    const float along = x * direction.x + y * direction.y + z * direction.z;
+    const float height = x * normal_x + y * normal_y + z * normal_z;
+    const float cosine = direction.x * normal_x + direction.y * normal_y + direction.z * normal_z;
+    const float amplitude = disc_amplitude(radius, cosine);
+    const float whole = whole_disc(radius, x * x + y * y + z * z, along, height, cosine);
+    const bool is_dark = (along >= 0) | (height <= -amplitude);
+    const float other = is_dark ? 0.0F : -1.0F;
+    factor[e] = (height >= amplitude) & !is_dark ? whole : other;
+  }
 }
 
 glm::vec3 highest_point(const PreparedLight& lamp, const glm::vec3& normal) {
@@ -160,7 +216,9 @@ vec3 disc_normal(vec3 place) { return lamp_direction; }
 )";
 
 constexpr LampSurface kSurface{.evaluate_places = evaluate_places,
+                               .places_of_part = places_of_part,
                                .form_factor = form_factor,
+                               .form_factors = form_factors,
                                .highest_point = highest_point,
                                .place = place,
                                .mesh = mesh,

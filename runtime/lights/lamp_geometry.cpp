@@ -6,6 +6,11 @@
 #include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
+namespace {
+
+constexpr float kLeastDivisor = 1e-30F;  // of a place at the point itself
+
+}  // namespace
 
 Sides sides_around(const glm::vec3& axis, const glm::vec3& tangent) {
   const glm::vec3 side = glm::normalize(tangent - glm::dot(tangent, axis) * axis);
@@ -92,6 +97,29 @@ UnitLight from_flat_place(const PreparedLight& lamp, const glm::vec3& to_center,
   const glm::vec3 direction = path / distance;
   const float cosine = std::max(0.0F, -glm::dot(direction, lamp.direction));
   return {direction, distance, area * cosine / distance_squared};
+}
+
+void flat_places(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                 const PartValues& x, const PartValues& y, PlacesOfPart& places) {
+  const glm::vec3 middle = lamp.position, side = lamp.side, other_side = lamp.other_side;
+  const glm::vec3 direction = lamp.direction;
+  const std::size_t begin = part * UnitLightBlock::kPart;
+#pragma omp simd
+  for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
+    const std::size_t k = begin + e;
+    const float path_x = middle.x - points.position[0][k] + x[e] * side.x + y[e] * other_side.x;
+    const float path_y = middle.y - points.position[1][k] + x[e] * side.y + y[e] * other_side.y;
+    const float path_z = middle.z - points.position[2][k] + x[e] * side.z + y[e] * other_side.z;
+    const float ahead = path_x * direction.x + path_y * direction.y + path_z * direction.z;
+    const float height =
+        path_x * points.normal[0][k] + path_y * points.normal[1][k] + path_z * points.normal[2][k];
+    const float distance_squared = path_x * path_x + path_y * path_y + path_z * path_z;
+    places.path[0][e] = path_x;
+    places.path[1][e] = path_y;
+    places.path[2][e] = path_z;
+    places.weight[e] = std::max(0.0F, -ahead) * std::max(0.0F, height) /
+                       std::max(distance_squared * distance_squared, kLeastDivisor);
+  }
 }
 
 glm::vec3 from_middle(const PreparedLight& lamp, const glm::vec2& at) {

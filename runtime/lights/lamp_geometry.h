@@ -2,7 +2,9 @@
 
 // Geometry that several kinds of lamps share.
 
+#include <cmath>
 #include <glm/glm.hpp>
+#include <numbers>
 #include <span>
 
 #include "runtime/lights/lamp_kind.h"
@@ -37,6 +39,21 @@ void apply_profile(const PreparedLight& lamp, std::size_t part, UnitLightBlock& 
 /// Point k of a golden-angle spiral around the unit circle.
 glm::vec2 golden_turn(std::uint32_t k);
 
+/// Unit square to unit disc, areas in proportion (P. Shirley, K. Chiu, "A low distortion map
+/// between disk and square", 1997). Without branches and calls, for loops that are vectorised; to
+/// 3e-8.
+inline void square_to_disc(float u, float v, float& x, float& y) {
+  const float a = 2 * u - 1, b = 2 * v - 1;
+  const bool wide = std::abs(a) > std::abs(b);
+  const float r = wide ? a : b, other = wide ? b : a;
+  const float t = 0.25F * std::numbers::pi_v<float> * other / (r == 0 ? 1.0F : r), tt = t * t;
+  // Taylor's series, for up to an eighth of a turn.
+  const float sine = t * (1 - tt / 6 * (1 - tt / 20 * (1 - tt / 42 * (1 - tt / 72))));
+  const float cosine = 1 - tt / 2 * (1 - tt / 12 * (1 - tt / 30 * (1 - tt / 56)));
+  x = r * (wide ? cosine : sine);
+  y = r * (wide ? sine : cosine);
+}
+
 // ---- Flat one-sided lamps, around `position`, spanned by `side` and `other_side`
 
 /// The light of one sample point of the lamp, at `at` in units of its sides from the centre.
@@ -44,6 +61,10 @@ glm::vec2 golden_turn(std::uint32_t k);
 /// of the range.
 UnitLight from_flat_place(const PreparedLight& lamp, const glm::vec3& to_center, float area,
                           const glm::vec2& at);
+
+/// As LampSurface::places_of_part, with places in units of the sides.
+void flat_places(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                 const PartValues& x, const PartValues& y, PlacesOfPart& places);
 
 /// A triangle fan around the centre of a lamp. `rim` is in units of its sides, clockwise for an
 /// observer who looks along `direction`.

@@ -99,6 +99,21 @@ float PreparedLight::unoccluded_irradiance(const glm::vec3& point, const glm::ve
   return window * std::numbers::pi_v<float> * kind->surface->form_factor(*this, point, normal);
 }
 
+void PreparedLight::unoccluded_irradiance(const PatchPointBlock& points, std::size_t part,
+                                          PartValues& irradiance) const {
+  kind->surface->form_factors(*this, points, part, irradiance);
+  const std::size_t begin = part * UnitLightBlock::kPart;
+  for (std::size_t e = 0; e < irradiance.size(); ++e) {
+    if (irradiance[e] == 0) continue;
+    const std::size_t k = begin + e;
+    if (irradiance[e] < 0) {
+      irradiance[e] = kind->surface->form_factor(*this, points.at(k), points.normal_at(k));
+    }
+    const glm::vec3 to_center = position - points.at(k);
+    irradiance[e] *= std::numbers::pi_v<float> * range_window(glm::dot(to_center, to_center));
+  }
+}
+
 float PreparedLight::extent() const {
   return has_area() ? radius + glm::length(side) + glm::length(other_side) : 0;
 }

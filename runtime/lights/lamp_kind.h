@@ -43,6 +43,17 @@ struct UnitLightBlock {
   }
 };
 
+/// A number for each point of a part of a block.
+using PartValues = std::array<float, UnitLightBlock::kPart>;
+
+/// A place of a lamp with a surface for each point of a part of a block.
+struct PlacesOfPart {
+  std::array<PartValues, 3> path;  ///< metres, from the point to its place
+  /// What the place adds to the light of the lamp there, in a unit that all places of a point
+  /// share; 0 from below the horizon.
+  PartValues weight;
+};
+
 /// A light of intensity 1, with all values that do not depend on the lit point. Two are equal if
 /// they light every point alike. The kind of the light fills in the members that it uses.
 struct PreparedLight {
@@ -68,6 +79,10 @@ struct PreparedLight {
   /// with a surface if nothing is in between: closed forms, cut at the horizon, times the window of
   /// the range.
   float unoccluded_irradiance(const glm::vec3& point, const glm::vec3& normal) const;
+
+  /// The same at the points of part number `part` of a block.
+  void unoccluded_irradiance(const PatchPointBlock& points, std::size_t part,
+                             PartValues& irradiance) const;
 
   /// The point of a lamp with a surface that is highest above a horizon with unit `normal`.
   glm::vec3 highest_point(const glm::vec3& normal) const;
@@ -109,8 +124,15 @@ struct LampSurface {
   /// As PreparedLight::evaluate_places.
   void (*evaluate_places)(const PreparedLight& lamp, const glm::vec3& point,
                           std::span<const glm::vec2> places, std::span<UnitLight> light);
+  /// The places that evaluate_places takes for (u, v), one pair for each point of a part of a
+  /// block.
+  void (*places_of_part)(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                         const PartValues& u, const PartValues& v, PlacesOfPart& places);
   /// From a differential element to the lamp, cut at the element's horizon.
   float (*form_factor)(const PreparedLight& lamp, const glm::vec3& point, const glm::vec3& normal);
+  /// The same at the points of a part of a block; below 0 where only form_factor tells.
+  void (*form_factors)(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                       PartValues& factor);
   /// As PreparedLight::highest_point.
   glm::vec3 (*highest_point)(const PreparedLight& lamp, const glm::vec3& normal);
 

@@ -3,6 +3,7 @@
 // Comparisons of points and boxes with the planes of shadow volumes, for one instruction set.
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 namespace rebounce {
@@ -23,6 +24,8 @@ struct VolumePlanes {
   Plane plane[kPlanes];
 };
 
+using VolumeNumber = std::uint32_t;
+
 /// Points that are compared at a time.
 inline constexpr std::size_t kShadowLanes = 16;
 
@@ -34,10 +37,20 @@ struct ShadowKernels {
   /// wholly inside if `sign` is -1.
   unsigned (*box_in_volumes)(const PlaneLanes* plane, const float* middle, const float* half,
                              float sign);
-  /// depth[e] = how far point e is inside of any of the `count` volumes; below 0 outside of all.
-  /// Coordinates [axis][lane] are `stride` floats apart. Returns the least.
-  float (*points_in_volumes)(const VolumePlanes* volume, std::size_t count, const float* position,
-                             std::size_t stride, float* depth);
+  /// depth[e] = how far point e is inside of any of the `count` volumes with these numbers; below 0
+  /// outside of all. Coordinates [axis][lane] are `stride` floats apart. Returns the least.
+  float (*points_in_volumes)(const VolumePlanes* volume, const VolumeNumber* number,
+                             std::size_t count, const float* position, std::size_t stride,
+                             float* depth);
+  /// What stands between points and a place for each of them. `piece`: by the numbers of volumes,
+  /// the planes of an occluder's sides, with it on their inner side, and last its own. Only those
+  /// in whose `volume` a point lies that is `open` (not 0) are looked at. `path`
+  /// [place][axis][lane]: from the points to places; `hidden` [place][lane] becomes 1 where a piece
+  /// crosses it, but for the end of the path beyond `length` of it.
+  void (*hide_places)(const VolumePlanes* volume, const VolumePlanes* piece,
+                      const VolumeNumber* number, std::size_t count, const float* position,
+                      std::size_t stride, const float* open, const float* path,
+                      std::size_t place_count, float length, float* hidden);
 };
 
 /// Those that this processor can run, the portable ones first.

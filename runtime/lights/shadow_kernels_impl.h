@@ -27,6 +27,11 @@ inline float multiply_add(float a, float b, float c) {
 #endif
 }
 
+/// How far a point is on the inner side of a plane.
+inline float height_over(const VolumePlanes::Plane& p, float x, float y, float z) {
+  return multiply_add(p.x, x, multiply_add(p.y, y, multiply_add(p.z, z, -p.distance)));
+}
+
 unsigned box_in_volumes(const PlaneLanes* plane, const float* middle, const float* half,
                         float sign) {
   const float x = middle[0], y = middle[1], z = middle[2];
@@ -52,18 +57,17 @@ unsigned box_in_volumes(const PlaneLanes* plane, const float* middle, const floa
   return inside;
 }
 
-float points_in_volumes(const VolumePlanes* volume, std::size_t count, const float* position,
-                        std::size_t stride, float* depth) {
+float points_in_volumes(const VolumePlanes* volume, const VolumeNumber* number, std::size_t count,
+                        const float* position, std::size_t stride, float* depth) {
   const float *x = position, *y = position + stride, *z = position + 2 * stride;
   float most[kShadowLanes];
   for (float& value : most) value = -kBeyondAll;
   for (std::size_t k = 0; k < count; ++k) {
-    const auto& plane = volume[k].plane;
+    const auto& plane = volume[number[k]].plane;
 #pragma omp simd
     for (std::size_t i = 0; i < kShadowLanes; ++i) {
       const auto height = [&](const VolumePlanes::Plane& p) {
-        return multiply_add(p.x, x[i],
-                            multiply_add(p.y, y[i], multiply_add(p.z, z[i], -p.distance)));
+        return height_over(p, x[i], y[i], z[i]);
       };
       const float least =
           smaller(smaller(smaller(height(plane[0]), height(plane[1])), height(plane[2])),
@@ -80,8 +84,57 @@ float points_in_volumes(const VolumePlanes* volume, std::size_t count, const flo
   return all;
 }
 
+void hide_places(const VolumePlanes* volume, const VolumePlanes* piece, const VolumeNumber* number,
+                 std::size_t count, const float* position, std::size_t stride, const float* open,
+                 const float* path, std::size_t place_count, float length, float* hidden) {
+  constexpr std::size_t kOwn = VolumePlanes::kPlanes - 1;
+  const float *x = position, *y = position + stride, *z = position + 2 * stride;
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto& [a, b, c, d, e] = volume[number[k]].plane;
+    float any = 0;
+#pragma omp simd reduction(max : any)
+    for (std::size_t i = 0; i < kShadowLanes; ++i) {
+      const float least = smaller(
+          smaller(smaller(height_over(a, x[i], y[i], z[i]), height_over(b, x[i], y[i], z[i])),
+                  height_over(c, x[i], y[i], z[i])),
+          smaller(height_over(d, x[i], y[i], z[i]), height_over(e, x[i], y[i], z[i])));
+      any = larger(any, least >= 0 ? open[i] : 0.0F);
+    }
+    if (any == 0) continue;
+    const VolumePlanes::Plane* plane = piece[number[k]].plane;
+    float over[VolumePlanes::kPlanes][kShadowLanes];
+    for (std::size_t p = 0; p < VolumePlanes::kPlanes; ++p) {
+      for (std::size_t i = 0; i < kShadowLanes; ++i) {
+        over[p][i] = height_over(plane[p], x[i], y[i], z[i]);
+      }
+    }
+    for (std::size_t s = 0; s < place_count; ++s) {
+      const float* way = path + 3 * kShadowLanes * s;
+      float* here = hidden + kShadowLanes * s;
+#pragma omp simd
+      for (std::size_t i = 0; i < kShadowLanes; ++i) {
+        const float way_x = length * way[i], way_y = length * way[kShadowLanes + i],
+                    way_z = length * way[2 * kShadowLanes + i];
+        const auto along = [&](std::size_t p) {
+          return multiply_add(plane[p].x, way_x,
+                              multiply_add(plane[p].y, way_y, plane[p].z * way_z));
+        };
+        // It meets the piece's plane after a part from / by of its way, where it must be on the
+        // inner side of all others.
+        const float by = along(kOwn), from = magnitude(over[kOwn][i]), whole = magnitude(by);
+        float inside = kBeyondAll;
+        for (std::size_t p = 0; p < kOwn; ++p) {
+          inside = smaller(inside, multiply_add(over[p][i], whole, along(p) * from));
+        }
+        const bool meets = over[kOwn][i] * (over[kOwn][i] + by) < 0;
+        here[i] = larger(here[i], (inside >= 0) & meets ? 1.0F : 0.0F);
+      }
+    }
+  }
+}
+
 constexpr ShadowKernels make_shadow_kernels(const char* name) {
-  return {name, box_in_volumes, points_in_volumes};
+  return {name, box_in_volumes, points_in_volumes, hide_places};
 }
 
 }  // namespace

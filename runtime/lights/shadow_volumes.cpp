@@ -24,10 +24,16 @@ void put(PlaneLanes& planes, std::size_t lane, const glm::vec3& normal, float di
   planes.distance[lane] = distance;
 }
 
+VolumePlanes::Plane plane_through(const glm::vec3& at, const glm::vec3& normal) {
+  return {normal.x, normal.y, normal.z, glm::dot(at, normal)};
+}
+
 }  // namespace
 
 OccluderGroups::OccluderGroups(const Occluders& occluders)
-    : group((occluders.piece.size() + kLanes - 1) / kLanes), is_whole(occluders.is_whole) {
+    : group((occluders.piece.size() + kLanes - 1) / kLanes),
+      piece(occluders.piece.size()),
+      is_whole(occluders.is_whole) {
   for (std::size_t k = 0; k < occluders.piece.size(); ++k) {
     OccluderGroup& here = group[k / kLanes];
     const std::size_t lane = k % kLanes;
@@ -38,9 +44,13 @@ OccluderGroups::OccluderGroups(const Occluders& occluders)
       const glm::vec3 from = occluder.corner[c];
       const glm::vec3 along = occluder.corner[(c + 1) % kCorners] - from;
       const float length = glm::length(along);
+      const glm::vec3 inward =
+          length > 0 ? glm::cross(occluder.normal, along / length) : glm::vec3(0);
       put(here.corner[c], lane, from);
-      if (length > 0) put(here.inward[c], lane, glm::cross(occluder.normal, along / length));
+      put(here.inward[c], lane, inward);
+      piece[k].plane[c] = plane_through(from, inward);
     }
+    piece[k].plane[kCorners] = plane_through(occluder.corner[0], occluder.normal);
   }
 }
 
@@ -77,6 +87,8 @@ void ShadowVolumes::set(const PreparedLight& lamp, std::span<const OccluderGroup
       set_side(of_lamp, groups[g], side, outer_[g].plane[side], inner_[g].plane[side]);
     }
     set_plane(of_lamp, groups[g], g);
+    spread(outer_[g], &outer_planes_[g * kLanes]);
+    spread(inner_[g], &inner_planes_[g * kLanes]);
   }
 }
 
@@ -217,15 +229,14 @@ bool ShadowVolumes::is_certain(Number number) const {
   return inner_[number / kLanes].plane[kCorners].distance[number % kLanes] != kNever;
 }
 
-VolumePlanes ShadowVolumes::planes(const std::vector<Group>& groups, Number number) {
-  const Group& group = groups[number / kLanes];
-  const std::size_t k = number % kLanes;
-  VolumePlanes planes;
+/// Writes down each volume of a group.
+void ShadowVolumes::spread(const Group& group, VolumePlanes* volume) {
   for (std::size_t p = 0; p < VolumePlanes::kPlanes; ++p) {
     const PlaneLanes& lanes = group.plane[p];
-    planes.plane[p] = {lanes.x[k], lanes.y[k], lanes.z[k], lanes.distance[k]};
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      volume[k].plane[p] = {lanes.x[k], lanes.y[k], lanes.z[k], lanes.distance[k]};
+    }
   }
-  return planes;
 }
 
 }  // namespace rebounce

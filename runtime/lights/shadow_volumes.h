@@ -34,17 +34,28 @@ struct OccluderGroup {
 
 struct OccluderGroups {
   std::vector<OccluderGroup> group;
+  /// [occluders] planes through the sides, with the occluder on their inner side, and its own.
+  std::vector<VolumePlanes> piece;
   bool is_whole;  ///< see Occluders
 
   explicit OccluderGroups(const Occluders& occluders);
+
+  /// False if light may get through.
+  bool is_solid(std::size_t occluder) const {
+    return group[occluder / OccluderGroup::kLanes].solid[occluder % OccluderGroup::kLanes];
+  }
 };
 
 /// What occluders hide of one lamp.
 class ShadowVolumes {
  public:
-  using Number = std::uint32_t;  ///< of an occluder
+  using Number = VolumeNumber;  ///< of an occluder
 
-  explicit ShadowVolumes(std::size_t group_count) : outer_(group_count), inner_(group_count) {}
+  explicit ShadowVolumes(std::size_t group_count)
+      : outer_(group_count),
+        inner_(group_count),
+        outer_planes_(group_count * OccluderGroup::kLanes),
+        inner_planes_(outer_planes_.size()) {}
 
   /// Computes the volumes of `lamp`. Does not allocate. `groups`: as many as the object has;
   /// `tolerance`, metres: what a lamp may reach behind a plane and count as in front of it.
@@ -63,10 +74,11 @@ class ShadowVolumes {
   Between between(const Box& box, std::span<const Number> groups, std::span<Number> room,
                   std::size_t& count) const;
 
-  /// Nothing outside of it is in the shadow. Of a lamp without a surface, all inside is.
-  VolumePlanes outer(Number number) const { return planes(outer_, number); }
-  /// All inside of it is wholly in the shadow.
-  VolumePlanes inner(Number number) const { return planes(inner_, number); }
+  /// [occluders] Nothing outside of one is in the shadow. Of a lamp without a surface, all inside
+  /// is.
+  std::span<const VolumePlanes> outer() const { return outer_planes_; }
+  /// [occluders] All inside of one is wholly in the shadow.
+  std::span<const VolumePlanes> inner() const { return inner_planes_; }
 
   /// False if light may get through the occluder or past it on both sides.
   bool is_certain(Number number) const;
@@ -80,11 +92,12 @@ class ShadowVolumes {
   void set_plane(const Lamp& lamp, const OccluderGroup& group, std::size_t g);
   static void set_side(const Lamp& lamp, const OccluderGroup& group, std::size_t side,
                        PlaneLanes& outer, PlaneLanes& inner);
-  static VolumePlanes planes(const std::vector<Group>& groups, Number number);
+  static void spread(const Group& group, VolumePlanes* volume);
   template <typename Visit>
   Between visit_between(const Box& box, Number group, const Visit& visit) const;
 
   std::vector<Group> outer_, inner_;
+  std::vector<VolumePlanes> outer_planes_, inner_planes_;  ///< the same, volume by volume
 };
 
 }  // namespace rebounce

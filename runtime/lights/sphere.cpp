@@ -1,6 +1,7 @@
 // A sphere of uniform luminance. Form factor, also where the horizon cuts the sphere: J. R. Howell,
 // "A catalog of radiation heat transfer configuration factors", B-43. Sample points: C. Wang,
-// "Direct lighting models for ray tracing with cylindrical lamps", 1992.
+// "Direct lighting models for ray tracing with cylindrical lamps", 1992,
+// with the square taken to the cone by way of a disc.
 
 #include <algorithm>
 #include <cmath>
@@ -52,32 +53,123 @@ float form_factor(const PreparedLight& lamp, const glm::vec3& point, const glm::
   return std::max(0.0F, static_cast<float>(cut_sphere(sine_squared, cosine)));
 }
 
-// Uniformly in the cone that the sphere subtends.
+// The cases that need no arc.
+void form_factors(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                  PartValues& factor) {
+  const glm::vec3 middle = lamp.position;
+  const float radius = lamp.radius;
+  const std::size_t begin = part * UnitLightBlock::kPart;
+#pragma omp simd
+  for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
+    const std::size_t k = begin + e;
+    const float x = middle.x - points.position[0][k];
+    const float y = middle.y - points.position[1][k];
+    const float z = middle.z - points.position[2][k];
+    const float height =
+        x * points.normal[0][k] + y * points.normal[1][k] + z * points.normal[2][k];
+    const float distance_squared = x * x + y * y + z * z;
+    const float whole = radius * radius * height / (distance_squared * std::sqrt(distance_squared));
+    const bool outside = distance_squared > radius * radius;
+    const float other = outside & (height <= -radius) ? 0.0F : -1.0F;
+    factor[e] = outside & (height >= radius) ? whole : other;
+  }
+}
+
+/// Two directions across the unit vector (x, y, z) and each other (T. Duff et al., "Building an
+/// orthonormal basis, revisited", 2017).
+struct Across {
+  float first_x, first_y, first_z, second_x, second_y, second_z;
+
+  Across(float x, float y, float z) {
+    const float sign = std::copysign(1.0F, z), a = -1 / (sign + z), b = x * y * a;
+    first_x = 1 + sign * x * x * a;
+    first_y = sign * b;
+    first_z = -sign * x;
+    second_x = b;
+    second_y = sign + y * y * a;
+    second_z = -y;
+  }
+};
+
+/// The cone that a sphere subtends, seen from outside of it.
+struct Cone {
+  float radius_squared, distance_squared, distance;
+  float height;  ///< 1 - cosine of its half angle, without cancellation
+
+  Cone(float of_radius_squared, float of_distance_squared)
+      : radius_squared(of_radius_squared), distance_squared(of_distance_squared) {
+    const float sine_squared = radius_squared / distance_squared;
+    distance = std::sqrt(distance_squared);
+    height = sine_squared / (1 + std::sqrt(std::max(0.0F, 1 - sine_squared)));
+  }
+};
+
+/// A direction in a cone, uniformly for (u, v) in the unit square, and the way to the sphere.
+struct DirectionInCone {
+  float cosine;         ///< of the angle to the axis
+  float first, second;  ///< along Across
+  float distance;
+
+  DirectionInCone(const Cone& cone, float u, float v) {
+    float x = 0, y = 0;
+    square_to_disc(u, v, x, y);
+    const float down = (x * x + y * y) * cone.height;
+    cosine = 1 - down;
+    const float sine_part = std::sqrt(cone.height * (2 - down));
+    first = sine_part * x;
+    second = sine_part * y;
+    const float off_axis_squared = cone.distance_squared * down * (2 - down);
+    distance =
+        cone.distance * cosine - std::sqrt(std::max(0.0F, cone.radius_squared - off_axis_squared));
+  }
+};
+
 void evaluate_places(const PreparedLight& lamp, const glm::vec3& point,
                      std::span<const glm::vec2> places, std::span<UnitLight> light) {
   const glm::vec3 to_center = lamp.position - point;
-  const float distance_squared = glm::dot(to_center, to_center);
-  const float radius_squared = lamp.radius * lamp.radius;
-  const float sine_squared = radius_squared / distance_squared;
-  if (!(sine_squared < 1)) {  // inside
+  const Cone cone(lamp.radius * lamp.radius, glm::dot(to_center, to_center));
+  if (!(cone.radius_squared < cone.distance_squared)) {  // inside
     std::ranges::fill(light, UnitLight{});
     return;
   }
-  const float distance = std::sqrt(distance_squared);
-  // 1 - cos of the cone's half angle, without cancellation.
-  const float height = sine_squared / (1 + std::sqrt(1 - sine_squared));
-  const float illuminance = 2 * kPi * height * lamp.range_window(distance_squared);
-  const glm::vec3 axis = to_center / distance;
-  const auto [x, y] = sides_around(axis, least_axis(axis));
+  const float illuminance = 2 * kPi * cone.height * lamp.range_window(cone.distance_squared);
+  const glm::vec3 axis = to_center / cone.distance;
+  const Across across(axis.x, axis.y, axis.z);
   for (std::size_t k = 0; k < places.size(); ++k) {
-    const float down = places[k].x * height;  // 1 - cosine of the angle to the axis
-    const float cosine = 1 - down, sine_squared_here = down * (1 + cosine);
-    const float sine = std::sqrt(sine_squared_here), turn = 2 * kPi * places[k].y;
-    // The first intersection with the sphere.
-    const float off_axis_squared = distance_squared * sine_squared_here;
-    const float into = std::sqrt(std::max(0.0F, radius_squared - off_axis_squared));
-    light[k] = {cosine * axis + sine * (std::cos(turn) * x + std::sin(turn) * y),
-                distance * cosine - into, illuminance};
+    const DirectionInCone way(cone, places[k].x, places[k].y);
+    light[k] = {way.cosine * axis +
+                    way.first * glm::vec3(across.first_x, across.first_y, across.first_z) +
+                    way.second * glm::vec3(across.second_x, across.second_y, across.second_z),
+                way.distance, illuminance};
+  }
+}
+
+void places_of_part(const PreparedLight& lamp, const PatchPointBlock& points, std::size_t part,
+                    const PartValues& u, const PartValues& v, PlacesOfPart& places) {
+  const glm::vec3 middle = lamp.position;
+  const float radius_squared = lamp.radius * lamp.radius;
+  const std::size_t begin = part * UnitLightBlock::kPart;
+#pragma omp simd
+  for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
+    const std::size_t k = begin + e;
+    const float to_x = middle.x - points.position[0][k];
+    const float to_y = middle.y - points.position[1][k];
+    const float to_z = middle.z - points.position[2][k];
+    const Cone cone(radius_squared, to_x * to_x + to_y * to_y + to_z * to_z);
+    const DirectionInCone way(cone, u[e], v[e]);
+    const float axis_x = to_x / cone.distance, axis_y = to_y / cone.distance,
+                axis_z = to_z / cone.distance;
+    const Across across(axis_x, axis_y, axis_z);
+    const float x = way.cosine * axis_x + way.first * across.first_x + way.second * across.second_x;
+    const float y = way.cosine * axis_y + way.first * across.first_y + way.second * across.second_y;
+    const float z = way.cosine * axis_z + way.first * across.first_z + way.second * across.second_z;
+    places.path[0][e] = way.distance * x;
+    places.path[1][e] = way.distance * y;
+    places.path[2][e] = way.distance * z;
+    const float height =
+        x * points.normal[0][k] + y * points.normal[1][k] + z * points.normal[2][k];
+    const bool outside = radius_squared < cone.distance_squared;
+    places.weight[e] = outside ? std::max(0.0F, height) : 0.0F;
   }
 }
 
@@ -122,7 +214,9 @@ vec3 sphere_normal(vec3 place) { return place / lamp_radius; }
 )";
 
 constexpr LampSurface kSurface{.evaluate_places = evaluate_places,
+                               .places_of_part = places_of_part,
                                .form_factor = form_factor,
+                               .form_factors = form_factors,
                                .highest_point = highest_point,
                                .place = place,
                                .mesh = mesh,

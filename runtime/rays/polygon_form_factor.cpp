@@ -50,15 +50,7 @@ float edge_term(const glm::vec3& a, const glm::vec3& b, float length_a, float le
     const float sine = glm::length(axis);
     return sine > 0 ? std::atan2(sine, glm::dot(a, b)) * glm::dot(axis, normal) / sine : 0;
   }
-  // The arc cosine is sqrt(1 - x) times a polynomial, to 2e-8 (M. Abramowitz, I. Stegun, "Handbook
-  // of Mathematical Functions", 1964, 4.4.46). So the angle over its sine needs no small
-  // difference.
-  constexpr std::array kCoefficients = {-0.0012624911F, 0.0066700901F,  -0.0170881256F,
-                                        0.0308918810F,  -0.0501743046F, 0.0889789874F,
-                                        -0.2145988016F, 1.5707963050F};
-  float polynomial = 0;
-  for (const float coefficient : kCoefficients) polynomial = polynomial * cosine + coefficient;
-  return polynomial / (std::sqrt(1 + cosine) * product) * glm::dot(axis, normal);
+  return acute_edge_term(cosine, glm::dot(axis, normal), product);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <system_error>
 
 #include "rebounce/error.h"
+#include "transfer/base/machine_memory.h"
 
 namespace rebounce {
 namespace {
@@ -23,8 +24,7 @@ namespace {
 /// Throws Error if the machine has less memory than the file has bytes. All of them are read at
 /// once, and the operator again in every frame.
 void check_memory_for(const std::filesystem::path& path, std::uint64_t size) {
-  const std::uint64_t memory = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
-                               static_cast<std::uint64_t>(::sysconf(_SC_PAGE_SIZE));
+  const std::uint64_t memory = machine_memory_bytes();
   if (size <= memory) return;
   const auto gib = [](std::uint64_t bytes) { return std::to_string(bytes >> 30) + " GiB"; };
   throw Error("cannot read " + path.string() + ": it has " + gib(size) + ", this machine " +

@@ -44,6 +44,11 @@ class FormFactorAssembly {
     std::vector<std::uint64_t> row_begin = {0};
     std::vector<std::uint32_t> column;
     std::vector<float> exchange_area;
+    std::size_t count = 0;
+    for (const auto& row : rows) count += row.size();
+    row_begin.reserve(rows.size() + 1);
+    column.reserve(count);
+    exchange_area.reserve(count);
     for (const auto& row : rows) {
       for (const ExchangeEntry& entry : row) {
         column.push_back(entry.column);

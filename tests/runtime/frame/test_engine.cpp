@@ -11,12 +11,10 @@
 namespace rebounce::test_engine {
 namespace {
 
-std::shared_ptr<const TransferData> two_squares() {
-  auto data = std::make_shared<TransferData>();
-  test::add_square(*data, 1, 0, 8, true, {0.5F, 0.4F, 0.3F});
-  test::add_square(*data, 1, 2, 8, false, {0.2F, 0.7F, 0.9F});
+/// Two squares, of which one patch emits.
+std::shared_ptr<const TransferData> lit_squares() {
+  const auto data = test::facing_squares();
   data->patches.emitted_exitance[3] = {1, 2, 3};
-  test::add_even_exchange(*data);
   return data;
 }
 
@@ -32,7 +30,7 @@ std::vector<Float3> copy(std::span<const Float3> values) {
 }
 
 TEST(Engine, StagesAddUp) {
-  const auto data = two_squares();
+  const auto data = lit_squares();
   Engine engine(data);
   const Light lamp = lamp_at(0.2F);
   engine.relight({&lamp, 1}, {});
@@ -54,7 +52,7 @@ TEST(Engine, StagesAddUp) {
 }
 
 TEST(Engine, AFrameDoesNotAllocate) {
-  Engine engine(two_squares());
+  Engine engine(lit_squares());
   const std::vector<Light> lights = {lamp_at(0.1F), lamp_at(-0.4F)};
   engine.relight(lights, {});  // threads and their buffers are made once
   const int count = test::count_allocations([&] { engine.relight(lights, {}); });
@@ -62,7 +60,7 @@ TEST(Engine, AFrameDoesNotAllocate) {
 }
 
 TEST(Engine, ALightMovedAndMovedBackGivesTheSameBits) {
-  Engine engine(two_squares());
+  Engine engine(lit_squares());
   const Light here = lamp_at(0.1F), there = lamp_at(0.7F);
   engine.relight({&here, 1}, {});
   const std::vector<Float3> before = copy(engine.radiosity());
@@ -73,7 +71,7 @@ TEST(Engine, ALightMovedAndMovedBackGivesTheSameBits) {
 }
 
 TEST(Engine, TakesTheCallersDirectLight) {
-  Engine engine(two_squares());
+  Engine engine(lit_squares());
   const Light lamp = lamp_at(0.1F);
   engine.relight({&lamp, 1}, {});
   const std::vector<Float3> own = copy(engine.radiosity()),
@@ -84,7 +82,7 @@ TEST(Engine, TakesTheCallersDirectLight) {
 }
 
 TEST(Engine, LightThatIsNoneIsRefusedAndTheLastFrameStays) {
-  Engine engine(two_squares());
+  Engine engine(lit_squares());
   const Light lamp = lamp_at(0.1F);
   const Sky sky = {{1, 1, 1}, 3};
   engine.relight({&lamp, 1}, sky);
@@ -114,7 +112,7 @@ TEST(Engine, LightThatIsNoneIsRefusedAndTheLastFrameStays) {
 }
 
 TEST(Engine, OutputsOfAnotherSizeAreRefused) {
-  Engine engine(two_squares());
+  Engine engine(lit_squares());
   engine.relight(std::vector<Float3>(engine.radiosity().size(), {1, 1, 1}));
   std::vector<Float3> values(engine.data().mesh.position.size() + 1);
   EXPECT_THROW(vertex_irradiance(engine, values), Error);
@@ -127,7 +125,7 @@ TEST(Engine, OutputsOfAnotherSizeAreRefused) {
 }
 
 TEST(Engine, ACopyHasALightStateOfItsOwn) {
-  Engine engine(two_squares());
+  Engine engine(lit_squares());
   const Light here = lamp_at(0.1F), there = lamp_at(0.7F);
   engine.relight({&here, 1}, {});
   const std::vector<Float3> before = copy(engine.radiosity());
@@ -142,7 +140,7 @@ TEST(Engine, ACopyHasALightStateOfItsOwn) {
 }
 
 TEST(Engine, EmittersAreScaledByMaterial) {
-  const auto data = std::make_shared<TransferData>(*two_squares());
+  const auto data = std::make_shared<TransferData>(*lit_squares());
   data->materials.resize(3);
   data->materials[1].emitted_luminance = data->materials[2].emitted_luminance = {1, 1, 1};
   data->mesh.triangle_material[3] = 1;
@@ -171,7 +169,7 @@ TEST(Engine, EmittersAreScaledByMaterial) {
 }
 
 TEST(Engine, NeedsAnOperator) {
-  const auto data = std::make_shared<TransferData>(*two_squares());
+  const auto data = std::make_shared<TransferData>(*lit_squares());
   data->transfer = nullptr;
   EXPECT_THROW(Engine{data}, Error);
 }
