@@ -32,6 +32,14 @@ inline float height_over(const VolumePlanes::Plane& p, float x, float y, float z
   return multiply_add(p.x, x, multiply_add(p.y, y, multiply_add(p.z, z, -p.distance)));
 }
 
+/// How far a point is inside of a volume; below 0 outside.
+inline float depth_in(const VolumePlanes& volume, float x, float y, float z) {
+  const auto& plane = volume.plane;
+  return smaller(smaller(smaller(height_over(plane[0], x, y, z), height_over(plane[1], x, y, z)),
+                         height_over(plane[2], x, y, z)),
+                 smaller(height_over(plane[3], x, y, z), height_over(plane[4], x, y, z)));
+}
+
 unsigned box_in_volumes(const PlaneLanes* plane, const float* middle, const float* half,
                         float sign) {
   const float x = middle[0], y = middle[1], z = middle[2];
@@ -63,16 +71,9 @@ float points_in_volumes(const VolumePlanes* volume, const VolumeNumber* number, 
   float most[kShadowLanes];
   for (float& value : most) value = -kBeyondAll;
   for (std::size_t k = 0; k < count; ++k) {
-    const auto& plane = volume[number[k]].plane;
 #pragma omp simd
     for (std::size_t i = 0; i < kShadowLanes; ++i) {
-      const auto height = [&](const VolumePlanes::Plane& p) {
-        return height_over(p, x[i], y[i], z[i]);
-      };
-      const float least =
-          smaller(smaller(smaller(height(plane[0]), height(plane[1])), height(plane[2])),
-                  smaller(height(plane[3]), height(plane[4])));
-      most[i] = larger(most[i], least);
+      most[i] = larger(most[i], depth_in(volume[number[k]], x[i], y[i], z[i]));
     }
   }
   float all = kBeyondAll;
@@ -90,15 +91,10 @@ void hide_places(const VolumePlanes* volume, const VolumePlanes* piece, const Vo
   constexpr std::size_t kOwn = VolumePlanes::kPlanes - 1;
   const float *x = position, *y = position + stride, *z = position + 2 * stride;
   for (std::size_t k = 0; k < count; ++k) {
-    const auto& [a, b, c, d, e] = volume[number[k]].plane;
     float any = 0;
 #pragma omp simd reduction(max : any)
     for (std::size_t i = 0; i < kShadowLanes; ++i) {
-      const float least = smaller(
-          smaller(smaller(height_over(a, x[i], y[i], z[i]), height_over(b, x[i], y[i], z[i])),
-                  height_over(c, x[i], y[i], z[i])),
-          smaller(height_over(d, x[i], y[i], z[i]), height_over(e, x[i], y[i], z[i])));
-      any = larger(any, least >= 0 ? open[i] : 0.0F);
+      any = larger(any, depth_in(volume[number[k]], x[i], y[i], z[i]) >= 0 ? open[i] : 0.0F);
     }
     if (any == 0) continue;
     const VolumePlanes::Plane* plane = piece[number[k]].plane;
