@@ -71,9 +71,10 @@ float points_in_volumes(const VolumePlanes* volume, const VolumeNumber* number, 
   float most[kShadowLanes];
   for (float& value : most) value = -kBeyondAll;
   for (std::size_t k = 0; k < count; ++k) {
+    const VolumePlanes asked = volume[number[k]];  // a copy: its planes stay in registers
 #pragma omp simd
     for (std::size_t i = 0; i < kShadowLanes; ++i) {
-      most[i] = larger(most[i], depth_in(volume[number[k]], x[i], y[i], z[i]));
+      most[i] = larger(most[i], depth_in(asked, x[i], y[i], z[i]));
     }
   }
   float all = kBeyondAll;
@@ -91,10 +92,11 @@ void hide_places(const VolumePlanes* volume, const VolumePlanes* piece, const Vo
   constexpr std::size_t kOwn = VolumePlanes::kPlanes - 1;
   const float *x = position, *y = position + stride, *z = position + 2 * stride;
   for (std::size_t k = 0; k < count; ++k) {
+    const VolumePlanes asked = volume[number[k]];
     float any = 0;
 #pragma omp simd reduction(max : any)
     for (std::size_t i = 0; i < kShadowLanes; ++i) {
-      any = larger(any, depth_in(volume[number[k]], x[i], y[i], z[i]) >= 0 ? open[i] : 0.0F);
+      any = larger(any, depth_in(asked, x[i], y[i], z[i]) >= 0 ? open[i] : 0.0F);
     }
     if (any == 0) continue;
     const VolumePlanes::Plane* plane = piece[number[k]].plane;
